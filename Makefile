@@ -1,0 +1,42 @@
+# The folder .venv is remade by a change of pyproject.toml; its stamps say what was installed into it.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+BASE   := $(VENV)/base.stamp
+DEV    := $(VENV)/dev.stamp
+
+# Recorded runs that are too large for the repository; tests that need them are skipped without it.
+ifneq ($(wildcard ../shared),)
+export CARE_SHARED ?= $(abspath ../shared)
+endif
+
+.PHONY: demo test check profiles clean
+
+demo: $(BASE)
+	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
+
+test: $(DEV)
+	$(BIN)/pytest -n 2
+
+check: $(DEV)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+profiles: $(DEV)
+	$(BIN)/python -m benchmarks.train_profiles
+
+clean:
+	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(BASE): pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(DEV): pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@ $(BASE)

@@ -1,0 +1,165 @@
+"""Mechanisms: how each metric and objective answers to its causes. Learned offline, evaluated with numpy alone.
+
+A mechanism is a Gaussian process (Rasmussen and Williams 2006, chapters 2 and 4) with one relevance per input.
+Its kernel is the sum of an additive part (each option acts alone) and a joint part (options interact):
+
+    k(x, x') = a^2 mean_j e_j + b^2 prod_j e_j,    e_j = exp(-(r_j (x_j - x'_j))^2 / 2)
+
+so it learns from few missions, says how sure it is away from the data, and stores nothing but numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+Transform = Literal["identity", "log", "log1p"]
+BLOCK = 4_000_000
+"""Largest number of floats in one block of pairwise distances: bounds memory, not accuracy."""
+JITTER = 1e-6
+TAIL = 0.01
+"""Odds are kept this far from 0 and 1: no table of a few hundred runs supports more."""
+
+
+def transformed(values: FloatArray, transform: Transform) -> FloatArray:
+    """The scale on which a mechanism is additive in its noise."""
+    if transform == "log":
+        return np.log(values)
+    return np.log1p(values) if transform == "log1p" else values
+
+
+def restored(values: FloatArray, transform: Transform) -> FloatArray:
+    """The inverse of `transformed`."""
+    if transform == "log":
+        return np.exp(values)
+    return np.expm1(values) if transform == "log1p" else values
+
+
+@dataclass(frozen=True, eq=False)
+class Kernel:
+    """The covariance above on scaled inputs. `relevance` has shape (p,); amplitudes and `noise` are standard deviations."""
+
+    relevance: FloatArray
+    additive: float
+    joint: float
+    noise: float
+
+    def __call__(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        """Covariance of the noise-free values. a: (m, p), b: (n, p) -> (m, n)."""
+        rows = max(1, BLOCK // max(1, b.size))
+        return np.vstack([self._block(a[i : i + rows], b) for i in range(0, len(a), rows)])
+
+    def _block(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        exponent = -0.5 * ((a[:, None, :] - b[None, :, :]) * self.relevance) ** 2
+        covariance: FloatArray = self.additive**2 * np.exp(exponent).mean(axis=-1)
+        covariance += self.joint**2 * np.exp(exponent.sum(axis=-1))
+        return covariance
+
+    @property
+    def variance(self) -> float:
+        """Prior variance of a noise-free value."""
+        return self.additive**2 + self.joint**2
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """One mechanism: a regression of the (transformed) target on its inputs.
+
+    Binary targets are coded -1 and 1 and regressed the same way; `calibration` then turns the regression into
+    odds. Everything is scaled: inputs to mean 0 and spread 1 (log first where `log_inputs`), the target likewise.
+
+    Attributes:
+        inputs: names, shape (p,), in the order of the columns that `predict` expects.
+        points: shape (n, p), scaled training inputs.
+        targets: shape (n,), scaled training targets.
+        calibration: binary: (slope, offset) of the logistic of the regression. Continuous: sorted standardised
+            leave-one-out residuals, the distribution of this mechanism's own errors.
+    """
+
+    inputs: tuple[str, ...]
+    log_inputs: NDArray[np.bool_]
+    centre: FloatArray
+    spread: FloatArray
+    kernel: Kernel
+    points: FloatArray
+    targets: FloatArray
+    mean: float
+    scale: float
+    transform: Transform
+    binary: bool
+    calibration: FloatArray
+
+    def scaled(self, x: FloatArray) -> FloatArray:
+        """Inputs in their own units, shape (m, p), to the scale the kernel sees."""
+        logs = np.log(np.where(self.log_inputs, np.maximum(x, 1e-12), 1.0))
+        scaled: FloatArray = (np.where(self.log_inputs, logs, x) - self.centre) / self.spread
+        return scaled
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        covariance = self.kernel(self.points, self.points)
+        return np.linalg.inv(covariance + np.eye(len(self.points)) * (self.kernel.noise**2 + JITTER))
+
+    @cached_property
+    def _weights(self) -> FloatArray:
+        weights: FloatArray = self._inverse @ self.targets
+        return weights
+
+    def latent(self, x: FloatArray) -> FloatArray:
+        """Posterior mean on the transformed scale. x: (m, p) -> (m,)."""
+        mean: FloatArray = self.mean + self.scale * (self.kernel(self.scaled(x), self.points) @ self._weights)
+        return mean
+
+    def latent_covariance(self, x: FloatArray) -> FloatArray:
+        """Posterior covariance of the noise-free value on the transformed scale. x: (m, p) -> (m, m)."""
+        z = self.scaled(x)
+        cross = self.kernel(z, self.points)
+        posterior: FloatArray = self.scale**2 * (self.kernel(z, z) - cross @ self._inverse @ cross.T)
+        return posterior
+
+    def latent_spread(self, x: FloatArray) -> FloatArray:
+        """Posterior standard deviation of the noise-free value, shape (m,)."""
+        cross = self.kernel(self.scaled(x), self.points)
+        explained = np.einsum("ij,jk,ik->i", cross, self._inverse, cross)
+        spread: FloatArray = self.scale * np.sqrt(np.maximum(self.kernel.variance - explained, 1e-12))
+        return spread
+
+    def ignorance(self, x: FloatArray) -> FloatArray:
+        """How little the training data say there: posterior over prior variance, 0 (known) to 1 (nothing known)."""
+        share: FloatArray = (self.latent_spread(x) / self.scale) ** 2 / max(self.kernel.variance, 1e-12)
+        return np.clip(share, 0.0, 1.0)
+
+    @property
+    def noise_spread(self) -> float:
+        """Standard deviation of a run around the mechanism, on the transformed scale."""
+        return self.scale * self.kernel.noise
+
+    def odds(self, x: FloatArray) -> FloatArray:
+        """Binary targets: probability of 1, shape (m,)."""
+        slope, offset = self.calibration
+        probability: FloatArray = 1.0 / (1.0 + np.exp(-(slope * self.latent(x) + offset)))
+        return np.clip(probability, TAIL, 1 - TAIL)
+
+    def share_below(self, z: FloatArray) -> FloatArray:
+        """Continuous targets: distribution function of the standardised error, kept off 0 and 1."""
+        levels = (np.arange(len(self.calibration)) + 0.5) / len(self.calibration)
+        return np.clip(np.interp(z, self.calibration, levels, left=0.0, right=1.0), TAIL, 1 - TAIL)
+
+    def error_quantile(self, share: float) -> float:
+        """Continuous targets: that quantile of the standardised error."""
+        return float(np.quantile(self.calibration, share))
+
+    def expected(self, x: FloatArray) -> FloatArray:
+        """Expected value in the target's own unit; the odds of 1 for binary targets."""
+        return self.odds(x) if self.binary else restored(self.latent(x), self.transform)
+
+
+def columns(rows: Sequence[dict[str, float]], names: Sequence[str]) -> FloatArray:
+    """Configurations as a matrix, shape (len(rows), len(names))."""
+    return np.array([[row[name] for name in names] for row in rows], dtype=float).reshape(len(rows), len(names))

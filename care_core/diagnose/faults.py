@@ -1,0 +1,46 @@
+"""Run and thresholds -> which objectives are broken, which are fine, and which could not be judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from care_core.diagnose.records import ObjectiveResult, Status
+from care_core.profile.model import Summary
+from care_core.profile.schema import Schema
+from care_core.run import Run, Unavailable
+from care_core.variables import Threshold, Variable
+
+
+def thresholds_in_force(schema: Schema, overrides: Mapping[str, float]) -> dict[str, Threshold]:
+    """The profile's thresholds with the operator's values put in."""
+    bounds: dict[str, Threshold] = {}
+    for objective in schema.objectives:
+        bound = objective.threshold
+        if objective.name in overrides:
+            bound = Threshold(bound.op if bound else "<=", overrides[objective.name])
+        if bound is not None:
+            bounds[objective.name] = bound
+    return bounds
+
+
+def judge(
+    run: Run, schema: Schema, bounds: Mapping[str, Threshold], summaries: Mapping[str, Summary]
+) -> tuple[ObjectiveResult, ...]:
+    """Every objective of the profile against its threshold. Not evaluated is not OK."""
+    return tuple(
+        _judge_one(objective, run, bounds.get(objective.name), summaries.get(objective.name))
+        for objective in schema.objectives
+    )
+
+
+def _judge_one(objective: Variable, run: Run, bound: Threshold | None, summary: Summary | None) -> ObjectiveResult:
+    value = run.objectives.get(objective.name)
+    if value is None:
+        return ObjectiveResult(objective, None, bound, "not_evaluated", "the profile does not say how to read it from a log")
+    if isinstance(value, Unavailable):
+        reason = f"{value.reason} ({value.hint})" if value.hint else value.reason
+        return ObjectiveResult(objective, None, bound, "not_evaluated", reason)
+    if bound is None:
+        return ObjectiveResult(objective, value, None, "not_evaluated", "no threshold: give one with --threshold")
+    status: Status = "ok" if bound.met(value) else "fault"
+    return ObjectiveResult(objective, value, bound, status, percentile=summary.percentile(value) if summary else None)

@@ -1,0 +1,144 @@
+"""Causes -> the smallest set of option changes that is likely to meet every threshold, and its alternatives."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from itertools import product
+
+import numpy as np
+
+from care_core.causal.counterfactual import Config, World
+from care_core.diagnose.records import Change, Fix, Prediction
+from care_core.profile.model import Model
+from care_core.variables import Variable
+
+MAX_CHANGES = 4
+STEPS = 5
+"""Values tried between the run's value and the reference, the reference included."""
+BEAM = 8
+"""Sets kept at each size."""
+GAIN_FOR_ONE_MORE = 0.1
+"""Odds that one more change must add: each change is something an operator has to do and to believe."""
+DISTANCE_COST = 0.02
+"""Odds given up for leaving a value where it is rather than moving it across its whole range."""
+MAX_ALTERNATIVES = 3
+
+Assignment = Mapping[str, float]
+
+
+def candidate_values(variable: Variable, current: float, reference: float, model: Model) -> tuple[float, ...]:
+    """Acceptable values inside the training support, from the reference towards the run's value.
+
+    An option marked `safety` is only moved towards its default, never past it, so no value here is looser.
+    """
+    if variable.labels:
+        steps: Iterable[float] = (code for code, _ in variable.labels)
+    elif variable.type == "bool":
+        steps = (0.0, 1.0)
+    elif variable.is_log_scaled and current > 0 and reference > 0:
+        steps = np.geomspace(reference, current, STEPS + 1)[:-1]
+    else:
+        steps = np.linspace(reference, current, STEPS + 1)[:-1]
+    snapped = dict.fromkeys(variable.snap(float(step)) for step in steps)
+    return tuple(v for v in snapped if v != current and variable.accepts(v) and model.supports(variable.name, v))
+
+
+def search(
+    world: World, options: Mapping[str, Variable], candidates: Collection[str], reference: Config
+) -> list[tuple[Assignment, float]]:
+    """Best sets of changes by size (index 0: one change), each with the odds that all thresholds are met.
+
+    Beam search: every option alone at every value, then the best sets widened by one option at a time.
+    """
+    values = {
+        name: found
+        for name in candidates
+        if (found := candidate_values(options[name], world.config[name], reference[name], world.model))
+    }
+    singles = [{name: value} for name, found in values.items() for value in found]
+    ranked = _ranked(world, options, singles)
+    best_single = {name: value for assignment, _ in reversed(ranked) for name, value in assignment.items()}
+    beam, found_sets = ranked[:BEAM], ranked[:1]
+    for _ in range(1, MAX_CHANGES):
+        wider = _widened((a for a, _ in beam), values, best_single, reference)
+        beam = _ranked(world, options, wider)[:BEAM]
+        if not beam:
+            break
+        found_sets.append(beam[0])
+    return found_sets
+
+
+def best_alone(
+    world: World, options: Mapping[str, Variable], name: str, reference: Config
+) -> tuple[float, float] | None:
+    """The value of one option with the best odds when nothing else changes, and those odds."""
+    values = candidate_values(options[name], world.config[name], reference[name], world.model)
+    ranked = _ranked(world, options, [{name: value} for value in values])
+    return (ranked[0][0][name], ranked[0][1]) if ranked else None
+
+
+def _widened(
+    sets: Iterable[Assignment], values: Mapping[str, tuple[float, ...]], best_single: Assignment, reference: Config
+) -> list[Assignment]:
+    wider: dict[tuple[tuple[str, float], ...], Assignment] = {}
+    for assignment, name in product(sets, values):
+        if name in assignment:
+            continue
+        for value in dict.fromkeys((best_single[name], values[name][0])):
+            new = {**assignment, name: value}
+            wider[tuple(sorted(new.items()))] = new
+    return list(wider.values())
+
+
+def _ranked(
+    world: World, options: Mapping[str, Variable], sets: list[Assignment]
+) -> list[tuple[Assignment, float]]:
+    if not sets:
+        return []
+    odds = world.odds([{**world.config, **assignment} for assignment in sets])
+    moved = [
+        sum(options[name].distance(world.config[name], value) for name, value in assignment.items())
+        for assignment in sets
+    ]
+    order = np.argsort(-(odds - DISTANCE_COST * np.array(moved)), kind="stable")
+    return [(sets[i], float(odds[i])) for i in order]
+
+
+def smallest_good(found: list[tuple[Assignment, float]]) -> int:
+    """Index of the set to suggest: one more change only where it adds enough odds."""
+    chosen = 0
+    for i in range(1, len(found)):
+        if found[i][1] >= found[chosen][1] + GAIN_FOR_ONE_MORE * (i - chosen):
+            chosen = i
+    return chosen
+
+
+def to_fix(world: World, options: Mapping[str, Variable], assignment: Assignment, odds: float) -> Fix:
+    """The set as a record, with every objective's predicted outcome; changes in the order of what each does alone."""
+    alone = {name: world.odds([{**world.config, name: value}])[0] for name, value in assignment.items()}
+    order = sorted(assignment, key=lambda name: (-alone[name], name))
+    config = {**world.config, **assignment}
+    return Fix(
+        changes=tuple(
+            Change(options[name], world.config[name], assignment[name], change_notes(options[name])) for name in order
+        ),
+        p_fixed=odds,
+        predicted={name: prediction(world, name, config) for name in world.model.outcomes},
+    )
+
+
+def prediction(world: World, objective: str, config: Config) -> Prediction:
+    """The objective's predicted outcome under one configuration."""
+    p = world.predict(objective, [config])
+    p_ok = float(p.p_ok[0])
+    return Prediction(float(p.value[0]), float(p.low[0]), float(p.high[0]), None if np.isnan(p_ok) else p_ok)
+
+
+def change_notes(option: Variable) -> tuple[str, ...]:
+    """What an operator has to know before changing this option."""
+    notes = []
+    if option.reboot_required:
+        notes.append("takes effect after a reboot")
+    if len(option.parameters) > 1:
+        notes.append(f"sets {len(option.parameters)} keys: {', '.join(option.parameters)}")
+    return tuple(notes)

@@ -1,0 +1,137 @@
+"""Fault and model -> causes of this run: the options whose values moved the objective the wrong way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_core.causal.counterfactual import Config, World
+from care_core.causal.mechanisms import FloatArray, columns
+from care_core.causal.paths import CausalPath, rank_paths
+from care_core.diagnose.records import PathNode
+from care_core.profile.model import EffectRecord, Model
+from care_core.profile.schema import Schema
+from care_core.run import Run, is_known
+
+PERMUTATIONS = 12
+"""Orders of reset per Shapley estimate, each also taken backwards."""
+SAME = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Suspect:
+    """An option off its reference on a directed path to a faulty objective, with what it costs this run."""
+
+    option: str
+    contribution: float
+    path: CausalPath
+    effect: EffectRecord
+
+
+def reference_config(schema: Schema, model: Model) -> dict[str, float]:
+    """The configuration that faults are judged against: declared defaults, else the middle of the training runs.
+
+    Contexts are held at the middle of the training runs, until the run's own are known.
+    """
+    config: dict[str, float] = {}
+    for option in (*schema.options, *schema.contexts):
+        if option.default is not None:
+            config[option.name] = option.default
+        elif option.name in model.summaries:
+            quantiles = model.summaries[option.name].quantiles
+            config[option.name] = option.snap(quantiles[len(quantiles) // 2])
+    return config
+
+
+def deviating(config: Config, reference: Config) -> tuple[str, ...]:
+    """Options whose value in this run is not the reference's."""
+    return tuple(
+        name
+        for name, value in reference.items()
+        if name in config and abs(config[name] - value) > SAME * max(abs(value), abs(config[name]), 1e-9)
+    )
+
+
+def suspects(world: World, objective: str, reference: Config) -> tuple[Suspect, ...]:
+    """Options off their reference that have a causal path to the objective, largest contribution first.
+
+    The contribution is a Shapley value (Shapley 1953) over these options: how much the odds of keeping the threshold
+    rise when the option goes back to its reference, averaged over the orders in which the others may go back, so an
+    interaction is shared by those who take part in it and the contributions add up to the whole change.
+    """
+    paths = best_paths(world.model, objective)
+    effects = world.model.effects
+    names = [
+        name
+        for name in deviating(world.config, reference)
+        if name in paths and effects[name, objective].identified
+    ]
+    shares = _shapley(names, lambda sets: world.predict(objective, [_reset(world.config, reference, s) for s in sets]).p_ok)
+    found = [Suspect(n, share, paths[n], effects[n, objective]) for n, share in zip(names, shares, strict=True)]
+    return tuple(sorted(found, key=lambda s: (-s.contribution, -s.effect.effect, s.option)))
+
+
+def best_paths(model: Model, objective: str) -> Mapping[str, CausalPath]:
+    """Per option the directed path to the objective with the largest path ACE (Eq. 2)."""
+    weight = {edge: record.effect for edge, record in model.edges.items()}
+    found: dict[str, CausalPath] = {}
+    for option, target in model.effects:
+        if target == objective:
+            paths = rank_paths(model.graph, objective, [option], weight, top=1)
+            if paths:
+                found[option] = paths[0]
+    return found
+
+
+def _reset(config: Config, reference: Config, names: frozenset[str]) -> dict[str, float]:
+    return {**config, **{name: reference[name] for name in names}}
+
+
+def _shapley(names: Sequence[str], odds: Callable[[Sequence[frozenset[str]]], FloatArray]) -> FloatArray:
+    """Shapley values by sampled orders, each with its reverse; the seed is fixed, so the answer repeats."""
+    if not names:
+        return np.zeros(0)
+    rng = np.random.default_rng(0)
+    orders = [rng.permutation(len(names)) for _ in range(PERMUTATIONS)]
+    orders += [order[::-1] for order in orders]
+    chains = [[frozenset(names[i] for i in order[:k]) for k in range(len(names) + 1)] for order in orders]
+    distinct = list(dict.fromkeys(subset for chain in chains for subset in chain))
+    value = dict(zip(distinct, odds(distinct), strict=True))
+    shares = np.zeros(len(names))
+    for order, chain in zip(orders, chains, strict=True):
+        shares[order] += np.diff([value[subset] for subset in chain])
+    mean: FloatArray = shares / len(orders)
+    return mean
+
+
+def describe_path(path: CausalPath, world: World, schema: Schema, run: Run, reference: Config) -> tuple[PathNode, ...]:
+    """The path as this run met it: at each node its value, and what the reference configuration would give."""
+    nodes = []
+    for i, name in enumerate(path.nodes):
+        value = run.value(name)
+        edge = world.model.edges.get(path.edges[i]) if i < len(path.edges) else None
+        signed = None
+        if edge is not None:
+            signed = -edge.effect if edge.direction == "decreasing" else edge.effect
+        nodes.append(
+            PathNode(
+                name=name,
+                unit=schema.variables[name].unit,
+                value=value if is_known(value) else None,
+                expected=_expected(name, world, reference),
+                effect=signed,
+                support=None if edge is None else edge.support,
+            )
+        )
+    return tuple(nodes)
+
+
+def _expected(name: str, world: World, reference: Config) -> float | None:
+    if name in reference:
+        return reference[name]
+    if name in world.model.outcomes:
+        return float(world.predict(name, [reference]).value[0])
+    mechanism = world.model.mechanisms.get(name)
+    return None if mechanism is None else float(mechanism.expected(columns([reference], mechanism.inputs))[0])

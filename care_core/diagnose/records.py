@@ -1,0 +1,132 @@
+"""What a diagnosis is made of. Plain values: the report writer and the terminal app read these and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from care_core.run import Run
+from care_core.variables import Threshold, Variable
+
+Status = Literal["ok", "fault", "not_evaluated"]
+Confidence = Literal["high", "medium", "low"]
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectiveResult:
+    """An objective of this run against its threshold. `reason` says why it was not evaluated."""
+
+    variable: Variable
+    value: float | None
+    threshold: Threshold | None
+    status: Status
+    reason: str = ""
+    percentile: float | None = None
+    """Share (0 to 1) of the profile's training runs with a smaller value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """A predicted value of an objective with its 80 % interval, and the odds that it keeps its threshold."""
+
+    value: float
+    low: float
+    high: float
+    p_ok: float | None = None
+
+    def status(self) -> Status:
+        if self.p_ok is None:
+            return "not_evaluated"
+        return "ok" if self.p_ok >= 0.5 else "fault"
+
+
+@dataclass(frozen=True, slots=True)
+class PathNode:
+    """One node of a causal path as this run met it: its value, and what the reference configuration would give."""
+
+    name: str
+    unit: str
+    value: float | None
+    expected: float | None
+    effect: float | None = None
+    """Standardised effect of the edge that leads to the next node, signed; None on the last node."""
+    support: float | None = None
+    """Share of bootstrap resamples that hold the edge to the next node; None on the last node."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """An option with the path by which it moved a faulty objective in this run.
+
+    `path_ace` is the paper's Eq. 2 on scaled variables (it ranks the platform, not this run); `total_effect` the
+    option's Eq. 1 effect on the objective. `contribution` is how much of this run's odds of being fault-free the
+    option costs (0 to 1): counterfactual change against the profile's reference configuration.
+    """
+
+    rank: int
+    option: Variable
+    path: tuple[PathNode, ...]
+    path_ace: float
+    total_effect: float
+    contribution: float
+    current: float
+    suggested: float | None
+    predicted: Prediction | None
+    p_fixed: float | None
+    confidence: Confidence
+    in_support: bool
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A faulty objective with its causes, best first."""
+
+    objective: ObjectiveResult
+    causes: tuple[Cause, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One option to change, in the option's unit."""
+
+    option: Variable
+    current: float
+    suggested: float
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """A set of changes with its predicted outcome. `p_fixed`: odds that all objectives keep their thresholds."""
+
+    changes: tuple[Change, ...]
+    p_fixed: float
+    predicted: Mapping[str, Prediction]
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileChoice:
+    """The profile that was used, and how it was chosen."""
+
+    name: str
+    version: str
+    platform: str
+    reason: str
+    warnings: tuple[str, ...] = ()
+    """What of the log differs from the profile: firmware, frame, distro, mission."""
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """The whole answer for one run. `fix` is None when nothing is broken or the engine abstains (`abstained`)."""
+
+    profile: ProfileChoice
+    run: Run
+    objectives: tuple[ObjectiveResult, ...]
+    faults: tuple[Fault, ...]
+    fix: Fix | None
+    alternatives: tuple[Fix, ...] = ()
+    abstained: str | None = None
+    notes: tuple[str, ...] = field(default=())

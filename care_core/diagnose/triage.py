@@ -1,0 +1,223 @@
+"""The whole line in one place: log -> run -> faults -> causes -> fix. The only module that strings the steps together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+
+from care_core.causal.counterfactual import Config, World
+from care_core.diagnose.faults import judge, thresholds_in_force
+from care_core.diagnose.fixes import (
+    MAX_ALTERNATIVES,
+    best_alone,
+    change_notes,
+    prediction,
+    search,
+    smallest_good,
+    to_fix,
+)
+from care_core.diagnose.ranking import Suspect, describe_path, deviating, reference_config, suspects
+from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
+from care_core.extract.read import read_run
+from care_core.logs.base import Log
+from care_core.profile.store import Profile
+from care_core.run import Run, Setting, is_known
+
+MIN_CONTRIBUTION = 0.02
+"""Odds an option must cost before it is called a cause of this run."""
+MIN_ODDS = 0.2
+"""Best odds below which the engine abstains: a confident wrong answer costs a field day."""
+HIGH_ODDS, LOW_ODDS = 0.7, 0.4
+HIGH_SUPPORT, LOW_SUPPORT = 0.8, 0.5
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Case:
+    """What every step of one diagnosis needs."""
+
+    profile: Profile
+    choice: ProfileChoice
+    run: Run
+    world: World
+    reference: Config
+    keep: Collection[str]
+    assumed: frozenset[str]
+    """Options that no source holds: taken to be at their reference."""
+
+
+def triage(
+    log: Log,
+    profile: Profile,
+    choice: ProfileChoice,
+    *,
+    configs: Mapping[str, Setting] | None = None,
+    keep: Collection[str] = (),
+    thresholds: Mapping[str, float] | None = None,
+    mission: int | None = None,
+    top: int = 5,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Diagnose one mission of a log.
+
+    Args:
+        configs: settings from configuration files, used where the log holds none.
+        keep: options that must stay as they are.
+        thresholds: the operator's own bounds, per objective.
+        mission: which mission of the log, from 1; the last when None.
+        top: most causes to report per fault.
+
+    Raises:
+        CareError: the log holds no such mission, or the profile has no usable model.
+    """
+    report = progress or (lambda _step, _share: None)
+    report("reading the log", 0.0)
+    overrides = dict(thresholds or {})
+    run = read_run(log, profile.schema, overrides=configs or {}, mission=mission, judge_anyway=tuple(overrides))
+    report("judging the objectives", 0.6)
+    return diagnose(run, profile, choice, keep=keep, thresholds=overrides, top=top, progress=progress)
+
+
+def diagnose(
+    run: Run,
+    profile: Profile,
+    choice: ProfileChoice,
+    *,
+    keep: Collection[str] = (),
+    thresholds: Mapping[str, float] | None = None,
+    top: int = 5,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Diagnose a run that has been read; the arguments are those of `triage`."""
+    report = progress or (lambda _step, _share: None)
+    model, schema = profile.model, profile.schema
+    bounds = thresholds_in_force(schema, thresholds or {})
+    objectives = judge(run, schema, bounds, model.summaries)
+    broken = [result for result in objectives if result.status == "fault" and result.variable.name in model.outcomes]
+    if not any(result.status == "fault" for result in objectives):
+        return Diagnosis(choice, run, objectives, (), None)
+    report("ranking the causes", 0.7)
+    # A context is met, not set: the reference configuration is judged under this run's.
+    met = {name: value for name, value in run.context.items() if is_known(value)}
+    reference = {**reference_config(schema, model), **met}
+    config = {**reference, **run.config}
+    world = World(model, config, {**run.metrics, **run.objectives}, bounds)
+    case = _Case(profile, choice, run, world, reference, keep, frozenset(v.name for v in schema.options) - frozenset(run.config))
+    found = {result.variable.name: suspects(world, result.variable.name, reference) for result in broken}
+    faults = tuple(Fault(result, _causes(case, result, found[result.variable.name], top)) for result in broken)
+    report("searching for a fix", 0.85)
+    fixes = _fixes(case, {s.option for group in found.values() for s in group})
+    abstained = _abstains(case, faults, fixes)
+    report("done", 1.0)
+    return Diagnosis(
+        profile=choice,
+        run=run,
+        objectives=objectives,
+        faults=faults,
+        fix=None if abstained else fixes[0],
+        alternatives=() if abstained else tuple(fixes[1:]),
+        abstained=abstained,
+        notes=_notes(case),
+    )
+
+
+def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
+    weighty = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION][:top]
+    return tuple(_cause(case, result, suspect, rank) for rank, suspect in enumerate(weighty, start=1))
+
+
+def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) -> Cause:
+    name, world = suspect.option, case.world
+    option = case.profile.schema.variables[name]
+    best = None if name in case.keep else best_alone(world, case.profile.schema.variables, name, case.reference)
+    path = describe_path(suspect.path, world, case.profile.schema, case.run, case.reference)
+    in_support = world.model.supports(name, world.config[name])
+    weakest = min((node.support for node in path if node.support is not None), default=0.0)
+    changed = world.config if best is None else {**world.config, name: best[0]}
+    return Cause(
+        rank=rank,
+        option=option,
+        path=path,
+        path_ace=suspect.path.ace,
+        total_effect=suspect.effect.effect,
+        contribution=suspect.contribution,
+        current=world.config[name],
+        suggested=None if best is None else best[0],
+        predicted=None if best is None else prediction(world, result.variable.name, changed),
+        p_fixed=None if best is None else best[1],
+        confidence=_confidence(case, suspect.contribution, in_support, weakest),
+        in_support=in_support,
+        notes=_cause_notes(case, suspect, in_support, weakest),
+    )
+
+
+def _confidence(case: _Case, contribution: float, in_support: bool, weakest_edge: float) -> Confidence:
+    """High where the option explains most of the fault along edges that nearly every resample holds."""
+    doubtful = not in_support or bool(case.choice.warnings) or not case.run.mission.fits
+    if doubtful or weakest_edge < LOW_SUPPORT or contribution < LOW_ODDS / 4:
+        return "low"
+    if weakest_edge >= HIGH_SUPPORT and contribution >= LOW_ODDS:
+        return "high"
+    return "medium"
+
+
+def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, weakest_edge: float) -> tuple[str, ...]:
+    notes = []
+    if not in_support:
+        summary = case.world.model.summaries[suspect.option]
+        notes.append(f"outside the training support ({summary.low:g} to {summary.high:g})")
+    if weakest_edge < LOW_SUPPORT:
+        notes.append(f"an edge of this path was found in only {weakest_edge:.0%} of resamples")
+    if suspect.option in case.keep:
+        notes.append("pinned by --keep: not changed")
+    notes += change_notes(case.profile.schema.variables[suspect.option])
+    notes += [f"this run says: {e.text}" for e in case.run.evidence if suspect.option in e.options]
+    return tuple(notes)
+
+
+def _fixes(case: _Case, options: set[str]) -> list[Fix]:
+    """The suggested fix first, then up to three that trade changes for odds or take another way."""
+    variables = case.profile.schema.variables
+    # Options off their reference that break another objective matter too once this fault is gone.
+    every = options | {name for name in deviating(case.world.config, case.reference) if _has_effect(case, name)}
+    free = sorted(every - set(case.keep))
+    found = search(case.world, variables, free, case.reference)
+    if not found:
+        return []
+    chosen = smallest_good(found)
+    others = [found[i] for i in range(len(found)) if i != chosen and abs(i - chosen) == 1]
+    without = [name for name in free if name not in found[chosen][0]]
+    detour = search(case.world, variables, without, case.reference)
+    others += [detour[smallest_good(detour)]] if detour else []
+    ranked = [found[chosen], *sorted(others, key=lambda pair: -pair[1])]
+    useful = [pair for i, pair in enumerate(ranked) if i == 0 or pair[1] >= MIN_ODDS]
+    return [to_fix(case.world, variables, assignment, odds) for assignment, odds in useful[: 1 + MAX_ALTERNATIVES]]
+
+
+def _has_effect(case: _Case, option: str) -> bool:
+    effects = case.world.model.effects
+    return any(effects[key].identified and effects[key].effect > 0 for key in effects if key[0] == option)
+
+
+def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str | None:
+    if not any(fault.causes for fault in faults):
+        return (
+            "no option that this profile models explains the fault: look at what the run met "
+            "(wind, battery, positioning, obstacles) or at parameters outside the profile"
+        )
+    now = float(case.world.odds([case.world.config])[0])
+    if not fixes or fixes[0].p_fixed < max(MIN_ODDS, now + MIN_CONTRIBUTION):
+        return "no change inside the acceptable ranges is likely enough to meet every threshold"
+    return None
+
+
+def _notes(case: _Case) -> tuple[str, ...]:
+    notes = list(case.choice.warnings)
+    if not case.run.mission.fits:
+        notes.append(case.run.mission.mismatch)
+    if case.assumed:
+        names = sorted(case.assumed)
+        shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+        notes.append(f"not in the log, taken to be at their reference: {shown}")
+    return tuple(notes)

@@ -1,0 +1,660 @@
+"""ArduPilot flights: how missions are found in a DataFlash log, and the extractors that read them.
+
+A mission is one arming to the next disarm. A log without any arming in which arming was refused is one mission
+too: the vehicle never left the ground, and its last refusals say why.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.extract.flight import NEEDS, Flight, analyse, has, messages, waypoint_offsets
+from care_core.extract.registry import MISSION_KINDS, Args, Mission, MissionKind, extractor, merge_needs, missing
+from care_core.logs.base import Table, Wanted
+from care_core.run import Evidence, Unavailable, Value, is_known
+
+Floats = NDArray[np.float64]
+
+_EV_ARMED, _EV_DISARMED = 10, 11
+_REFUSAL = re.compile(r"(?:Pre)?Arm: (.*)")
+# A pre-arm check repeats its complaints every 30 s, an arming attempt once.
+_REFUSAL_REPEAT_S = 35.0
+_WAYPOINT_TOLERANCE_M = 5.0
+_MIN_ROWS = 5
+_PHASE_ARGS = {
+    "phase": "only this part of the flight: takeoff, leg, return, return_climb, return_cruise, descent, touchdown",
+    "index": "number of the leg, from 1",
+}
+
+# Subsystems of an ERR record by the kind of event; code 0 means that the fault went away.
+_ERR_SUBSYSTEMS: dict[int, tuple[str, str]] = {
+    5: ("failsafe", "radio"), 6: ("failsafe", "battery"), 8: ("failsafe", "ground station"),
+    9: ("failsafe", "fence"), 12: ("crash", "crash check"), 16: ("ekf", "EKF check"),
+    17: ("failsafe", "EKF"), 20: ("failsafe", "ADSB"), 23: ("failsafe", "terrain"), 24: ("ekf", "EKF primary changed"),
+    25: ("thrust", "thrust loss check"), 26: ("failsafe", "sensors"), 27: ("failsafe", "leak"),
+    29: ("vibration", "vibration compensation"), 31: ("failsafe", "dead reckoning"),
+}  # fmt: skip
+
+_MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
+    (re.compile(r"crash", re.IGNORECASE), "crash"),
+    (re.compile(r"failsafe|battery .* is (low|critical)", re.IGNORECASE), "failsafe"),
+    (re.compile(r"EKF variance|lane switch|emergency yaw reset|GPS Glitch", re.IGNORECASE), "ekf"),
+    (re.compile(r"thrust loss", re.IGNORECASE), "thrust"),
+    (re.compile(r"vibration compensation", re.IGNORECASE), "vibration"),
+)
+"""Messages of a flight that speak about its failure, first match counts."""
+
+
+class ArduPilotFlight(MissionKind):
+    """From arming to disarming."""
+
+    name = "ardupilot_flight"
+    args: Mapping[str, str] = {
+        "waypoints": "list of [latitude, longitude, height above home in m] that the thresholds belong to",
+        "tolerance_m": "how far from home a landing may end, and a waypoint may be off",
+    }
+
+    def needs(self, spec: Args) -> Wanted:
+        return NEEDS
+
+    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
+        spans = _armed_spans(tables, duration_s)
+        if not spans and _refusals(tables.get("MSG")):
+            spans = [(0.0, duration_s, True)]
+        return tuple(Mission(tables, start_s, end_s, ended, spec) for start_s, end_s, ended in spans)
+
+    def mismatch(self, mission: Mission) -> str:
+        expected = mission.spec.get("waypoints", ())
+        flown = mission.shared(analyse).waypoints
+        if not expected:
+            return ""
+        if len(flown) != len(expected):
+            return f"the mission has {len(flown)} waypoints, the profile's has {len(expected)}"
+        tolerance_m = float(mission.spec.get("tolerance_m", _WAYPOINT_TOLERANCE_M))
+        for number, off_m in enumerate(waypoint_offsets(flown, expected), start=1):
+            if off_m > tolerance_m:
+                return f"waypoint {number} is {off_m:.0f} m from where the profile's mission has it"
+        return ""
+
+    def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
+        if not _is_armed(mission):
+            return tuple(Evidence(t, text, "refusal") for t, text in _last_refusals(mission))
+        found = [Evidence(t, text, kind) for t, text, kind in _telling(mission)]
+        spoken = {one.kind for one in found}
+        for t, subsystem, code in _errors(mission):
+            kind, what = _ERR_SUBSYSTEMS.get(subsystem, ("", ""))
+            if kind and code and kind not in spoken:
+                found.append(Evidence(t, f"ERR {what}, code {code}", kind))
+        if _forced(mission):
+            found.append(Evidence(mission.end_s, "Disarmed by force in flight", "forced"))
+        return tuple(sorted(found, key=lambda one: one.time_s))
+
+
+MISSION_KINDS[ArduPilotFlight.name] = ArduPilotFlight()
+
+
+def _armed_spans(tables: Mapping[str, Table], duration_s: float) -> list[tuple[float, float, bool]]:
+    """Start, end and whether it ended, of every time the motors were armed."""
+    spans: list[tuple[float, float, bool]] = []
+    armed_at: float | None = None
+    for t, is_armed in _arm_events(tables):
+        if is_armed and armed_at is None:
+            armed_at = t
+        elif not is_armed and armed_at is not None:
+            spans.append((armed_at, t, True))
+            armed_at = None
+    if armed_at is not None:
+        spans.append((armed_at, duration_s, False))
+    return spans
+
+
+def _arm_events(tables: Mapping[str, Table]) -> list[tuple[float, bool]]:
+    arm, events = tables.get("ARM"), tables.get("EV")
+    if arm is not None and has(arm, "ArmState"):
+        return list(zip(arm.t.tolist(), (arm["ArmState"] == 1).tolist(), strict=True))
+    if events is not None and has(events, "Id"):
+        part = events.where(np.isin(events["Id"], (_EV_ARMED, _EV_DISARMED)))
+        return list(zip(part.t.tolist(), (part["Id"] == _EV_ARMED).tolist(), strict=True))
+    return []
+
+
+def _refusals(table: Table | None) -> list[tuple[float, str]]:
+    return [(t, text) for t, text in messages(table) if _REFUSAL.match(text)]
+
+
+def _last_refusals(mission: Mission) -> list[tuple[float, str]]:
+    """The complaints that still stood when arming was last refused, each once, latest time."""
+    refusals = _refusals(mission.tables.get("MSG"))
+    attempts = [t for t, text in refusals if text.startswith("Arm:")] or [t for t, _ in refusals]
+    if not attempts:
+        return []
+    standing: dict[str, tuple[float, str]] = {}
+    for t, text in refusals:
+        is_check = text.startswith("PreArm:") and t >= attempts[-1] - _REFUSAL_REPEAT_S
+        reason = _REFUSAL.sub(r"\1", text)
+        if t >= attempts[-1] - 0.5 or (is_check and reason in standing):
+            standing[reason] = (t, text)
+    return sorted(standing.values())
+
+
+def _is_armed(mission: Mission) -> bool:
+    return any(is_armed and t <= mission.end_s for t, is_armed in _arm_events(mission.tables))
+
+
+def _errors(mission: Mission) -> list[tuple[float, int, int]]:
+    table = mission.table("ERR")
+    if table is None or not has(table, "Subsys", "ECode"):
+        return []
+    return [
+        (t, int(subsystem), int(code))
+        for t, subsystem, code in zip(table.t.tolist(), table["Subsys"], table["ECode"], strict=True)
+    ]
+
+
+def _telling(mission: Mission) -> list[tuple[float, str, str]]:
+    """Messages of the flight that speak about a failure: time, text and kind."""
+    found = []
+    for t, text in messages(mission.tables.get("MSG"), mission.start_s, mission.end_s):
+        kind = next((kind for pattern, kind in _MESSAGE_KINDS if pattern.search(text)), None)
+        if kind is not None and not _REFUSAL.match(text):
+            found.append((t, text, kind))
+    return found
+
+
+def _forced(mission: Mission) -> bool:
+    arm = mission.table("ARM")
+    if arm is None or not has(arm, "ArmState", "Forced"):
+        return False
+    return bool(np.any((arm["ArmState"] == 0) & (arm["Forced"] == 1)))
+
+
+_NOT_FLOWN = Unavailable("the vehicle never armed", "see why arming was refused")
+_EVENTS: Wanted = {name: NEEDS[name] for name in ("MSG", "ARM", "EV", "ERR")}
+
+
+def _flight(mission: Mission) -> Flight | Unavailable:
+    return mission.shared(analyse) if _is_armed(mission) else _NOT_FLOWN
+
+
+def _has_event(mission: Mission, kind: str, about: str = "") -> float:
+    """1 when an ERR record or a message of the flight is of this kind and speaks of `about`."""
+    if not _is_armed(mission):
+        return 0.0
+    word = about.casefold()
+    for _, subsystem, code in _errors(mission):
+        err_kind, what = _ERR_SUBSYSTEMS.get(subsystem, ("", ""))
+        if code and err_kind == kind and word in what.casefold():
+            return 1.0
+    return float(any(known == kind and word in text.casefold() for _, text, known in _telling(mission)))
+
+
+# --- outcome ---------------------------------------------------------------------------------------------------
+
+
+@extractor("mission_success", needs=NEEDS, unit="")
+def mission_success(mission: Mission, args: Args) -> Value:
+    """1 when every waypoint was reached, the vehicle landed near home (`tolerance_m` of the mission) and disarmed by
+    itself, with no crash and no failsafe; else 0. A refused arming is 0."""
+    if not _is_armed(mission):
+        return 0.0
+    if not mission.ended:
+        return Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
+    if _forced(mission) or _has_event(mission, "crash") or _has_event(mission, "failsafe"):
+        return 0.0
+    flight = mission.shared(analyse)
+    if not flight.waypoints:
+        return Unavailable("the log names no waypoints", "record CMD")
+    if flight.reached < len(flight.waypoints):
+        return 0.0
+    off_m = landing_error(mission, {})
+    if not is_known(off_m):
+        return off_m
+    return float(off_m <= float(mission.spec.get("tolerance_m", _WAYPOINT_TOLERANCE_M)))
+
+
+@extractor("arming_refused", needs=_EVENTS, unit="", args={"text": "count only refusals whose message holds this text"})
+def arming_refused(mission: Mission, args: Args) -> Value:
+    """1 when arming was refused to the end of the log, else 0; earlier refusals before an arming do not count."""
+    if _is_armed(mission):
+        return 0.0
+    word = str(args.get("text", "")).casefold()
+    return float(any(word in text.casefold() for _, text in _last_refusals(mission)))
+
+
+@extractor("failsafe", needs=_EVENTS, unit="", args={"about": "battery, radio, EKF, ...; any when not given"})
+def failsafe(mission: Mission, args: Args) -> Value:
+    """1 when a failsafe acted in flight, else 0."""
+    return _has_event(mission, "failsafe", str(args.get("about", "")))
+
+
+@extractor("crash", needs=_EVENTS, unit="")
+def crash(mission: Mission, args: Args) -> Value:
+    """1 when the autopilot's crash check disarmed the vehicle, else 0."""
+    return _has_event(mission, "crash")
+
+
+@extractor("thrust_loss", needs=_EVENTS, unit="")
+def thrust_loss(mission: Mission, args: Args) -> Value:
+    """1 when the autopilot reported that thrust could not hold attitude or height, else 0."""
+    return _has_event(mission, "thrust")
+
+
+@extractor("ekf_trouble", needs=_EVENTS, unit="")
+def ekf_trouble(mission: Mission, args: Args) -> Value:
+    """1 when the estimator reported variance, a lane switch or a yaw reset in flight, else 0."""
+    return _has_event(mission, "ekf")
+
+
+@extractor("forced_disarm", needs=_EVENTS, unit="")
+def forced_disarm(mission: Mission, args: Args) -> Value:
+    """1 when the operator disarmed the vehicle by force, else 0."""
+    return float(_forced(mission))
+
+
+@extractor("arming_time", needs=_EVENTS, unit="s")
+def arming_time(mission: Mission, args: Args) -> Value:
+    """Time from the first refusal of arming to the arming, 0 when it was never refused."""
+    if not _is_armed(mission):
+        return _NOT_FLOWN
+    earlier = [end for _, end, _ in _armed_spans(mission.tables, mission.end_s) if end < mission.start_s]
+    since = max(earlier, default=-math.inf)
+    refused = [t for t, _ in _refusals(mission.tables.get("MSG")) if since < t < mission.start_s]
+    return mission.start_s - min(refused, default=mission.start_s)
+
+
+@extractor("waypoints_reached", needs=NEEDS, unit="")
+def waypoints_reached(mission: Mission, args: Args) -> Value:
+    """How many of the mission's waypoints the autopilot reported as reached."""
+    flight = _flight(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    return float(flight.reached) if flight.waypoints else Unavailable("the log names no waypoints", "record CMD")
+
+
+@extractor("landing_error", needs=NEEDS, unit="m")
+def landing_error(mission: Mission, args: Args) -> Value:
+    """Horizontal distance from home at the end of the flight."""
+    flight = _flight(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    if flight.track is None:
+        return missing("POS")
+    return math.hypot(flight.track.north[-1], flight.track.east[-1])
+
+
+@extractor("waypoint_miss", needs=NEEDS, unit="m")
+def waypoint_miss(mission: Mission, args: Args) -> Value:
+    """The largest, over the waypoints, of the smallest horizontal distance from the waypoint: corners cut."""
+    flight = _flight(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    if flight.track is None or not len(flight.route):
+        return missing("POS" if flight.track is None else "CMD")
+    north, east = flight.track.north[:, None] - flight.route[:, 0], flight.track.east[:, None] - flight.route[:, 1]
+    return float(np.hypot(north, east).min(axis=0).max())
+
+
+# --- time, way, energy -----------------------------------------------------------------------------------------
+
+
+@extractor("mission_time", needs=NEEDS, unit="s")
+def mission_time(mission: Mission, args: Args) -> Value:
+    """Time from arming to disarming."""
+    return mission.end_s - mission.start_s if _is_armed(mission) else _NOT_FLOWN
+
+
+@extractor("phase_time", needs=NEEDS, unit="s", args=_PHASE_ARGS)
+def phase_time(mission: Mission, args: Args) -> Value:
+    """Duration of one completed part of the flight."""
+    span = _phase(mission, args)
+    return span if isinstance(span, Unavailable) else span[1] - span[0]
+
+
+@extractor("return_height", needs=NEEDS, unit="m")
+def return_height(mission: Mission, args: Args) -> Value:
+    """The greatest height above home on the way back."""
+    span = _phase(mission, {"phase": "return_climb"})
+    flight = _flight(mission)
+    if isinstance(span, Unavailable):
+        return span
+    if isinstance(flight, Unavailable) or flight.track is None:
+        return missing("POS")
+    return float(flight.track.height[flight.track.t >= span[0]].max())
+
+
+@extractor("distance", needs=NEEDS, unit="m")
+def distance(mission: Mission, args: Args) -> Value:
+    """Length of the way over ground while airborne."""
+    flight = _flight(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    if flight.track is None:
+        return missing("POS")
+    steps = np.hypot(np.diff(flight.track.north), np.diff(flight.track.east))
+    return float(steps[flight.track.airborne(flight.track.t)[1:]].sum())
+
+
+@extractor("path_error", needs=NEEDS, unit="m", args={"stat": "max or mean"})
+def path_error(mission: Mission, args: Args) -> Value:
+    """Horizontal distance from the legs (home, waypoints, home) while airborne."""
+    flight = _flight(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    if flight.track is None or not len(flight.route):
+        return missing("POS" if flight.track is None else "CMD")
+    return _statistic(flight.path_errors(), str(args.get("stat", "max")))
+
+
+_BATTERY: Wanted = {"BAT": ("Inst", "Instance", "Volt", "Curr", "EnrgTot")}
+
+
+@extractor("energy_used", needs=merge_needs((NEEDS, _BATTERY)), unit="Wh")
+def energy_used(mission: Mission, args: Args) -> Value:
+    """Energy drawn between arming and disarming: the monitor's counter, else voltage times current over time."""
+    if not _is_armed(mission):
+        return _NOT_FLOWN
+    table = mission.tables.get("BAT")
+    if table is None or not len(table):
+        return missing("BAT")
+    used = [_energy(battery, mission) for battery in _instances(table)]
+    known = [value for value in used if value is not None]
+    return sum(known) if known else missing("BAT energy, or voltage with current")
+
+
+def _energy(battery: Table, mission: Mission) -> float | None:
+    if has(battery, "EnrgTot") and np.ptp(battery["EnrgTot"]) > 0:
+        start, end = np.interp((mission.start_s, mission.end_s), battery.t, battery["EnrgTot"])
+        return float(end - start)
+    inside = battery.between(mission.start_s, mission.end_s)
+    if len(inside) < _MIN_ROWS or not has(inside, "Volt", "Curr"):
+        return None
+    power = inside["Volt"] * inside["Curr"]
+    return float(np.sum((power[1:] + power[:-1]) / 2 * np.diff(inside.t)) / 3600)
+
+
+@extractor("min_voltage", needs=merge_needs((NEEDS, _BATTERY)), unit="V")
+def min_voltage(mission: Mission, args: Args) -> Value:
+    """The lowest battery voltage between arming and disarming."""
+    if not _is_armed(mission):
+        return _NOT_FLOWN
+    volts = _series(mission, "BAT", ("Volt",), {}, airborne=False)
+    return volts if isinstance(volts, Unavailable) else _statistic(volts["Volt"], "min")
+
+
+@extractor("start_voltage", needs=merge_needs((NEEDS, _BATTERY)), unit="V")
+def start_voltage(mission: Mission, args: Args) -> Value:
+    """Battery voltage in the last second before the motors were armed."""
+    table = mission.tables.get("BAT")
+    if table is None or not has(table, "Volt"):
+        return missing("BAT")
+    before = next(iter(_instances(table))).between(-math.inf, mission.start_s)
+    return float(before["Volt"][-1]) if len(before) else Unavailable("no BAT before arming", "log while disarmed")
+
+
+@extractor(
+    "voltage_margin", needs=merge_needs((NEEDS, _BATTERY)), unit="V", args={"parameter": "the low voltage failsafe"}
+)
+def voltage_margin(mission: Mission, args: Args) -> Value:
+    """How far the lowest voltage of the flight stayed above the low voltage failsafe; below 0 it was crossed."""
+    lowest = min_voltage(mission, {})
+    name = str(args.get("parameter", "BATT_LOW_VOLT"))
+    bound = mission.settings.get(name)
+    if not is_known(lowest):
+        return lowest
+    return lowest - float(bound) if isinstance(bound, (int, float)) else Unavailable(f"no parameter {name} in the log")
+
+
+# --- statistics over a part of the flight ----------------------------------------------------------------------
+
+
+def _phase(mission: Mission, args: Args) -> tuple[float, float] | Unavailable:
+    """Start and end in the log of the part of the flight that `args` name."""
+    flight = _flight(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    name, index = str(args.get("phase", "")), int(args.get("index", 0))
+    phase = flight.phases.get((name, index))
+    if phase is None:
+        return Unavailable(f"the flight did not complete '{name}{f' {index}' if index else ''}'")
+    return phase.start_s, phase.end_s
+
+
+def _series(
+    mission: Mission, channel: str, fields: Sequence[str], args: Args, *, airborne: bool = True
+) -> Table | Unavailable:
+    """Rows of a channel while airborne (or in a phase), first instance only, with all of `fields` finite."""
+    flight = _flight(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    table = mission.table(channel)
+    if table is None or not all(field in table.columns for field in fields):
+        return missing(channel)
+    table = next(iter(_instances(table)), table)
+    if "phase" in args:
+        span = _phase(mission, args)
+        if isinstance(span, Unavailable):
+            return span
+        table = table.between(*span)
+    elif airborne:
+        if flight.track is None:
+            return missing("POS")
+        table = table.where(flight.track.airborne(table.t))
+    finite = np.ones(len(table), dtype=bool)
+    for field in fields:
+        finite &= np.isfinite(table[field])
+    table = table.where(finite)
+    if len(table) < _MIN_ROWS:
+        return Unavailable(f"too little {channel} in this part of the flight", "was the vehicle airborne?")
+    return table
+
+
+def _instances(table: Table) -> list[Table]:
+    """The table split by the column that numbers its sensors, lowest first."""
+    name = next((name for name in ("I", "IMU", "C", "Inst", "Instance") if name in table.columns), None)
+    if name is None:
+        return [table]
+    return [table.where(table[name] == number) for number in np.unique(table[name])]
+
+
+def _statistic(values: Floats, stat: str) -> Value:
+    """One number from many. `peak` is the 95th percentile, which one bad sample cannot move."""
+    measures: dict[str, Callable[[Floats], object]] = {
+        "mean": np.mean,
+        "max": np.max,
+        "min": np.min,
+        "std": np.std,
+        "rms": lambda x: np.sqrt(np.mean(x**2)),
+        "peak": lambda x: np.percentile(x, 95),
+    }
+    if not len(values):
+        return Unavailable("the vehicle was never airborne")
+    if stat not in measures:
+        return Unavailable(f"there is no statistic '{stat}'", f"use one of {', '.join(measures)}")
+    return float(measures[stat](values))  # type: ignore[arg-type]
+
+
+def _wrapped(degrees: Floats) -> Floats:
+    return np.asarray((degrees + 180.0) % 360.0 - 180.0)
+
+
+def _register(
+    name: str, wanted: Wanted, unit: str, doc: str, measure: Callable[[Table, Mission, Args], Floats],
+    *, stat: str, args: Mapping[str, str] | None = None,
+) -> None:  # fmt: skip
+    """Register an extractor that is a statistic of one channel over a part of the flight."""
+    ((channel, fields),) = wanted.items()
+    required = [field for field in fields if field not in ("I", "IMU", "C")]
+
+    def compute(mission: Mission, given: Args) -> Value:
+        table = _series(mission, channel, required, given)
+        if isinstance(table, Unavailable):
+            return table
+        return _statistic(measure(table, mission, given), str(given.get("stat", stat)))
+
+    compute.__doc__ = f"{doc} Statistic: {stat} unless `stat` says otherwise."
+    described = {"stat": "mean, max, min, std, rms or peak (95th percentile)", **_PHASE_ARGS, **(args or {})}
+    extractor(name, needs=merge_needs((NEEDS, wanted)), unit=unit, args=described)(compute)
+
+
+_AXES = {"roll": ("R", "RDes", "ROut"), "pitch": ("P", "PDes", "POut"), "yaw": ("Y", "YDes", "YOut")}
+_AXIS = {"axis": "roll, pitch, yaw, or tilt (roll and pitch together)"}
+
+
+def _attitude_error(table: Table, mission: Mission, args: Args) -> Floats:
+    errors = {
+        "roll": table["DesRoll"] - table["Roll"],
+        "pitch": table["DesPitch"] - table["Pitch"],
+        "yaw": _wrapped(table["DesYaw"] - table["Yaw"]),
+    }
+    axis = str(args.get("axis", "tilt"))
+    return np.asarray(errors[axis] if axis in errors else np.hypot(errors["roll"], errors["pitch"]))
+
+
+def _of_axis(column: Callable[[Table, tuple[str, str, str]], Floats]) -> Callable[[Table, Mission, Args], Floats]:
+    return lambda table, _mission, args: column(table, _AXES.get(str(args.get("axis")), _AXES["roll"]))
+
+
+def _lean(table: Table) -> Floats:
+    return np.asarray(np.degrees(np.arccos(np.cos(np.radians(table["Roll"])) * np.cos(np.radians(table["Pitch"])))))
+
+
+def _motors(table: Table) -> Floats:
+    """Outputs of the motors, shape (rows, 4), as a share of their range of 1000 to 2000 microseconds."""
+    return np.asarray((np.column_stack([table[name] for name in ("C1", "C2", "C3", "C4")]) - 1000.0) / 1000.0)
+
+
+def _at_limit(table: Table, mission: Mission, _args: Args) -> Floats:
+    limit = mission.settings.get("MOT_SPIN_MAX", 0.95)
+    top = float(limit) if isinstance(limit, (int, float)) else 0.95
+    return np.asarray(_motors(table).max(axis=1) >= top - 0.005, dtype=np.float64)
+
+
+_ATTITUDE = {"ATT": ("DesRoll", "Roll", "DesPitch", "Pitch", "DesYaw", "Yaw")}
+_RATE = {"RATE": ("R", "RDes", "ROut", "P", "PDes", "POut", "Y", "YDes", "YOut")}
+_HEIGHT = {"PSCD": ("TPD", "PD", "TVD", "VD", "TAD", "AD")}
+_OUTPUTS = {"RCOU": ("C1", "C2", "C3", "C4")}
+
+_register("attitude_error", _ATTITUDE, "deg", "Wanted minus flown attitude.", _attitude_error, stat="rms", args=_AXIS)
+_register("rate_error", _RATE, "deg/s", "Wanted minus flown rotation rate: slack or oscillation of one axis.",
+          _of_axis(lambda t, c: t[c[0]] - t[c[1]]), stat="rms", args=_AXIS)  # fmt: skip
+_register("rate_activity", _RATE, "deg/s", "Rotation rate of one axis.",
+          _of_axis(lambda t, c: t[c[0]]), stat="rms", args=_AXIS)  # fmt: skip
+_register("rate_output", _RATE, "", "Output of one axis' rate controller: how hard it works.",
+          _of_axis(lambda t, c: t[c[2]]), stat="rms", args=_AXIS)  # fmt: skip
+_register("lean_angle", _ATTITUDE, "deg", "Angle between the vehicle's mast and the vertical.",
+          lambda t, _m, _a: _lean(t), stat="peak")  # fmt: skip
+_register("altitude_error", _HEIGHT, "m", "Wanted minus flown height.",
+          lambda t, _m, _a: np.abs(t["TPD"] - t["PD"]), stat="rms")  # fmt: skip
+_register("climb_rate_error", _HEIGHT, "m/s", "Wanted minus flown vertical speed.",
+          lambda t, _m, _a: np.abs(t["TVD"] - t["VD"]), stat="rms")  # fmt: skip
+_register("vertical_acceleration_error", _HEIGHT, "m/s/s", "Wanted minus flown vertical acceleration.",
+          lambda t, _m, _a: np.abs(t["TAD"] - t["AD"]), stat="rms")  # fmt: skip
+_register("climb_rate", _HEIGHT, "m/s", "Speed upwards.", lambda t, _m, _a: -t["VD"], stat="peak")
+_register("descent_rate", _HEIGHT, "m/s", "Speed downwards.", lambda t, _m, _a: t["VD"], stat="peak")
+_register("motor_saturation", _OUTPUTS, "", "Share of the time in which a motor is at MOT_SPIN_MAX.",
+          _at_limit, stat="mean")  # fmt: skip
+_register("motor_output", _OUTPUTS, "", "Mean output of the motors, as a share of their range.",
+          lambda t, _m, _a: _motors(t).mean(axis=1), stat="mean")  # fmt: skip
+_register("motor_spread", _OUTPUTS, "", "How far the motors differ from each other, as a share of their range.",
+          lambda t, _m, _a: np.ptp(_motors(t), axis=1), stat="mean")  # fmt: skip
+_register("throttle", {"CTUN": ("ThO",)}, "", "Throttle out of the attitude controller, 0 to 1.",
+          lambda t, _m, _a: t["ThO"], stat="mean")  # fmt: skip
+_register("vibration", {"VIBE": ("IMU", "VibeX", "VibeY", "VibeZ")}, "m/s/s", "Vibration of the first IMU, all axes.",
+          lambda t, _m, _a: np.sqrt(t["VibeX"] ** 2 + t["VibeY"] ** 2 + t["VibeZ"] ** 2), stat="mean")  # fmt: skip
+_register("gps_quality", {"GPS": ("I", "HDop")}, "", "Horizontal dilution of precision of the first GPS.",
+          lambda t, _m, _a: t["HDop"], stat="mean")  # fmt: skip
+_register("ekf_velocity_innovation", {"XKF3": ("C", "IVN", "IVE")}, "m/s",
+          "Horizontal velocity measured minus estimated, first core.",
+          lambda t, _m, _a: np.hypot(t["IVN"], t["IVE"]), stat="rms")  # fmt: skip
+_register("ekf_position_innovation", {"XKF3": ("C", "IPN", "IPE")}, "m",
+          "Horizontal position measured minus estimated, first core.",
+          lambda t, _m, _a: np.hypot(t["IPN"], t["IPE"]), stat="rms")  # fmt: skip
+
+
+@extractor(
+    "ekf_innovation",
+    needs=lambda args: merge_needs((NEEDS, {"XKF4": ("C", str(args.get("field", "SV")))})),
+    unit="",
+    args={"field": "SV velocity, SP position, SH height, SM compass", "stat": "mean, max, rms or peak", **_PHASE_ARGS},
+)
+def ekf_innovation(mission: Mission, args: Args) -> Value:
+    """Innovation test ratio of the first estimator core (above 1 it rejects the sensor). Mean unless `stat`."""
+    field = str(args.get("field", "SV"))
+    table = _series(mission, "XKF4", (field,), args)
+    return table if isinstance(table, Unavailable) else _statistic(table[field], str(args.get("stat", "mean")))
+
+
+@extractor("mean_lean_angle", needs=merge_needs((NEEDS, _ATTITUDE)), unit="deg", args=_PHASE_ARGS)
+def mean_lean_angle(mission: Mission, args: Args) -> Value:
+    """Angle of the lean averaged over the earth's directions while airborne: what steady wind asks for."""
+    table = _series(mission, "ATT", ("Roll", "Pitch", "Yaw"), args)
+    if isinstance(table, Unavailable):
+        return table
+    roll, pitch, yaw = (np.radians(table[name]) for name in ("Roll", "Pitch", "Yaw"))
+    forward, right = -np.tan(pitch), np.tan(roll) / np.cos(pitch)
+    north, east = forward * np.cos(yaw) - right * np.sin(yaw), forward * np.sin(yaw) + right * np.cos(yaw)
+    # A tumbling vehicle passes through 90 degrees, where the tangent has no bound.
+    level = np.hypot(north, east) < 2.0
+    if not level.any():
+        return Unavailable("the vehicle was never near level", "")
+    return math.degrees(math.atan(math.hypot(float(north[level].mean()), float(east[level].mean()))))
+
+
+def _horizontal(*fields: str) -> Wanted:
+    """The position controller's records of both horizontal axes, by the letter that the axis puts in a field."""
+    return merge_needs(
+        (NEEDS, {"PSCN": tuple(f"{field}N" for field in fields), "PSCE": tuple(f"{field}E" for field in fields)})
+    )
+
+
+def _both_axes(mission: Mission, args: Args, of_axis: Callable[[Callable[[str], Floats]], Floats], stat: str,
+               fields: Sequence[str]) -> Value:  # fmt: skip
+    """A statistic of the length of the vector whose north and east parts `of_axis` gives."""
+    parts = []
+    for axis in "NE":
+        names = [f"{field}{axis}" for field in fields]
+        table = _series(mission, f"PSC{axis}", names, args)
+        if isinstance(table, Unavailable):
+            return table
+        columns = dict(zip(fields, (table[name] for name in names), strict=True))
+        parts.append(of_axis(columns.__getitem__))
+    count = min(len(part) for part in parts)
+    return _statistic(np.hypot(parts[0][:count], parts[1][:count]), str(args.get("stat", stat)))
+
+
+_HORIZONTAL_ARGS = {"stat": "mean, max, rms or peak (95th percentile)", **_PHASE_ARGS}
+
+
+@extractor("velocity_error", needs=_horizontal("TV", "V"), unit="m/s", args=_HORIZONTAL_ARGS)
+def velocity_error(mission: Mission, args: Args) -> Value:
+    """Wanted minus flown horizontal velocity. Statistic: rms unless `stat` says otherwise."""
+    return _both_axes(mission, args, lambda of: of("TV") - of("V"), "rms", ("TV", "V"))
+
+
+@extractor("position_error", needs=_horizontal("TP", "P"), unit="m", args=_HORIZONTAL_ARGS)
+def position_error(mission: Mission, args: Args) -> Value:
+    """Wanted minus flown horizontal position. Statistic: rms unless `stat` says otherwise."""
+    return _both_axes(mission, args, lambda of: of("TP") - of("P"), "rms", ("TP", "P"))
+
+
+@extractor("acceleration_error", needs=_horizontal("TA", "A"), unit="m/s/s", args=_HORIZONTAL_ARGS)
+def acceleration_error(mission: Mission, args: Args) -> Value:
+    """Wanted minus flown horizontal acceleration. Statistic: rms unless `stat` says otherwise."""
+    return _both_axes(mission, args, lambda of: of("TA") - of("A"), "rms", ("TA", "A"))
+
+
+@extractor("planned_acceleration", needs=_horizontal("DA"), unit="m/s/s", args=_HORIZONTAL_ARGS)
+def planned_acceleration(mission: Mission, args: Args) -> Value:
+    """Horizontal acceleration that the path planner asks for. Statistic: peak unless `stat` says otherwise."""
+    return _both_axes(mission, args, lambda of: of("DA"), "peak", ("DA",))
+
+
+@extractor("speed", needs=_horizontal("V"), unit="m/s", args=_HORIZONTAL_ARGS)
+def speed(mission: Mission, args: Args) -> Value:
+    """Horizontal speed while airborne. Statistic: mean unless `stat` says otherwise."""
+    return _both_axes(mission, args, lambda of: of("V"), "mean", ("V",))

@@ -1,0 +1,257 @@
+"""What one ArduPilot flight did: its mission items, its track around home, and its phases.
+
+Everything is worked out once per mission (`Mission.shared(analyse)`) and read by the extractors of `ardupilot`.
+Positions are metres north and east of home on a plane, which is exact to centimetres over a few kilometres.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.extract.registry import Mission
+from care_core.logs.base import Table, Wanted
+
+NEEDS: Wanted = {
+    "POS": ("Lat", "Lng", "RelHomeAlt"),
+    "ORGN": ("Type", "Lat", "Lng"),
+    "CMD": ("CNum", "CId", "Lat", "Lng", "Alt"),
+    "MODE": ("ModeNum",),
+    "MSG": ("Message",),
+    "ARM": ("ArmState", "Forced"),
+    "EV": ("Id",),
+    "ERR": ("Subsys", "ECode"),
+}
+"""What `analyse` and the search for missions read."""
+
+AIRBORNE_M = 2.0
+"""Height above home from which a vehicle counts as airborne."""
+
+_METRES_PER_DEGREE = 111_319.49
+_NAV_WAYPOINT, _NAV_RTL, _NAV_LAND = 16, 20, 21
+_MODE_RTL, _MODE_LAND = 6, 9
+_HOME = 1
+_AT_HEIGHT_M = 0.5
+_STARTED = re.compile(r"Mission: (\d+) ")
+_REACHED = re.compile(r"Reached command #(\d+)")
+
+Floats = NDArray[np.float64]
+
+
+class Waypoint(NamedTuple):
+    """A mission waypoint: latitude and longitude in degrees, height above home in metres."""
+
+    lat: float
+    lng: float
+    alt_m: float
+
+
+class Phase(NamedTuple):
+    """A part of the flight that was completed, in seconds of the log."""
+
+    start_s: float
+    end_s: float
+
+    @property
+    def duration_s(self) -> float:
+        return self.end_s - self.start_s
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """Where the vehicle was: arrays of shape (n,), seconds of the log and metres from home."""
+
+    t: Floats
+    north: Floats
+    east: Floats
+    height: Floats
+
+    def airborne(self, t: Floats) -> NDArray[np.bool_]:
+        """Whether the vehicle was higher than `AIRBORNE_M` at times `t`."""
+        return np.asarray(np.interp(t, self.t, self.height) > AIRBORNE_M)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flight:
+    """One flight. `phases` holds only what was completed, by name and index (legs count from 1, the rest is 0)."""
+
+    waypoints: tuple[Waypoint, ...]
+    """The waypoints of the mission that the vehicle was given."""
+    route: Floats
+    """Shape (waypoints, 2): north and east of home in metres, the flown order."""
+    reached: int
+    """How many of the waypoints the autopilot reported as reached."""
+    track: Track | None
+    """None when the log holds no position."""
+    phases: Mapping[tuple[str, int], Phase]
+
+    def path_errors(self) -> Floats:
+        """Horizontal distance in metres from the legs (home, waypoints, home) at every airborne position."""
+        if self.track is None:
+            return np.empty(0)
+        up = self.track.height > AIRBORNE_M
+        points = np.column_stack((self.track.north[up], self.track.east[up]))
+        corners = np.vstack((np.zeros(2), self.route, np.zeros(2)))
+        return distance_to_legs(points, corners)
+
+
+def analyse(mission: Mission) -> Flight:
+    """Work out the flight of a mission; use through `mission.shared`."""
+    items = _items(mission)
+    numbers = [number for number, (command, _) in sorted(items.items()) if _is_waypoint(command, items[number][1])]
+    waypoints = tuple(items[number][1] for number in numbers)
+    home = _home(mission)
+    track = _track(mission, home)
+    started, reached = _milestones(mission)
+    route = np.array([_offset(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
+    return Flight(
+        waypoints=waypoints,
+        route=route.astype(np.float64),
+        reached=sum(number in reached for number in numbers),
+        track=track,
+        phases=_phases(mission, track, numbers, started, reached),
+    )
+
+
+def distance_to_legs(points: Floats, corners: Floats) -> Floats:
+    """Distance of each point, shape (n, 2), from the nearest of the legs between `corners`, shape (legs + 1, 2)."""
+    if len(corners) < 2 or not len(points):
+        return np.empty(0)
+    start, leg = corners[:-1], np.diff(corners, axis=0)
+    along = points[:, None, :] - start[None]
+    length2 = np.maximum((leg**2).sum(axis=1), 1e-9)
+    share = np.clip((along * leg).sum(axis=2) / length2, 0.0, 1.0)
+    off = along - share[..., None] * leg
+    return np.asarray(np.hypot(off[..., 0], off[..., 1]).min(axis=1), dtype=np.float64)
+
+
+def waypoint_offsets(waypoints: Sequence[Waypoint], expected: Sequence[Sequence[float]]) -> list[float]:
+    """Distance in metres, height included, of each waypoint from the one it should be."""
+    offsets = []
+    for waypoint, (lat, lng, alt_m) in zip(waypoints, expected, strict=True):
+        north, east = _offset((lat, lng), waypoint.lat, waypoint.lng)
+        offsets.append(math.hypot(north, east, waypoint.alt_m - alt_m))
+    return offsets
+
+
+def messages(table: Table | None, start_s: float = -math.inf, end_s: float = math.inf) -> list[tuple[float, str]]:
+    """Time and text of the vehicle's messages between two times."""
+    if table is None or "Message" not in table.columns:
+        return []
+    part = table.between(start_s, end_s)
+    return list(zip(part.t.tolist(), part["Message"].tolist(), strict=True))
+
+
+def has(table: Table | None, *fields: str) -> bool:
+    """Whether a table is there with all these fields and at least one row."""
+    return table is not None and len(table) > 0 and all(field in table.columns for field in fields)
+
+
+def _items(mission: Mission) -> dict[int, tuple[int, Waypoint]]:
+    """Mission item number -> its command and place, as last loaded before the mission ended."""
+    table = mission.tables.get("CMD")
+    if table is None or not has(table, "CNum", "CId", "Lat", "Lng", "Alt"):
+        return {}
+    part = table.where(table.t <= mission.end_s)
+    rows: Any = zip(*(part[field].tolist() for field in ("CNum", "CId", "Lat", "Lng", "Alt")), strict=True)
+    return {int(number): (int(command), Waypoint(lat, lng, alt)) for number, command, lat, lng, alt in rows}
+
+
+def _is_waypoint(command: int, place: Waypoint) -> bool:
+    return command == _NAV_WAYPOINT and (place.lat != 0 or place.lng != 0)
+
+
+def _home(mission: Mission) -> tuple[float, float] | None:
+    """Home as set on arming, else the first position of the flight."""
+    table = mission.tables.get("ORGN")
+    if table is not None and has(table, "Type", "Lat", "Lng"):
+        homes = table.where((table["Type"] == _HOME) & (table.t <= mission.start_s + 1.0))
+        if len(homes):
+            return float(homes["Lat"][-1]), float(homes["Lng"][-1])
+    position = mission.table("POS")
+    if position is not None and has(position, "Lat", "Lng"):
+        return float(position["Lat"][0]), float(position["Lng"][0])
+    return None
+
+
+def _offset(home: tuple[float, float], lat: float, lng: float) -> tuple[float, float]:
+    return (lat - home[0]) * _METRES_PER_DEGREE, (lng - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
+
+
+def _track(mission: Mission, home: tuple[float, float] | None) -> Track | None:
+    position = mission.table("POS")
+    if home is None or position is None or not has(position, "Lat", "Lng", "RelHomeAlt"):
+        return None
+    north = (position["Lat"] - home[0]) * _METRES_PER_DEGREE
+    east = (position["Lng"] - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
+    return Track(position.t, north, east, position["RelHomeAlt"])
+
+
+def _milestones(mission: Mission) -> tuple[dict[int, float], dict[int, float]]:
+    """When each mission item was first started, and when it was first reported as reached."""
+    started: dict[int, float] = {}
+    reached: dict[int, float] = {}
+    for t, text in messages(mission.tables.get("MSG"), mission.start_s, mission.end_s):
+        for pattern, found in ((_STARTED, started), (_REACHED, reached)):
+            match = pattern.match(text)
+            if match:
+                found.setdefault(int(match[1]), t)
+    return started, reached
+
+
+def _phases(
+    mission: Mission, track: Track | None, numbers: Sequence[int], started: Mapping[int, float],
+    reached: Mapping[int, float],
+) -> dict[tuple[str, int], Phase]:  # fmt: skip
+    phases: dict[tuple[str, int], Phase] = {}
+    if numbers and numbers[0] in started:
+        phases["takeoff", 0] = Phase(mission.start_s, started[numbers[0]])
+    for index, number in enumerate(numbers, start=1):
+        if number in started and number in reached:
+            phases["leg", index] = Phase(started[number], reached[number])
+    homeward = _homeward(mission, started)
+    if homeward is not None and track is not None:
+        phases.update({(name, 0): phase for name, phase in _return_phases(mission, track, homeward).items()})
+    return phases
+
+
+def _homeward(mission: Mission, started: Mapping[int, float]) -> float | None:
+    """When the vehicle set out for home: by a mission item, a failsafe or the operator."""
+    items = _items(mission)
+    times = [t for number, t in started.items() if items.get(number, (0, None))[0] in (_NAV_RTL, _NAV_LAND)]
+    modes = mission.table("MODE")
+    if modes is not None and has(modes, "ModeNum"):
+        times += modes.t[np.isin(modes["ModeNum"], (_MODE_RTL, _MODE_LAND))].tolist()
+    return min(times, default=None)
+
+
+def _return_phases(mission: Mission, track: Track, homeward_s: float) -> dict[str, Phase]:
+    """The way home by height: the climb to the return height, the flight at it, the descent, the last metres."""
+    after = track.t >= homeward_s
+    t, height = track.t[after], track.height[after]
+    if len(t) < 3 or height.max() < AIRBORNE_M:
+        return {}
+    high = np.flatnonzero(height >= height.max() - _AT_HEIGHT_M)
+    top_s, leave_s = float(t[high[0]]), float(t[high[-1]])
+    phases = {"return_climb": Phase(homeward_s, top_s)}
+    if height[-1] > AIRBORNE_M:
+        return phases
+    phases["return_cruise"] = Phase(top_s, leave_s)
+    phases["return"] = Phase(homeward_s, leave_s)
+    slow_below = _number(mission.settings.get("LAND_ALT_LOW"), 1000.0) / 100
+    low = np.flatnonzero((t >= leave_s) & (height <= slow_below))
+    slow_s = float(t[low[0]])
+    if height.max() > slow_below + 1.0:
+        phases["descent"] = Phase(leave_s, slow_s)
+    phases["touchdown"] = Phase(slow_s, mission.end_s)
+    return phases
+
+
+def _number(value: float | str | None, default: float) -> float:
+    return float(value) if isinstance(value, (int, float)) else default

@@ -1,0 +1,196 @@
+"""Log + schema -> Run: cuts the mission out, reads the configuration as driven, and runs the extractors.
+
+Everything a profile asks of a log is merged into one reading plan, so the log is decoded once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+from care_core.errors import ProfileError, UsageError, nearest
+from care_core.extract import ardupilot, navigation  # registers the extractors and mission kinds
+from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
+from care_core.extract.settings import configuration, in_force
+from care_core.logs import log_digest
+from care_core.logs.base import Log
+from care_core.profile.schema import Schema
+from care_core.run import Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
+from care_core.variables import Role, Variable
+
+__all__ = ["ardupilot", "navigation", "read_run", "read_runs"]
+
+
+def read_run(
+    log: Log,
+    schema: Schema,
+    *,
+    overrides: Mapping[str, Setting] | None = None,
+    mission: int | None = None,
+    judge_anyway: Collection[str] = (),
+) -> Run:
+    """Read one mission of a log: the last one, or number `mission` (from 1).
+
+    `overrides` are settings of configuration files, used only for options that the log does not hold.
+    `judge_anyway` names objectives that the operator gave thresholds for: they are judged even where the mission
+    is not the one that the profile's thresholds belong to.
+
+    Raises:
+        ProfileError: the profile reads no logs, or the log holds no mission of its kind.
+        UsageError: there is no mission of that number.
+    """
+    source = _Source.read(log, schema)
+    count = len(source.missions)
+    if mission is not None and not 1 <= mission <= count:
+        held = "holds one mission" if count == 1 else f"holds missions 1 to {count}"
+        raise UsageError(f"There is no mission {mission}: the log {held}.", hint="Name one of them.", where="--mission")
+    return source.run((mission or count) - 1, overrides or {}, judge_anyway)
+
+
+def read_runs(log: Log, schema: Schema) -> tuple[Run, ...]:
+    """Read every mission of a log, in time order. Raises as `read_run` does."""
+    source = _Source.read(log, schema)
+    return tuple(source.run(index, {}, ()) for index in range(len(source.missions)))
+
+
+def mission_kind(schema: Schema) -> MissionKind:
+    """How this profile finds missions. Raises ProfileError when it does not say, or names no known kind."""
+    kind = schema.mission.get("kind")
+    if not schema.logs or kind is None:
+        raise ProfileError(
+            f"Profile '{schema.name}' describes a table of runs and reads no logs.",
+            hint="Name the profile of the robot with --profile.",
+            where=schema.name,
+        )
+    if kind not in MISSION_KINDS:
+        raise ProfileError(f"There is no mission kind '{kind}'.", hint=nearest(str(kind), MISSION_KINDS))
+    return MISSION_KINDS[str(kind)]
+
+
+def reading_plan(schema: Schema) -> dict[str, tuple[str, ...]]:
+    """The channels and fields that a profile reads from a log."""
+    needs = [mission_kind(schema).needs(schema.mission)]
+    for variable in schema.variables.values():
+        if variable.extract is not None:
+            where = f"{schema.name}: {variable.name}"
+            needs.append(find_extractor(variable.extract.kind, where).needs(variable.extract.args))
+    return merge_needs(needs)
+
+
+def log_info(log: Log, sha256: str) -> LogInfo:
+    """The record of where a run came from."""
+    return LogInfo(
+        path=str(log.path),
+        format=log.format.value,
+        start=log.start,
+        duration_s=log.duration_s,
+        sha256=sha256,
+        damage=tuple(log.damage),
+        facts=dict(log.facts),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Source:
+    """A log read once by a profile's plan, and the missions found in it."""
+
+    schema: Schema
+    kind: MissionKind
+    log: LogInfo
+    settings: Mapping[str, tuple[Setting, ...]]
+    missions: tuple[Mission, ...]
+
+    @classmethod
+    def read(cls, log: Log, schema: Schema) -> _Source:
+        kind = mission_kind(schema)
+        plan = reading_plan(schema)
+        # Hashing leaves the interpreter lock, so it costs nothing beside decoding.
+        with ThreadPoolExecutor(max_workers=1) as pool:
+            digest = pool.submit(log_digest, log.path)
+            tables = log.read(plan)
+            settings = log.settings()
+            sha256 = digest.result()
+        missions = kind.missions(tables, log.duration_s, schema.mission)
+        if not missions:
+            raise ProfileError(
+                f"The log holds no mission that profile '{schema.name}' can read.",
+                hint="Look at what was recorded with 'care inspect'.",
+                where=str(log.path),
+            )
+        return cls(schema, kind, log_info(log, sha256), settings, missions)
+
+    def run(self, index: int, overrides: Mapping[str, Setting], judge_anyway: Collection[str]) -> Run:
+        found = self.missions[index]
+        driven = {name: in_force(history, found.end_s) for name, history in self.settings.items()}
+        config, settings = configuration(self.schema.options, driven, overrides)
+        mission = replace(found, settings={name: setting.value for name, setting in driven.items()})
+        mismatch = self.kind.mismatch(mission)
+        objectives = self._values(Role.OBJECTIVE, mission)
+        return Run(
+            config=config,
+            context=self._values(Role.CONTEXT, mission),
+            metrics=self._values(Role.METRIC, mission),
+            objectives=_gated(self.schema, objectives, mission.ended, mismatch, judge_anyway),
+            settings=settings,
+            log=self.log,
+            mission=MissionInfo(
+                index=index + 1,
+                count=len(self.missions),
+                start_s=mission.start_s,
+                end_s=mission.end_s,
+                ended=mission.ended,
+                fits=not mismatch,
+                mismatch=mismatch,
+            ),
+            evidence=tuple(_pointed(evidence, self.schema) for evidence in self.kind.evidence(mission)),
+        )
+
+    def _values(self, role: Role, mission: Mission) -> dict[str, Value]:
+        return {variable.name: _extract(variable, mission) for variable in self.schema.of(role)}
+
+
+def _extract(variable: Variable, mission: Mission) -> Value:
+    if variable.extract is None:
+        return Unavailable("the profile does not say how to read it from a log", f"add 'extract' to {variable.name}")
+    return find_extractor(variable.extract.kind).compute(mission, variable.extract.args)
+
+
+def _pointed(evidence: Evidence, schema: Schema) -> Evidence:
+    """The evidence with the options that the profile's rules add to those the extractor named."""
+    text = evidence.text.casefold()
+    named = [option for rule, options in schema.evidence if rule.casefold() in text for option in options]
+    return replace(evidence, options=tuple(dict.fromkeys((*evidence.options, *named))))
+
+
+def _gated(
+    schema: Schema, objectives: Mapping[str, Value], ended: bool, mismatch: str, judge_anyway: Collection[str]
+) -> dict[str, Value]:
+    """Objectives with those withheld whose value means nothing for this mission."""
+    if not ended:
+        cut = Unavailable("the log ends before the mission does", "record until the mission has ended")
+        return {name: value if isinstance(value, Unavailable) else cut for name, value in objectives.items()}
+    withheld: Unavailable | None = None
+    if not _accomplished(schema, objectives):
+        withheld = Unavailable("mission was not accomplished, so its value means nothing", "repair the mission first")
+    gated = dict(objectives)
+    for objective in schema.objectives:
+        value = objectives[objective.name]
+        if objective.kind == "functional" or isinstance(value, Unavailable):
+            continue
+        if withheld is not None:
+            gated[objective.name] = withheld
+        elif mismatch and objective.name not in judge_anyway:
+            hint = f"give this mission's bound with --threshold {objective.name}=VALUE"
+            gated[objective.name] = Unavailable(mismatch, hint)
+    return gated
+
+
+def _accomplished(schema: Schema, objectives: Mapping[str, Value]) -> bool:
+    for objective in schema.objectives:
+        if objective.kind != "functional":
+            continue
+        value = objectives[objective.name]
+        if not is_known(value) or (objective.threshold is not None and not objective.threshold.met(value)):
+            return False
+    return True

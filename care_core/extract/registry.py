@@ -1,0 +1,126 @@
+"""The extractor library's frame: a profile names an extractor, the registry finds it and says what it needs.
+
+An extractor is a pure function of one mission and its arguments. It answers a number or `Unavailable`; it
+never raises on poor data. New platforms are YAML files that combine these, not code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from care_core.errors import ProfileError, nearest
+from care_core.logs.base import Table, Wanted
+from care_core.run import Evidence, Unavailable, Value
+
+Args = Mapping[str, Any]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mission:
+    """One mission cut out of a log: what extractors see.
+
+    `tables` hold the decoded channels of the whole log (times in seconds from its start); `start_s` and `end_s`
+    bound the mission in it. `spec` is the profile's `mission` section (its goals or waypoints). `cache` lets
+    extractors share an analysis of the same mission, see `shared`.
+    """
+
+    tables: Mapping[str, Table]
+    start_s: float
+    end_s: float
+    ended: bool
+    spec: Mapping[str, Any]
+    settings: Mapping[str, float | str] = field(default_factory=dict)
+    """Parameters as driven in this mission, by their name in the log."""
+    cache: dict[Any, Any] = field(default_factory=dict)
+
+    def table(self, channel: str) -> Table | None:
+        """The messages of a channel inside the mission, None when the log lacks the channel."""
+        table = self.tables.get(channel)
+        return None if table is None else table.between(self.start_s, self.end_s)
+
+    def shared(self, analysis: Callable[[Mission], T]) -> T:
+        """`analysis(self)`, computed once per mission."""
+        if analysis not in self.cache:
+            self.cache[analysis] = analysis(self)
+        answer: T = self.cache[analysis]
+        return answer
+
+
+Compute = Callable[[Mission, Args], Value]
+
+
+@dataclass(frozen=True, slots=True)
+class Extractor:
+    """A named extractor: the channels and fields it reads (`needs`), its unit, its arguments with their meaning."""
+
+    name: str
+    compute: Compute
+    needs: Callable[[Args], Wanted]
+    unit: str
+    doc: str
+    args: Mapping[str, str] = field(default_factory=dict)
+
+
+class MissionKind:
+    """How missions are found in a log, one subclass an ecosystem (see `ardupilot` and `navigation`)."""
+
+    name: str
+    args: Mapping[str, str]
+
+    def needs(self, spec: Args) -> Wanted:
+        """The channels and fields that `missions`, `fit` and `evidence` read."""
+        raise NotImplementedError
+
+    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
+        """Every mission of the log, in time order; empty when the log holds none."""
+        raise NotImplementedError
+
+    def mismatch(self, mission: Mission) -> str:
+        """Why this is not the mission that the profile's thresholds belong to, one sentence; '' when it is."""
+        raise NotImplementedError
+
+    def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
+        """Messages that speak about a failure of this mission, in time order."""
+        raise NotImplementedError
+
+
+EXTRACTORS: dict[str, Extractor] = {}
+MISSION_KINDS: dict[str, MissionKind] = {}
+
+
+def extractor(
+    name: str, *, needs: Wanted | Callable[[Args], Wanted], unit: str, args: Mapping[str, str] | None = None
+) -> Callable[[Compute], Compute]:
+    """Register a function as the extractor `name`; its docstring becomes the documentation."""
+
+    def register(compute: Compute) -> Compute:
+        find_needs = needs if callable(needs) else lambda _args: needs
+        doc = " ".join((compute.__doc__ or "").split())
+        EXTRACTORS[name] = Extractor(name, compute, find_needs, unit, doc, args or {})
+        return compute
+
+    return register
+
+
+def find_extractor(kind: str, where: str = "") -> Extractor:
+    """The extractor of that name; raises ProfileError that names the nearest one."""
+    if kind not in EXTRACTORS:
+        raise ProfileError(f"There is no extractor '{kind}'.", hint=nearest(kind, EXTRACTORS), where=where)
+    return EXTRACTORS[kind]
+
+
+def merge_needs(parts: Iterable[Wanted]) -> dict[str, tuple[str, ...]]:
+    """One reading plan out of many: per channel the union of the fields, in order of first mention."""
+    plan: dict[str, dict[str, None]] = {}
+    for part in parts:
+        for channel, fields in part.items():
+            plan.setdefault(channel, {}).update(dict.fromkeys(fields))
+    return {channel: tuple(fields) for channel, fields in plan.items()}
+
+
+def missing(channel: str, hint: str = "") -> Unavailable:
+    """The answer of an extractor whose channel is not in the log."""
+    return Unavailable(f"no {channel} in the log", hint or f"record {channel}")

@@ -1,0 +1,117 @@
+"""Model -> MODEL_CARD.md: what the profile was learned from, how well it predicts, and what it cannot say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from care_core.profile.model import Model
+from care_core.profile.schema import Schema
+
+TOP = 10
+OBJECTIVE_WORDS = {"all": "all objectives together"}
+
+
+def model_card(schema: Schema, model: Model) -> str:
+    """The card as Markdown. Same model, same card."""
+    parts = [
+        f"# Model card: {schema.name}",
+        f"{schema.platform}. {schema.doc}".strip(),
+        _data(schema, model),
+        _graph(model),
+        _paths(model),
+        _skill(model),
+        _effects(model),
+        _support(schema, model),
+        _limits(schema, model),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+def _data(schema: Schema, model: Model) -> str:
+    t = model.training
+    how = "Options were chosen by operators (observational)" if schema.observational else "Options were set at random"
+    return (
+        f"## Data\n\nOrigin: {t.origin}\n\n{t.runs} runs. {how}. Seed {t.seed}, alpha {t.alpha:g}, "
+        f"{t.resamples} bootstrap resamples. Trained with `care train`."
+    )
+
+
+def _graph(model: Model) -> str:
+    strong = sum(e.support >= 0.8 for e in model.edges.values())
+    text = (
+        f"## Graph\n\n{len(model.graph.nodes)} nodes, {len(model.edges)} directed edges "
+        f"({strong} found in at least 80 % of resamples), {len(model.bidirected)} confounded pairs."
+    )
+    if model.training.screened_out:
+        text += f"\n\nOptions that nothing was found to depend on: {', '.join(model.training.screened_out)}."
+    if model.training.direct_edges:
+        rows = ((a, b, f"{p:.2g}") for a, b, p in model.training.direct_edges)
+        text += (
+            "\n\nEffects that the metrics do not carry in full, kept as direct edges:\n\n"
+            + _table(("option", "objective", "p"), rows)
+        )
+    return text
+
+
+def _paths(model: Model) -> str:
+    rows = [
+        (objective, str(rank), " -> ".join(path.nodes), f"{path.ace:.2f} ({path.low:.2f} to {path.high:.2f})")
+        for objective, paths in model.paths.items()
+        for rank, path in enumerate(paths[:TOP], start=1)
+    ]
+    header = ("objective", "rank", "path", "path ACE (90 % interval)")
+    return "## Strongest paths\n\nMean edge effect on scaled variables (Eq. 2).\n\n" + _table(header, rows)
+
+
+def _skill(model: Model) -> str:
+    rows = [
+        (
+            OBJECTIVE_WORDS.get(name, name),
+            f"{s['runs']:.0f}",
+            f"{s.get('base_rate', 0):.2f}",
+            f"{s.get('log_loss', 0):.3f}",
+            f"{s.get('auc', 0):.3f}",
+            f"{s.get('calibration_error', 0):.3f}",
+        )
+        for name, s in model.skill.items()
+        if s["runs"]
+    ]
+    header = ("odds of keeping the threshold of", "runs", "met", "log loss", "AUC", "calibration error")
+    return "## Skill on runs it has not seen (cross-validation)\n\n" + _table(header, rows)
+
+
+def _effects(model: Model) -> str:
+    ranked = sorted(model.effects.values(), key=lambda e: (e.objective, -e.effect))
+    rows = []
+    for objective in dict.fromkeys(e.objective for e in ranked):
+        for e in [e for e in ranked if e.objective == objective][:TOP]:
+            known = "yes" if e.identified else "no: not ranked"
+            rows.append((objective, e.option, f"{e.effect:.2f} ({e.low:.2f} to {e.high:.2f})", e.direction, known))
+    header = ("objective", "option", "effect (90 % interval)", "direction", "identified")
+    return "## Total effects\n\nEq. 1 on scaled variables.\n\n" + _table(header, rows)
+
+
+def _support(schema: Schema, model: Model) -> str:
+    rows = [
+        (o.name, f"{s.low:g} to {s.high:g}", "" if o.range is None else f"{o.range[0]:g} to {o.range[1]:g}", o.unit)
+        for o in schema.options
+        if (s := model.summaries.get(o.name)) is not None
+    ]
+    return "## Support\n\n" + _table(("option", "in the training runs", "acceptable", "unit"), rows)
+
+
+def _limits(schema: Schema, model: Model) -> str:
+    lines = [
+        "Holds for this platform, this mission and the ranges above; outside them a diagnosis says so.",
+        "An effect says what changing an option does on average, not that it caused every fault.",
+    ]
+    unpredicted = [o.name for o in schema.objectives if o.name not in model.outcomes]
+    if unpredicted:
+        lines.append(f"No option was found to move: {', '.join(unpredicted)}. Their faults are never explained.")
+    lines += list(model.training.notes)
+    return "## Limits\n\n" + "\n".join(f"- {line}" for line in lines)

@@ -1,0 +1,68 @@
+"""What a schema rules out before any data is seen, each rule with its reason (paper, section III-A)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from care_core.profile.schema import Schema
+from care_core.variables import Role
+
+O, C, M, Y = Role.OPTION, Role.CONTEXT, Role.METRIC, Role.OBJECTIVE  # noqa: E741
+
+_SET_BEFORE = "it is set before the mission, so nothing in the mission can cause it"
+_MET = "a context is met, not made: nothing in the model causes it"
+_NOT_FROM_RESULT = "an objective judges the mission and causes nothing but other objectives"
+
+ALWAYS: Mapping[tuple[Role, Role], str] = {
+    (O, O): "options are set independently of each other",
+    (M, O): _SET_BEFORE,
+    (Y, O): _SET_BEFORE,
+    (O, C): _MET,
+    (C, C): _MET,
+    (M, C): _MET,
+    (Y, C): _MET,
+    (Y, M): _NOT_FROM_RESULT,
+    (O, Y): "an option acts on an objective through metrics (Problem 2.1); what remains is tested apart",
+}
+RANDOMISED: Mapping[tuple[Role, Role], str] = {
+    (C, O): "options were drawn without regard to the context",
+}
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """The rules of one schema, by role."""
+
+    roles: Mapping[str, Role]
+    observational: bool = False
+
+    @classmethod
+    def of(cls, schema: Schema) -> Constraints:
+        return cls({name: variable.role for name, variable in schema.variables.items()}, schema.observational)
+
+    def reason(self, cause: str, effect: str) -> str | None:
+        """Why the directed edge cannot be, None where it can."""
+        pair = (self.roles[cause], self.roles[effect])
+        return ALWAYS.get(pair) or (None if self.observational else RANDOMISED.get(pair))
+
+    def forbids(self, cause: str, effect: str) -> bool:
+        """Whether the directed edge cannot be."""
+        return self.reason(cause, effect) is not None
+
+    def separates(self, a: str, b: str) -> bool:
+        """Whether no edge of any kind may join the pair.
+
+        In an observational table an option may share a hidden cause with an objective (an operator who saw trouble
+        coming), so such a pair stays open to a bidirected edge.
+        """
+        if self.observational and {self.roles[a], self.roles[b]} == {O, Y}:
+            return False
+        return self.forbids(a, b) and self.forbids(b, a)
+
+    def is_exogenous(self, name: str) -> bool:
+        """Whether nothing, seen or hidden, drives the variable together with what follows it.
+
+        True for options drawn at random and for contexts; in an observational table for contexts only.
+        """
+        return self.roles[name] is C or (self.roles[name] is O and not self.observational)

@@ -1,0 +1,160 @@
+"""Fitting mechanisms: Gaussian processes whose input relevances are learned under a sparse prior.
+
+Marginal likelihood (Rasmussen and Williams 2006, Eq. 5.8) with a log-Cauchy-like penalty on every relevance, so
+an input that explains nothing ends near zero and costs nothing, which is what makes few missions suffice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_solve
+from scipy.optimize import minimize
+
+from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism, Transform, transformed
+from care_core.errors import LearningError
+
+MAX_POINTS = 600
+"""Training rows a mechanism keeps; more are thinned at random (a kernel over n rows costs n^2 memory)."""
+ITERATIONS = 60
+RELEVANCE_SCALE = 0.1
+"""Relevance below which an input counts as unused in the penalty."""
+RESIDUAL_LEVELS = 101
+MIN_ROWS = 20
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What a mechanism may depend on: names, and which of them act as ratios."""
+
+    names: tuple[str, ...]
+    log: NDArray[np.bool_]
+
+
+def fit_mechanism(
+    x: FloatArray, y: FloatArray, inputs: Inputs, *, binary: bool, rng: np.random.Generator, iterations: int = ITERATIONS
+) -> Mechanism:
+    """Fit one mechanism.
+
+    Args:
+        x: shape (n, p), inputs in their own units. y: shape (n,), 0 or 1 when `binary`. No NaN.
+        rng: only used to thin tables of more than `MAX_POINTS` rows.
+
+    Raises:
+        LearningError: too few rows.
+    """
+    if len(y) < MIN_ROWS:
+        raise LearningError(f"A mechanism needs {MIN_ROWS} runs, the table has {len(y)}.", hint="Record more missions.")
+    if len(y) > MAX_POINTS:
+        keep = np.sort(rng.choice(len(y), MAX_POINTS, replace=False))
+        x, y = x[keep], y[keep]
+    transform: Transform = "identity" if binary else best_transform(y)
+    coded = 2.0 * y - 1.0 if binary else transformed(y, transform)
+    raw = np.where(inputs.log, np.log(np.where(inputs.log, np.maximum(x, 1e-12), 1.0)), x)
+    centre, spread = raw.mean(axis=0), raw.std(axis=0)
+    spread = np.where(spread > 0, spread, 1.0)
+    points = ((raw - centre) / spread).astype(np.float32).astype(float)
+    mean, scale = float(coded.mean()), float(coded.std()) or 1.0
+    targets = ((coded - mean) / scale).astype(np.float32).astype(float)
+    kernel = _fit_kernel(points, targets, iterations)
+    errors, spreads = _leave_one_out(kernel, points, targets)
+    calibration = _logistic(mean + scale * (targets - errors), y) if binary else _residual_levels(errors / spreads)
+    return Mechanism(
+        inputs.names, inputs.log, centre, spread, kernel, points, targets, mean, scale, transform, binary, calibration
+    )
+
+
+def best_transform(y: FloatArray) -> Transform:
+    """The scale on which the target is least skewed: times and energies act as ratios, counts have heavy tails."""
+    choices: list[Transform] = ["identity"]
+    if (y > 0).all():
+        choices.append("log")
+    if (y >= 0).all():
+        choices.append("log1p")
+    return min(choices, key=lambda choice: abs(_skewness(transformed(y, choice))))
+
+
+def _skewness(values: FloatArray) -> float:
+    spread = values.std()
+    return 0.0 if spread == 0 else float((((values - values.mean()) / spread) ** 3).mean())
+
+
+def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int) -> Kernel:
+    n, p = points.shape
+    if p == 0 or np.ptp(targets) == 0:
+        return Kernel(np.zeros(p), 0.0, 0.0, 1.0)
+    squared = (points[:, None, :] - points[None, :, :]) ** 2
+    start = np.r_[np.full(p, np.log(0.3)), 0.0, 0.0, np.log(0.5)]
+    bounds = [(-6.0, 2.0)] * p + [(-4.0, 3.0)] * 2 + [(-4.0, 1.0)]
+    best = minimize(
+        _negative_log_posterior,
+        start,
+        args=(squared, targets),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=bounds,
+        options={"maxiter": iterations},
+    )
+    theta = np.exp(best.x)
+    return Kernel(theta[:p], float(theta[p]), float(theta[p + 1]), float(theta[p + 2]))
+
+
+def _negative_log_posterior(log_theta: FloatArray, squared: FloatArray, targets: FloatArray) -> tuple[float, FloatArray]:
+    """Value and gradient with respect to the logarithms of (relevances, additive, joint, noise)."""
+    n, p = len(targets), squared.shape[2]
+    relevance, (additive, joint, noise) = np.exp(log_theta[:p]), np.exp(log_theta[p:])
+    weighted = squared * relevance**2
+    each = np.exp(-0.5 * weighted)
+    together = np.exp(-0.5 * weighted.sum(axis=2))
+    mean_each = each.mean(axis=2)
+    covariance = additive**2 * mean_each + joint**2 * together + np.eye(n) * (noise**2 + JITTER)
+    try:
+        chol = np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        return 1e10, np.zeros_like(log_theta)
+    inverse = cho_solve((chol, True), np.eye(n))
+    alpha = inverse @ targets
+    value = 0.5 * targets @ alpha + np.log(np.diag(chol)).sum()
+    sensitivity = 0.5 * (inverse - np.outer(alpha, alpha))
+    pull = np.einsum("ij,ijk->k", sensitivity * joint**2 * together, weighted)
+    pull += np.einsum("ij,ijk,ijk->k", sensitivity * additive**2 / p, weighted, each)
+    ratio = (relevance / RELEVANCE_SCALE) ** 2
+    gradient = np.r_[
+        -pull + 2 * ratio / (1 + ratio),
+        2 * (sensitivity * additive**2 * mean_each).sum(),
+        2 * (sensitivity * joint**2 * together).sum(),
+        2 * noise**2 * np.trace(sensitivity),
+    ]
+    return float(value + np.log1p(ratio).sum()), gradient
+
+
+def _leave_one_out(kernel: Kernel, points: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Leave-one-out errors and their predicted spreads (Rasmussen and Williams 2006, Eq. 5.12)."""
+    covariance = kernel(points, points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
+    inverse = np.linalg.inv(covariance)
+    diagonal = np.diag(inverse)
+    return (inverse @ targets) / diagonal, 1.0 / np.sqrt(diagonal)
+
+
+def _residual_levels(standardised: FloatArray) -> FloatArray:
+    levels: FloatArray = np.quantile(standardised, (np.arange(RESIDUAL_LEVELS) + 0.5) / RESIDUAL_LEVELS)
+    return levels
+
+
+def _logistic(score: FloatArray, y: FloatArray) -> FloatArray:
+    """Platt's calibration of leave-one-out scores: (slope, offset), slope never negative, targets smoothed."""
+    positive, negative = y.sum(), len(y) - y.sum()
+    smoothed = np.where(y > 0.5, (positive + 1) / (positive + 2), 1 / (negative + 2))
+
+    def loss(theta: FloatArray) -> tuple[float, FloatArray]:
+        logit = theta[0] * score + theta[1]
+        probability = 1 / (1 + np.exp(-logit))
+        value = np.logaddexp(0, logit).sum() - (smoothed * logit).sum()
+        difference = probability - smoothed
+        return float(value), np.array([(difference * score).sum(), difference.sum()])
+
+    best = minimize(loss, np.array([1.0, 0.0]), jac=True, method="L-BFGS-B", bounds=[(0, 20), (-10, 10)])
+    calibration: FloatArray = best.x
+    return calibration

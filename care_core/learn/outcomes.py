@@ -1,0 +1,180 @@
+"""Runs table + graph -> how each objective is predicted from the options that cause it.
+
+A functional objective is taken apart into stages, the binary metrics that end a mission when they go wrong (a refused
+arming, a failsafe): each is learned on the missions that reached it, so a mission that never flew still teaches what
+refuses arming and does not blur what makes a flight fail. A non-functional objective is learned on the missions in
+which it exists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from care_core.causal.graph import CausalGraph
+from care_core.causal.mechanisms import FloatArray, Mechanism
+from care_core.learn.fitting import MIN_ROWS, Inputs, fit_mechanism
+from care_core.profile.model import OutcomeRecord, StageRecord
+from care_core.profile.schema import Schema
+from care_core.variables import Role, Variable
+
+MIN_CLASS = 5
+"""Missions each way that a stage needs: with fewer there is nothing to learn about who fails it."""
+MOVES_TOGETHER = 0.9
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage as found in the table. `reached` and `passed` have shape (n,); the latter counts only where reached."""
+
+    variable: str
+    passes: float
+    reached: NDArray[np.bool_]
+    passed: NDArray[np.bool_]
+
+
+def causes_of(name: str, graph: CausalGraph, schema: Schema) -> tuple[str, ...]:
+    """The exogenous variables that a mechanism for `name` reads: its option ancestors, and the contexts among its
+    ancestors where options were chosen by what the run met (they are the adjustment)."""
+    ancestors = graph.ancestors(name)
+    roles = (Role.OPTION, Role.CONTEXT) if schema.observational else (Role.OPTION,)
+    return tuple(v.name for v in schema.variables.values() if v.role in roles and v.name in ancestors)
+
+
+def inputs_of(names: Sequence[str], schema: Schema) -> Inputs:
+    return Inputs(tuple(names), np.array([schema.variables[name].is_log_scaled for name in names], dtype=bool))
+
+
+def met(objective: Variable, frame: pd.DataFrame) -> FloatArray:
+    """1 where the objective keeps its threshold, 0 where not, NaN where it has no value; shape (n,)."""
+    values = frame[objective.name].to_numpy(dtype=float)
+    bound = objective.threshold
+    kept = np.array([np.nan if np.isnan(v) else float(bound.met(v)) if bound else 1.0 for v in values])
+    return kept
+
+
+def find_stages(objective: Variable, schema: Schema, frame: pd.DataFrame) -> tuple[Stage, ...]:
+    """The conditions on the way to a functional objective, in the order the profile declares them.
+
+    A binary metric is a stage when every mission on its rarer-success side misses the objective. What the metrics
+    leave unexplained is a last stage, the objective itself.
+    """
+    success = met(objective, frame)
+    reached = ~np.isnan(success)
+    stages: list[Stage] = []
+    for metric in schema.metrics:
+        found = _stage(metric, frame, success, reached)
+        if found is not None:
+            stages.append(found)
+            reached = reached & found.passed
+    last = Stage(objective.name, 1.0, reached, reached & (success == 1.0))
+    if _both_ways(last):
+        stages.append(last)
+    return tuple(stages)
+
+
+def _stage(metric: Variable, frame: pd.DataFrame, success: FloatArray, reached: NDArray[np.bool_]) -> Stage | None:
+    if metric.type != "bool":
+        return None
+    values = frame[metric.name].to_numpy(dtype=float)
+    here = reached & ~np.isnan(values)
+    for passes in (0.0, 1.0):
+        stage = Stage(metric.name, passes, here, here & (values == passes))
+        failed = here & (values != passes)
+        if _both_ways(stage) and not (success[failed] == 1.0).any():
+            # A mission without the metric's value is not stopped by it.
+            return Stage(metric.name, passes, here, reached & ~failed)
+    return None
+
+
+def _both_ways(stage: Stage) -> bool:
+    passed = int((stage.reached & stage.passed).sum())
+    return passed >= MIN_CLASS and int(stage.reached.sum()) - passed >= MIN_CLASS
+
+
+def fit_outcomes(
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, iterations: int
+) -> tuple[dict[str, OutcomeRecord], dict[str, Mechanism]]:
+    """Mechanisms of every objective that the graph gives a cause and the table gives values."""
+    outcomes: dict[str, OutcomeRecord] = {}
+    mechanisms: dict[str, Mechanism] = {}
+    for objective in schema.objectives:
+        if objective.kind == "functional":
+            fitted = _fit_functional(objective, frame, schema, graph, rng, iterations)
+        else:
+            fitted = _fit_continuous(objective, frame, schema, graph, rng, iterations)
+        if fitted is not None:
+            outcomes[objective.name], found = fitted
+            mechanisms.update(found)
+    return outcomes, mechanisms
+
+
+Fitted = tuple[OutcomeRecord, dict[str, Mechanism]]
+
+
+def _fit_functional(
+    objective: Variable, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, iterations: int
+) -> Fitted | None:
+    records, mechanisms = [], {}
+    for stage in find_stages(objective, schema, frame):
+        names = causes_of(stage.variable, graph, schema)
+        if not names:
+            continue
+        key = f"stage:{stage.variable}"
+        x = frame.loc[stage.reached, list(names)].to_numpy(dtype=float)
+        one = stage.passed if stage.passes == 1.0 else ~stage.passed
+        y = one[stage.reached].astype(float)
+        mechanisms[key] = fit_mechanism(x, y, inputs_of(names, schema), binary=True, rng=rng, iterations=iterations)
+        records.append(StageRecord(variable=stage.variable, passes=stage.passes, mechanism=key))
+    return (OutcomeRecord(objective=objective.name, stages=tuple(records)), mechanisms) if records else None
+
+
+def _fit_continuous(
+    objective: Variable, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, iterations: int
+) -> Fitted | None:
+    mechanism = fit_total(objective.name, frame, schema, graph, rng, iterations=iterations)
+    if mechanism is None:
+        return None
+    return OutcomeRecord(objective=objective.name, mechanism=objective.name), {objective.name: mechanism}
+
+
+def fit_total(
+    name: str, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, iterations: int
+) -> Mechanism | None:
+    """The variable as a function of the exogenous variables that cause it; None where it has no cause or no values."""
+    names = causes_of(name, graph, schema)
+    return fit_on(names, name, frame, schema, rng, iterations=iterations) if names else None
+
+
+def fit_on(
+    names: Sequence[str], target: str, frame: pd.DataFrame, schema: Schema, rng: np.random.Generator, *, iterations: int
+) -> Mechanism | None:
+    """The target as a function of `names`, on the runs that hold them all; None where too few runs do."""
+    known = frame[[*names, target]].dropna()
+    if len(known) < MIN_ROWS or known[target].nunique() < 2:
+        return None
+    y = known[target].to_numpy(dtype=float)
+    binary = set(np.unique(y)) <= {0.0, 1.0}
+    x = known[list(names)].to_numpy(dtype=float)
+    return fit_mechanism(x, y, inputs_of(names, schema), binary=binary, rng=rng, iterations=iterations)
+
+
+def groups_that_move_together(schema: Schema, frame: pd.DataFrame) -> tuple[tuple[str, ...], ...]:
+    """Non-functional objectives whose rank correlation over the runs exceeds 0.9."""
+    names = [v.name for v in schema.objectives if v.kind == "non-functional"]
+    if len(names) < 2:
+        return ()
+    # Ranks by pandas, so that Spearman's correlation needs no further library.
+    correlation: Mapping[str, Mapping[str, float]] = frame[names].rank().corr().to_dict()  # type: ignore[assignment]
+    groups: list[list[str]] = []
+    for name in names:
+        home = next((g for g in groups if all(abs(correlation[name][other]) > MOVES_TOGETHER for other in g)), None)
+        if home is None:
+            groups.append([name])
+        else:
+            home.append(name)
+    return tuple(tuple(group) for group in groups if len(group) > 1)

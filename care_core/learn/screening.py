@@ -1,0 +1,133 @@
+"""Options that nothing depends on are set aside before the graph search, at a controlled false discovery rate.
+
+The search grows steeply with the number of options, and a vehicle has hundreds to thousands of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy import stats
+
+from care_core.learn.table import FloatArray, normal_scores
+from care_core.profile.schema import Schema
+
+BINS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Screening:
+    """`p_values`: one row an option, one column a metric or objective. Constant options have p = 1."""
+
+    kept: tuple[str, ...]
+    dropped: tuple[str, ...]
+    p_values: pd.DataFrame
+
+
+def screen_options(frame: pd.DataFrame, schema: Schema, *, false_discovery_rate: float = 0.1) -> Screening:
+    """Test every option with every metric and objective, and keep the options with a discovery.
+
+    Args:
+        false_discovery_rate: expected share of null pairs among the discovered ones (Benjamini-Hochberg). The graph
+            search tests again at its own alpha, so this one errs on the side of keeping.
+    """
+    options = [v.name for v in schema.options]
+    targets = [v.name for v in (*schema.metrics, *schema.objectives)]
+    p = dependence(frame[options].to_numpy(float), frame[targets].to_numpy(float))
+    found = discoveries(p, false_discovery_rate).any(axis=1).tolist()
+    return Screening(
+        kept=tuple(name for name, hit in zip(options, found, strict=True) if hit),
+        dropped=tuple(name for name, hit in zip(options, found, strict=True) if not hit),
+        p_values=pd.DataFrame(p, index=options, columns=targets),
+    )
+
+
+def dependence(sources: FloatArray, targets: FloatArray) -> FloatArray:
+    """p-values of marginal independence of every source with every target.
+
+    Two tests on normal scores: correlation (sensitive to monotonic effects) and one-way analysis of variance over
+    up to `BINS` equally filled bins of the source (sensitive to an optimum inside); the smaller p-value, doubled.
+
+    Args:
+        sources: shape (n, k).
+        targets: shape (n, m). NaN in either leaves the row out of that pair.
+
+    Returns:
+        Shape (k, m).
+    """
+    x, y = normal_scores(sources), normal_scores(targets)
+    p = np.minimum(_correlation_p(x, y), _binned_p(x, y))
+    return np.asarray(np.minimum(2 * p, 1.0))
+
+
+def discoveries(p: FloatArray, rate: float) -> NDArray[np.bool_]:
+    """Benjamini-Hochberg: which of the p-values are discoveries at this false discovery rate. Any shape."""
+    ordered = np.sort(p, axis=None)
+    below = ordered <= rate * np.arange(1, ordered.size + 1) / max(ordered.size, 1)
+    cut = ordered[np.flatnonzero(below)[-1]] if below.any() else -1.0
+    return np.asarray(p <= cut)
+
+
+def pairwise_correlation(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Pearson correlation over the rows that both columns have, 0 where either is constant there.
+
+    Args:
+        x: shape (n, k), NaN for missing.
+        y: shape (n, m), likewise.
+
+    Returns:
+        Correlations and numbers of rows, both of shape (k, m).
+    """
+    has_x, has_y = np.isfinite(x).astype(float), np.isfinite(y).astype(float)
+    x, y = np.nan_to_num(x), np.nan_to_num(y)
+    n = has_x.T @ has_y
+    rows = np.maximum(n, 1.0)
+    sum_x, sum_y = x.T @ has_y, has_x.T @ y
+    var_x = (x**2).T @ has_y / rows - (sum_x / rows) ** 2
+    var_y = has_x.T @ (y**2) / rows - (sum_y / rows) ** 2
+    covariance = x.T @ y / rows - sum_x * sum_y / rows**2
+    varies = (var_x > 1e-9) & (var_y > 1e-9)
+    scale = np.sqrt(np.where(varies, var_x * var_y, 1.0))
+    return np.asarray(np.where(varies, np.clip(covariance / scale, -1.0, 1.0), 0.0)), np.asarray(n)
+
+
+def _correlation_p(x: FloatArray, y: FloatArray) -> FloatArray:
+    r, n = pairwise_correlation(x, y)
+    freedom = np.maximum(n - 2, 1)
+    t = np.abs(r) * np.sqrt(freedom / np.maximum(1 - r**2, 1e-12))
+    return np.asarray(np.where(n > 2, 2 * stats.t.sf(t, freedom), 1.0))
+
+
+def _binned_p(x: FloatArray, y: FloatArray) -> FloatArray:
+    """F-tests of the targets' means over the sources' bins, all pairs at once."""
+    has_y = np.isfinite(y).astype(float)
+    y = np.nan_to_num(y)
+    bins = _bin(x)
+    rows = np.zeros((x.shape[1], y.shape[1]))
+    total, squares, between = rows.copy(), rows.copy(), rows.copy()
+    groups = rows.copy()
+    for level in range(BINS):
+        member = (bins == level).astype(float)
+        count, sums = member.T @ has_y, member.T @ y
+        rows += count
+        total += sums
+        squares += member.T @ y**2
+        between += sums**2 / np.maximum(count, 1)
+        groups += count > 0
+    correction = total**2 / np.maximum(rows, 1)
+    between, within = between - correction, squares - between
+    freedom = rows - groups
+    usable = (groups > 1) & (freedom > 0) & (squares - correction > 1e-9)
+    f = (between / np.maximum(groups - 1, 1)) / np.maximum(within / np.maximum(freedom, 1), 1e-12)
+    p = stats.f.sf(f, np.maximum(groups - 1, 1), np.maximum(freedom, 1))
+    return np.asarray(np.where(usable, p, 1.0))
+
+
+def _bin(x: FloatArray) -> NDArray[np.int64]:
+    """Bin numbers 0..BINS-1 of equal probability (equal values stay together), -1 for missing."""
+    # Normal scores are standardised, so the normal quantiles cut them into equally filled bins.
+    cuts = stats.norm.ppf(np.arange(1, BINS) / BINS)
+    return np.where(np.isfinite(x), np.searchsorted(cuts, np.nan_to_num(x)), -1)

@@ -1,0 +1,101 @@
+"""Does the model predict missions it has not seen? Cross-validated odds, and whether they can be believed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from care_core.causal.counterfactual import World
+from care_core.causal.graph import CausalGraph
+from care_core.causal.mechanisms import FloatArray
+from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
+from care_core.profile.model import Model, Training
+from care_core.profile.schema import Schema
+
+BINS = 10
+
+
+def cross_validated_skill(
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, folds: int, iterations: int
+) -> dict[str, dict[str, float]]:
+    """Per objective, and for `all` of them, skill of the odds on held-out runs; the graph is kept, mechanisms refitted."""
+    fold = rng.permutation(len(frame)) % folds
+    odds: dict[str, FloatArray] = {}
+    for k in range(folds):
+        held_out = fold == k
+        predicted = _odds(frame[~held_out], frame[held_out], schema, graph, rng, iterations)
+        for name, values in predicted.items():
+            odds.setdefault(name, np.full(len(frame), np.nan))[held_out] = values
+    truth: dict[str, FloatArray] = {objective.name: met(objective, frame) for objective in schema.objectives}
+    truth["all"] = np.all([np.nan_to_num(kept, nan=0.0) == 1.0 for kept in truth.values()], axis=0).astype(float)
+    return {name: score(odds[name], truth[name]) for name in odds}
+
+
+def _odds(
+    train: pd.DataFrame,
+    test: pd.DataFrame,
+    schema: Schema,
+    graph: CausalGraph,
+    rng: np.random.Generator,
+    iterations: int,
+) -> Mapping[str, FloatArray]:
+    outcomes, mechanisms = fit_outcomes(train, schema, graph, rng, iterations=iterations)
+    training = Training(
+        origin="", runs=len(train), seed=0, alpha=0.0, resamples=0,
+        moves_together=groups_that_move_together(schema, train),
+    )  # fmt: skip
+    model = Model(
+        schema_digest="", graph=graph, edges={}, bidirected=(), effects={}, paths={}, outcomes=outcomes, summaries={},
+        skill={}, training=training, mechanisms=mechanisms,
+    )  # fmt: skip
+    configs = [{str(k): float(v) for k, v in row.items()} for row in test.to_dict("records")]
+    bounds = {v.name: v.threshold for v in schema.objectives if v.threshold is not None and v.name in outcomes}
+    world = World(model, configs[0], {}, bounds)
+    odds = {name: world.predict(name, configs).p_ok for name in bounds}
+    odds["all"] = world.odds(configs)
+    return odds
+
+
+def score(odds: FloatArray, truth: FloatArray) -> dict[str, float]:
+    """Log loss, Brier score, AUC, calibration error and the base rate, over the runs that have a truth."""
+    known = np.isfinite(odds) & np.isfinite(truth)
+    p, y = odds[known], truth[known]
+    if not len(y):
+        return {"runs": 0.0}
+    clipped = np.clip(p, 1e-3, 1 - 1e-3)
+    return {
+        "runs": float(len(y)),
+        "base_rate": float(y.mean()),
+        "log_loss": float(-(y * np.log(clipped) + (1 - y) * np.log(1 - clipped)).mean()),
+        "brier": float(((p - y) ** 2).mean()),
+        "auc": _auc(p, y == 1.0),
+        "calibration_error": calibration_error(p, y),
+    }
+
+
+def _auc(p: FloatArray, positive: NDArray[np.bool_]) -> float:
+    """Share of (met, missed) pairs in which the met run had the higher odds; ties count half."""
+    if positive.all() or not positive.any():
+        return float("nan")
+    ranks = pd.Series(p).rank().to_numpy()
+    n = int(positive.sum())
+    return float((ranks[positive].sum() - n * (n + 1) / 2) / (n * (len(p) - n)))
+
+
+def reliability(p: FloatArray, y: FloatArray) -> list[tuple[float, float, int]]:
+    """Rows of (mean predicted odds, share that was met, runs), one a tenth of the odds that holds any."""
+    tenth = np.minimum((p * BINS).astype(int), BINS - 1)
+    return [
+        (float(p[tenth == k].mean()), float(y[tenth == k].mean()), int((tenth == k).sum()))
+        for k in range(BINS)
+        if (tenth == k).any()
+    ]
+
+
+def calibration_error(p: FloatArray, y: FloatArray) -> float:
+    """Expected calibration error over tenths of the predicted odds."""
+    rows = reliability(p, y)
+    return sum(abs(predicted - seen) * count for predicted, seen, count in rows) / len(p)

@@ -1,0 +1,247 @@
+"""Runs table + schema -> the learned half of a profile (paper, Alg. 1; effects by Eq. 1, paths by Eq. 2)."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from care_core.causal.effects import Effect, acceptable_values, average_causal_effect
+from care_core.causal.graph import CausalGraph
+from care_core.causal.mechanisms import FloatArray, Mechanism
+from care_core.causal.paths import CausalPath, rank_paths
+from care_core.learn.bootstrap import edge_support
+from care_core.learn.identification import identify
+from care_core.learn.outcomes import fit_on, fit_outcomes, fit_total, groups_that_move_together
+from care_core.learn.skill import cross_validated_skill
+from care_core.learn.structure import Structure, learn_structure
+from care_core.profile.model import EdgeRecord, EffectRecord, Model, OutcomeRecord, PathRecord, Summary, Training
+from care_core.profile.schema import Schema
+
+Edge = tuple[str, str]
+Progress = Callable[[str, float], None]
+
+BACKGROUND = 32
+"""Training runs over which an effect is averaged."""
+EFFECT_RESAMPLES = 20
+"""Bootstrap resamples behind the intervals of effects (mechanisms are refitted with their kernels kept)."""
+ITERATIONS = 60
+FOLDS = 5
+TOP_PATHS = 20
+QUANTILES = np.linspace(0, 1, 21)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What steers training. `n_jobs` processes share the bootstrap; the answer does not depend on them."""
+
+    seed: int = 0
+    alpha: float = 0.01
+    resamples: int = 50
+    n_jobs: int = 2
+    origin: str = "not stated"
+
+
+def train(frame: pd.DataFrame, schema: Schema, settings: Settings, progress: Progress | None = None) -> Model:
+    """Learn a profile's model from a table of runs (one row a mission, columns named as in the schema).
+
+    Raises:
+        LearningError: too few runs, or no option has an effect that the table can show.
+    """
+    report = progress or (lambda _step, _share: None)
+    rng = np.random.default_rng(settings.seed)
+    report("learning the graph", 0.0)
+    structure = learn_structure(frame, schema, alpha=settings.alpha, rng=rng)
+    report(f"bootstrapping the graph, {settings.resamples} resamples", 0.1)
+    support = edge_support(
+        frame, schema, resamples=settings.resamples, rng=rng, n_jobs=settings.n_jobs, alpha=settings.alpha
+    )
+    graph = structure.graph
+    report("fitting mechanisms", 0.4)
+    outcomes, mechanisms = fit_outcomes(frame, schema, graph, rng, iterations=ITERATIONS)
+    for metric in schema.metrics:
+        fitted = fit_total(metric.name, frame, schema, graph, rng, iterations=ITERATIONS)
+        if fitted is not None:
+            mechanisms[metric.name] = fitted
+    report("measuring effects", 0.6)
+    resamples = _Resamples.draw(len(frame), rng)
+    edges = _edge_effects(frame, schema, graph, rng, resamples)
+    report("cross-validating", 0.8)
+    skill = cross_validated_skill(frame, schema, graph, rng, folds=FOLDS, iterations=ITERATIONS)
+    return Model(
+        schema_digest=schema.digest,
+        graph=graph,
+        edges={edge: _edge_record(edge, "directed", support, edges) for edge in sorted(graph.directed)},
+        bidirected=tuple(_edge_record(edge, "bidirected", support, edges) for edge in sorted(graph.bidirected)),
+        effects=_total_effects(frame, schema, graph, outcomes, mechanisms, resamples),
+        paths=_paths(schema, graph, edges),
+        outcomes=outcomes,
+        summaries=_summaries(frame, schema),
+        skill=skill,
+        training=_training(frame, schema, structure, settings),
+        mechanisms=mechanisms,
+    )
+
+
+@dataclass(frozen=True)
+class _Resamples:
+    """Row numbers of each bootstrap resample, shape (EFFECT_RESAMPLES, n): the same for every mechanism."""
+
+    rows: FloatArray
+
+    @classmethod
+    def draw(cls, n: int, rng: np.random.Generator) -> _Resamples:
+        return cls(rng.integers(0, n, size=(EFFECT_RESAMPLES, n)))
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """Eq. 1 on the whole table, and its magnitude in each resample, shape (EFFECT_RESAMPLES,)."""
+
+    effect: Effect
+    resampled: FloatArray
+
+
+def _measure(name: str, mechanism: Mechanism, frame: pd.DataFrame, schema: Schema, resamples: _Resamples) -> _Measured:
+    """Eq. 1 of input `name` on the mechanism's target, averaged over a background of training runs."""
+    position = mechanism.inputs.index(name)
+    raw = frame[list(mechanism.inputs)].dropna()
+    step = max(1, len(raw) // BACKGROUND)
+    background = raw.to_numpy(dtype=float)[::step][:BACKGROUND]
+    values = acceptable_values(schema.variables[name], frame[name])
+    grid = np.repeat(background, len(values), axis=0)
+    grid[:, position] = np.tile(values, len(background))
+
+    def response(m: Mechanism) -> FloatArray:
+        answer = m.odds(grid) if m.binary else m.latent(grid)
+        mean: FloatArray = answer.reshape(len(background), len(values)).mean(axis=0)
+        return mean
+
+    spread = 0.5 * mechanism.scale if mechanism.binary else mechanism.scale
+    drawn = [average_causal_effect(response(_refitted(mechanism, rows)), spread).magnitude for rows in resamples.rows]
+    return _Measured(average_causal_effect(response(mechanism), spread), np.array(drawn))
+
+
+def _refitted(mechanism: Mechanism, rows: FloatArray) -> Mechanism:
+    """The mechanism on resampled training points, its kernel kept."""
+    chosen = (rows % len(mechanism.targets))[: len(mechanism.targets)]
+    return dataclasses.replace(mechanism, points=mechanism.points[chosen], targets=mechanism.targets[chosen])
+
+
+def _edge_effects(
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, resamples: _Resamples
+) -> dict[Edge, _Measured]:
+    """Direct effect of every directed edge: the child's mechanism over all its parents, the others held."""
+    effects: dict[Edge, _Measured] = {}
+    for child in graph.topological_order():
+        parents = sorted(graph.parents(child))
+        mechanism = fit_on(parents, child, frame, schema, rng, iterations=ITERATIONS) if parents else None
+        if mechanism is not None:
+            for parent in parents:
+                effects[parent, child] = _measure(parent, mechanism, frame, schema, resamples)
+    return effects
+
+
+def _edge_record(edge: Edge, kind: str, support: Mapping[Edge, float], effects: Mapping[Edge, _Measured]) -> EdgeRecord:
+    measured = effects.get(edge) if kind == "directed" else None
+    return EdgeRecord(
+        source=edge[0],
+        target=edge[1],
+        kind="directed" if kind == "directed" else "bidirected",
+        support=support.get(edge, 0.0),
+        effect=measured.effect.magnitude if measured else 0.0,
+        direction=measured.effect.direction if measured else "none",
+    )
+
+
+def _total_effects(
+    frame: pd.DataFrame,
+    schema: Schema,
+    graph: CausalGraph,
+    outcomes: Mapping[str, OutcomeRecord],
+    mechanisms: Mapping[str, Mechanism],
+    resamples: _Resamples,
+) -> dict[Edge, EffectRecord]:
+    """Every option with a directed path to an objective: is the effect identified, and how large is it?"""
+    records: dict[Edge, EffectRecord] = {}
+    for objective, outcome in outcomes.items():
+        keys = [stage.mechanism for stage in outcome.stages] or [outcome.mechanism]
+        for option in (v.name for v in schema.options if v.name in graph.ancestors(objective)):
+            answer = identify(graph, option, objective)
+            # A functional objective is as sensitive to an option as its most sensitive stage.
+            measured = [
+                _measure(option, mechanisms[key], frame, schema, resamples)
+                for key in keys
+                if option in mechanisms[key].inputs
+            ]
+            if not measured:
+                continue
+            best = max(measured, key=lambda m: m.effect.magnitude)
+            low, high = np.quantile(best.resampled, [0.05, 0.95])
+            records[option, objective] = EffectRecord(
+                option=option,
+                objective=objective,
+                identified=answer.identified,
+                functional=answer.functional,
+                adjustment=tuple(answer.adjustment),
+                effect=best.effect.magnitude,
+                low=float(low),
+                high=float(high),
+                direction=best.effect.direction,
+            )
+    return records
+
+
+def _paths(schema: Schema, graph: CausalGraph, edges: Mapping[Edge, _Measured]) -> dict[str, tuple[PathRecord, ...]]:
+    """Alg. 2: the top paths of each objective, with the interval of their mean edge effect over resamples."""
+    weight = {edge: measured.effect.magnitude for edge, measured in edges.items()}
+    options = {option.name for option in schema.options}
+
+    def record(path: CausalPath, objective: str) -> PathRecord:
+        drawn = np.mean([edges[edge].resampled for edge in path.edges], axis=0)
+        low, high = np.quantile(drawn, [0.05, 0.95])
+        return PathRecord(objective=objective, nodes=path.nodes, ace=path.ace, low=float(low), high=float(high))
+
+    return {
+        objective.name: tuple(
+            record(path, objective.name) for path in rank_paths(graph, objective.name, options, weight, top=TOP_PATHS)
+        )
+        for objective in schema.objectives
+        if objective.name in graph.nodes
+    }
+
+
+def _summaries(frame: pd.DataFrame, schema: Schema) -> dict[str, Summary]:
+    summaries: dict[str, Summary] = {}
+    for name in schema.variables:
+        if name not in frame:
+            continue
+        values = frame[name].to_numpy(dtype=float)
+        values = values[np.isfinite(values)]
+        if len(values):
+            summaries[name] = Summary(
+                count=len(values),
+                mean=float(values.mean()),
+                spread=float(values.std()),
+                quantiles=tuple(float(q) for q in np.quantile(values, QUANTILES)),
+            )
+    return summaries
+
+
+def _training(frame: pd.DataFrame, schema: Schema, structure: Structure, settings: Settings) -> Training:
+    return Training(
+        origin=settings.origin,
+        runs=len(frame),
+        seed=settings.seed,
+        alpha=settings.alpha,
+        resamples=settings.resamples,
+        screened_out=tuple(structure.dropped_options),
+        direct_edges=tuple((a, b, p) for a, b, p in structure.direct),
+        moves_together=groups_that_move_together(schema, frame),
+        notes=tuple(structure.notes),
+    )
+
+

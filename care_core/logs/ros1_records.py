@@ -1,0 +1,249 @@
+"""The container of a ROS 1 bag (format 2.0): chunks, connections, and where each message lies.
+
+One walk over the record headers finds everything, so a bag that was cut short, or whose index was never written,
+is read by the same code as a sound one; only chunks without index records are looked into.
+Format: wiki.ros.org/Bags/Format/2.0.
+"""
+
+from __future__ import annotations
+
+import bz2
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from mmap import mmap
+from typing import Any
+
+import numpy as np
+from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]  # a dependency of rosbags
+from numpy.typing import NDArray
+
+from care_core.logs.ros1_message import Buffer
+from care_core.run import Damage
+
+MAGIC = b"#ROSBAG V2.0\n"
+
+ENTRY = np.dtype([("seconds", "<u4"), ("nanoseconds", "<u4"), ("offset", "<u4")])
+"""An index record's entry: record time of a message and its offset in the uncompressed chunk."""
+
+_MESSAGE, _BAG, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = range(2, 8)
+_SIZE = struct.Struct("<I")
+_TIME = struct.Struct("<II")
+_IS_MESSAGE = b"\x04\x00\x00\x00op=\x02"
+
+
+class BrokenRecordError(Exception):
+    """Bytes that are no record. Stays inside the reader."""
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A publisher's side of a topic; the same topic may have several, even of different types."""
+
+    topic: str
+    type: str
+    definition: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chunk:
+    """A chunk: where its data lies in the file, and per connection id the entries of its messages."""
+
+    pos: int
+    start: int
+    end: int
+    compression: str
+    index: dict[int, NDArray[Any]] = field(default_factory=dict)
+
+    def open(self, bag: Buffer) -> tuple[Buffer, int, int]:
+        """The chunk's plain data as (buffer, begin, end); what is there of a cut one. Raises BrokenRecordError."""
+        if self.compression == "none":
+            return bag, self.start, self.end
+        plain = _decompress(self.compression, bag[self.start : self.end])
+        return plain, 0, len(plain)
+
+
+@dataclass(slots=True)
+class Contents:
+    """What a walk over a bag finds."""
+
+    connections: dict[int, Connection] = field(default_factory=dict)
+    chunks: list[Chunk] = field(default_factory=list)
+    damage: list[Damage] = field(default_factory=list)
+    is_encrypted: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """A record: its header fields and where its data lies; `end` may be beyond the file's."""
+
+    pos: int
+    fields: dict[bytes, bytes]
+    start: int
+    end: int
+
+    @property
+    def op(self) -> int:
+        value = self.fields.get(b"op", b"")
+        return value[0] if len(value) == 1 else -1
+
+    def number(self, name: bytes) -> int:
+        value = self.fields.get(name, b"")
+        if len(value) not in (4, 8):
+            raise BrokenRecordError(f"no {name.decode()} in a record")
+        return int.from_bytes(value, "little")
+
+
+def read_contents(bag: mmap) -> Contents:
+    """Walk over a bag's records."""
+    contents = Contents()
+    pos, size = len(MAGIC), len(bag)
+    index_pos = connection_count = 0
+    while pos < size:
+        try:
+            record = _read_record(bag, pos, size)
+            if record.op == _BAG:
+                index_pos, connection_count = record.number(b"index_pos"), record.number(b"conn_count")
+                contents.is_encrypted = bool(record.fields.get(b"encryptor"))
+            _take(bag, record, contents)
+        except BrokenRecordError as err:
+            contents.damage.append(Damage(f"the log breaks off: {err}", pos))
+            break
+        pos = record.end
+    if index_pos == 0:
+        contents.damage.insert(0, Damage("the recording was not closed, so the bag has no index", len(MAGIC)))
+    elif len(contents.connections) < connection_count and not contents.damage:
+        contents.damage.append(Damage("the log breaks off before its index", size))
+    _complete(bag, contents)
+    return contents
+
+
+def locate(buffer: Buffer, begin: int, end: int, offset: int) -> tuple[int, int]:
+    """Where the data of the message at an index entry's offset lies. Raises BrokenRecordError.
+
+    Some writers let the offset point at a connection record that comes before the message.
+    """
+    pos = begin + offset
+    while pos + 8 <= end:
+        (header_size,) = _SIZE.unpack_from(buffer, pos)
+        start = pos + 8 + int(header_size)
+        if start > end:
+            break
+        header = buffer[pos + 4 : start - 4]
+        (data_size,) = _SIZE.unpack_from(buffer, start - 4)
+        if start + data_size > end:
+            break
+        if _IS_MESSAGE in header:
+            return start, start + int(data_size)
+        pos = start + int(data_size)
+    raise BrokenRecordError("a message lies beyond the end of its chunk")
+
+
+def _take(bag: mmap, record: _Record, contents: Contents) -> None:
+    """Add what a top-level record says to the contents."""
+    if record.op == _CHUNK:
+        compression = record.fields.get(b"compression", b"").decode("ascii", "replace")
+        contents.chunks.append(Chunk(record.pos, record.start, min(record.end, len(bag)), compression))
+    if record.end > len(bag):
+        raise BrokenRecordError("its last record is cut short")
+    if record.op == _INDEX and contents.chunks:
+        size = record.number(b"count") * ENTRY.itemsize
+        if size != record.end - record.start:
+            raise BrokenRecordError("an index record of the wrong size")
+        contents.chunks[-1].index[record.number(b"conn")] = np.frombuffer(bag[record.start : record.end], ENTRY)
+    elif record.op == _CONNECTION:
+        _take_connection(bag, record, contents)
+
+
+def _take_connection(buffer: Buffer, record: _Record, contents: Contents) -> None:
+    described = _fields(buffer, record.start, record.end)
+    contents.connections[record.number(b"conn")] = Connection(
+        topic=_normal(record.fields.get(b"topic", b"").decode("utf-8", "replace")),
+        type=described.get(b"type", b"").decode("utf-8", "replace"),
+        definition=described.get(b"message_definition", b"").decode("utf-8", "replace"),
+    )
+
+
+def _complete(bag: mmap, contents: Contents) -> None:
+    """Look into chunks for what index and connection records at the top level do not say."""
+    for chunk in contents.chunks:
+        if chunk.index and all(number in contents.connections for number in chunk.index):
+            continue
+        try:
+            found = _scan(chunk, bag, contents)
+        except BrokenRecordError as err:
+            contents.damage.append(Damage(str(err), chunk.pos))
+            continue
+        if not chunk.index:
+            chunk.index.update({number: np.array(entries, ENTRY) for number, entries in found.items()})
+
+
+def _scan(chunk: Chunk, bag: mmap, contents: Contents) -> dict[int, list[tuple[int, int, int]]]:
+    """Index entries of a chunk's complete messages per connection; takes its connection records on the way."""
+    buffer, begin, end = chunk.open(bag)
+    found: dict[int, list[tuple[int, int, int]]] = {}
+    for record in _complete_records(buffer, begin, end):
+        if record.op == _CONNECTION:
+            _take_connection(buffer, record, contents)
+        elif record.op == _MESSAGE and len(record.fields.get(b"time", b"")) == _TIME.size:
+            seconds, nanoseconds = _TIME.unpack(record.fields[b"time"])
+            found.setdefault(record.number(b"conn"), []).append((seconds, nanoseconds, record.pos - begin))
+    return found
+
+
+def _complete_records(buffer: Buffer, pos: int, end: int) -> Iterator[_Record]:
+    while pos < end:
+        try:
+            record = _read_record(buffer, pos, end)
+        except BrokenRecordError:
+            return
+        if record.end > end:
+            return
+        yield record
+        pos = record.end
+
+
+def _read_record(buffer: Buffer, pos: int, end: int) -> _Record:
+    try:
+        (header_size,) = _SIZE.unpack_from(buffer, pos)
+        start = pos + 8 + int(header_size)
+        if start > end:
+            raise BrokenRecordError("a record header is cut short")
+        fields = _fields(buffer, pos + 4, start - 4)
+        (data_size,) = _SIZE.unpack_from(buffer, start - 4)
+    except struct.error as err:
+        raise BrokenRecordError("a record header is cut short") from err
+    if b"op" not in fields:
+        raise BrokenRecordError("these bytes are no record")
+    return _Record(pos, fields, start, start + int(data_size))
+
+
+def _fields(buffer: Buffer, pos: int, end: int) -> dict[bytes, bytes]:
+    fields: dict[bytes, bytes] = {}
+    while pos < end:
+        (size,) = _SIZE.unpack_from(buffer, pos)
+        pos += 4
+        if pos + size > end:
+            raise BrokenRecordError("these bytes are no record")
+        name, _, value = buffer[pos : pos + size].partition(b"=")
+        fields[name] = value
+        pos += size
+    return fields
+
+
+def _decompress(compression: str, data: bytes) -> bytes:
+    """Plain data of a chunk, of a chunk cut short the part that is there."""
+    try:
+        if compression == "bz2":
+            return bz2.BZ2Decompressor().decompress(data)
+        if compression == "lz4":
+            return bytes(LZ4FrameDecompressor().decompress(data))
+    except (OSError, RuntimeError, EOFError) as err:
+        raise BrokenRecordError(f"a {compression} chunk cannot be unpacked") from err
+    raise BrokenRecordError(f"a chunk of unknown compression '{compression}'")
+
+
+def _normal(topic: str) -> str:
+    """The topic without doubled or trailing slashes."""
+    lead = "/" if topic.startswith("/") else ""
+    return lead + "/".join(part for part in topic.split("/") if part)

@@ -1,0 +1,294 @@
+"""`model.json` and `mechanisms.npz`: the learned half of a profile. Read, checked, written; nothing executable.
+
+pydantic checks the shape of the file at this edge; the rest of the core sees the frozen records below.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from care_core.causal.effects import Direction
+from care_core.causal.graph import CausalGraph
+from care_core.causal.mechanisms import FloatArray, Kernel, Mechanism, Transform
+from care_core.errors import ProfileError
+
+MODEL_VERSION = 1
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class EdgeRecord(_Record):
+    """An edge with the share of bootstrap resamples that hold it, and its effect (Eq. 1, scaled)."""
+
+    source: str
+    target: str
+    kind: Literal["directed", "bidirected"]
+    support: float
+    effect: float = 0.0
+    direction: Direction = "none"
+
+
+class EffectRecord(_Record):
+    """Total effect of an option on an objective: identification and Eq. 1 with its bootstrap interval."""
+
+    option: str
+    objective: str
+    identified: bool
+    functional: str
+    adjustment: tuple[str, ...] = ()
+    effect: float
+    low: float
+    high: float
+    direction: Direction
+
+
+class PathRecord(_Record):
+    """A ranked path (Eq. 2) with its bootstrap interval."""
+
+    objective: str
+    nodes: tuple[str, ...]
+    ace: float
+    low: float
+    high: float
+
+
+class Summary(_Record):
+    """What the training runs held of one variable: `quantiles` at 0, 5, ... 100 %."""
+
+    count: int
+    mean: float
+    spread: float
+    quantiles: tuple[float, ...]
+
+    @property
+    def low(self) -> float:
+        return self.quantiles[0]
+
+    @property
+    def high(self) -> float:
+        return self.quantiles[-1]
+
+    def percentile(self, value: float) -> float:
+        """Share (0 to 1) of the training runs with a smaller value."""
+        return float(np.interp(value, self.quantiles, np.linspace(0, 1, len(self.quantiles))))
+
+
+class StageRecord(_Record):
+    """One condition on the way to a functional objective: the mission passes when `variable` equals `passes`."""
+
+    variable: str
+    passes: float
+    mechanism: str
+
+
+class OutcomeRecord(_Record):
+    """How an objective is predicted: `stages` for a functional one (all must pass, in order), else one mechanism."""
+
+    objective: str
+    stages: tuple[StageRecord, ...] = ()
+    mechanism: str = ""
+
+
+class Training(_Record):
+    """Where the model came from."""
+
+    origin: str
+    runs: int
+    seed: int
+    alpha: float
+    resamples: int
+    screened_out: tuple[str, ...] = ()
+    direct_edges: tuple[tuple[str, str, float], ...] = ()
+    """Option -> objective edges that the metrics do not explain, with the p-value that kept them."""
+    moves_together: tuple[tuple[str, ...], ...] = ()
+    """Groups of non-functional objectives that rise and fall together (rank correlation above 0.9)."""
+    notes: tuple[str, ...] = ()
+
+
+class _MechanismRecord(_Record):
+    target: str
+    inputs: tuple[str, ...]
+    transform: Transform
+    binary: bool
+
+
+class _ModelFile(_Record):
+    model_version: Literal[1]
+    schema_digest: str
+    nodes: tuple[str, ...]
+    edges: tuple[EdgeRecord, ...]
+    effects: tuple[EffectRecord, ...]
+    paths: tuple[PathRecord, ...]
+    outcomes: tuple[OutcomeRecord, ...]
+    summaries: dict[str, Summary]
+    skill: dict[str, dict[str, float]]
+    training: Training
+    mechanisms: dict[str, _MechanismRecord]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What was learned of a platform. `mechanisms` are keyed by the variable they predict (stages: `stage:NAME`)."""
+
+    schema_digest: str
+    graph: CausalGraph
+    edges: Mapping[tuple[str, str], EdgeRecord]
+    """Directed edges only; confounded pairs are in the graph's bidirected edges."""
+    bidirected: tuple[EdgeRecord, ...]
+    effects: Mapping[tuple[str, str], EffectRecord]
+    paths: Mapping[str, tuple[PathRecord, ...]]
+    outcomes: Mapping[str, OutcomeRecord]
+    summaries: Mapping[str, Summary]
+    skill: Mapping[str, Mapping[str, float]]
+    training: Training
+    mechanisms: Mapping[str, Mechanism] = field(default_factory=dict)
+
+    def supports(self, option: str, value: float) -> bool:
+        """Whether the training runs reach this value of the option."""
+        summary = self.summaries.get(option)
+        return summary is None or summary.low <= value <= summary.high
+
+
+def write_model(model: Model, folder: Path) -> None:
+    """Write `model.json` and `mechanisms.npz` into a profile folder, each atomically."""
+    record = _ModelFile(
+        model_version=MODEL_VERSION,
+        schema_digest=model.schema_digest,
+        nodes=model.graph.nodes,
+        edges=(*model.edges.values(), *model.bidirected),
+        effects=tuple(model.effects.values()),
+        paths=tuple(path for paths in model.paths.values() for path in paths),
+        outcomes=tuple(model.outcomes.values()),
+        summaries=dict(model.summaries),
+        skill={name: dict(values) for name, values in model.skill.items()},
+        training=model.training,
+        mechanisms={
+            key: _MechanismRecord(target=key.removeprefix("stage:"), inputs=m.inputs, transform=m.transform, binary=m.binary)
+            for key, m in model.mechanisms.items()
+        },
+    )
+    text = json.dumps(_rounded(record.model_dump(mode="json")), indent=1, ensure_ascii=False) + "\n"
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **_arrays(model.mechanisms))  # type: ignore[arg-type]
+    _replace(folder / "model.json", text.encode())
+    _replace(folder / "mechanisms.npz", buffer.getvalue())
+
+
+def _rounded(value: Any) -> Any:
+    """Six significant digits: a model file is read in reviews."""
+    if isinstance(value, float):
+        return float(f"{value:.6g}")
+    if isinstance(value, dict):
+        return {key: _rounded(part) for key, part in value.items()}
+    return [_rounded(part) for part in value] if isinstance(value, (list, tuple)) else value
+
+
+def _replace(path: Path, content: bytes) -> None:
+    temporary = path.with_name(f".{path.name}.part")
+    temporary.write_bytes(content)
+    os.replace(temporary, path)
+
+
+def _arrays(mechanisms: Mapping[str, Mechanism]) -> dict[str, np.ndarray[Any, Any]]:
+    arrays: dict[str, np.ndarray[Any, Any]] = {}
+    for key, m in mechanisms.items():
+        k = m.kernel
+        arrays[f"{key}/scaling"] = np.vstack([m.log_inputs, m.centre, m.spread, k.relevance]).astype(np.float64)
+        arrays[f"{key}/numbers"] = np.array([k.additive, k.joint, k.noise, m.mean, m.scale])
+        arrays[f"{key}/points"] = m.points.astype(np.float32)
+        arrays[f"{key}/targets"] = m.targets.astype(np.float32)
+        arrays[f"{key}/calibration"] = m.calibration.astype(np.float32)
+    return arrays
+
+
+def read_model(folder: Path) -> Model:
+    """Read the learned half of a profile.
+
+    Raises:
+        ProfileError: a file is missing, damaged, or of another version.
+    """
+    path = folder / "model.json"
+    try:
+        record = _ModelFile.model_validate_json(path.read_text(encoding="utf-8"))
+        with np.load(folder / "mechanisms.npz", allow_pickle=False) as arrays:
+            mechanisms = {key: _mechanism(key, m, arrays) for key, m in record.mechanisms.items()}
+        graph = CausalGraph(
+            record.nodes,
+            frozenset((e.source, e.target) for e in record.edges if e.kind == "directed"),
+            frozenset((e.source, e.target) for e in record.edges if e.kind == "bidirected"),
+        )
+    except OSError as err:
+        raise ProfileError(
+            f"The profile has no readable model: {err.strerror or err}.",
+            hint="Train it with 'care train', or choose another with --profile.",
+            where=str(folder),
+        ) from err
+    except ValidationError as err:
+        first = err.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise ProfileError(
+            f"'{key}': {first['msg']}.", hint="Train the profile again with 'care train'.", where=str(path)
+        ) from err
+    except (ValueError, KeyError) as err:
+        raise ProfileError(
+            f"The model is damaged: {err}.", hint="Train the profile again with 'care train'.", where=str(folder)
+        ) from err
+    return _to_model(record, graph, mechanisms)
+
+
+def _to_model(record: _ModelFile, graph: CausalGraph, mechanisms: Mapping[str, Mechanism]) -> Model:
+    paths: dict[str, tuple[PathRecord, ...]] = {}
+    for path in record.paths:
+        paths[path.objective] = (*paths.get(path.objective, ()), path)
+    return Model(
+        schema_digest=record.schema_digest,
+        graph=graph,
+        edges={(e.source, e.target): e for e in record.edges if e.kind == "directed"},
+        bidirected=tuple(e for e in record.edges if e.kind == "bidirected"),
+        effects={(e.option, e.objective): e for e in record.effects},
+        paths=paths,
+        outcomes={o.objective: o for o in record.outcomes},
+        summaries=record.summaries,
+        skill=record.skill,
+        training=record.training,
+        mechanisms=mechanisms,
+    )
+
+
+def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArray]) -> Mechanism:
+    def floats(name: str) -> FloatArray:
+        array = np.asarray(arrays[f"{key}/{name}"], dtype=np.float64)
+        if not np.isfinite(array).all():
+            raise ValueError(f"{key}/{name} holds values that are not finite")
+        return array
+
+    logs, centre, spread, relevance = floats("scaling")
+    additive, joint, noise, mean, scale = floats("numbers")
+    points = floats("points")
+    if points.ndim != 2 or points.shape[1] != len(record.inputs) or len(logs) != len(record.inputs):
+        raise ValueError(f"{key} does not match its inputs")
+    return Mechanism(
+        inputs=record.inputs,
+        log_inputs=logs.astype(bool),
+        centre=centre,
+        spread=spread,
+        kernel=Kernel(relevance, float(additive), float(joint), float(noise)),
+        points=points,
+        targets=floats("targets"),
+        mean=float(mean),
+        scale=float(scale),
+        transform=record.transform,
+        binary=record.binary,
+        calibration=floats("calibration"),
+    )

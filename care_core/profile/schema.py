@@ -1,0 +1,209 @@
+"""`profile.yaml`: what people write about a platform, checked key by key and turned into plain records.
+
+pydantic stays inside this module; the rest of the core sees `Schema` and `Variable`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from care_core.errors import ProfileError, nearest
+from care_core.variables import Extract, Kind, Op, Role, Threshold, ValueType, Variable
+
+SCHEMA_VERSION = 1
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Threshold(_Strict):
+    op: Op
+    value: float
+
+
+class _Variable(_Strict):
+    role: Role
+    type: ValueType = "float"
+    unit: str = ""
+    doc: str = ""
+    range: tuple[float, float] | None = None
+    default: float | None = None
+    values: dict[float, str] = Field(default_factory=dict)
+    parameter: str | list[str] = Field(default_factory=list)
+    reboot_required: bool = False
+    safety: bool = False
+    kind: Kind | None = None
+    threshold: _Threshold | None = None
+    extract: dict[str, Any] | None = None
+
+    @model_validator(mode="after")
+    def _fits_role(self) -> _Variable:
+        if self.role is Role.OBJECTIVE and self.kind is None:
+            raise ValueError("an objective needs 'kind': functional or non-functional")
+        if self.role is not Role.OBJECTIVE and self.threshold is not None:
+            raise ValueError("only objectives have a 'threshold'")
+        if self.role is not Role.OPTION and self.parameter:
+            raise ValueError("only options have a 'parameter'")
+        if self.range is not None and self.range[0] >= self.range[1]:
+            raise ValueError("'range' must be [low, high] with low < high")
+        if self.extract is not None and "kind" not in self.extract:
+            raise ValueError("'extract' needs 'kind', the name of an extractor")
+        return self
+
+
+class _Match(_Strict):
+    """What a log must say to be of this platform; each is searched in the log's facts, ignoring case."""
+
+    firmware: str = ""
+    frame: str = ""
+    stack: str = ""
+
+
+class _EvidenceRule(_Strict):
+    text: str
+    options: list[str]
+
+
+class _Profile(_Strict):
+    schema_version: Literal[1]
+    name: str
+    version: str
+    platform: str
+    doc: str = ""
+    match: _Match = _Match()
+    logs: list[str] = Field(default_factory=list)
+    observational: bool = False
+    mission: dict[str, Any] = Field(default_factory=dict)
+    evidence: list[_EvidenceRule] = Field(default_factory=list)
+    variables: dict[str, _Variable]
+
+
+@dataclass(frozen=True, slots=True)
+class Schema:
+    """A platform as people described it. `variables` keeps the order of the file."""
+
+    name: str
+    version: str
+    platform: str
+    doc: str
+    match: Mapping[str, str]
+    """What the log's facts should contain: `firmware`, `frame`, `stack` (only those given)."""
+    logs: tuple[str, ...]
+    """Formats this platform records (`dataflash-bin`, `ros1-bag`); empty for a published table."""
+    observational: bool
+    """True when operators chose options by what they met, so context may cause options (DESIGN section 6)."""
+    mission: Mapping[str, Any]
+    evidence: tuple[tuple[str, tuple[str, ...]], ...]
+    """Text found in a message of the log -> the options it points at."""
+    variables: Mapping[str, Variable]
+    digest: str = field(default="", compare=False)
+    """SHA-256 of the variables' names, roles, types, ranges and extraction: what a model was learned for."""
+
+    def of(self, role: Role) -> tuple[Variable, ...]:
+        return tuple(v for v in self.variables.values() if v.role is role)
+
+    @property
+    def options(self) -> tuple[Variable, ...]:
+        return self.of(Role.OPTION)
+
+    @property
+    def contexts(self) -> tuple[Variable, ...]:
+        return self.of(Role.CONTEXT)
+
+    @property
+    def metrics(self) -> tuple[Variable, ...]:
+        return self.of(Role.METRIC)
+
+    @property
+    def objectives(self) -> tuple[Variable, ...]:
+        return self.of(Role.OBJECTIVE)
+
+
+def read_schema(path: Path) -> Schema:
+    """Read and check a `profile.yaml`.
+
+    Raises:
+        ProfileError: no such file, not YAML, or a key or value that does not belong, with the nearest known key.
+    """
+    try:
+        data = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+    except OSError as err:
+        raise ProfileError(f"Cannot read the profile: {err.strerror}.", where=str(path)) from err
+    except (YAMLError, UnicodeDecodeError) as err:
+        detail = " ".join(str(err).split())[:200]
+        raise ProfileError(f"Not valid YAML: {detail}", where=str(path)) from err
+    if not isinstance(data, dict):
+        raise ProfileError("A profile is a mapping with 'name' and 'variables'.", where=str(path))
+    try:
+        return _to_schema(_Profile.model_validate(data))
+    except ValidationError as err:
+        raise _explain(err, path) from err
+
+
+def _explain(err: ValidationError, path: Path) -> ProfileError:
+    first = err.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        model = _Variable if first["loc"][0] == "variables" else _Profile
+        hint = nearest(str(first["loc"][-1]), model.model_fields)
+        return ProfileError(f"Unknown key '{key}'.", hint=hint, where=str(path))
+    message = first["msg"].removeprefix("Value error, ")
+    return ProfileError(f"'{key}': {message}.", hint="Correct the key and run the command again.", where=str(path))
+
+
+def _to_schema(data: _Profile) -> Schema:
+    variables = {name: _to_variable(name, v) for name, v in data.variables.items()}
+    return Schema(
+        name=data.name,
+        version=data.version,
+        platform=data.platform,
+        doc=data.doc,
+        match={key: text for key, text in data.match.model_dump().items() if text},
+        logs=tuple(data.logs),
+        observational=data.observational,
+        mission=data.mission,
+        evidence=tuple((rule.text, tuple(rule.options)) for rule in data.evidence),
+        variables=variables,
+        digest=_digest(variables),
+    )
+
+
+def _to_variable(name: str, v: _Variable) -> Variable:
+    extract = None
+    if v.extract is not None:
+        args = {key: value for key, value in v.extract.items() if key != "kind"}
+        extract = Extract(str(v.extract["kind"]), args)
+    return Variable(
+        name=name,
+        role=v.role,
+        type=v.type,
+        unit=v.unit,
+        doc=v.doc,
+        range=v.range,
+        default=v.default,
+        labels=tuple(v.values.items()),
+        parameters=(v.parameter,) if isinstance(v.parameter, str) else tuple(v.parameter),
+        reboot_required=v.reboot_required,
+        safety=v.safety,
+        kind=v.kind,
+        threshold=None if v.threshold is None else Threshold(v.threshold.op, v.threshold.value),
+        extract=extract,
+    )
+
+
+def _digest(variables: Mapping[str, Variable]) -> str:
+    parts = [
+        f"{v.name}|{v.role.value}|{v.type}|{v.range}|{v.labels}|{v.extract.kind if v.extract else ''}"
+        f"|{sorted(v.extract.args.items()) if v.extract else ''}"
+        for v in variables.values()
+    ]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()

@@ -1,0 +1,61 @@
+"""Where profiles live, and how one is opened by name or by folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from care_core.errors import ProfileError, nearest
+from care_core.profile.model import Model, read_model
+from care_core.profile.schema import Schema, read_schema
+from care_core.resources import bundled
+
+PROFILE_FILE = "profile.yaml"
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A platform: what people wrote (`schema`) and what was learned (`model`, read when first needed)."""
+
+    path: Path
+    schema: Schema
+
+    @cached_property
+    def model(self) -> Model:
+        """The learned model.
+
+        Raises:
+            ProfileError: there is none, it is damaged, or it was learned for other variables than the schema holds.
+        """
+        model = read_model(self.path)
+        if model.schema_digest != self.schema.digest:
+            raise ProfileError(
+                "The model was learned for other variables than profile.yaml declares.",
+                hint="Train the profile again with 'care train'.",
+                where=str(self.path),
+            )
+        return model
+
+
+def available_profiles() -> list[Path]:
+    """Folders of the profiles that came with this installation, by name."""
+    return sorted(path.parent for path in bundled("profiles").glob(f"*/{PROFILE_FILE}"))
+
+
+def load_profile(name_or_path: str | Path) -> Profile:
+    """Open a bundled profile by its name, or any profile by its folder or `profile.yaml`.
+
+    Raises:
+        ProfileError: no such profile (the nearest name is given), or it is unsound.
+    """
+    path = Path(name_or_path)
+    if path.name == PROFILE_FILE:
+        path = path.parent
+    if not (path / PROFILE_FILE).is_file():
+        known = {folder.name: folder for folder in available_profiles()}
+        if str(name_or_path) not in known:
+            hint = nearest(str(name_or_path), known) or f"Known profiles: {', '.join(known)}."
+            raise ProfileError(f"There is no profile '{name_or_path}'.", hint=hint)
+        path = known[str(name_or_path)]
+    return Profile(path, read_schema(path / PROFILE_FILE))

@@ -1,0 +1,17 @@
+"""A diagnosis as text, JSON, YAML and Markdown, and writing it to a file."""
+
+from care_core.report.document import Report, TriageDocument, build_document, json_schema
+from care_core.report.terminal import to_text
+from care_core.report.writers import to_json, to_markdown, to_yaml, write_atomically
+
+__all__ = [
+    "Report",
+    "TriageDocument",
+    "build_document",
+    "json_schema",
+    "to_json",
+    "to_markdown",
+    "to_text",
+    "to_yaml",
+    "write_atomically",
+]

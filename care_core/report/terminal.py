@@ -1,0 +1,167 @@
+"""A diagnosis as plain text for a terminal: the answer first, then what it rests on."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+
+from care_core.configs import apply_commands, format_for, unified_diff
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode
+from care_core.report.writers import STATUS_WORDS
+from care_core.text import clean
+
+WIDTH = 80
+EVIDENCE_SHOWN = 5
+
+
+def to_text(diagnosis: Diagnosis) -> str:
+    """The diagnosis in lines of at most 80 columns (a diff or command may be longer: it is to be copied)."""
+    sections = [
+        _headline(diagnosis),
+        _origin(diagnosis),
+        _objectives(diagnosis),
+        *(_causes(fault) for fault in diagnosis.faults),
+        _fix(diagnosis),
+        _evidence(diagnosis),
+        _notes(diagnosis),
+    ]
+    return "\n\n".join(text for text in ("\n".join(section) for section in sections) if text) + "\n"
+
+
+def _wrapped(text: str, first: str = "", rest: str | None = None) -> list[str]:
+    indent = " " * len(first) if rest is None else rest
+    return textwrap.wrap(clean(text), WIDTH, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+
+
+def _headline(diagnosis: Diagnosis) -> Iterator[str]:
+    broken = [_measured(objective) for objective in diagnosis.objectives if objective.status == "fault"]
+    unknown = [objective.variable.name for objective in diagnosis.objectives if objective.status == "not_evaluated"]
+    if broken:
+        yield from _wrapped("; ".join(broken), "FAULT: ")
+    elif unknown:
+        yield from _wrapped(f"no fault found, but {', '.join(unknown)} could not be evaluated", "NOT EVALUATED: ")
+    else:
+        yield "OK: all objectives are within their thresholds"
+    if diagnosis.abstained:
+        yield from _wrapped(diagnosis.abstained, "No answer: ")
+    if diagnosis.fix is not None:
+        yield from _wrapped(_summary(diagnosis, diagnosis.fix))
+
+
+def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
+    causes = [cause for fault in diagnosis.faults for cause in fault.causes]
+    changed = {change.option.name for change in fix.changes}
+    confidence = next((cause.confidence for cause in causes if cause.option.name in changed), None)
+    changes = ", ".join(
+        f"{change.option.name} {change.option.show(change.current)} -> {change.option.show(change.suggested)}"
+        for change in fix.changes
+    )
+    sure = f", {confidence} confidence" if confidence else ""
+    warnings = "".join(f"; {warning}" for warning in diagnosis.profile.warnings)
+    return f"Change {changes}: {fix.p_fixed:.0%} odds that all objectives are met{sure}{warnings}"
+
+
+def _measured(objective: ObjectiveResult) -> str:
+    unit = objective.variable.unit
+    value = "unknown" if objective.value is None else f"{objective.value:.4g}"
+    wanted = "" if objective.threshold is None else f", wanted {objective.threshold}"
+    return f"{objective.variable.name} = {value}{wanted} {unit}".rstrip()
+
+
+def _origin(diagnosis: Diagnosis) -> Iterator[str]:
+    run, profile = diagnosis.run, diagnosis.profile
+    facts = "".join(f", {fact}" for fact in run.log.facts.values())
+    mission = f"mission {run.mission.index} of {run.mission.count}"
+    duration = f"{run.mission.end_s - run.mission.start_s:.0f} s"
+    yield from _wrapped(f"{Path(run.log.path).name}, {mission}, {duration}{facts}", "Log      ")
+    yield from _wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
+    for warning in profile.warnings:
+        yield from _wrapped(warning, "Warning  ")
+    for damage in run.log.damage:
+        at = "" if damage.time_s is None else f" at {damage.time_s:.1f} s"
+        yield from _wrapped(f"{damage.what}{at}", "Damage   ")
+
+
+def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
+    yield "Objectives"
+    name_width = max((len(objective.variable.name) for objective in diagnosis.objectives), default=0)
+    for objective in diagnosis.objectives:
+        value = "-" if objective.value is None else f"{objective.value:.4g}"
+        wanted = "" if objective.threshold is None else f"{objective.threshold}"
+        word = STATUS_WORDS[objective.status]
+        line = f"  {word:<13}  {objective.variable.name:<{name_width}}  {value:>8}  {wanted} {objective.variable.unit}"
+        yield line.rstrip()
+        if objective.reason:
+            yield from _wrapped(objective.reason, " " * 17)
+
+
+def _causes(fault: Fault) -> Iterator[str]:
+    yield f"Causes of {fault.objective.variable.name}"
+    if not fault.causes:
+        yield "  none was found among the options of the profile"
+    for cause in fault.causes:
+        yield from _cause(cause)
+
+
+def _cause(cause: Cause) -> Iterator[str]:
+    option = cause.option
+    change = option.show(cause.current)
+    if cause.suggested is not None:
+        change += f" -> {option.show(cause.suggested)}"
+    facts = [f"{cause.confidence} confidence"]
+    if cause.p_fixed is not None:
+        facts.insert(0, f"{cause.p_fixed:.0%} fixed by it alone")
+    if not cause.in_support:
+        facts.append("outside the training runs")
+    yield from _wrapped(f"{option.name}  {change} {option.unit}  ({', '.join(facts)})", f"  {cause.rank}. ")
+    yield from _wrapped(" -> ".join(node.name for node in cause.path), "     ", "       ")
+    for node in cause.path[1:]:
+        if node.value is not None or node.expected is not None:
+            yield from _wrapped(_node(node), "       ", "         ")
+    for note in cause.notes:
+        yield from _wrapped(note, "     ! ")
+
+
+def _node(node: PathNode) -> str:
+    here = "unknown" if node.value is None else f"{node.value:.4g} {node.unit}".rstrip()
+    expected = "" if node.expected is None else f", {node.expected:.4g} expected"
+    return f"{node.name}: {here} in this run{expected}"
+
+
+def _fix(diagnosis: Diagnosis) -> Iterator[str]:
+    fix = diagnosis.fix
+    if fix is None:
+        return
+    yield f"Fix ({fix.p_fixed:.0%} odds that all objectives are met)"
+    for change in fix.changes:
+        option = change.option
+        restart = ", needs a restart" if option.reboot_required else ""
+        values = f"{option.show(change.current)} -> {option.show(change.suggested)} {option.unit}".rstrip()
+        yield from _wrapped(f"{option.name}  {values}{restart}", "  ", "    ")
+        for note in change.notes:
+            yield from _wrapped(note, "    ! ")
+    for name, predicted in fix.predicted.items():
+        interval = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g})"
+        yield from _wrapped(f"predicted {name}: {interval}  {STATUS_WORDS[predicted.status()]}", "  ", "    ")
+    yield ""
+    yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix).splitlines())
+    yield ""
+    yield from (f"  {line}" for line in apply_commands(fix.changes, format_for(diagnosis.run.log.format)))
+
+
+def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
+    evidence = diagnosis.run.evidence
+    if not evidence or not diagnosis.faults:
+        return
+    yield "Messages of this run"
+    for item in evidence[-EVIDENCE_SHOWN:]:
+        points = f" (points at {', '.join(item.options)})" if item.options else ""
+        yield from _wrapped(f"{item.text}{points}", f"  {item.time_s:8.1f} s  ")
+
+
+def _notes(diagnosis: Diagnosis) -> Iterator[str]:
+    if diagnosis.notes:
+        yield "Notes"
+    for note in diagnosis.notes:
+        yield from _wrapped(note, "  - ")

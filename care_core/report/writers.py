@@ -1,0 +1,170 @@
+"""The report in the formats that files have, and writing it whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Iterable, Iterator
+from io import StringIO
+from pathlib import Path
+
+from ruamel.yaml import YAML
+from ruamel.yaml.scalarstring import LiteralScalarString
+
+from care_core.errors import UsageError
+from care_core.report.document import CauseEntry, FixSet, ObjectiveEntry, Report, TriageDocument
+
+STATUS_WORDS = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
+
+_YAML_WIDTH = 100
+_MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~])")
+
+
+def to_json(report: Report) -> str:
+    """The document `care.triage/1`, one object."""
+    return report.model_dump_json(by_alias=True, include=set(TriageDocument.model_fields), indent=2) + "\n"
+
+
+def to_yaml(report: Report) -> str:
+    """The document with the unified diff and the commands that apply it."""
+    data = report.model_dump(by_alias=True, exclude={"notes"})
+    if report.diff:
+        data["diff"] = LiteralScalarString(report.diff)
+    yaml = YAML()
+    yaml.width = _YAML_WIDTH
+    stream = StringIO()
+    yaml.dump(data, stream)
+    return stream.getvalue()
+
+
+def to_markdown(report: Report) -> str:
+    """A report to paste into a ticket."""
+    return "\n".join(_markdown(report)) + "\n"
+
+
+def _markdown(report: Report) -> Iterator[str]:
+    yield f"# Triage of {_escape(Path(report.log.path).name)}"
+    yield ""
+    yield _verdict(report)
+    yield ""
+    yield "## Objectives"
+    yield ""
+    yield from _table(("Objective", "Value", "Wanted", "Status", "Why"), map(_objective_row, report.objectives))
+    for fault in report.faults:
+        yield ""
+        yield f"## Causes of `{fault.objective}`"
+        yield ""
+        if fault.causes:
+            yield from _table(("", "Option", "Path", "Driven", "Suggested", "Odds"), map(_cause_row, fault.causes))
+        else:
+            yield "None was found among the options of the profile."
+    if report.fix is not None:
+        yield ""
+        yield from _fix_section(report, report.fix)
+    if report.notes:
+        yield ""
+        yield "## Notes"
+        yield ""
+        yield from (f"- {_escape(note)}" for note in report.notes)
+    yield ""
+    yield from _origin(report)
+
+
+def _verdict(report: Report) -> str:
+    broken = [objective.name for objective in report.objectives if objective.status == "fault"]
+    if report.abstained:
+        return f"**No answer**: {_escape(report.abstained)}"
+    if not broken:
+        unknown = any(objective.status == "not_evaluated" for objective in report.objectives)
+        return "**No fault found**, but not everything could be evaluated." if unknown else "**No fault found.**"
+    names = ", ".join(f"`{name}`" for name in broken)
+    if report.fix is None:
+        return f"**Fault**: {names}."
+    changes = ", ".join(f"`{change.option}` from {change.from_:g} to {change.to:g}" for change in report.fix.changes)
+    return f"**Fault**: {names}. Change {changes}: {report.fix.p_fixed:.0%} odds that all objectives are met."
+
+
+def _objective_row(objective: ObjectiveEntry) -> tuple[str, ...]:
+    value = "" if objective.value is None else f"{objective.value:.4g} {objective.unit}".strip()
+    bound = objective.threshold
+    wanted = "" if bound is None else f"{bound.op} {bound.value:g} {objective.unit}".strip()
+    reason = _escape(objective.reason or "")
+    return f"`{objective.name}`", value, _escape(wanted), STATUS_WORDS[objective.status], reason
+
+
+def _cause_row(cause: CauseEntry) -> tuple[str, ...]:
+    suggested = "" if cause.suggested is None else f"{cause.suggested:g}"
+    odds = cause.confidence if cause.p_fixed is None else f"{cause.p_fixed:.0%}, {cause.confidence}"
+    if not cause.in_support:
+        odds += ", outside the training runs"
+    return str(cause.rank), f"`{cause.option}`", " → ".join(cause.path), f"{cause.current:g}", suggested, odds
+
+
+def _fix_section(report: Report, fix: FixSet) -> Iterator[str]:
+    yield "## Fix"
+    yield ""
+    rows = (
+        (f"`{name}`", f"{p.value:.4g} ({p.low:.4g} to {p.high:.4g})", STATUS_WORDS[p.status])
+        for name, p in fix.predicted.items()
+    )
+    yield from _table(("Objective", "Predicted (80 %)", "Status"), rows)
+    yield ""
+    yield "```diff"
+    yield report.diff.rstrip("\n")
+    yield "```"
+    yield ""
+    yield "```sh"
+    yield from report.apply
+    yield "```"
+
+
+def _origin(report: Report) -> Iterator[str]:
+    log, profile = report.log, report.profile
+    yield f"Log `{_escape(log.path)}`, {log.format}, {log.duration_s:.0f} s, SHA-256 `{log.sha256}`."
+    yield f"Profile {profile.name} {profile.version} ({profile.platform})."
+    for damage in log.damage:
+        yield f"Damage: {_escape(damage.what)}."
+
+
+def _table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
+    heads = tuple(heads)
+    yield f"| {' | '.join(heads)} |"
+    yield f"|{'---|' * len(heads)}"
+    for row in rows:
+        yield f"| {' | '.join(row)} |"
+
+
+def _escape(text: str) -> str:
+    return _MARKDOWN_SPECIAL.sub(r"\\\1", text)
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write a file through a temporary one beside it: a reader sees the old file or the new one, never half.
+
+    Raises:
+        UsageError: the folder does not exist or may not be written to.
+    """
+    try:
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as stream:
+                stream.write(text)
+            Path(temporary).chmod(_mode(path))
+            Path(temporary).replace(path)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+    except OSError as err:
+        raise UsageError(
+            f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
+        ) from err
+
+
+def _mode(path: Path) -> int:
+    """The mode a plain `open` would give: that of the file it replaces, else what the umask allows."""
+    if path.exists():
+        return path.stat().st_mode & 0o777
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask

@@ -1,0 +1,106 @@
+"""One mission, as read from a log: configuration, context, metrics, objectives, and where each came from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TypeGuard
+
+
+@dataclass(frozen=True, slots=True)
+class Unavailable:
+    """A value that could not be had: why, and how to have it next time. A result, not an error."""
+
+    reason: str
+    hint: str = ""
+
+
+Value = float | Unavailable
+
+
+def is_known(value: Value | None) -> TypeGuard[float]:
+    """Whether there is a number to work with."""
+    return value is not None and not isinstance(value, Unavailable)
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A parameter as driven: its last value before the mission ended, and what the source says about it."""
+
+    name: str
+    value: float | str
+    source: str
+    default: float | str | None = None
+    low: float | None = None
+    high: float | None = None
+    changed_at_s: float | None = None
+    """Seconds from the start of the log of the last change after the first value, None when it never changed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """What is broken in a log, at which byte, at which second of the log (None: unknown)."""
+
+    what: str
+    byte: int | None = None
+    time_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """A message of this run that speaks about its failure, with the options it points at (may be none)."""
+
+    time_s: float
+    text: str
+    kind: str
+    """`refusal`, `failsafe`, `crash`, `planner`, ..., as named by the extractor that found it."""
+    options: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class LogInfo:
+    """Where a run came from."""
+
+    path: str
+    format: str
+    start: str | None
+    """ISO 8601 wall-clock time (UTC) of the first message, None where the log has no wall clock."""
+    duration_s: float
+    sha256: str
+    damage: tuple[Damage, ...] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
+    """What the log says of its robot: firmware, frame, distro."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionInfo:
+    """Which mission of the log this is. `index` counts from 1; `fits` says whether it is the profile's mission."""
+
+    index: int
+    count: int
+    start_s: float
+    end_s: float
+    ended: bool
+    """False when the log stops before the mission does: nothing about its end is known."""
+    fits: bool
+    mismatch: str = ""
+    """Why it is not the profile's mission, in one sentence; empty when it fits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One mission. Keys are the profile's variable names; `config` lacks options that no source holds."""
+
+    config: Mapping[str, float]
+    context: Mapping[str, Value]
+    metrics: Mapping[str, Value]
+    objectives: Mapping[str, Value]
+    settings: Mapping[str, Setting]
+    log: LogInfo
+    mission: MissionInfo
+    evidence: tuple[Evidence, ...] = ()
+
+    def value(self, name: str) -> Value | None:
+        """The run's value of a variable of any role, None when the run does not hold it."""
+        parts: tuple[Mapping[str, Value], ...] = (self.config, self.context, self.metrics, self.objectives)
+        return next((part[name] for part in parts if name in part), None)

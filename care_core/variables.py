@@ -1,0 +1,115 @@
+"""What a profile talks about: options, contexts, metrics and objectives. Values only, no data."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from types import MappingProxyType
+from typing import Any, Literal
+
+
+class Role(str, Enum):
+    """The part a variable plays (paper, section III-A: X, exogenous, S, Y)."""
+
+    OPTION = "option"
+    CONTEXT = "context"
+    METRIC = "metric"
+    OBJECTIVE = "objective"
+
+
+Op = Literal["<=", ">=", "<", ">", "=="]
+Kind = Literal["functional", "non-functional"]
+ValueType = Literal["float", "int", "bool", "enum"]
+
+_COMPARE = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt, "==": operator.eq}
+
+
+@dataclass(frozen=True, slots=True)
+class Threshold:
+    """The bound an objective must keep, in the objective's unit."""
+
+    op: Op
+    value: float
+
+    def met(self, value: float) -> bool:
+        return bool(_COMPARE[self.op](value, self.value))
+
+    def __str__(self) -> str:
+        return f"{self.op} {self.value:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Extract:
+    """How a value is read from a log: the name of an extractor and its arguments."""
+
+    kind: str
+    args: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One declared variable of a profile.
+
+    `range` holds the acceptable values (what may be suggested), in `unit`. `parameters` are the keys an option
+    sets, in the log and in configuration files; several when one option sets them all (both costmaps).
+    `labels` names the codes of an enum; values are always numbers (bool: 0 or 1).
+    """
+
+    name: str
+    role: Role
+    type: ValueType = "float"
+    unit: str = ""
+    doc: str = ""
+    range: tuple[float, float] | None = None
+    default: float | None = None
+    labels: tuple[tuple[float, str], ...] = ()
+    parameters: tuple[str, ...] = ()
+    reboot_required: bool = False
+    safety: bool = False
+    kind: Kind | None = None
+    threshold: Threshold | None = None
+    extract: Extract | None = None
+
+    def accepts(self, value: float) -> bool:
+        """Whether `value` may be suggested for this option."""
+        if self.labels:
+            return any(value == code for code, _ in self.labels)
+        return self.range is None or self.range[0] <= value <= self.range[1]
+
+    def snap(self, value: float) -> float:
+        """The nearest acceptable value of the option's type, floats to four significant digits."""
+        if self.labels:
+            return min((code for code, _ in self.labels), key=lambda code: abs(code - value))
+        if self.range is not None:
+            value = min(max(value, self.range[0]), self.range[1])
+        if self.type in ("int", "bool"):
+            return float(round(value))
+        return float(f"{value:.4g}")
+
+    @property
+    def is_log_scaled(self) -> bool:
+        """Whether a change is better judged as a ratio: a positive range over more than a decade."""
+        return self.range is not None and self.range[0] > 0 and self.range[1] / self.range[0] >= 10
+
+    def distance(self, a: float, b: float) -> float:
+        """How far apart two values are, as a share of the acceptable range (0 to 1), ratios where log scaled."""
+        if self.range is None or self.range[1] <= self.range[0]:
+            return float(a != b)
+        low, high = self.range
+        if self.is_log_scaled and a > 0 and b > 0:
+            return abs(math.log(a / b)) / math.log(high / low)
+        return abs(a - b) / (high - low)
+
+    def show(self, value: float | None) -> str:
+        """The value as an operator writes it, without its unit."""
+        if value is None:
+            return "unknown"
+        for code, label in self.labels:
+            if value == code:
+                return f"{code:g} ({label})"
+        if self.type == "bool":
+            return "true" if value else "false"
+        return f"{value:.6g}"

@@ -1,0 +1,3 @@
+"""The command line and the terminal app."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,90 @@
+"""What the command line says and where: data on stdout, talk on stderr, and every error in one sentence."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import time
+import traceback
+from pathlib import Path
+
+from care_core.errors import CareError, ExitCode
+from care_core.text import clean
+
+PIPE_CLOSED = 128 + 13
+"""Exit code of a process whose reader went away, as the shell gives it for SIGPIPE."""
+
+QUIET_S = 1.0
+"""Work that takes longer says what it is doing."""
+
+_STATUS = re.compile(r"\b(FAULT|NOT EVALUATED|OK)\b")
+_COLOURS = {"FAULT": "\x1b[1;31m", "NOT EVALUATED": "\x1b[33m", "OK": "\x1b[32m"}
+_RESET = "\x1b[0m"
+
+
+def emit(text: str, out: Path | None = None) -> None:
+    """Write data: to the file `out`, whole or not at all, else to stdout."""
+    if out is not None:
+        from care_core.report.writers import write_atomically
+
+        write_atomically(out, text)
+        say(f"wrote {out}")
+        return
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The interpreter flushes stdout once more when it ends, which must not fail again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(PIPE_CLOSED) from None
+
+
+def say(text: str) -> None:
+    """One line of talk on stderr."""
+    print(clean(text), file=sys.stderr)
+
+
+def painted(text: str) -> str:
+    """The text with its status words in colour, where stdout is a terminal that wants colour."""
+    if not sys.stdout.isatty() or os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb":
+        return text
+    return _STATUS.sub(lambda match: f"{_COLOURS[match[0]]}{match[0]}{_RESET}", text)
+
+
+class Progress:
+    """Says on stderr what is being done: a line rewritten in place on a terminal, else one plain line after a second.
+
+    Use as a context manager; the object is called with the step and the share that is done (0 to 1).
+    """
+
+    def __init__(self) -> None:
+        self._in_place = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+        self._started = time.monotonic()
+        self._said = False
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._in_place and self._said:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+    def __call__(self, step: str, share: float) -> None:
+        if self._in_place:
+            print(f"\r\x1b[K{clean(step)} {share:.0%}"[:100], end="", file=sys.stderr, flush=True)
+            self._said = True
+        elif not self._said and time.monotonic() - self._started > QUIET_S:
+            say(f"{step} ...")
+            self._said = True
+
+
+def explain(err: Exception) -> ExitCode:
+    """Say what went wrong on stderr and give the exit code for it. With CARE_DEBUG=1 the traceback is shown too."""
+    if os.environ.get("CARE_DEBUG") == "1":
+        traceback.print_exception(type(err), err, err.__traceback__)
+    if isinstance(err, CareError):
+        say(f"care: {err}")
+        return err.exit_code
+    say(f"care: unexpected {type(err).__name__}: {err}. Set CARE_DEBUG=1 to see where it comes from.")
+    return ExitCode.USAGE

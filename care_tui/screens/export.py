@@ -1,0 +1,92 @@
+"""Where the report goes, and whether an existing file may be replaced."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from textual import on, work
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.content import Content
+from textual.screen import ModalScreen
+from textual.widgets import Input, Static
+
+from care_core.diagnose.records import Diagnosis
+from care_core.errors import CareError, UsageError
+from care_tui.clean import clean
+from care_tui.jobs import SUFFIXES, Engine, as_care_error
+from care_tui.messages import DiagnosisFailed, ReportWritten
+
+
+class OverwriteDialog(ModalScreen[bool]):
+    """Asks before a file is replaced."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("y", "dismiss(True)", "Replace", id="overwrite.yes"),
+        Binding("n,escape", "dismiss(False)", "Keep", id="overwrite.no"),
+    ]
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path = path
+
+    def compose(self) -> ComposeResult:
+        with Vertical(classes="dialog small"):
+            yield Static(Content.assemble((clean(str(self._path)), "bold"), " exists. Replace it?"))
+            yield Static("y replaces it, n or Esc keeps it", classes="hint", markup=False)
+
+
+class ExportDialog(ModalScreen[str | None]):
+    """Asks for a file name and writes the report; answers with the path, None when nothing was written."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "dismiss(None)", "Cancel", id="export.cancel")]
+
+    def __init__(self, diagnosis: Diagnosis, default: Path, engine: Engine) -> None:
+        super().__init__()
+        self._diagnosis = diagnosis
+        self._default = default
+        self._engine = engine
+
+    def compose(self) -> ComposeResult:
+        box = Input(str(self._default), select_on_focus=False, id="file-name")
+        box.cursor_blink = False
+        with Vertical(classes="dialog small"):
+            yield Static("Write the report to", classes="title", markup=False)
+            yield box
+            yield Static("The name chooses the format: .yaml, .md or .json. Enter writes, Esc cancels.", classes="hint")
+            yield Static(id="export-error", markup=False)
+
+    @on(Input.Submitted)
+    async def _submit(self, event: Input.Submitted) -> None:
+        path = Path(event.value.strip()).expanduser()
+        if path.suffix.lower() not in SUFFIXES:
+            self._say(UsageError("The file name must end in .yaml, .md or .json."))
+        elif path.exists():
+            self.app.push_screen(OverwriteDialog(path), lambda replace: self._write(path) if replace else None)
+        else:
+            self._write(path)
+
+    @work(thread=True, exclusive=True, exit_on_error=False)
+    def _write(self, path: Path) -> None:
+        try:
+            text = self._engine.report(self._diagnosis, SUFFIXES[path.suffix.lower()])
+            self._engine.save(path, text)
+        except Exception as err:
+            self.post_message(DiagnosisFailed(as_care_error(err)))
+        else:
+            self.post_message(ReportWritten(str(path.absolute())))
+
+    @on(ReportWritten)
+    def _finish(self, event: ReportWritten) -> None:
+        event.stop()
+        self.dismiss(event.path)
+
+    @on(DiagnosisFailed)
+    def _show_error(self, event: DiagnosisFailed) -> None:
+        event.stop()
+        self._say(event.error)
+
+    def _say(self, error: CareError) -> None:
+        self.query_one("#export-error", Static).update(Content.styled(f"! {clean(str(error))}", "bold $text-error"))

@@ -1,0 +1,41 @@
+"""The keys that work where the operator stands."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.content import Content
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+from care_tui.render import Row, Rows
+from care_tui.widgets.lines import Lines
+
+Keys = Iterable[tuple[str, str]]
+
+
+class HelpScreen(ModalScreen[None]):
+    """A list of keys and what they do, above the screen they belong to."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape,q,question_mark,f1,enter", "dismiss", "Close", id="help.close"),
+    ]
+
+    def __init__(self, about: str, keys: Keys) -> None:
+        super().__init__()
+        self._about = about
+        self._keys = tuple(keys)
+
+    def compose(self) -> ComposeResult:
+        width = max((len(key) for key, _ in self._keys), default=0) + 2
+        rows = [Row(Content(self._about)), Row(Content())]
+        rows += [
+            Row(Content.assemble((f"{key:<{width}}", "bold $text-accent"), does), width) for key, does in self._keys
+        ]
+        with Vertical(classes="dialog"):
+            yield Static("Keys that work here (Esc closes)", classes="title", markup=False)
+            yield Lines(Rows(rows), id="help")

@@ -1,0 +1,59 @@
+"""Fixtures for all tests: the folder of recorded runs, and a `care` that is called like the command."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+
+class Outcome(NamedTuple):
+    """What a call of the command gave."""
+
+    code: int
+    stdout: str
+    stderr: str
+
+
+Care = Callable[..., Outcome]
+
+
+@pytest.fixture(autouse=True)
+def _own_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hide the developer's home folder and terminal from the tests."""
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(home / ".config"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(home / ".local"))
+    for name in ("CARE_DEBUG", "NO_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture(scope="session")
+def recorded() -> Path:
+    """The folder with `data` and `logs`; tests that need it are skipped where it is not set."""
+    folder = os.environ.get("CARE_SHARED")
+    if not folder:
+        pytest.skip("CARE_SHARED does not name a folder of recorded runs")
+    return Path(folder)
+
+
+@pytest.fixture
+def care(capsys: pytest.CaptureFixture[str]) -> Care:
+    """Call the command in this process."""
+
+    def call(*args: str | Path) -> Outcome:
+        from care_tui.cli import app
+
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            app([str(arg) for arg in args], prog_name="care")
+        code = ended.value.code
+        captured = capsys.readouterr()
+        return Outcome(code if isinstance(code, int) else 0 if code is None else 1, captured.out, captured.err)
+
+    return call

@@ -1,0 +1,330 @@
+"""Missions and extractors on flights made up here, and the profile on recorded ones."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_core.extract import ardupilot
+from care_core.extract.flight import analyse, distance_to_legs
+from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Mission, find_extractor, merge_needs
+from care_core.logs import open_log
+from care_core.logs.base import Table
+from care_core.profile.schema import Schema, read_schema
+from care_core.run import Unavailable, Value, is_known
+from care_core.variables import Role
+
+PROFILE = Path(__file__).parents[2] / "profiles" / "arducopter" / "profile.yaml"
+KIND = MISSION_KINDS["ardupilot_flight"]
+HOME = (-35.0, 149.0)
+METRES = 111_319.49
+
+
+def table(rows: list[tuple[Any, ...]], *fields: str) -> Table:
+    """Rows of (time, field, field, ...) as a table."""
+    columns = list(zip(*rows, strict=True)) if rows else [() for _ in range(len(fields) + 1)]
+    return Table(
+        np.array(columns[0], dtype=float),
+        {
+            name: np.array(column, dtype=object if any(isinstance(one, str) for one in column) else float)
+            for name, column in zip(fields, columns[1:], strict=True)
+        },
+    )
+
+
+def north(metres: float) -> float:
+    return HOME[0] + metres / METRES
+
+
+def flight(**replaced: Table | None) -> dict[str, Table]:
+    """A square take-off to 20 m, one waypoint 100 m north, and back: armed at 10 s, disarmed at 70 s."""
+    path = [(10, 0, 0), (20, 0, 20), (30, 100, 20), (40, 0, 20), (50, 0, 9.5), (69, 0, 0), (75, 0, 0)]
+    t, way, height = (np.array(column, dtype=float) for column in zip(*path, strict=True))
+    at = np.arange(0.0, 75.0, 0.5)
+    position = np.interp(at, t, way)
+    level = np.zeros_like(at)
+    tables = {
+        "ARM": table([(10.0, 1, 0), (70.0, 0, 0)], "ArmState", "Forced"),
+        "MSG": table(
+            [
+                (2.0, "Arm: AHRS: waiting for home"),
+                (4.0, "Arm: Need Position Estimate"),
+                (20.0, "Mission: 2 WP"),
+                (30.0, "Reached command #2"),
+                (30.0, "Mission: 3 RTL"),
+            ],
+            "Message",
+        ),
+        "CMD": table(
+            [(0.0, 1, 22, 0.0, 0.0, 20.0), (0.0, 2, 16, north(100), HOME[1], 20.0), (0.0, 3, 20, 0.0, 0.0, 0.0)],
+            "CNum", "CId", "Lat", "Lng", "Alt",
+        ),
+        "ORGN": table([(10.0, 1, *HOME)], "Type", "Lat", "Lng"),
+        "POS": Table(
+            at, {"Lat": north(0) + position / METRES, "Lng": level + HOME[1], "RelHomeAlt": np.interp(at, t, height)}
+        ),
+        "BAT": Table(at, {"Inst": level, "Volt": 12.0 - at / 50, "Curr": level + 36.0, "EnrgTot": 0.12 * at}),
+        "ATT": Table(
+            at,
+            {
+                "DesRoll": level + 1.0, "Roll": level, "DesPitch": level, "Pitch": level - 5.0,
+                "DesYaw": level + 359.0, "Yaw": level + 1.0,
+            },
+        ),
+    }  # fmt: skip
+    for name, one in replaced.items():
+        if one is None:
+            tables.pop(name)
+        else:
+            tables[name] = one
+    return tables
+
+
+SPEC: Mapping[str, Any] = {"waypoints": [[north(100), HOME[1], 20]], "tolerance_m": 5}
+
+
+def only(tables: Mapping[str, Table], **settings: float) -> Mission:
+    (mission,) = KIND.missions(tables, 75.0, SPEC)
+    return Mission(mission.tables, mission.start_s, mission.end_s, mission.ended, mission.spec, settings)
+
+
+def value(mission: Mission, kind: str, **args: Any) -> Value:
+    return find_extractor(kind).compute(mission, args)
+
+
+def test_a_good_flight() -> None:
+    mission = only(flight(), BATT_LOW_VOLT=10.5)
+    assert (mission.start_s, mission.end_s, mission.ended) == (10.0, 70.0, True)
+    assert KIND.mismatch(mission) == ""
+    assert KIND.evidence(mission) == ()
+    assert value(mission, "mission_success") == 1.0
+    assert value(mission, "mission_time") == 60.0
+    assert value(mission, "arming_time") == 8.0
+    assert value(mission, "waypoints_reached") == 1.0
+    assert value(mission, "energy_used") == pytest.approx(7.2)
+    assert value(mission, "min_voltage") == pytest.approx(12.0 - 1.4)
+    assert value(mission, "voltage_margin") == pytest.approx(0.1)
+    assert value(mission, "path_error") == pytest.approx(0.0, abs=1e-6)
+    assert value(mission, "landing_error") == pytest.approx(0.0, abs=1e-6)
+    assert value(mission, "waypoint_miss") == pytest.approx(0.0, abs=1e-6)
+    assert value(mission, "distance") == pytest.approx(200.0, abs=0.1)
+    assert value(mission, "attitude_error", axis="yaw") == pytest.approx(2.0)
+    assert value(mission, "attitude_error", axis="roll", stat="max") == pytest.approx(1.0)
+    assert value(mission, "mean_lean_angle") == pytest.approx(5.0)
+
+
+def test_phases_cover_the_flight() -> None:
+    mission = only(flight())
+    times = {
+        name: value(mission, "phase_time", phase=name) for name in ("takeoff", "return_climb", "return", "descent")
+    }
+    assert times == {"takeoff": 10.0, "return_climb": 0.0, "return": 10.0, "descent": pytest.approx(9.5)}
+    assert value(mission, "phase_time", phase="leg", index=1) == 10.0
+    assert value(mission, "phase_time", phase="touchdown") == pytest.approx(20.5)
+    missed = value(mission, "phase_time", phase="leg", index=2)
+    assert missed == Unavailable("the flight did not complete 'leg 2'")
+
+
+def test_energy_is_integrated_where_the_monitor_does_not_count() -> None:
+    battery = flight()["BAT"]
+    plain = Table(battery.t, {"Volt": np.full(len(battery), 10.0), "Curr": np.full(len(battery), 36.0)})
+    assert value(only(flight(BAT=plain)), "energy_used") == pytest.approx(6.0)
+
+
+@pytest.mark.parametrize(
+    ("replaced", "metric"),
+    [
+        ({"ARM": table([(10.0, 1, 0), (70.0, 0, 1)], "ArmState", "Forced")}, "forced_disarm"),
+        ({"ERR": table([(40.0, 6, 1)], "Subsys", "ECode")}, "failsafe"),
+        ({"ERR": table([(40.0, 12, 1)], "Subsys", "ECode")}, "crash"),
+        ({"MSG": table([(35.0, "Battery Failsafe")], "Message")}, "failsafe"),
+    ],
+)
+def test_what_makes_a_mission_fail(replaced: dict[str, Table], metric: str) -> None:
+    mission = only(flight(**replaced))
+    assert value(mission, metric) == 1.0
+    assert value(mission, "mission_success") == 0.0
+    assert len(KIND.evidence(mission)) == 1
+
+
+def test_a_cleared_error_is_no_failsafe() -> None:
+    mission = only(flight(ERR=table([(40.0, 6, 0), (41.0, 21, 2)], "Subsys", "ECode")))
+    assert value(mission, "failsafe") == 0.0
+    assert value(mission, "mission_success") == 1.0
+
+
+def test_a_missed_waypoint_and_a_landing_elsewhere_fail() -> None:
+    mission = only(flight(MSG=table([(20.0, "Mission: 2 WP")], "Message")))
+    assert (value(mission, "waypoints_reached"), value(mission, "mission_success")) == (0.0, 0.0)
+    moved = only(flight(ORGN=table([(10.0, 1, north(-8), HOME[1])], "Type", "Lat", "Lng")))
+    assert value(moved, "landing_error") == pytest.approx(8.0)
+    assert value(moved, "mission_success") == 0.0
+
+
+def test_a_log_that_ends_in_flight_has_no_success() -> None:
+    mission = only(flight(ARM=table([(10.0, 1, 0)], "ArmState", "Forced")))
+    assert not mission.ended
+    assert isinstance(value(mission, "mission_success"), Unavailable)
+
+
+def test_arming_by_events_and_more_than_one_flight() -> None:
+    events = table([(5.0, 10), (6.0, 15), (8.0, 11), (10.0, 10), (70.0, 11)], "Id")
+    missions = KIND.missions(flight(ARM=None, EV=events), 75.0, SPEC)
+    assert [(one.start_s, one.end_s, one.ended) for one in missions] == [(5.0, 8.0, True), (10.0, 70.0, True)]
+
+
+def test_refused_arming_is_one_mission_with_the_last_reasons() -> None:
+    texts = table(
+        [
+            (2.0, "Arm: Gyros inconsistent"),
+            (30.0, "PreArm: Check ANGLE_MAX"),
+            (30.0, "PreArm: RC not calibrated"),
+            (50.0, "Arm: AHRS: waiting for home"),
+            (50.0, "Arm: Check ANGLE_MAX"),
+        ],
+        "Message",
+    )
+    mission = only({"MSG": texts})
+    assert (mission.start_s, mission.end_s, mission.ended) == (0.0, 75.0, True)
+    assert [(one.text, one.kind) for one in KIND.evidence(mission)] == [
+        ("Arm: AHRS: waiting for home", "refusal"),
+        ("Arm: Check ANGLE_MAX", "refusal"),
+    ]
+    assert value(mission, "arming_refused") == 1.0
+    assert value(mission, "arming_refused", text="angle_max") == 1.0
+    assert value(mission, "arming_refused", text="Gyros") == 0.0
+    assert value(mission, "mission_success") == 0.0
+    assert value(mission, "mission_time") == Unavailable("the vehicle never armed", "see why arming was refused")
+
+
+def test_a_refusal_before_arming_is_no_evidence() -> None:
+    assert value(only(flight()), "arming_refused") == 0.0
+
+
+def test_a_log_without_arming_or_refusal_holds_no_mission() -> None:
+    assert KIND.missions({"MSG": table([(1.0, "ArduCopter V4.5.4")], "Message")}, 9.0, SPEC) == ()
+
+
+def test_another_mission_is_named() -> None:
+    other = flight()["CMD"]
+    far = Table(other.t, {**other.columns, "Lat": np.array([0.0, north(160), 0.0])})
+    assert KIND.mismatch(only(flight(CMD=far))) == "waypoint 1 is 60 m from where the profile's mission has it"
+    assert "has 0 waypoints" in KIND.mismatch(only(flight(CMD=None)))
+
+
+@pytest.mark.parametrize("lost", ["POS", "BAT", "ATT", "CMD", "ORGN", "MSG", "ARM"])
+def test_a_missing_channel_never_raises_and_never_gives_a_number_of_it(lost: str) -> None:
+    schema = read_schema(PROFILE)
+    for mission in KIND.missions(flight(**{lost: None}), 75.0, SPEC):
+        for variable in schema.variables.values():
+            if variable.extract is not None:
+                found = value(mission, variable.extract.kind, **variable.extract.args)
+                assert isinstance(found, Unavailable) or np.isfinite(found)
+    if lost != "ARM":
+        mission = only(flight(**{lost: None}))
+        gone = {"POS": "path_error", "BAT": "energy_used", "ATT": "attitude_error", "CMD": "waypoints_reached"}
+        if lost in gone:
+            assert isinstance(value(mission, gone[lost]), Unavailable)
+
+
+@given(st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), min_size=2, max_size=6), st.floats(0, 1))
+def test_points_on_a_leg_have_no_path_error(corners: list[tuple[float, float]], share: float) -> None:
+    legs = np.array(corners)
+    points = legs[:-1] + share * np.diff(legs, axis=0)
+    assert np.all(distance_to_legs(points, legs) < 1e-6)
+    assert np.all(distance_to_legs(points + 3000.0, legs) > 1000.0)
+
+
+def test_the_profile_reads_no_simulator_and_names_known_extractors() -> None:
+    schema = read_schema(PROFILE)
+    assert len(schema.options) == 33
+    assert "SIM_" not in PROFILE.read_text(encoding="utf-8")
+    for variable in schema.variables.values():
+        if variable.role is Role.OPTION:
+            assert variable.default is not None
+            assert variable.accepts(variable.default)
+            assert variable.doc
+        else:
+            assert variable.extract is not None
+            assert variable.extract.kind in EXTRACTORS
+            assert variable.unit == EXTRACTORS[variable.extract.kind].unit
+    assert all(option in schema.variables for _, options in schema.evidence for option in options)
+    assert schema.variables["BATT_LOW_VOLT"].safety
+
+
+def test_every_extractor_is_documented() -> None:
+    assert all(one.doc for one in EXTRACTORS.values())
+
+
+SHARED = os.environ.get("CARE_SHARED")
+needs_data = pytest.mark.skipif(SHARED is None, reason="CARE_SHARED names no folder of recorded runs")
+
+
+def recorded(path: Path, schema: Schema) -> tuple[Mission, dict[str, Value]]:
+    log = open_log(path)
+    extracts = {name: one.extract for name, one in schema.variables.items() if one.extract is not None}
+    needs = [KIND.needs(schema.mission), *(find_extractor(e.kind).needs(e.args) for e in extracts.values())]
+    last = KIND.missions(log.read(merge_needs(needs)), log.duration_s, schema.mission)[-1]
+    settings = {name: history[-1].value for name, history in log.settings().items()}
+    mission = Mission(last.tables, last.start_s, last.end_s, last.ended, last.spec, settings)
+    return mission, {name: find_extractor(e.kind).compute(mission, e.args) for name, e in extracts.items()}
+
+
+def faults(count: int) -> Iterator[dict[str, Any]]:
+    with Path(SHARED or "", "data", "arducopter", "faults", "truth.jsonl").open(encoding="utf-8") as lines:
+        for line, _ in zip(lines, range(count), strict=False):
+            yield json.loads(line)
+
+
+@needs_data
+def test_recorded_faults_agree_with_what_was_measured_outside() -> None:
+    schema = read_schema(PROFILE)
+    for fault in faults(12):
+        log = Path(SHARED or "", "data", "arducopter", "faults", f"{fault['tag']}.BIN")
+        mission, values = recorded(log, schema)
+        truth = fault["objectives"]
+        assert KIND.mismatch(mission) == ""
+        assert values["mission_success"] == truth["mission_success"], fault["tag"]
+        if truth["outcome"] == "arm_failed":
+            assert all(one.kind == "refusal" for one in KIND.evidence(mission))
+            assert KIND.evidence(mission)
+            continue
+        time_s, energy_wh = values["mission_time"], values["energy"]
+        assert is_known(time_s)
+        assert is_known(energy_wh)
+        assert time_s == pytest.approx(truth["mission_time_s"], abs=0.4)
+        assert energy_wh == pytest.approx(truth["energy_wh"], abs=0.05)
+        assert mission.shared(analyse).track is not None
+
+
+@needs_data
+def test_recorded_options_are_those_that_were_flown() -> None:
+    schema = read_schema(PROFILE)
+    for fault in faults(6):
+        found = open_log(Path(SHARED or "", "data", "arducopter", "faults", f"{fault['tag']}.BIN")).settings()
+        for option in schema.options:
+            driven = found[option.parameters[0]][-1].value
+            assert driven == pytest.approx(fault["config"][option.name], rel=1e-3), (fault["tag"], option.name)
+
+
+@needs_data
+def test_ranges_and_defaults_are_the_sampled_ones() -> None:
+    schema = read_schema(PROFILE)
+    with Path(SHARED or "", "data", "arducopter", "reference.csv").open(encoding="utf-8") as stream:
+        for row in csv.DictReader(stream):
+            option = schema.variables[row["option"]]
+            assert option.default == float(row["reference"])
+            assert option.range == (float(row["low"]), float(row["high"]))
+
+
+def test_the_mission_kind_is_registered() -> None:
+    assert isinstance(KIND, ardupilot.ArduPilotFlight)
