@@ -6,14 +6,15 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from textual import on, work
+from textual import constants, on, work
 from textual.app import App, SystemCommand
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
+from textual.scrollbar import ScrollBar, ScrollBarRender
 from textual.worker import Worker, get_current_worker
 
 from care_core.errors import CareError, ExitCode
-from care_tui.jobs import Cancelled, Engine, as_care_error, exit_code
+from care_tui.jobs import CancelledError, Engine, as_care_error, exit_code
 from care_tui.messages import DiagnosisFailed, DiagnosisReady, Progressed
 from care_tui.render import ASCII, UNICODE
 from care_tui.screens.base import CareScreen
@@ -21,6 +22,16 @@ from care_tui.screens.diagnosis import DiagnosisScreen
 from care_tui.screens.help import HelpScreen, Keys
 from care_tui.screens.loading import ErrorScreen, LoadingScreen
 from care_tui.widgets.step_bar import STEPS
+
+THEME = "ansi-dark"
+"""The terminal's own colours: right on any background, with 16 colours, and half the bytes on a slow link."""
+TEXTUAL_THEME = "textual-dark"
+
+
+class PlainScrollBar(ScrollBarRender):
+    """A scroll bar without block characters, which not every terminal has."""
+
+    VERTICAL_BARS: ClassVar[list[str]] = [" "] * 8
 
 
 class CareApp(App[int], inherit_bindings=False):
@@ -45,6 +56,9 @@ class CareApp(App[int], inherit_bindings=False):
     ) -> None:
         super().__init__()
         self.animation_level = "none"
+        ScrollBar.renderer = PlainScrollBar
+        if constants.DEFAULT_THEME == TEXTUAL_THEME:
+            self.theme = THEME
         self.set_class(ascii, "-ascii")
         self.code = ExitCode.INTERRUPTED
         self._log_path = log
@@ -55,7 +69,7 @@ class CareApp(App[int], inherit_bindings=False):
         self._job: Worker[None] | None = None
 
     def on_mount(self) -> None:
-        self.push_screen(LoadingScreen(self._log_path))
+        self.push_screen(LoadingScreen(self._log_path, self._glyphs))
         self._job = self._diagnose()
 
     # The work
@@ -66,13 +80,13 @@ class CareApp(App[int], inherit_bindings=False):
 
         def progress(step: str, fraction: float) -> None:
             if worker.is_cancelled:
-                raise Cancelled
+                raise CancelledError
             self.post_message(Progressed(step, fraction))
 
         try:
             diagnosis = self._engine.diagnose(self._log_path, self._profile, self._configs, progress)
             progress("Done", 1.0)
-        except Cancelled:
+        except CancelledError:
             return
         except Exception as err:
             self.post_message(DiagnosisFailed(as_care_error(err)))
@@ -109,7 +123,7 @@ class CareApp(App[int], inherit_bindings=False):
 
     def action_retry(self) -> None:
         self.code = ExitCode.INTERRUPTED
-        self._replace(LoadingScreen(self._log_path))
+        self._replace(LoadingScreen(self._log_path, self._glyphs))
         self._job = self._diagnose()
 
     # Keys and commands that work everywhere
@@ -132,7 +146,7 @@ class CareApp(App[int], inherit_bindings=False):
         keys: dict[str, list[str]] = {}
         for key, active in screen.active_bindings.items():
             description = active.binding.description
-            if active.enabled and description and not active.binding.system:
+            if active.enabled and description and active.binding.id:
                 keys.setdefault(description, []).append(self.get_key_display(active.binding.with_key(key)))
         return [(" ".join(shown), description) for description, shown in keys.items()]
 

@@ -343,7 +343,7 @@ def train(
     schema: Annotated[Path, typer.Option("--schema", help="The profile.yaml that describes its columns.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder of the new profile.")],
     seed: Annotated[int, typer.Option("--seed", help="Seed of every random choice.")] = 0,
-    resamples: Annotated[int, typer.Option("--resamples", min=2, help="Bootstrap resamples.")] = 100,
+    resamples: Annotated[int, typer.Option("--resamples", min=2, help="Bootstrap resamples.")] = 50,
 ) -> None:
     """Learn a profile from a table of runs."""
     from care_tui.training import train_profile

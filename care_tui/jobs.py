@@ -19,22 +19,27 @@ SUFFIXES: dict[str, ReportFormat] = {".yaml": "yaml", ".yml": "yaml", ".md": "ma
 """File suffix to report format; the first suffix of a format is its default."""
 
 
-class Cancelled(Exception):
+class CancelledError(Exception):
     """The operator took the work back. Raised out of a progress call to unwind the engine."""
 
 
 def diagnose_log(path: Path, profile: str | None, configs: Sequence[Path], progress: Progress) -> Diagnosis:
     """The whole line from a log file to its diagnosis, the same as `care triage` runs."""
+    from care_core.configs import read_configs
     from care_core.diagnose.triage import triage
+    from care_core.extract.settings import disagreements
     from care_core.logs import open_log
     from care_core.profile.select import choose_profile
     from care_core.profile.store import available_profiles, load_profile
 
-    progress("Opening the log", 0.0)
+    overrides = read_configs(configs)
+    progress("opening the log", 0.0)
     log = open_log(path)
-    profiles = [load_profile(name) for name in ([profile] if profile else available_profiles())]
-    chosen, choice = choose_profile(log, profiles)
-    return triage(log, chosen, choice, configs=configs, progress=progress)
+    names: list[Path] | list[str] = available_profiles() if profile is None else [profile]
+    chosen, choice = choose_profile(log, [load_profile(name) for name in names])
+    diagnosis = triage(log, chosen, choice, configs=overrides, progress=progress)
+    notes = disagreements(chosen.schema, diagnosis.run.config, overrides)
+    return replace(diagnosis, notes=(*diagnosis.notes, *notes))
 
 
 def diff_of(run: Run, fix: Fix) -> str:
@@ -56,10 +61,7 @@ def save_report(path: Path, text: str) -> None:
     """Write the report; the file is whole or not there at all."""
     from care_core.report import write_atomically
 
-    try:
-        write_atomically(path, text)
-    except OSError as err:
-        raise CareError(f"Cannot write the report: {err.strerror or err}.", hint="Choose another place.") from err
+    write_atomically(path, text)
 
 
 @dataclass(frozen=True, slots=True)

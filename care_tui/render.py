@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from rich.segment import Segment
 from textual.content import Content
 from textual.css.styles import RulesMap
 from textual.strip import Strip
@@ -28,10 +29,11 @@ from care_core.diagnose.records import (
 )
 from care_core.errors import CareError
 from care_core.run import Damage, Evidence
+from care_core.text import clean
 from care_core.variables import Threshold, Variable
-from care_tui.clean import clean
 
 LABEL_WIDTH = 14
+PROGRESS_WIDTH = 40
 FEW_RESAMPLES = 0.5
 """Edges that fewer bootstrap resamples hold are flagged."""
 
@@ -48,10 +50,12 @@ class Glyphs:
     root: str
     line: str
     down: str
+    done: str
+    ahead: str
 
 
-UNICODE = Glyphs(ok="✓", fault="✗", unknown="?", here="▸", to="→", root="●", line="│", down="▼")
-ASCII = Glyphs(ok="+", fault="x", unknown="?", here=">", to="->", root="*", line="|", down="v")
+UNICODE = Glyphs(ok="✓", fault="✗", unknown="?", here="▸", to="→", root="●", line="│", down="▼", done="█", ahead="░")
+ASCII = Glyphs(ok="+", fault="x", unknown="?", here=">", to="->", root="*", line="|", down="v", done="#", ahead=".")
 
 WORDS: dict[Status, str] = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
 _COLOURS: dict[Status, str] = {"ok": "$text-success", "fault": "bold $text-error", "not_evaluated": "$text-warning"}
@@ -76,7 +80,7 @@ class Rows(Visual):
 
     def render_strips(self, width: int, height: int | None, style: Style, options: RenderOptions) -> list[Strip]:
         lines = self.wrap(width)[:height]
-        return [strip for line in lines for strip in line.render_strips(width, 1, style, options)]
+        return [_lean(strip) for line in lines for strip in line.render_strips(width, 1, style, options)]
 
     def get_optimal_width(self, rules: RulesMap, container_width: int) -> int:
         return max((row.content.cell_length for row in self.rows), default=0)
@@ -86,6 +90,12 @@ class Rows(Visual):
 
     def get_height(self, rules: RulesMap, width: int) -> int:
         return len(self.wrap(width))
+
+
+def _lean(strip: Strip) -> Strip:
+    """The strip without the marks for text selection, which keep neighbours of one style from being sent as one."""
+    segments = [Segment(text, style and style.clear_meta_and_links()) for text, style, _ in strip]
+    return Strip(segments, strip.cell_length)
 
 
 def _wrap(row: Row, width: int) -> list[Content]:
@@ -108,7 +118,7 @@ def text(value: str, style: str = "") -> Content:
 def labelled(label: str, value: Content | str, style: str = "") -> Row:
     """A row `label  value` with the values in one column."""
     body = text(value) if isinstance(value, str) else value
-    return Row(Content.assemble((f"{label:<{LABEL_WIDTH}}", style or "dim"), body), LABEL_WIDTH)
+    return Row(Content.assemble((f"{label:<{LABEL_WIDTH}}", style), body), LABEL_WIDTH)
 
 
 def heading(value: str) -> Row:
@@ -171,7 +181,7 @@ def objective_rows(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Rows:
     if result.reason:
         rows.append(Row(Content(" " * 16) + text(result.reason), 16))
     elif result.status == "fault" and result.percentile is not None:
-        usual = f"above {percent(result.percentile)} of the training runs"
+        usual = f"percentile {100 * result.percentile:.3g} of the training runs"
         rows.append(Row(Content.styled(" " * 16 + usual, "dim"), 16))
     return Rows(rows)
 
@@ -215,7 +225,7 @@ def evidence_row(part: Evidence, option: str = "") -> Row:
     points = option and option in part.options
     head = f"{part.time_s:8.1f} s  {clean(part.kind):<9} "
     tail = "  (points at this option)" if points else ""
-    return Row(Content.assemble((head, "dim"), text(part.text), (tail, "bold")), len(head))
+    return Row(Content.assemble(head, text(part.text), (tail, "bold")), len(head))
 
 
 # Step 2: causes
@@ -225,13 +235,16 @@ def cause_rows(cause: Cause, glyphs: Glyphs) -> Rows:
     """One cause of the ranked list: the option with its change, then what it is worth, with its caveats beside it."""
     option = cause.option
     head = Content.assemble(
-        f"{cause.rank:>2} ", text(option.name, "bold"), "  ", change_text(option, cause.current, cause.suggested, glyphs)
+        f"{cause.rank:>2} ",
+        text(option.name, "bold"),
+        "  ",
+        change_text(option, cause.current, cause.suggested, glyphs),
     )
     worth = [f"{cause.confidence} confidence"]
     if cause.p_fixed is not None:
-        worth.append(f"fixed {percent(cause.p_fixed)}")
+        worth.append(f"odds of a fix {percent(cause.p_fixed)}")
     caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
-    return Rows([Row(head, 3), Row(Content.assemble("   " + ", ".join(worth), (caveats, "$text-warning")), 3)])
+    return Rows([Row(head, 3), Row(Content("   " + ", ".join(worth) + caveats), 3)])
 
 
 def change_text(option: Variable, current: float, suggested: float | None, glyphs: Glyphs) -> Content:
@@ -258,8 +271,8 @@ def path_rows(cause: Cause, objective: ObjectiveResult, glyphs: Glyphs) -> list[
         line = Content.assemble(f"{sign} ", text(node.name, "bold").pad_right(width - len(clean(node.name)) + 2))
         line += text(node_value(node, cause.option if place == 0 else None))
         if place == last:
-            line += Content.assemble("  ", text(limit(objective.threshold, node.unit)), "  ")
-            rows.append(Row(line + status(objective.status, glyphs), width + 4))
+            line += Content.assemble("  ", status(objective.status, glyphs), "  ")
+            rows.append(Row(line + text(limit(objective.threshold, node.unit)), width + 4))
         else:
             rows += [Row(line, width + 4), Row(edge_line(node, glyphs), 4)]
     return rows
@@ -284,7 +297,7 @@ def edge_line(node: PathNode, glyphs: Glyphs) -> Content:
 def cause_detail(cause: Cause, objective: ObjectiveResult, evidence: Sequence[Evidence], glyphs: Glyphs) -> Rows:
     """Everything about one cause: its path, what it is worth, its caveats, what the log says."""
     option = cause.option
-    gain = "" if cause.p_fixed is None else f", all objectives kept with {percent(cause.p_fixed)}"
+    gain = "" if cause.p_fixed is None else f", odds that it keeps all thresholds {percent(cause.p_fixed)}"
     rows = [*path_rows(cause, objective, glyphs), Row(Content())]
     rows.append(labelled("Confidence", f"{cause.confidence}{gain}"))
     rows += [warning("Caveat", note) for note in caveats_of(cause)]
@@ -299,8 +312,7 @@ def cause_detail(cause: Cause, objective: ObjectiveResult, evidence: Sequence[Ev
     if option.doc:
         rows.append(labelled("About", option.doc))
     if evidence:
-        first = sorted(evidence, key=lambda part: option.name not in part.options)
-        rows += [Row(Content()), heading("The log says"), *(evidence_row(part, option.name) for part in first)]
+        rows += [Row(Content()), heading("The log says"), *(evidence_row(part, option.name) for part in evidence)]
     return Rows(rows)
 
 
@@ -322,11 +334,14 @@ def no_cause_rows(diagnosis: Diagnosis, objective: ObjectiveResult | None) -> Ro
 def fix_rows(fix: Fix, place: int, glyphs: Glyphs) -> Rows:
     """One fix of the list: suggested or alternative, its odds, its changes."""
     label = "Suggested" if place == 0 else f"Alternative {place}"
-    head = Content.assemble((f"{label:<15}", "bold"), f"all objectives kept with {percent(fix.p_fixed)}")
+    head = Content.assemble((f"{label:<15}", "bold"), f"odds of keeping all thresholds {percent(fix.p_fixed)}")
     changes = [
         Row(
             Content.assemble(
-                "  ", text(change.option.name), "  ", change_text(change.option, change.current, change.suggested, glyphs)
+                "  ",
+                text(change.option.name),
+                "  ",
+                change_text(change.option, change.current, change.suggested, glyphs),
             ),
             4,
         )
@@ -370,9 +385,9 @@ def change_rows(change: Change, glyphs: Glyphs) -> list[Row]:
 
 
 def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs) -> Content:
-    """`✓ OK  139 s, 131 to 150 s, kept with 91 %`."""
+    """`✓ OK  139, 131 to 150 s, odds 91 %`."""
     span = f"  {predicted.value:.4g}, {predicted.low:.4g} to {measure(predicted.high, variable.unit)}"
-    odds = "" if predicted.p_ok is None else f", kept with {percent(predicted.p_ok)}"
+    odds = "" if predicted.p_ok is None else f", odds {percent(predicted.p_ok)}"
     return status(predicted.status(), glyphs) + text(f"{span}{odds}")
 
 
@@ -398,6 +413,13 @@ def diff_rows(diff: str) -> Rows:
 def plain_rows(document: str) -> Rows:
     """A document as it is, line by line."""
     return Rows(Row(text(line), len(line) - len(line.lstrip()) + 2) for line in document.splitlines())
+
+
+def progress_bar(fraction: float, glyphs: Glyphs) -> Content:
+    """How much of the work is done; drawn when the engine reports, never on a timer."""
+    done = round(PROGRESS_WIDTH * min(max(fraction, 0.0), 1.0))
+    bar = glyphs.done * done + glyphs.ahead * (PROGRESS_WIDTH - done)
+    return Content(f"{bar} {percent(done / PROGRESS_WIDTH)}")
 
 
 def error_rows(error: CareError) -> Rows:

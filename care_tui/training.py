@@ -5,50 +5,40 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from care_core.errors import LearningError, UsageError
+from care_core.errors import UsageError
 from care_core.extract.table import INSTALL_LEARN
 from care_core.profile.model import write_model
 from care_core.profile.schema import read_schema
 from care_core.profile.store import PROFILE_FILE
 
-if TYPE_CHECKING:
-    import pandas as pd
+CARD_FILE = "MODEL_CARD.md"
 
 
 def train_profile(
     runs: Path, schema_path: Path, out: Path, *, seed: int, resamples: int, progress: Callable[[str, float], None]
 ) -> None:
-    """Learn the model and write `profile.yaml` with it into `out`.
+    """Learn the model and write it into `out` with `profile.yaml` and the model card.
 
     Raises:
-        UsageError: the learning libraries are not installed.
+        UsageError: the learning libraries are not installed, or the folder cannot be made.
         ProfileError: the schema is unsound.
         LearningError: the table cannot be read, or cannot carry a model.
     """
     schema = read_schema(schema_path)
     try:
-        from care_core.learn.train import train
+        from care_core.learn.card import model_card
+        from care_core.learn.table import read_table
+        from care_core.learn.train import Settings, train
     except ModuleNotFoundError as err:
         raise UsageError(f"Learning needs {err.name}, which is not installed.", hint=f"{INSTALL_LEARN}.") from err
-    frame = read_runs_table(runs)
-    progress("learning", 0.0)
-    model = train(frame, schema, seed=seed, resamples=resamples)
-    out.mkdir(parents=True, exist_ok=True)
-    write_model(model, out)
-    if schema_path.resolve() != (out / PROFILE_FILE).resolve():
-        shutil.copyfile(schema_path, out / PROFILE_FILE)
-
-
-def read_runs_table(path: Path) -> pd.DataFrame:
-    """A table of runs from CSV or Parquet."""
-    import pandas as pd
-
+    frame = read_table(runs, schema)
+    model = train(frame, schema, Settings(seed=seed, resamples=resamples, origin=runs.name), progress)
     try:
-        return pd.read_parquet(path) if path.suffix.lower() == ".parquet" else pd.read_csv(path)
-    except ImportError as err:
-        raise UsageError("Parquet cannot be read here.", hint=f"{INSTALL_LEARN}, or give a .csv.") from err
-    except (OSError, ValueError) as err:
-        detail = " ".join(str(err).split())[:200]
-        raise LearningError(f"Cannot read the table of runs: {detail}.", where=str(path)) from err
+        out.mkdir(parents=True, exist_ok=True)
+        write_model(model, out)
+        if schema_path.resolve() != (out / PROFILE_FILE).resolve():
+            shutil.copyfile(schema_path, out / PROFILE_FILE)
+        (out / CARD_FILE).write_text(model_card(schema, model), encoding="utf-8")
+    except OSError as err:
+        raise UsageError(f"Cannot write the profile: {err.strerror}.", where=str(out)) from err

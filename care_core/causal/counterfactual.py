@@ -75,7 +75,9 @@ class World:
         p_ok = np.ones(len(configs))
         reached = True
         for stage in outcome.stages:
-            passed = self._passed(outcome.objective, stage) if reached else None
+            passed = self._passed(outcome.objective, stage)
+            if not reached and (passed or stage.variable == outcome.objective):
+                passed = None  # what came after the failure says nothing about this stage
             p_ok *= self._stage_odds(stage, passed, configs)
             reached = reached and passed is not False
         zero, one = np.zeros_like(p_ok), np.ones_like(p_ok)

@@ -93,6 +93,31 @@ class CausalGraph:
         """All nodes, causes before effects, ties in the order of `nodes`."""
         return self._order
 
+    def m_separated(self, a: str, b: str, given: Collection[str] = ()) -> bool:
+        """Whether every path between the two nodes is blocked by `given` (m-separation, Richardson 2003)."""
+        blocked, opened = set(given), self.ancestors(*given)
+        # A step is a node and whether it was entered through an arrowhead.
+        ahead = [*self._steps(a, True), *self._steps(a, False)]
+        seen: set[tuple[str, bool]] = set()
+        while ahead:
+            node, by_arrowhead = ahead.pop()
+            if node == b:
+                return False
+            if (node, by_arrowhead) in seen:
+                continue
+            seen.add((node, by_arrowhead))
+            if node not in blocked:
+                ahead += self._steps(node, False)
+            if (node in opened) if by_arrowhead else (node not in blocked):
+                ahead += self._steps(node, True)
+        return True
+
+    def _steps(self, node: str, by_arrowhead: bool) -> list[tuple[str, bool]]:
+        """The steps that leave a node by an arrowhead at it, or by a tail."""
+        if by_arrowhead:
+            return [(n, False) for n in self.parents(node)] + [(n, True) for n in self.siblings(node)]
+        return [(n, True) for n in self.children(node)]
+
     def subgraph(self, nodes: Collection[str]) -> CausalGraph:
         """The graph on some of its nodes, with the edges among them."""
         kept = set(nodes)

@@ -196,6 +196,11 @@ def _has_event(mission: Mission, kind: str, about: str = "") -> float:
 # --- outcome ---------------------------------------------------------------------------------------------------
 
 
+def _in_flight(mission: Mission, kind: str, about: str = "") -> Value:
+    """The same, for a vehicle that was armed: one that never flew shows neither."""
+    return _has_event(mission, kind, about) if _is_armed(mission) else _NOT_FLOWN
+
+
 @extractor("mission_success", needs=NEEDS, unit="")
 def mission_success(mission: Mission, args: Args) -> Value:
     """1 when every waypoint was reached, the vehicle landed near home (`tolerance_m` of the mission) and disarmed by
@@ -229,31 +234,31 @@ def arming_refused(mission: Mission, args: Args) -> Value:
 @extractor("failsafe", needs=_EVENTS, unit="", args={"about": "battery, radio, EKF, ...; any when not given"})
 def failsafe(mission: Mission, args: Args) -> Value:
     """1 when a failsafe acted in flight, else 0."""
-    return _has_event(mission, "failsafe", str(args.get("about", "")))
+    return _in_flight(mission, "failsafe", str(args.get("about", "")))
 
 
 @extractor("crash", needs=_EVENTS, unit="")
 def crash(mission: Mission, args: Args) -> Value:
     """1 when the autopilot's crash check disarmed the vehicle, else 0."""
-    return _has_event(mission, "crash")
+    return _in_flight(mission, "crash")
 
 
 @extractor("thrust_loss", needs=_EVENTS, unit="")
 def thrust_loss(mission: Mission, args: Args) -> Value:
     """1 when the autopilot reported that thrust could not hold attitude or height, else 0."""
-    return _has_event(mission, "thrust")
+    return _in_flight(mission, "thrust")
 
 
 @extractor("ekf_trouble", needs=_EVENTS, unit="")
 def ekf_trouble(mission: Mission, args: Args) -> Value:
     """1 when the estimator reported variance, a lane switch or a yaw reset in flight, else 0."""
-    return _has_event(mission, "ekf")
+    return _in_flight(mission, "ekf")
 
 
 @extractor("forced_disarm", needs=_EVENTS, unit="")
 def forced_disarm(mission: Mission, args: Args) -> Value:
     """1 when the operator disarmed the vehicle by force, else 0."""
-    return float(_forced(mission))
+    return float(_forced(mission)) if _is_armed(mission) else _NOT_FLOWN
 
 
 @extractor("arming_time", needs=_EVENTS, unit="s")

@@ -50,15 +50,24 @@ class Constraints:
         """Whether the directed edge cannot be."""
         return self.reason(cause, effect) is not None
 
-    def separates(self, a: str, b: str) -> bool:
-        """Whether no edge of any kind may join the pair.
+    def never_causes(self, a: str, b: str) -> bool:
+        """Whether `a` causes `b` neither directly nor through others: an arrowhead at `a` in the partial graph."""
+        return self.forbids(a, b) and (self.roles[a], self.roles[b]) != (O, Y)
 
-        In an observational table an option may share a hidden cause with an objective (an operator who saw trouble
-        coming), so such a pair stays open to a bidirected edge.
+    def separates(self, a: str, b: str) -> bool:
+        """Whether the pair is independent by design, so that no test is needed.
+
+        An option and an objective are not: the option acts through metrics.
         """
-        if self.observational and {self.roles[a], self.roles[b]} == {O, Y}:
-            return False
-        return self.forbids(a, b) and self.forbids(b, a)
+        return self.never_causes(a, b) and self.never_causes(b, a)
+
+    def may_explain(self, given: str, name: str) -> bool:
+        """Whether conditioning on `given` may take away a dependence of `name`: only what can cause it does.
+
+        Objectives are left out even for other objectives. Time and energy of a mission nearly repeat each other,
+        and each would take away every other cause of the other.
+        """
+        return self.roles[given] is not Y and not self.never_causes(given, name)
 
     def is_exogenous(self, name: str) -> bool:
         """Whether nothing, seen or hidden, drives the variable together with what follows it.

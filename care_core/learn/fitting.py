@@ -21,6 +21,9 @@ MAX_POINTS = 600
 ITERATIONS = 60
 RELEVANCE_SCALE = 0.1
 """Relevance below which an input counts as unused in the penalty."""
+NOISE, BINARY_NOISE = 0.02, 0.3
+"""Least noise, as a share of the target's spread. Yes-or-no outcomes near a limit go either way: a regression that
+reproduces every one of them has learned them by heart."""
 RESIDUAL_LEVELS = 101
 MIN_ROWS = 20
 
@@ -58,7 +61,7 @@ def fit_mechanism(
     points = ((raw - centre) / spread).astype(np.float32).astype(float)
     mean, scale = float(coded.mean()), float(coded.std()) or 1.0
     targets = ((coded - mean) / scale).astype(np.float32).astype(float)
-    kernel = _fit_kernel(points, targets, iterations)
+    kernel = _fit_kernel(points, targets, iterations, BINARY_NOISE if binary else NOISE)
     errors, spreads = _leave_one_out(kernel, points, targets)
     calibration = _logistic(mean + scale * (targets - errors), y) if binary else _residual_levels(errors / spreads)
     return Mechanism(
@@ -81,13 +84,13 @@ def _skewness(values: FloatArray) -> float:
     return 0.0 if spread == 0 else float((((values - values.mean()) / spread) ** 3).mean())
 
 
-def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int) -> Kernel:
+def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_noise: float) -> Kernel:
     n, p = points.shape
     if p == 0 or np.ptp(targets) == 0:
         return Kernel(np.zeros(p), 0.0, 0.0, 1.0)
     squared = (points[:, None, :] - points[None, :, :]) ** 2
     start = np.r_[np.full(p, np.log(0.3)), 0.0, 0.0, np.log(0.5)]
-    bounds = [(-6.0, 2.0)] * p + [(-4.0, 3.0)] * 2 + [(-4.0, 1.0)]
+    bounds = [(-6.0, 2.0)] * p + [(-4.0, 3.0)] * 2 + [(np.log(least_noise), 1.0)]
     best = minimize(
         _negative_log_posterior,
         start,

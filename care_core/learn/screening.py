@@ -10,12 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import fdtrc, ndtri, stdtr
 
 from care_core.learn.table import FloatArray, normal_scores
 from care_core.profile.schema import Schema
 
 BINS = 5
+CUTS = ndtri(np.arange(1, BINS) / BINS)
+"""Normal scores are standardised, so the normal quantiles cut them into equally filled bins."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +39,11 @@ def screen_options(frame: pd.DataFrame, schema: Schema, *, false_discovery_rate:
     options = [v.name for v in schema.options]
     targets = [v.name for v in (*schema.metrics, *schema.objectives)]
     p = dependence(frame[options].to_numpy(float), frame[targets].to_numpy(float))
-    found = discoveries(p, false_discovery_rate).any(axis=1).tolist()
+    found = np.flatnonzero(discoveries(p, false_discovery_rate).any(axis=1))
+    kept = tuple(options[i] for i in found)
     return Screening(
-        kept=tuple(name for name, hit in zip(options, found, strict=True) if hit),
-        dropped=tuple(name for name, hit in zip(options, found, strict=True) if not hit),
+        kept=kept,
+        dropped=tuple(name for name in options if name not in set(kept)),
         p_values=pd.DataFrame(p, index=options, columns=targets),
     )
 
@@ -72,14 +75,15 @@ def discoveries(p: FloatArray, rate: float) -> NDArray[np.bool_]:
 
 
 def pairwise_correlation(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Pearson correlation over the rows that both columns have, 0 where either is constant there.
+    """Pearson correlation over the rows that both columns have.
 
     Args:
         x: shape (n, k), NaN for missing.
         y: shape (n, m), likewise.
 
     Returns:
-        Correlations and numbers of rows, both of shape (k, m).
+        Correlations and numbers of rows, both of shape (k, m); correlation and number are 0 where a column is constant
+        over the common rows (a metric that only accomplished missions have says nothing of success).
     """
     has_x, has_y = np.isfinite(x).astype(float), np.isfinite(y).astype(float)
     x, y = np.nan_to_num(x), np.nan_to_num(y)
@@ -91,21 +95,22 @@ def pairwise_correlation(x: FloatArray, y: FloatArray) -> tuple[FloatArray, Floa
     covariance = x.T @ y / rows - sum_x * sum_y / rows**2
     varies = (var_x > 1e-9) & (var_y > 1e-9)
     scale = np.sqrt(np.where(varies, var_x * var_y, 1.0))
-    return np.asarray(np.where(varies, np.clip(covariance / scale, -1.0, 1.0), 0.0)), np.asarray(n)
+    r = np.where(varies, np.clip(covariance / scale, -1.0, 1.0), 0.0)
+    return np.asarray(r), np.asarray(np.where(varies, n, 0.0))
 
 
 def _correlation_p(x: FloatArray, y: FloatArray) -> FloatArray:
     r, n = pairwise_correlation(x, y)
     freedom = np.maximum(n - 2, 1)
     t = np.abs(r) * np.sqrt(freedom / np.maximum(1 - r**2, 1e-12))
-    return np.asarray(np.where(n > 2, 2 * stats.t.sf(t, freedom), 1.0))
+    return np.asarray(np.where(n > 2, 2 * stdtr(freedom, -t), 1.0))
 
 
 def _binned_p(x: FloatArray, y: FloatArray) -> FloatArray:
     """F-tests of the targets' means over the sources' bins, all pairs at once."""
     has_y = np.isfinite(y).astype(float)
     y = np.nan_to_num(y)
-    bins = _bin(x)
+    bins = bin_numbers(x)
     rows = np.zeros((x.shape[1], y.shape[1]))
     total, squares, between = rows.copy(), rows.copy(), rows.copy()
     groups = rows.copy()
@@ -122,12 +127,10 @@ def _binned_p(x: FloatArray, y: FloatArray) -> FloatArray:
     freedom = rows - groups
     usable = (groups > 1) & (freedom > 0) & (squares - correction > 1e-9)
     f = (between / np.maximum(groups - 1, 1)) / np.maximum(within / np.maximum(freedom, 1), 1e-12)
-    p = stats.f.sf(f, np.maximum(groups - 1, 1), np.maximum(freedom, 1))
+    p = fdtrc(np.maximum(groups - 1, 1), np.maximum(freedom, 1), np.maximum(f, 0.0))
     return np.asarray(np.where(usable, p, 1.0))
 
 
-def _bin(x: FloatArray) -> NDArray[np.int64]:
-    """Bin numbers 0..BINS-1 of equal probability (equal values stay together), -1 for missing."""
-    # Normal scores are standardised, so the normal quantiles cut them into equally filled bins.
-    cuts = stats.norm.ppf(np.arange(1, BINS) / BINS)
-    return np.where(np.isfinite(x), np.searchsorted(cuts, np.nan_to_num(x)), -1)
+def bin_numbers(x: FloatArray) -> NDArray[np.int64]:
+    """Bin numbers 0..BINS-1 of normal scores, equally filled (equal values stay together), -1 for missing."""
+    return np.where(np.isfinite(x), np.searchsorted(CUTS, np.nan_to_num(x)), -1)

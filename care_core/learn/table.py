@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +18,7 @@ FloatArray = NDArray[np.float64]
 
 MIN_RUNS = 30
 """Below this, Fisher's z at the default alpha sees only correlations above 0.5."""
-FORMATS: Mapping[str, Callable[[Path], pd.DataFrame]] = {".csv": pd.read_csv, ".parquet": pd.read_parquet}
+FORMATS = (".csv", ".parquet")
 
 
 def read_table(path: Path, schema: Schema) -> pd.DataFrame:
@@ -49,7 +48,8 @@ def check_table(frame: pd.DataFrame, schema: Schema, where: str = "") -> pd.Data
             where=where,
         )
     columns = {name: _numbers(frame[name], variable, where) for name, variable in schema.variables.items()}
-    return pd.DataFrame(columns).reset_index(drop=True)
+    checked: pd.DataFrame = pd.DataFrame(columns)
+    return checked
 
 
 def normal_scores(values: ArrayLike) -> FloatArray:
@@ -81,11 +81,11 @@ def _read(path: Path) -> pd.DataFrame:
             where=str(path),
         )
     try:
-        frame = FORMATS[path.suffix.lower()](path)
-    except OSError as err:
+        frame: pd.DataFrame = pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path)
+    except OSError as err:  # pyarrow's errors too
         reason = err.strerror or "it is not a table of that format"
         raise LearningError(f"Cannot read the table: {reason}.", where=str(path)) from err
-    except (ValueError, ImportError) as err:  # pandas' parser errors and pyarrow's are ValueErrors
+    except (ValueError, ImportError) as err:  # pandas' parser errors are ValueErrors
         detail = " ".join(str(err).split())[:200]
         raise LearningError(f"Cannot read the table: {detail}.", where=str(path)) from err
     if frame.columns.has_duplicates:
@@ -107,10 +107,11 @@ def _numbers(column: pd.Series[float], variable: Variable, where: str) -> FloatA
             where=f"{where} row {row + 1}".strip(),
         )
     values = np.where(np.isfinite(values), values, np.nan)
-    if variable.role in (Role.OPTION, Role.CONTEXT) and np.isnan(values).any():
+    # A context such as the wind is measured in flight: a refused mission has none.
+    if variable.role is Role.OPTION and np.isnan(values).any():
         row = int(np.isnan(values).argmax())
         raise LearningError(
-            f"The {variable.role.value} '{variable.name}' is missing in a run.",
+            f"The option '{variable.name}' is missing in a run.",
             hint="Fill in the value as driven, or leave the run out.",
             where=f"{where} row {row + 1}".strip(),
         )

@@ -22,7 +22,6 @@ UNREADABLE_MAGIC = (
     (b"SQLite format 3\0", "a ROS 2 bag (SQLite)", "Convert it to a ROS 1 bag with 'rosbags-convert'."),
     (b"\x89MCAP0\r\n", "an MCAP file", "Convert it to a ROS 1 bag with 'rosbags-convert'."),
     (b"ULog\x01\x12\x35", "a PX4 ULog", ""),
-    (b"FMT, 128", "a DataFlash log as text", "Use the .BIN that the vehicle wrote."),
     (b"\x1f\x8b", "a gzip archive", "Unpack it first."),
     (b"PK\x03\x04", "a zip archive", "Unpack it first."),
     (b"\x28\xb5\x2f\xfd", "a zstd archive", "Unpack it first."),
@@ -50,11 +49,13 @@ def sniff(path: Path) -> LogFormat:
     if head.startswith(b"#ROSBAG V2.0"):
         return LogFormat.ROS1_BAG
     for magic, what, hint in UNREADABLE_MAGIC:
-        if head.lstrip(b"\r\n ").startswith(magic):
+        if head.startswith(magic):
             raise _unreadable(path, what, hint)
     # A DataFlash log declares its message types first; damage at its very start must not hide them.
     if b"\xa3\x95\x80" in head:
         return LogFormat.DATAFLASH_BIN
+    if b"FMT, 128" in head:
+        raise _unreadable(path, "a DataFlash log as text", "Use the .BIN that the vehicle wrote.")
     if len(head) > 8 and head[0] == 0 and head[8] in (0xFD, 0xFE):
         raise _unreadable(path, "a MAVLink telemetry log (.tlog)", "Use the .BIN from the vehicle's memory card.")
     raise LogError("Not a log of a known format.", hint=f"Readable are {READABLE}.", where=str(path))

@@ -8,18 +8,14 @@ strings and sequences led by a uint32 count (wiki.ros.org/ROS/Technical Overview
 from __future__ import annotations
 
 import math
+import re
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from mmap import mmap
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from rosbags.interfaces import Nodetype
-from rosbags.typesys import TypesysError, get_types_from_msg
-
-if TYPE_CHECKING:
-    from rosbags.interfaces.typing import BaseDesc, FieldDesc, NameDesc, Typesdict
 
 Buffer = bytes | mmap
 Step = Callable[[Buffer, int, int, list[Any]], int]
@@ -29,8 +25,9 @@ _CODES = {
     "bool": "?", "byte": "b", "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i",
     "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
-_TIME = "builtin_interfaces/msg/Time"
-_DURATION = "builtin_interfaces/msg/Duration"
+_SPAN_TYPES = ("time", "duration")
+_FIELD = re.compile(r"([\w/]+)(\[(\d*)\])?\s+(\w+)\s*(=)?")
+_SEPARATOR = re.compile(r"^=+\s*\nMSG:\s*(\S+)\s*$", re.MULTILINE)
 _COUNT = struct.Struct("<I")
 _STAMP = struct.Struct("<II")
 _SPAN = struct.Struct("<ii")
@@ -65,6 +62,53 @@ class MessageDecoder:
         return pos
 
 
+class Field(NamedTuple):
+    """A field of a message: `size` is None for one value, -1 for a sequence, else the length of an array."""
+
+    name: str
+    type: str
+    size: int | None
+
+
+Types = Mapping[str, Sequence[Field]]
+"""Fields by message type, of a message and all that it is made of."""
+
+
+def parse_definition(type_name: str, definition: str) -> Types:
+    """Fields of a message and of the messages it is made of (wiki.ros.org/msg). Raises MalformedMessageError.
+
+    A definition as bags hold it is the message's own text, then per message it needs a line of `=`, a line
+    `MSG: package/Type` and that one's text.
+    """
+    first, *rest = _SEPARATOR.split(definition.replace("\r\n", "\n"))
+    texts = {type_name: first} | dict(zip(rest[::2], rest[1::2], strict=True))
+    return {name: _fields(name, text, texts) for name, text in texts.items()}
+
+
+def _fields(owner: str, text: str, known: Mapping[str, str]) -> list[Field]:
+    fields = []
+    for line in text.splitlines():
+        bare = line.partition("#")[0].strip()
+        if not bare:
+            continue
+        match = _FIELD.match(bare)
+        if match is None:
+            raise MalformedMessageError(f"definition of {owner} not understood")
+        base, is_array, count, name, is_constant = match.groups()
+        if not is_constant:
+            size = None if is_array is None else int(count or -1)
+            fields.append(Field(name, _full_name(base, owner, known), size))
+    return fields
+
+
+def _full_name(base: str, owner: str, known: Mapping[str, str]) -> str:
+    """The type with its package: a bare name is of the owner's package, but for Header."""
+    if base in _CODES or base == "string" or base in _SPAN_TYPES or "/" in base:
+        return base
+    own = f"{owner.rpartition('/')[0]}/{base}"
+    return "std_msgs/Header" if base == "Header" and own not in known else own
+
+
 def message_decoder(type_name: str, definition: str, wanted: Sequence[str], zero_ns: int) -> MessageDecoder:
     """Compile a decoder for the `wanted` fields (dotted paths) of a message type.
 
@@ -75,12 +119,8 @@ def message_decoder(type_name: str, definition: str, wanted: Sequence[str], zero
     Raises:
         MalformedMessageError: the definition cannot be understood.
     """
-    try:
-        types = get_types_from_msg(definition, type_name)
-    except TypesysError as err:
-        raise MalformedMessageError(f"definition of {type_name} not understood") from err
-    plan = _Plan(types, frozenset(wanted), zero_ns)
-    plan.message(next(iter(types)), "")
+    plan = _Plan(parse_definition(type_name, definition), frozenset(wanted), zero_ns)
+    plan.message(type_name, "", ())
     return plan.decoder(whole=False)
 
 
@@ -88,7 +128,7 @@ def message_decoder(type_name: str, definition: str, wanted: Sequence[str], zero
 class _Plan:
     """The steps of one message, gathered field by field; `pending` is a stretch of fixed size, in struct codes."""
 
-    types: Typesdict
+    types: Types
     wanted: frozenset[str]
     zero_ns: int
     paths: list[str] = field(default_factory=list)
@@ -103,52 +143,46 @@ class _Plan:
         steps = self.steps if whole else self.steps[: self.last_useful]
         return MessageDecoder(tuple(self.paths), tuple(self.is_number), tuple(steps))
 
-    def message(self, name: str, prefix: str) -> None:
-        if name not in self.types:
+    def message(self, name: str, prefix: str, inside: tuple[str, ...]) -> None:
+        """Plan all fields of a message; `inside` are the types around it, which it cannot hold again."""
+        if name not in self.types or name in inside:
             raise MalformedMessageError(f"the definition lacks {name}")
-        for field_name, description in self.types[name][1]:
-            self.field(prefix + field_name, description)
+        for one in self.types[name]:
+            path = prefix + one.name
+            if one.size is None:
+                self.single(path, one.type, (*inside, name))
+            else:
+                self.array(path, one.type, None if one.size < 0 else one.size, (*inside, name))
 
-    def field(self, path: str, description: FieldDesc) -> None:
-        if description[0] == Nodetype.BASE:
-            self.primitive(path, str(description[1][0]))
-        elif description[0] == Nodetype.NAME:
-            self.named(path, description[1])
-        else:
-            element, count = description[1]
-            self.array(path, element, count if description[0] == Nodetype.ARRAY else None)
-
-    def primitive(self, path: str, base: str) -> None:
+    def single(self, path: str, base: str, inside: tuple[str, ...]) -> None:
         is_wanted = path in self.wanted
         if base == "string":
             self.step(_text_step if is_wanted else _skip_text_step, (path,) if is_wanted else ())
-            return
-        code = _code(base)
-        self.pending.append(code if is_wanted else f"{struct.calcsize(code)}x")
-        if is_wanted:
+        elif base in _SPAN_TYPES and is_wanted:
+            self.step(_time_step(self.zero_ns) if base == "time" else _duration_step, (path,), is_number=True)
+        elif base in _SPAN_TYPES:
+            self.pending.append(f"{_STAMP.size}x")
+        elif base not in _CODES:
+            self.message(base, path + ".", inside)
+        elif is_wanted:
+            self.pending.append(_CODES[base])
             self.paths.append(path)
             self.is_number.append(True)
-
-    def named(self, path: str, name: str) -> None:
-        if name not in (_TIME, _DURATION):
-            self.message(name, path + ".")
-        elif path in self.wanted:
-            self.step(_time_step(self.zero_ns) if name == _TIME else _duration_step, (path,), is_number=True)
         else:
-            self.pending.append(f"{_STAMP.size}x")
+            self.pending.append(f"{struct.calcsize(_CODES[base])}x")
 
-    def array(self, path: str, element: BaseDesc | NameDesc, count: int | None) -> None:
+    def array(self, path: str, base: str, count: int | None, inside: tuple[str, ...]) -> None:
         """An array of `count` elements, or a sequence that carries its own count (None)."""
         wanted = (path,) if path in self.wanted else ()
-        if element[0] == Nodetype.BASE and element[1][0] != "string":
-            dtype = np.dtype("<" + _code(element[1][0]))
+        if base in _CODES:
+            dtype = np.dtype("<" + _CODES[base])
             if count is not None and not wanted:
                 self.pending.append(f"{count * dtype.itemsize}x")
             else:
                 self.step(_numbers_array_step(dtype, count, keep=bool(wanted)), wanted)
             return
         inner = _Plan(self.types, self.wanted, self.zero_ns)
-        inner.field(path, element)
+        inner.single(path, base, inside)
         each = inner.decoder(whole=True)
         self.step(_elements_step(each, count), each.paths)
 
@@ -169,12 +203,6 @@ class _Plan:
         self.steps.append(_numbers_step(fixed) if reads else _skip_step(fixed.size))
         if reads:
             self.last_useful = len(self.steps)
-
-
-def _code(base: str) -> str:
-    if base not in _CODES:
-        raise MalformedMessageError(f"unknown type {base}")
-    return _CODES[base]
 
 
 def _numbers_step(fixed: struct.Struct) -> Step:

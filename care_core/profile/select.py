@@ -51,8 +51,6 @@ class Fit:
 def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice]:
     """The candidate with most parameters and sources in the log, then with the robot's or firmware's name.
 
-    With one candidate (the operator named it) this is a check that it fits at all.
-
     Raises:
         ProfileError: no candidate has anything in common with the log.
     """
@@ -66,12 +64,9 @@ def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice]
     return candidates[usable[0]], _choice(log, best, others)
 
 
-def describe_fit(log: Log, schema: Schema) -> ProfileChoice:
+def describe_fit(log: Log, profile: HasSchema) -> ProfileChoice:
     """How a profile that the operator named fits the log. Raises ProfileError when nothing of it is there."""
-    fit = measure_fit(log, schema)
-    if not fit.found:
-        raise _nothing_fits(log, [fit])
-    return _choice(log, fit, ())
+    return choose_profile(log, [profile])[1]
 
 
 def _choice(log: Log, fit: Fit, others: Sequence[str]) -> ProfileChoice:

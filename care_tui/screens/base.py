@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.widgets import Static
 
@@ -16,16 +17,19 @@ WIDE = 110
 class CareScreen(Screen[None]):
     """A screen that says so where the terminal is too small for it, and asks for nothing else there."""
 
-    HORIZONTAL_BREAKPOINTS: ClassVar[list[tuple[int, str]] | None] = [
-        (0, "-too-narrow"),
-        (MIN_WIDTH, "-narrow"),
-        (WIDE, "-wide"),
+    # Textual declares both as instance variables, so they cannot be ClassVar here.
+    HORIZONTAL_BREAKPOINTS = [(0, "-too-narrow"), (MIN_WIDTH, "-narrow"), (WIDE, "-wide")]  # noqa: RUF012
+    VERTICAL_BREAKPOINTS = [(0, "-too-low"), (MIN_HEIGHT, "-tall")]  # noqa: RUF012
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("tab", "app.focus_next", "Next pane", show=False, id="screen.next-pane"),
+        Binding("shift+tab", "app.focus_previous", "Previous pane", show=False, id="screen.previous-pane"),
     ]
-    VERTICAL_BREAKPOINTS: ClassVar[list[tuple[int, str]] | None] = [(0, "-too-low"), (MIN_HEIGHT, "-tall")]
     HELP_TEXT = ""
 
     def compose(self) -> ComposeResult:
-        yield Static(f"Terminal too small: {MIN_WIDTH} x {MIN_HEIGHT} is needed. q quits.", id="too-small", markup=False)
+        yield Static(
+            f"Terminal too small: {MIN_WIDTH} x {MIN_HEIGHT} is needed. q quits.", id="too-small", markup=False
+        )
         yield from self.compose_body()
 
     def compose_body(self) -> ComposeResult:

@@ -37,12 +37,12 @@ class DiagnosisScreen(CareScreen):
     AUTO_FOCUS = ""
     BINDINGS: ClassVar[list[BindingType]] = [
         *(
-            Binding(str(number), f"go({number})", name, show=False, id=f"step.{name.lower()}")
+            Binding(str(number), f"go({number})", "Jump to a step", show=False, id=f"step.{name.lower()}")
             for number, name in enumerate(STEPS, start=1)
         ),
         Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),
         Binding("left,h", "move(-1)", "Previous step", show=False, id="step.previous"),
-        Binding("enter", "move(1)", "Next step", id="step.on"),
+        Binding("enter", "move(1)", "Next step", key_display="enter", id="step.on"),
         Binding("escape", "back", "Back", id="step.back"),
         Binding("o", "next_fault", "Next fault", show=False, id="causes.next-fault"),
         Binding("f", "next_format", "Format", id="report.format"),
@@ -86,6 +86,8 @@ class DiagnosisScreen(CareScreen):
         """Keys of one step work in that step only."""
         if action in ("next_format", "export"):
             return self.step == REPORT
+        if action == "move":
+            return OBJECTIVES <= self.step + int(str(parameters[0])) <= REPORT
         if action == "next_fault":
             return self.step == CAUSES and len(self.diagnosis.faults) > 1
         return True
@@ -97,10 +99,11 @@ class DiagnosisScreen(CareScreen):
 
     def _show(self, step: int) -> None:
         self.step = step
-        self.query_one(StepBar).mark(step)
-        self.query_one(ContentSwitcher).current = f"step-{step}"
-        self._current().take_focus()
-        self.refresh_bindings()
+        with self.app.batch_update():
+            self.query_one(StepBar).mark(step)
+            self.query_one(ContentSwitcher).current = f"step-{step}"
+            self._current().take_focus()
+            self.refresh_bindings()
 
     def action_go(self, step: int) -> None:
         if step != self.step:
@@ -108,7 +111,7 @@ class DiagnosisScreen(CareScreen):
             self._show(step)
 
     def action_move(self, by: int) -> None:
-        self.action_go(min(max(self.step + by, OBJECTIVES), REPORT))
+        self.action_go(self.step + by)
 
     def action_back(self) -> None:
         if self._visited:

@@ -15,7 +15,7 @@ from textual.widgets import Input, Static
 
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError, UsageError
-from care_tui.clean import clean
+from care_core.text import clean
 from care_tui.jobs import SUFFIXES, Engine, as_care_error
 from care_tui.messages import DiagnosisFailed, ReportWritten
 
@@ -50,7 +50,7 @@ class ExportDialog(ModalScreen[str | None]):
         self._engine = engine
 
     def compose(self) -> ComposeResult:
-        box = Input(str(self._default), select_on_focus=False, id="file-name")
+        box = Input(str(self._default), select_on_focus=False, compact=True, id="file-name")
         box.cursor_blink = False
         with Vertical(classes="dialog small"):
             yield Static("Write the report to", classes="title", markup=False)
@@ -64,8 +64,13 @@ class ExportDialog(ModalScreen[str | None]):
         if path.suffix.lower() not in SUFFIXES:
             self._say(UsageError("The file name must end in .yaml, .md or .json."))
         elif path.exists():
-            self.app.push_screen(OverwriteDialog(path), lambda replace: self._write(path) if replace else None)
+            self._ask_then_write(path)
         else:
+            self._write(path)
+
+    @work(exclusive=True, group="ask")
+    async def _ask_then_write(self, path: Path) -> None:
+        if await self.app.push_screen_wait(OverwriteDialog(path)):
             self._write(path)
 
     @work(thread=True, exclusive=True, exit_on_error=False)

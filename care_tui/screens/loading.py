@@ -9,11 +9,12 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 from textual.content import Content
-from textual.widgets import Footer, ProgressBar, Static
+from textual.widgets import Footer, Static
 
 from care_core.errors import CareError
+from care_core.text import clean
 from care_tui import render
-from care_tui.clean import clean
+from care_tui.render import Glyphs
 from care_tui.screens.base import CareScreen
 from care_tui.widgets.lines import Lines
 
@@ -24,21 +25,22 @@ class LoadingScreen(CareScreen):
     HELP_TEXT = "The log is read and diagnosed. Esc stops the work; nothing was written."
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "app.cancel", "Cancel", id="loading.cancel")]
 
-    def __init__(self, log: Path) -> None:
+    def __init__(self, log: Path, glyphs: Glyphs) -> None:
         super().__init__()
         self._log = log
+        self._glyphs = glyphs
 
     def compose_body(self) -> ComposeResult:
         with Vertical(classes="message"):
             yield Static(Content(f"Diagnosing {clean(self._log.name)}"), classes="title")
-            yield Static("Starting", id="step", markup=False)
-            yield ProgressBar(total=1.0, show_eta=False, id="progress")
+            yield Static("starting", id="step", markup=False)
+            yield Static(render.progress_bar(0.0, self._glyphs), id="progress")
         yield Footer()
 
     def advance(self, step: str, fraction: float) -> None:
         """Show the step the engine is at."""
         self.query_one("#step", Static).update(render.text(step))
-        self.query_one(ProgressBar).update(progress=fraction)
+        self.query_one("#progress", Static).update(render.progress_bar(fraction, self._glyphs))
 
 
 class ErrorScreen(CareScreen):

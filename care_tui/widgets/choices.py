@@ -6,6 +6,9 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
+from textual.reactive import reactive
+from textual.strip import Strip
+from textual.style import Style
 from textual.widgets import OptionList
 
 from care_tui.render import Rows
@@ -21,11 +24,29 @@ class Choices(OptionList, inherit_bindings=False):
         Binding("end,G", "last", "Last", show=False, id="list.last"),
         Binding("pagedown,space", "page_down", "Page down", show=False, id="list.page-down"),
         Binding("pageup", "page_up", "Page up", show=False, id="list.page-up"),
-        Binding("enter", "select", "Open", id="list.open"),
+        Binding("enter", "select", "Open", key_display="enter", id="list.open"),
     ]
 
     def __init__(self, items: Iterable[Rows] = (), *, id: str | None = None) -> None:
         super().__init__(*items, id=id, compact=True)
+
+    highlighted: reactive[int | None] = reactive(None, repaint=False)
+
+    def _watch_highlighted(self, before: int | None, after: int | None) -> None:
+        """Repaint the two items that changed instead of the whole list."""
+        self._update_lines()
+        for item in (before, after):
+            if item is not None and item in self._index_to_line:
+                self.refresh_lines(self._index_to_line[item], self._heights[item])
+
+    def get_visual_style(self, *component_classes: str, partial: bool = False) -> Style:
+        """Reverse the highlighted item, which a style sheet cannot: status colours stay legible, mono shows it too."""
+        style = super().get_visual_style(*component_classes, partial=partial)
+        here = self.has_focus and "option-list--option-highlighted" in component_classes
+        return style + Style(reverse=True) if here else style
+
+    def render_line(self, y: int) -> Strip:
+        return super().render_line(y).simplify()
 
     def action_cursor_down(self) -> None:
         """Stop at the end instead of starting again at the top."""

@@ -13,7 +13,10 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 from textual.visual import Visual
 
-from care_tui.render import Rows
+from care_tui.render import Row, Rows
+
+MARGIN = 1
+"""Blank cells left and right of the text; part of the lines, since a style's padding costs bytes on each of them."""
 
 
 class Lines(ScrollView, can_focus=True, inherit_bindings=False):
@@ -49,11 +52,16 @@ class Lines(ScrollView, can_focus=True, inherit_bindings=False):
         self._wrap()
 
     def _wrap(self) -> None:
-        width = self.scrollable_content_region.width
-        if not width:
+        width, height = self.scrollable_content_region.size
+        if width <= 2 * MARGIN:
             return
-        before, self._lines = self._lines, self._rows.wrap(width)
-        self.virtual_size = Size(width, len(self._lines))
+        before = self._lines
+        self._lines = [line.pad_left(MARGIN) for line in self._rows.wrap(width - 2 * MARGIN)]
+        # Assigned as usual, a new size makes Textual lay out and repaint the screen; only the scroll bar depends on it.
+        size = Size(width, max(len(self._lines), height))
+        self.set_reactive(Lines.virtual_size, size)
+        self._scroll_update(size)
+        self._refresh_scrollbars()
         for y, (old, new) in enumerate(zip_longest(before, self._lines, fillvalue=Content())):
             if not old.is_same(new):
                 self.refresh(Region(0, y - self.scroll_offset.y, max(old.cell_length, new.cell_length), 1))
@@ -62,4 +70,4 @@ class Lines(ScrollView, can_focus=True, inherit_bindings=False):
         place, width, style = y + self.scroll_offset.y, self.size.width, self.visual_style
         if place >= len(self._lines):
             return Strip.blank(width, style.rich_style)
-        return Visual.to_strips(self, self._lines[place], width, 1, style, pad=True)[0]
+        return Visual.to_strips(self, Rows([Row(self._lines[place])]), width, 1, style, pad=True)[0].simplify()

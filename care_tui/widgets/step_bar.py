@@ -7,7 +7,7 @@ from textual.containers import Horizontal
 from textual.content import Content
 from textual.widgets import Static
 
-from care_tui.clean import clean
+from care_core.text import clean
 from care_tui.messages import StepChosen
 from care_tui.render import Glyphs
 

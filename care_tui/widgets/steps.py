@@ -10,8 +10,8 @@ from textual.widgets import OptionList, Static
 
 from care_core.diagnose.records import Cause, Diagnosis, Fault, ObjectiveResult
 from care_core.errors import CareError
+from care_core.text import clean
 from care_tui import render
-from care_tui.clean import clean
 from care_tui.jobs import ReportFormat, fixes
 from care_tui.messages import CauseChosen, FixChosen, ObjectiveChosen, StepChosen
 from care_tui.render import Glyphs

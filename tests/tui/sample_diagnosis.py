@@ -24,15 +24,36 @@ from care_core.variables import Role, Threshold, Variable
 HOSTILE = "PreArm: [bold]check[/bold] \x1b[31mfences\x1b[0m\u202e"
 
 LAND_SPEED = Variable(
-    "LAND_SPEED", Role.OPTION, "int", "cm/s", "descent speed of the final stage of landing", (30, 200), 50,
+    "LAND_SPEED",
+    Role.OPTION,
+    "int",
+    "cm/s",
+    "descent speed of the final stage of landing",
+    (30, 200),
+    50,
     parameters=("LAND_SPEED",),
 )
 WPNAV_SPEED = Variable(
-    "WPNAV_SPEED", Role.OPTION, "float", "cm/s", "horizontal speed between waypoints", (100, 2000), 1000,
-    parameters=("WPNAV_SPEED",), reboot_required=True,
+    "WPNAV_SPEED",
+    Role.OPTION,
+    "float",
+    "cm/s",
+    "horizontal speed between waypoints",
+    (100, 2000),
+    1000,
+    parameters=("WPNAV_SPEED",),
+    reboot_required=True,
 )
 BRD_TYPE = Variable(
-    "ARMING_MODE", Role.OPTION, "enum", "", "", None, 0, ((0, "off"), (1, "on")), ("ARMING_MODE", "ARMING_REQUIRE"),
+    "ARMING_MODE",
+    Role.OPTION,
+    "enum",
+    "",
+    "",
+    None,
+    0,
+    ((0, "off"), (1, "on")),
+    ("ARMING_MODE", "ARMING_REQUIRE"),
 )
 MISSION_TIME = Variable(
     "mission_time", Role.OBJECTIVE, unit="s", kind="non-functional", threshold=Threshold("<=", 150.0)
@@ -55,7 +76,11 @@ RUN = Run(
     objectives={"success": 1.0, "mission_time": 187.25, "energy": 11.3},
     settings={"LAND_SPEED": Setting("LAND_SPEED", 16.0, "PARM", default=50.0)},
     log=LogInfo(
-        "/flights/00000042.BIN", "dataflash-bin", "2024-05-04T10:15:00Z", 246.0, "0" * 64,
+        "/flights/00000042.BIN",
+        "dataflash-bin",
+        "2024-05-04T10:15:00Z",
+        246.0,
+        "0" * 64,
         damage=(Damage("142 bytes that are no message", byte=1048576, time_s=181.5),),
         facts={"firmware": "ArduCopter V4.3.6", "frame": "QUAD/X"},
     ),
@@ -104,7 +129,14 @@ FLIES_SLOWLY = Cause(
     notes=("edge seen in few resamples",),
 )
 SWITCHED = replace(
-    FLIES_SLOWLY, rank=3, option=BRD_TYPE, current=1.0, suggested=None, predicted=None, p_fixed=None, notes=(),
+    FLIES_SLOWLY,
+    rank=3,
+    option=BRD_TYPE,
+    current=1.0,
+    suggested=None,
+    predicted=None,
+    p_fixed=None,
+    notes=(),
     path=(PathNode("ARMING_MODE", "", 1.0, 0.0, effect=None, support=None), FLIES_SLOWLY.path[-1]),
 )
 
@@ -125,7 +157,10 @@ def faulty() -> Diagnosis:
     """mission_time and energy outside, LAND_SPEED the cause, path_error not evaluated."""
     return Diagnosis(
         profile=ProfileChoice(
-            "arducopter", "1.0", "ArduCopter SITL quad", "most parameters matched (31 of 31)",
+            "arducopter",
+            "1.0",
+            "ArduCopter SITL quad",
+            "most parameters matched (31 of 31)",
             warnings=("the log is from ArduCopter 4.3.6, the profile was learned on 4.6",),
         ),
         run=RUN,
@@ -146,7 +181,11 @@ def all_ok() -> Diagnosis:
 def abstaining() -> Diagnosis:
     """A fault that no option of the profile explains."""
     return replace(
-        faulty(), faults=(Fault(SLOW, ()),), objectives=(OK_SUCCESS, SLOW), fix=None, alternatives=(),
+        faulty(),
+        faults=(Fault(SLOW, ()),),
+        objectives=(OK_SUCCESS, SLOW),
+        fix=None,
+        alternatives=(),
         abstained="the wind (mean lean 19 deg) is outside what the profile has seen",
     )
 

@@ -6,6 +6,7 @@ import math
 import os
 import struct
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -134,12 +135,14 @@ def test_definitions_alone_are_no_log(tmp_path: Path) -> None:
 
 
 def test_reading_is_silent_and_does_not_write(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    path = write(tmp_path / "a.BIN", HEADER, *samples(3), b"junk" * 300, *samples(2))
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    path = write(folder / "a.BIN", HEADER, *samples(3), b"junk" * 300, *samples(2))
     stamp = path.stat().st_mtime_ns
     log = DataFlashLog(path)
     log.read({"TST": ("I",)})
     assert capfd.readouterr() == ("", "")
-    assert (path.stat().st_mtime_ns, [one.name for one in tmp_path.iterdir()]) == (stamp, ["a.BIN"])
+    assert (path.stat().st_mtime_ns, [one.name for one in folder.iterdir()]) == (stamp, ["a.BIN"])
 
 
 def test_a_file_cut_while_open_is_an_error(tmp_path: Path) -> None:
@@ -190,7 +193,7 @@ def test_agrees_with_pymavlink_message_by_message(name: str) -> None:
     reader = pytest.importorskip("pymavlink.DFReader")
     path = next(Path(SHARED or "", "logs", "dataflash_bin").glob(f"{name}.*"))
     log = DataFlashLog(path)
-    theirs: dict[str, list[dict[str, object]]] = {}
+    theirs: dict[str, list[dict[str, Any]]] = {}
     with reader.DFReader_binary(str(path)) as peer:
         while (message := peer.recv_match()) is not None:
             rows = theirs.setdefault(message.get_type(), [])

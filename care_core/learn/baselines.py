@@ -1,0 +1,100 @@
+"""What the causal engine is measured against: three rankings of a run's options that use no graph.
+
+None of them can say why. Each takes the same training table and the same run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from sklearn.ensemble import ExtraTreesClassifier, GradientBoostingClassifier
+
+from care_core.causal.mechanisms import FloatArray, columns
+from care_core.profile.schema import Schema
+from care_core.variables import Variable
+
+Config = Mapping[str, float]
+BINS = 4
+Z95 = 1.959964
+TREES = 400
+
+
+def largest_deviation(config: Config, reference: Config, schema: Schema, suspects: Sequence[str]) -> list[str]:
+    """Options by how far they are from the reference, as a share of their acceptable range."""
+    distance = {name: schema.variables[name].distance(config[name], reference[name]) for name in suspects}
+    return sorted(suspects, key=lambda name: (-distance[name], name))
+
+
+@dataclass(frozen=True)
+class Predicate:
+    """"Option within [low, high]": what cooperative bug isolation counts."""
+
+    low: float
+    high: float
+
+    def holds(self, values: FloatArray) -> NDArray[np.bool_]:
+        return (values >= self.low) & (values <= self.high)
+
+
+def cooperative_bug_isolation(
+    frame: pd.DataFrame, failed: NDArray[np.bool_], config: Config, schema: Schema, suspects: Sequence[str]
+) -> list[str]:
+    """Options by the Importance of the predicate that holds in this run (Liblit et al. 2005, section 3).
+
+    Predicates are the quantile bins of an option's training values (its reference a bin of its own). A predicate
+    whose Increase is not above 0 with 95 % confidence has no importance.
+    """
+    scores = {
+        name: _importance(_predicate_of(frame, config[name], schema.variables[name]), frame[name].to_numpy(), failed)
+        for name in suspects
+    }
+    return sorted(suspects, key=lambda name: (-scores[name], name))
+
+
+def _predicate_of(frame: pd.DataFrame, value: float, option: Variable) -> Predicate:
+    values = frame[option.name].to_numpy(dtype=float)
+    if option.default is not None and value == option.default:
+        return Predicate(value, value)
+    off = values[values != option.default] if option.default is not None else values
+    edges = np.quantile(off, np.linspace(0, 1, BINS + 1)) if len(off) else np.array([value, value])
+    k = int(np.clip(np.searchsorted(edges, value, side="right") - 1, 0, len(edges) - 2))
+    return Predicate(float(edges[k]), float(edges[k + 1]))
+
+
+def _importance(predicate: Predicate, values: FloatArray, failed: NDArray[np.bool_]) -> float:
+    true = predicate.holds(values)
+    seen_failed, seen = int((true & failed).sum()), int(true.sum())
+    if not seen_failed or not failed.any():
+        return 0.0
+    failure, context = seen_failed / seen, float(failed.mean())
+    increase = failure - context
+    error = np.sqrt(failure * (1 - failure) / seen + context * (1 - context) / len(failed))
+    if increase - Z95 * error <= 0:
+        return 0.0
+    reach = np.log(seen_failed) / np.log(max(int(failed.sum()), 2))
+    return 0.0 if reach <= 0 else float(2 / (1 / increase + 1 / reach))
+
+
+class PlainClassifier:
+    """Extremely randomised trees averaged with gradient boosting on the options alone: odds of meeting everything."""
+
+    def __init__(self, frame: pd.DataFrame, met_all: NDArray[np.bool_], options: Sequence[str], seed: int = 0) -> None:
+        self.options = list(options)
+        x = frame[self.options].to_numpy(dtype=float)
+        self._trees = ExtraTreesClassifier(TREES, min_samples_leaf=2, random_state=seed).fit(x, met_all)
+        self._boosting = GradientBoostingClassifier(random_state=seed).fit(x, met_all)
+
+    def odds(self, configs: Sequence[Config]) -> FloatArray:
+        """Predicted odds that every objective keeps its threshold, shape (m,)."""
+        x = columns([dict(c) for c in configs], self.options)
+        mean: FloatArray = (self._trees.predict_proba(x)[:, 1] + self._boosting.predict_proba(x)[:, 1]) / 2
+        return mean
+
+    def rank(self, config: Config, reference: Config, suspects: Sequence[str]) -> list[str]:
+        """Options by the odds of meeting everything when each alone goes back to its reference."""
+        odds = self.odds([{**config, name: reference[name]} for name in suspects])
+        return [suspects[i] for i in np.argsort(-odds, kind="stable")]

@@ -1,0 +1,416 @@
+"""From a runs table to a partial ancestral graph (paper, Alg. 1, lines 3 and 4): FCI.
+
+The adjacency search is ours, on whole arrays of conditioning sets: causal-learn tests one set at a time, also for pairs
+that are independent by design, and searches possible d-separating sets of any size. The orientation rules are
+causal-learn's. Its background knowledge is not used: it turns a forbidden `X <- Y` into a tail at X, so that a purely
+confounded pair comes out as `X --> Y` and the search for a latent cause never sees it. Here what a variable cannot
+cause becomes an arrowhead, and a tail is only given to what was drawn at random or met (`Constraints.is_exogenous`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import partial
+from itertools import combinations
+from typing import Protocol
+
+import numpy as np
+from causallearn.graph.Edge import Edge as CausalLearnEdge
+from causallearn.graph.Endpoint import Endpoint
+from causallearn.graph.GeneralGraph import GeneralGraph
+from causallearn.graph.GraphNode import GraphNode
+from causallearn.search.ConstraintBased.FCI import rule8, ruleR1, ruleR2, ruleR3, ruleR4B
+from numpy.typing import NDArray
+from scipy.special import erfc, ndtri
+
+from care_core.learn.constraints import Constraints
+from care_core.learn.table import FloatArray, normal_scores
+
+IntArray = NDArray[np.int64]
+SeparatingSets = dict[tuple[int, int], frozenset[int]]
+
+SHRINK = 1e-3
+"""Weight of the identity in the correlation matrix: metrics that nearly repeat each other leave it invertible."""
+MAX_GIVEN = 3
+"""Largest conditioning set among neighbours (anytime FCI, Spirtes 2001: stopping early keeps arrowheads valid)."""
+MAX_GIVEN_BEYOND = 2
+"""Largest conditioning set among possibly d-separating nodes that are not neighbours."""
+MAX_PATTERNS = 12
+"""Most patterns of missing values told apart; beyond, the most alike are merged."""
+CLEAR = 4.0
+"""Evidence (difference of squared z-scores) from which an unshielded triple is oriented: odds of about 7 to 1."""
+
+
+class Mark(Enum):
+    """The end of an edge: `TAIL` a cause, `ARROW` not a cause, `CIRCLE` either."""
+
+    TAIL = "-"
+    ARROW = ">"
+    CIRCLE = "o"
+
+
+@dataclass(frozen=True)
+class PagEdge:
+    """An edge `a *-* b` with the marks at its two ends; a comes before b in the graph's nodes."""
+
+    a: str
+    b: str
+    at_a: Mark
+    at_b: Mark
+
+
+@dataclass(frozen=True)
+class Pag:
+    """A partial ancestral graph: what the independences among the variables say of their causes."""
+
+    nodes: tuple[str, ...]
+    edges: tuple[PagEdge, ...]
+
+
+class Middle(Enum):
+    """What the middle of an unshielded triple is."""
+
+    COLLIDER = "collider"
+    NONCOLLIDER = "noncollider"
+    AMBIGUOUS = "ambiguous"
+
+
+Middles = dict[tuple[int, int, int], Middle]
+
+
+class IndependenceTest(Protocol):
+    """p-values of independence of x[i] and y[i] given the columns given[i], for all i at once."""
+
+    def p_values(self, x: IntArray, y: IntArray, given: IntArray) -> FloatArray:
+        """x and y: shape (k,); given: shape (k, d). Returns shape (k,), NaN where the pair cannot be tested."""
+
+
+class FisherZ:
+    """Fisher's z on normal scores, each test on the runs that have all its variables.
+
+    Correlations over whatever runs each pair has would mix populations: an option that ends missions early moves the
+    mean speed of all flights, but not that of the accomplished ones, and only those have a mission time.
+
+    Args:
+        data: shape (n_runs, n_columns), NaN for missing.
+    """
+
+    def __init__(self, data: FloatArray) -> None:
+        self._scores = normal_scores(data)
+        self._missing, self._pattern = _missing_patterns(np.isnan(data))
+        self._by_pattern: dict[int, tuple[FloatArray, NDArray[np.bool_], int]] = {}
+
+    def p_values(self, x: IntArray, y: IntArray, given: IntArray) -> FloatArray:
+        patterns = np.bitwise_or.reduce(self._pattern[np.column_stack([x, y, given])], axis=1)
+        p = np.empty(len(x))
+        for pattern in np.unique(patterns).tolist():
+            tests = patterns == pattern
+            p[tests] = self._on(pattern, x[tests], y[tests], given[tests])
+        return p
+
+    def _on(self, pattern: int, x: IntArray, y: IntArray, given: IntArray) -> FloatArray:
+        if pattern not in self._by_pattern:
+            self._by_pattern[pattern] = self._correlations(pattern)
+        correlation, varies, n = self._by_pattern[pattern]
+        r = np.clip(_partial_correlation(correlation, x, y, given), -1 + 1e-12, 1 - 1e-12)
+        z = np.sqrt(max(n - given.shape[1] - 3, 0)) * np.abs(np.arctanh(r))
+        return np.asarray(np.where(varies[x] & varies[y], erfc(z / np.sqrt(2)), np.nan))
+
+    def _correlations(self, pattern: int) -> tuple[FloatArray, NDArray[np.bool_], int]:
+        """Correlations, which columns vary, and the number of runs, over the runs that have these columns."""
+        lacking = [rows for bit, rows in enumerate(self._missing) if pattern >> bit & 1]
+        known = ~np.any(lacking, axis=0) if lacking else np.ones(len(self._scores), dtype=bool)
+        scores = np.nan_to_num(self._scores[known])
+        scores = scores - scores.mean(axis=0) if len(scores) else scores
+        spread = np.sqrt((scores**2).sum(axis=0))
+        varies = spread > 1e-6
+        scores = scores / np.where(varies, spread, np.inf)
+        correlation = (1 - SHRINK) * (scores.T @ scores)
+        np.fill_diagonal(correlation, 1.0)
+        return correlation, varies, len(scores)
+
+
+def _partial_correlation(correlation: FloatArray, x: IntArray, y: IntArray, given: IntArray) -> FloatArray:
+    """By recursion on the conditioning set, all tests at once."""
+    if not given.shape[1]:
+        return np.asarray(correlation[x, y])
+    rest, last = given[:, :-1], given[:, -1]
+    r_xy = _partial_correlation(correlation, x, y, rest)
+    r_xl = _partial_correlation(correlation, x, last, rest)
+    r_yl = _partial_correlation(correlation, y, last, rest)
+    return np.asarray((r_xy - r_xl * r_yl) / np.sqrt((1 - r_xl**2) * (1 - r_yl**2)))
+
+
+def _missing_patterns(missing: NDArray[np.bool_]) -> tuple[list[NDArray[np.bool_]], IntArray]:
+    """The patterns of missing runs among the columns, and per column the bit of its pattern (0: complete).
+
+    Patterns that differ in few runs are merged (their columns lose the runs of both), until there are few patterns.
+
+    Args:
+        missing: shape (n_runs, n_columns).
+    """
+    tolerance = 0.01
+    while True:
+        patterns: list[NDArray[np.bool_]] = []
+        bits = np.zeros(missing.shape[1], dtype=np.int64)
+        for column in np.flatnonzero(missing.any(axis=0)).tolist():
+            rows = missing[:, column]
+            place = next((i for i, seen in enumerate(patterns) if (seen != rows).mean() <= tolerance), len(patterns))
+            patterns[place:] = [patterns[place] | rows, *patterns[place + 1 :]] if place < len(patterns) else [rows]
+            bits[column] = 1 << place
+        if len(patterns) <= MAX_PATTERNS:
+            return patterns, bits
+        tolerance *= 2
+
+
+def discover(
+    names: Sequence[str],
+    test: IndependenceTest,
+    constraints: Constraints,
+    *,
+    alpha: float = 0.01,
+    max_given: int = MAX_GIVEN,
+    max_given_beyond: int = MAX_GIVEN_BEYOND,
+) -> Pag:
+    """FCI over the named columns, with the constraints as arrowheads.
+
+    Assumes no selection bias (rules R5 to R7 are left out). Rules R9 and R10 only add tails, which the entropic step
+    supplies as well, and cost as much as all the rest together on dense graphs: left out.
+
+    Args:
+        alpha: significance level of each independence test; larger means more edges.
+    """
+    separated = np.array([[a == b or constraints.separates(a, b) for b in names] for a in names])
+    explains = np.array([[constraints.may_explain(a, b) for b in names] for a in names])
+    adjacent, sets = _neighbour_search(~separated, explains, test, alpha, max_given)
+    exogenous = [constraints.is_exogenous(name) for name in names]
+    middles = _middles(adjacent, sets, test, exogenous)
+    marks = _with_colliders(_known_marks(names, adjacent, constraints), middles)
+    if _search_beyond(marks, adjacent, sets, explains, test, alpha, max_given_beyond):
+        middles = _middles(adjacent, sets, test, exogenous)
+        marks = _with_colliders(_known_marks(names, adjacent, constraints), middles)
+    return _closed_under_rules(names, marks, adjacent, sets, middles, test, alpha)
+
+
+def _neighbour_search(
+    possible: NDArray[np.bool_], explains: NDArray[np.bool_], test: IndependenceTest, alpha: float, max_given: int
+) -> tuple[NDArray[np.bool_], SeparatingSets]:
+    """The order-independent adjacency search (PC-stable), keeping the set with the largest p-value.
+
+    The most independent set, not the first found, decides on colliders: it is the least likely to be a chance find.
+    Pairs that are independent by design have the empty set.
+    """
+    adjacent = possible.copy()
+    sets: SeparatingSets = {}
+    for i, j in zip(*np.nonzero(~possible), strict=True):
+        sets[int(i), int(j)] = frozenset()
+    for size in range(max_given + 1):
+        neighbours = [np.flatnonzero(row).tolist() for row in adjacent]
+        removed = []
+        for x, y in _pairs(adjacent):
+            useful = explains[:, x] | explains[:, y]
+            candidates = [[n for n in neighbours[node] if useful[n] and n not in (x, y)] for node in (x, y)]
+            found = _most_independent(x, y, candidates, size, test, alpha)
+            if found is not None:
+                removed.append((x, y, found))
+        for x, y, found in removed:
+            _separate(adjacent, sets, x, y, found)
+        if max(map(len, neighbours), default=0) <= size:
+            break
+    return adjacent, sets
+
+
+def _search_beyond(
+    marks: IntArray,
+    adjacent: NDArray[np.bool_],
+    sets: SeparatingSets,
+    explains: NDArray[np.bool_],
+    test: IndependenceTest,
+    alpha: float,
+    max_given: int,
+) -> bool:
+    """Removes edges separated only by nodes that are not neighbours (Possible-D-SEP). Whether there was any."""
+    found_any = False
+    reach = [_possibly_separating(marks, adjacent, x) for x in range(len(adjacent))]
+    neighbours = [set(np.flatnonzero(row).tolist()) for row in adjacent]
+    for x, y in _pairs(adjacent):
+        for node, other in ((x, y), (y, x)):
+            beyond = reach[node] - neighbours[node] - {other}
+            candidates = [n for n in sorted(reach[node] - {other}) if explains[n, x] or explains[n, y]]
+            found = None
+            for size in range(1, max_given + 1) if beyond else ():
+                found = _most_independent(x, y, [candidates], size, test, alpha)
+                if found is not None:
+                    break
+            if found is not None:
+                _separate(adjacent, sets, x, y, found)
+                found_any = True
+                break
+    return found_any
+
+
+def _most_independent(
+    x: int, y: int, candidates: Sequence[Sequence[int]], size: int, test: IndependenceTest, alpha: float
+) -> frozenset[int] | None:
+    """Of the sets of this size, the one given which x and y look most independent, None if never independent."""
+    given = [subset for nodes in candidates for subset in combinations(nodes, size)]
+    if not given:
+        return None
+    if size == 0:
+        given = given[:1]
+    array = np.array(given, dtype=np.int64).reshape(len(given), size)
+    p = test.p_values(np.full(len(given), x), np.full(len(given), y), array)
+    # A pair never seen to vary together shows no dependence. A set whose runs leave one of the pair constant has
+    # selected runs, not explained the dependence seen in the others.
+    p = np.nan_to_num(p, nan=0.0 if size else 1.0)
+    best = int(p.argmax())
+    return frozenset(given[best]) if p[best] > alpha else None
+
+
+def _pairs(adjacent: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    for x, y in zip(*np.nonzero(np.triu(adjacent)), strict=True):
+        yield int(x), int(y)
+
+
+def _separate(adjacent: NDArray[np.bool_], sets: SeparatingSets, x: int, y: int, found: frozenset[int]) -> None:
+    adjacent[x, y] = adjacent[y, x] = False
+    sets[x, y] = sets[y, x] = found
+
+
+# Marks as a matrix: marks[i, j] is the mark at j of the edge between i and j, 0 where there is none.
+_NONE, _CIRCLE, _ARROW, _TAIL = 0, 1, 2, 3
+
+
+def _known_marks(names: Sequence[str], adjacent: NDArray[np.bool_], constraints: Constraints) -> IntArray:
+    """Circles, except what the constraints say: an arrowhead at what cannot cause, a tail at what is exogenous."""
+    marks = adjacent.astype(np.int64) * _CIRCLE
+    for i, j in zip(*np.nonzero(adjacent), strict=True):
+        if constraints.never_causes(names[j], names[i]) or constraints.is_exogenous(names[i]):
+            marks[i, j] = _ARROW
+        elif constraints.is_exogenous(names[j]):
+            marks[i, j] = _TAIL
+    return marks
+
+
+def _middles(
+    adjacent: NDArray[np.bool_], sets: SeparatingSets, test: IndependenceTest, exogenous: Sequence[bool]
+) -> Middles:
+    """What the middle of every unshielded triple is, by how independent its ends are with and without it.
+
+    A weak cause and an effect two steps away often look independent given nothing at all; taking the separating set
+    at its word makes the middle a collider and turns a causal chain into a hidden confounder. The evidence is the
+    difference of squared z-scores (twice the log-likelihood ratio of the two readings); below `CLEAR` the triple is
+    ambiguous and orients nothing.
+
+    Triples `x --> m *-* y` with an exogenous x all ask the same question, whether m is a cause of y: their evidence
+    is added up, so that one chance independence among many options does not decide. Where it says that m is a cause
+    of y, m is no collider towards y for any other neighbour either, whatever their own triple looks like: among
+    metrics, paths that nearly cancel are common.
+    """
+    evidence: dict[tuple[int, int, int], float] = {}
+    pooled: dict[tuple[int, int], float] = {}
+    for middle in range(len(adjacent)):
+        for x, y in combinations(np.flatnonzero(adjacent[middle]).tolist(), 2):
+            if adjacent[x, y] or exogenous[middle] or (exogenous[x] and exogenous[y]):
+                continue
+            evidence[x, middle, y] = _evidence(test, x, y, sorted(sets[x, y] - {middle}), middle)
+            if exogenous[x] or exogenous[y]:
+                question = middle, (y if exogenous[x] else x)
+                pooled[question] = pooled.get(question, 0.0) + evidence[x, middle, y]
+    readings = {}
+    for (x, middle, y), own in evidence.items():
+        asked = [pooled[middle, end] for end in (x, y) if (middle, end) in pooled]
+        decisive = exogenous[x] or exogenous[y] or min(asked, default=0.0) <= -CLEAR
+        readings[x, middle, y] = _reading(min(asked) if decisive else own)
+    return readings
+
+
+def _reading(evidence: float) -> Middle:
+    if abs(evidence) < CLEAR:
+        return Middle.AMBIGUOUS
+    return Middle.COLLIDER if evidence > 0 else Middle.NONCOLLIDER
+
+
+def _evidence(test: IndependenceTest, x: int, y: int, without: Sequence[int], middle: int) -> float:
+    """By how much conditioning on the middle raises the squared z-score of its ends; 0 if that cannot be tested."""
+    p = np.array([_p_value(test, x, y, without), _p_value(test, x, y, [*without, middle])])
+    before, after = ndtri(np.maximum(p, 1e-300) / 2) ** 2
+    return 0.0 if np.isnan(p).any() else float(after - before)
+
+
+def _p_value(test: IndependenceTest, x: int, y: int, given: Sequence[int]) -> float:
+    one = np.array([given], dtype=np.int64).reshape(1, -1)
+    return float(test.p_values(np.array([x]), np.array([y]), one)[0])
+
+
+def _with_colliders(known: IntArray, middles: Middles) -> IntArray:
+    """Rule R0: arrowheads at the colliders of unshielded triples."""
+    marks: IntArray = known.copy()
+    for (x, middle, y), kind in middles.items():
+        if kind is Middle.COLLIDER and _TAIL not in (marks[x, middle], marks[y, middle]):
+            marks[x, middle] = marks[y, middle] = _ARROW
+    return marks
+
+
+def _possibly_separating(marks: IntArray, adjacent: NDArray[np.bool_], start: int) -> set[int]:
+    """Nodes reached from `start` by paths whose every inner node is a collider or part of a triangle."""
+    steps = [(start, int(node)) for node in np.flatnonzero(adjacent[start])]
+    seen = set(steps)
+    while steps:
+        before, node = steps.pop()
+        for after in np.flatnonzero(adjacent[node]).tolist():
+            collider = marks[before, node] == _ARROW and marks[after, node] == _ARROW
+            if after not in (before, start) and (collider or adjacent[before, after]) and (node, after) not in seen:
+                seen.add((node, after))
+                steps.append((node, after))
+    return {node for _, node in seen}
+
+
+_ENDPOINTS = {_CIRCLE: Endpoint.CIRCLE, _ARROW: Endpoint.ARROW, _TAIL: Endpoint.TAIL}
+
+
+def _closed_under_rules(
+    names: Sequence[str],
+    marks: IntArray,
+    adjacent: NDArray[np.bool_],
+    sets: SeparatingSets,
+    middles: Middles,
+    test: IndependenceTest,
+    alpha: float,
+) -> Pag:
+    """Applies rules R1 to R4 and R8 of FCI until none does; they never touch a mark that is not a circle."""
+    nodes = [GraphNode(name) for name in names]
+    graph = GeneralGraph(nodes)
+    for i, j in _pairs(adjacent):
+        ends = _ENDPOINTS[int(marks[j, i])], _ENDPOINTS[int(marks[i, j])]
+        graph.add_edge(CausalLearnEdge(nodes[i], nodes[j], *ends))
+
+    chains = [
+        (nodes[ends[0]], nodes[middle], nodes[ends[1]])
+        for (x, middle, y), kind in middles.items()
+        for ends in ((x, y), (y, x))
+        if kind is Middle.NONCOLLIDER
+    ]
+    # causal-learn prints, in some versions whatever `verbose` says; stdout is for data.
+    with contextlib.redirect_stdout(io.StringIO()):
+        changed = True
+        while changed:
+            changed = False
+            for chain in chains:
+                changed = ruleR1(*chain, graph, None, changed)
+            for i, j in _pairs(adjacent):
+                for middle in np.flatnonzero(adjacent[i] & adjacent[j]).tolist():
+                    changed = ruleR2(nodes[i], nodes[middle], nodes[j], graph, None, changed)
+                    changed = ruleR2(nodes[j], nodes[middle], nodes[i], graph, None, changed)
+            changed = ruleR3(graph, sets, None, changed)
+            changed = ruleR4B(graph, -1, None, partial(_p_value, test), alpha, sets, changed, None)
+            changed = rule8(graph, nodes, changed)
+    edges = []
+    for i, j in _pairs(adjacent):
+        at_i, at_j = graph.get_endpoint(nodes[j], nodes[i]), graph.get_endpoint(nodes[i], nodes[j])
+        edges.append(PagEdge(names[i], names[j], Mark[at_i.name], Mark[at_j.name]))
+    return Pag(tuple(names), tuple(edges))

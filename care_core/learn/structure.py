@@ -1,0 +1,101 @@
+"""A runs table and a schema to a causal graph: screening, FCI, entropic resolution, residual edges (paper, Alg. 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from care_core.causal.graph import CausalGraph
+from care_core.errors import LearningError
+from care_core.learn.constraints import Constraints
+from care_core.learn.discovery import FisherZ, Pag, discover
+from care_core.learn.orientation import resolve
+from care_core.learn.residual import Residual, residual_direct_edges, residual_metric_edges
+from care_core.learn.screening import pairwise_correlation, screen_options
+from care_core.learn.table import normal_scores
+from care_core.profile.schema import Schema
+from care_core.variables import Role
+
+REPEATS = 0.98
+"""Rank correlation from which two metrics say the same thing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What was learned. `graph` has all variables of the schema; those set aside stand alone in it."""
+
+    graph: CausalGraph
+    pag: Pag
+    kept_options: tuple[str, ...]
+    dropped_options: tuple[str, ...]
+    direct: tuple[Residual, ...]
+    """Option to objective edges that were allowed, because the metrics do not carry the whole effect."""
+    notes: tuple[str, ...]
+
+
+def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01, rng: np.random.Generator) -> Structure:
+    """Learn the causal graph of a platform from its runs.
+
+    Args:
+        frame: a checked table (`table.read_table`), one row a run.
+        alpha: significance level of the independence tests, and false discovery rate of residual edges.
+        rng: starts of the latent search.
+
+    Raises:
+        LearningError: no option, or no objective, varies.
+    """
+    varying = [name for name in schema.variables if frame[name].nunique() > 1]
+    for role in (Role.OPTION, Role.OBJECTIVE):
+        if not any(schema.variables[name].role is role for name in varying):
+            raise LearningError(
+                f"No {role.value} varies in the table, so no effect can be learned.",
+                hint="Add runs with other configurations and outcomes.",
+            )
+    constraints = Constraints.of(schema)
+    screening = screen_options(frame, schema)
+    searched = [name for name in varying if name not in set(screening.dropped)]
+    columns = {name: frame[name].to_numpy(dtype=float) for name in searched}
+    test = FisherZ(np.column_stack(list(columns.values())))
+    pag = discover(searched, test, constraints, alpha=alpha)
+    resolved = resolve(pag, columns, constraints, rng)
+    graph = CausalGraph(
+        tuple(schema.variables),
+        frozenset(edge for edge in resolved.directed if not constraints.forbids(*edge)),
+        resolved.bidirected,
+    )
+    metric_edges = () if schema.observational else residual_metric_edges(frame, schema, graph, screening.kept, alpha)
+    graph = _with_edges(graph, metric_edges)
+    direct = residual_direct_edges(frame, schema, graph, screening.kept, alpha)
+    return Structure(
+        graph=_with_edges(graph, direct),
+        pag=pag,
+        kept_options=screening.kept,
+        dropped_options=screening.dropped,
+        direct=direct,
+        notes=(
+            *(f"'{name}' never varies in the table." for name in schema.variables if name not in varying),
+            *_repeats(frame, [v.name for v in schema.metrics if v.name in varying]),
+            *resolved.notes,
+            *(
+                f"{a} -> {b} was added: there is dependence beyond its other causes (p = {p:.2g})."
+                for a, b, p in metric_edges
+            ),
+        ),
+    )
+
+
+def _with_edges(graph: CausalGraph, edges: Sequence[Residual]) -> CausalGraph:
+    return CausalGraph(graph.nodes, graph.directed | {(a, b) for a, b, _ in edges}, graph.bidirected)
+
+
+def _repeats(frame: pd.DataFrame, metrics: Sequence[str]) -> list[str]:
+    """Pairs of metrics of which each hides the other's causes and effects from the search."""
+    scores = normal_scores(frame[list(metrics)].to_numpy(dtype=float))
+    r, _ = pairwise_correlation(scores, scores)
+    return [
+        f"'{metrics[i]}' and '{metrics[j]}' nearly repeat each other (rank correlation {r[i, j]:.2f}); keep one."
+        for i, j in zip(*np.nonzero(np.triu(np.abs(r) > REPEATS, k=1)), strict=True)
+    ]

@@ -1,0 +1,315 @@
+"""The command line: what is said where, exit codes, and what a wrong word is answered with."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from care_core.diagnose.records import Diagnosis
+from care_core.errors import UsageError
+from care_core.profile.store import load_profile
+from care_tui import __version__, cli, console
+from care_tui.cli import newest_log, route
+from tests.conftest import Care
+from tests.made import made_diagnosis
+
+COMMANDS = ("triage", "inspect", "params", "ingest", "train", "demo", "profiles", "schema")
+ROOT = Path(__file__).parents[2]
+
+
+def run_process(*args: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    code = "from care_tui.cli import main; main()"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), **variables}
+    return subprocess.run(
+        [sys.executable, "-c", code, *args], capture_output=True, text=True, timeout=60, env=environment, check=False
+    )
+
+
+@pytest.fixture
+def flights(recorded: Path) -> tuple[Path, ...]:
+    return tuple(sorted((recorded / "data" / "arducopter" / "faults").glob("*.BIN"))[:3])
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Puts a diagnosis made by hand in the place of the engine, and keeps what the engine was asked."""
+    asked: dict[str, Any] = {"answer": made_diagnosis()}
+
+    def diagnose(path: Path, profile: str | None, **options: Any) -> Diagnosis:
+        asked.update(options, path=path, profile=profile)
+        answer: Diagnosis = asked["answer"]
+        return answer
+
+    monkeypatch.setattr(cli, "diagnose", diagnose)
+    return asked
+
+
+def test_version_and_help(care: Care) -> None:
+    assert care("--version").stdout == f"care {__version__}\n"
+    listing = care("--help")
+    assert listing.code == 0
+    assert all(f"\n  {command}" in listing.stdout for command in COMMANDS)
+    assert "\n  open" not in listing.stdout
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(care: Care, command: str) -> None:
+    outcome = care(command, "--help")
+    assert outcome.code == 0
+    assert "Usage: care " in outcome.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "routed"),
+    [
+        ([], ["open"]),
+        (["flight.BIN"], ["open", "flight.BIN"]),
+        (["logs/flight", "--profile", "x"], ["open", "logs/flight", "--profile", "x"]),
+        (["--profile", "x", "flight.BIN"], ["open", "--profile", "x", "flight.BIN"]),
+        (["triage", "flight.BIN"], ["triage", "flight.BIN"]),
+        (["--help"], ["--help"]),
+    ],
+)
+def test_a_log_may_stand_where_a_command_does(words: list[str], routed: list[str]) -> None:
+    assert route(words, {"triage", "open"}, {"--help", "--version"}) == routed
+
+
+def test_a_misspelt_command_is_answered_with_the_nearest(care: Care) -> None:
+    outcome = care("triag", "a.BIN")
+    assert (outcome.code, outcome.stdout) == (2, "")
+    assert outcome.stderr == "care: There is no command 'triag'. Did you mean 'triage'?\n"
+
+
+def test_a_missing_log_is_unreadable(care: Care) -> None:
+    for words in (("missing.BIN",), ("triage", "missing.BIN"), ("inspect", "missing.BIN"), ("params", "missing.BIN")):
+        outcome = care(*words)
+        assert (outcome.code, outcome.stdout) == (4, "")
+        assert "missing.BIN: No such file." in outcome.stderr
+
+
+def test_the_app_asks_for_a_terminal(care: Care, tmp_path: Path) -> None:
+    log = tmp_path / "a.bag"
+    log.write_bytes(b"#ROSBAG V2.0\n")
+    outcome = care(log)
+    assert outcome.code == 2
+    assert "care triage LOG" in outcome.stderr
+
+
+def test_the_newest_log_is_found(tmp_path: Path) -> None:
+    for age, name in enumerate(("old.BIN", "new.bag", "newest.txt")):
+        path = tmp_path / name
+        path.touch()
+        os.utime(path, (age, age))
+    assert newest_log([tmp_path / "none", tmp_path]).name == "new.bag"
+    with pytest.raises(UsageError, match="no log in the usual places"):
+        newest_log([tmp_path / "none"])
+
+
+def test_triage_prints_data_on_stdout_alone(care: Care, made: dict[str, Any]) -> None:
+    outcome = care("triage", "a.BIN")
+    assert outcome.code == 1
+    assert outcome.stdout.startswith("FAULT: mission_time")
+    assert outcome.stderr == ""
+    assert json.loads(care("triage", "a.BIN", "--json").stdout)["schema"] == "care.triage/1"
+    assert "diff: |" in care("triage", "a.BIN", "--yaml").stdout
+    assert care("triage", "a.BIN", "--markdown").stdout.startswith("# Triage")
+
+
+def test_triage_passes_its_options_on(care: Care, made: dict[str, Any]) -> None:
+    care(
+        "triage", "a.BIN", "-p", "arducopter", "--config", "b.param", "--config", "c.param", "--keep", "A",
+        "--threshold", "energy=12", "--mission", "2", "--top", "3",
+    )  # fmt: skip
+    made.pop("answer")
+    assert made == {
+        "path": Path("a.BIN"),
+        "profile": "arducopter",
+        "configs": [Path("b.param"), Path("c.param")],
+        "keep": ["A"],
+        "thresholds": ["energy=12"],
+        "mission": 2,
+        "top": 3,
+    }
+
+
+def test_the_exit_code_says_what_was_found(care: Care, made: dict[str, Any]) -> None:
+    fault: Diagnosis = made["answer"]
+    ok, _, unknown = fault.objectives
+    for objectives, code in (((ok,), 0), (fault.objectives, 1), ((ok, unknown), 3)):
+        made["answer"] = replace(fault, objectives=objectives, faults=(), fix=None)
+        assert care("triage", "a.BIN").code == code
+
+
+def test_a_report_is_written_in_the_format_of_its_name(care: Care, made: dict[str, Any], tmp_path: Path) -> None:
+    out = tmp_path / "report.yaml"
+    outcome = care("triage", "a.BIN", "--out", out)
+    assert (outcome.code, outcome.stdout, outcome.stderr) == (1, "", f"wrote {out}\n")
+    assert out.read_text().startswith("schema: care.triage/1")
+    assert care("triage", "a.BIN", "--out", tmp_path / "none" / "report.json").code == 2
+
+
+def test_only_one_format_can_be_printed(care: Care, made: dict[str, Any]) -> None:
+    assert care("triage", "a.BIN", "--json", "--yaml").code == 2
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "reason"),
+    [
+        ("--keep", "WPNAV_SPED", "Did you mean 'WPNAV_SPEED'?"),
+        ("--threshold", "enery=3", "Did you mean 'energy'?"),
+        ("--threshold", "energy=much", "--threshold energy=NUMBER"),
+        ("--profile", "arducoptr", "Did you mean 'arducopter'?"),
+    ],
+)
+def test_unknown_names_are_answered_with_the_nearest(
+    care: Care, flights: tuple[Path, ...], option: str, value: str, reason: str
+) -> None:
+    outcome = care("triage", flights[0], option, value)
+    assert (outcome.code, outcome.stdout) == (2, "")
+    assert reason in outcome.stderr
+
+
+def test_a_configuration_that_cannot_be_read_is_named(care: Care, flights: tuple[Path, ...], tmp_path: Path) -> None:
+    broken = tmp_path / "a.param"
+    broken.write_text("A 1\nB\n")
+    outcome = care("triage", flights[0], "--config", broken)
+    assert outcome.code == 2
+    assert f"{broken}:2" in outcome.stderr
+
+
+def test_inspect_shows_what_a_log_holds(care: Care, flights: tuple[Path, ...]) -> None:
+    data = json.loads(care("inspect", flights[0], "--json").stdout)
+    assert data["format"] == "dataflash-bin"
+    assert data["parameters"] > 100
+    assert data["profiles"][0]["name"] == "arducopter"
+    assert any(channel["name"] == "PARM" for channel in data["channels"])
+    assert "dataflash-bin" in care("inspect", flights[0]).stdout
+
+
+def test_params_are_a_file_that_can_be_loaded(care: Care, flights: tuple[Path, ...], tmp_path: Path) -> None:
+    from care_core.configs import read_config
+
+    out = tmp_path / "driven.param"
+    assert care("params", flights[0], "--out", out).code == 0
+    driven = read_config(out)
+    changed = care("params", flights[0], "--changed").stdout.splitlines()
+    assert 0 < len(changed) < len(driven)
+    assert all(line.split(",")[0] in driven for line in changed)
+
+
+def test_ingest_goes_on_after_a_log_that_fails(care: Care, flights: tuple[Path, ...], tmp_path: Path) -> None:
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    for path in flights:
+        (folder / path.name).symlink_to(path)
+    (folder / "broken.bin").write_bytes(b"no log")
+    out = tmp_path / "runs.csv"
+    outcome = care("ingest", folder, "-o", out, "--profile", "arducopter")
+    assert outcome.code == 0
+    assert "broken.bin  Not a log of a known format." in outcome.stderr
+    with out.open() as stream:
+        rows = list(csv.reader(stream))
+    assert rows[0] == ["log", "mission", *load_profile("arducopter").schema.variables]
+    assert len(rows) == 1 + len(flights)
+
+
+def test_ingest_refuses_before_it_reads(care: Care, tmp_path: Path) -> None:
+    for out, place in ((tmp_path / "runs.txt", tmp_path), (tmp_path / "runs.csv", tmp_path / "none")):
+        assert care("ingest", place, "-o", out).code == 2
+    (tmp_path / "a.bin").write_bytes(b"no log")
+    outcome = care("ingest", tmp_path, "-o", tmp_path / "runs.csv", "--profile", "arducopter")
+    assert outcome.code == 4
+    assert not (tmp_path / "runs.csv").exists()
+
+
+def test_the_published_schema_is_printed(care: Care) -> None:
+    assert json.loads(care("schema", "triage").stdout)["title"] == "care.triage/1"
+
+
+def test_profiles_are_listed_and_shown(care: Care) -> None:
+    assert care("profiles").stdout == care("profiles", "list").stdout
+    assert "arducopter" in care("profiles").stdout
+    assert "objectives (4)" in care("profiles", "show", "arducopter").stdout
+    assert care("profiles", "show", "none").code == 2
+
+
+def test_the_demo_finds_its_fault(care: Care) -> None:
+    from care_core.resources import bundled
+
+    if not bundled("samples", cli.SAMPLE).is_file():
+        pytest.skip("the sample is not bundled yet")
+    outcome = care("demo")
+    assert outcome.code == 1, outcome.stderr
+    assert outcome.stdout.startswith("FAULT: ")
+    assert max(map(len, outcome.stdout.splitlines())) <= 80
+
+
+def test_an_unexpected_error_is_one_sentence(care: Care, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> Diagnosis:
+        raise RuntimeError("oops \x1b[31m")
+
+    monkeypatch.setattr(cli, "diagnose", fail)
+    outcome = care("triage", "a.BIN")
+    assert outcome.code == 2
+    assert outcome.stderr == (
+        "care: unexpected RuntimeError: oops \\x1b[31m. Set CARE_DEBUG=1 to see where it comes from.\n"
+    )
+    monkeypatch.setenv("CARE_DEBUG", "1")
+    assert "Traceback" in care("triage", "a.BIN").stderr
+
+
+def test_interrupted(care: Care, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(*_: object, **__: object) -> Diagnosis:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "diagnose", interrupt)
+    assert care("triage", "a.BIN").code == 130
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    code = "from care_tui.cli import main; main()"
+    with subprocess.Popen(
+        [sys.executable, "-c", code, "schema", "triage"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == b""
+        assert process.wait(timeout=60) == console.PIPE_CLOSED
+
+
+def test_colour_only_on_a_terminal_that_wants_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert console.painted("FAULT: x") == "FAULT: x"
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    assert console.painted("FAULT: x") == "\x1b[1;31mFAULT\x1b[0m: x"
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert console.painted("FAULT: x") == "FAULT: x"
+
+
+def test_slow_work_says_so_once(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    times: Iterable[float] = iter((0.0, 0.5, 1.5, 2.0))
+    monkeypatch.setattr("time.monotonic", lambda: next(iter(times)))
+    with console.Progress() as progress:
+        for share in (0.1, 0.5, 0.9):
+            progress("reading", share)
+    assert capsys.readouterr().err == "reading ...\n"
+
+
+def test_the_command_runs_as_a_process() -> None:
+    assert run_process("--version").stdout == f"care {__version__}\n"
+    outcome = run_process("triage", "missing.BIN")
+    assert (outcome.returncode, outcome.stdout) == (4, "")
+    assert "Traceback" not in outcome.stderr

@@ -1,0 +1,83 @@
+"""Writing the report to a file from the app."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from textual.widgets import Input, Static
+
+from care_tui.screens.diagnosis import DiagnosisScreen
+from care_tui.screens.export import ExportDialog, OverwriteDialog
+from care_tui.widgets.lines import Lines
+from tests.tui import sample_diagnosis as sample
+from tests.tui.conftest import MakeApp, settle
+
+
+@pytest.fixture(autouse=True)
+def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("formats", "name", "start"),
+    [
+        ([], "00000042.care.yaml", "report: yaml"),
+        (["f"], "00000042.care.md", "report: markdown"),
+        (["f", "f"], "00000042.care.json", "report: json"),
+    ],
+)
+async def test_export_writes_the_format_in_view_beside_the_operator(
+    make_app: MakeApp, tmp_path: Path, formats: list[str], name: str, start: str
+) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot, "5", *formats)
+        assert app.screen.query_one("#report", Lines).plain.startswith(start)
+        await settle(pilot, "e", "enter")
+        assert isinstance(app.screen, DiagnosisScreen)
+        assert (tmp_path / name).read_text().startswith(start)
+        assert str(tmp_path / name) in str(app.screen.query_one("#step-5 .title", Static).content)
+
+
+@pytest.mark.parametrize(("answer", "replaced"), [("y", True), ("n", False), ("escape", False)])
+async def test_an_existing_file_is_replaced_only_when_asked_for(
+    make_app: MakeApp, tmp_path: Path, answer: str, replaced: bool
+) -> None:
+    target = tmp_path / "00000042.care.yaml"
+    target.write_text("precious")
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "5", "e")
+        await pilot.press("enter")
+        await pilot.pause()
+        assert isinstance(app.screen, OverwriteDialog)
+        await pilot.press(answer)
+        await settle(pilot)
+        assert isinstance(app.screen, DiagnosisScreen if replaced else ExportDialog)
+    assert (target.read_text() != "precious") is replaced
+
+
+async def test_another_name_can_be_given_and_a_wrong_one_is_explained(make_app: MakeApp, tmp_path: Path) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "5", "e")
+        box = app.screen.query_one(Input)
+        box.value = "report.txt"
+        await settle(pilot, "enter")
+        assert ".yaml, .md or .json" in str(app.screen.query_one("#export-error", Static).content)
+        box.value = "missing/folder.md"
+        await settle(pilot, "enter")
+        assert "No such file" in str(app.screen.query_one("#export-error", Static).content)
+        box.value = "mine.json"
+        await settle(pilot, "enter")
+        assert isinstance(app.screen, DiagnosisScreen)
+    assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["mine.json"]
+
+
+async def test_escape_leaves_without_writing(make_app: MakeApp, tmp_path: Path) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "5", "e", "escape")
+        assert isinstance(app.screen, DiagnosisScreen)
+    assert not [path for path in tmp_path.iterdir() if path.is_file()]

@@ -1,0 +1,72 @@
+"""What the app looks like, as SVG. After a wanted change: pytest tests/tui --snapshot-update, and look at them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from textual.pilot import Pilot
+
+from care_core.errors import LogError
+from tests.tui import sample_diagnosis as sample
+from tests.tui.conftest import MakeApp, settle
+
+SIZES = [(80, 24), (120, 40)]
+SnapCompare = Callable[..., bool]
+
+pytestmark = pytest.mark.skipif(sys.version_info[:2] != (3, 11), reason="snapshots are made on Python 3.11 only")
+
+
+def press(*keys: str) -> Callable[[Pilot[Any]], Awaitable[None]]:
+    async def walk(pilot: Pilot[Any]) -> None:
+        await settle(pilot, *keys)
+
+    return walk
+
+
+@pytest.mark.parametrize("size", SIZES, ids=["80x24", "120x40"])
+@pytest.mark.parametrize(
+    "keys",
+    [(), ("2",), ("3", "j"), ("4",), ("5",)],
+    ids=["objectives", "causes", "fix", "diff", "report"],
+)
+def test_steps(snap_compare: SnapCompare, make_app: MakeApp, size: tuple[int, int], keys: tuple[str, ...]) -> None:
+    assert snap_compare(make_app(sample.faulty()), terminal_size=size, run_before=press(*keys))
+
+
+@pytest.mark.parametrize("kind", ["all_ok", "abstaining", "not_evaluated"])
+def test_other_verdicts(snap_compare: SnapCompare, make_app: MakeApp, kind: str) -> None:
+    diagnosis = getattr(sample, kind)()
+    assert snap_compare(make_app(diagnosis), terminal_size=(80, 24), run_before=press())
+
+
+def test_smallest_terminal(snap_compare: SnapCompare, make_app: MakeApp) -> None:
+    assert snap_compare(make_app(sample.faulty()), terminal_size=(60, 20), run_before=press("2"))
+
+
+def test_too_small_terminal(snap_compare: SnapCompare, make_app: MakeApp) -> None:
+    assert snap_compare(make_app(sample.faulty()), terminal_size=(50, 15), run_before=press())
+
+
+def test_ascii(snap_compare: SnapCompare, make_app: MakeApp) -> None:
+    assert snap_compare(make_app(sample.faulty(), ascii=True), terminal_size=(80, 24), run_before=press("2"))
+
+
+def test_no_colour(snap_compare: SnapCompare, make_app: MakeApp, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert snap_compare(make_app(sample.faulty()), terminal_size=(80, 24), run_before=press())
+
+
+def test_help(snap_compare: SnapCompare, make_app: MakeApp) -> None:
+    assert snap_compare(make_app(sample.faulty()), terminal_size=(80, 24), run_before=press("2", "question_mark"))
+
+
+def test_export_dialog(snap_compare: SnapCompare, make_app: MakeApp) -> None:
+    assert snap_compare(make_app(sample.faulty()), terminal_size=(80, 24), run_before=press("5", "e"))
+
+
+def test_error(snap_compare: SnapCompare, make_app: MakeApp) -> None:
+    error = LogError("Not a DataFlash log: the first bytes are PK.", hint="Give the .BIN file.", where="a.BIN")
+    assert snap_compare(make_app(error), terminal_size=(80, 24), run_before=press())
