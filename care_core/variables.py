@@ -72,6 +72,9 @@ class Variable:
     kind: Kind | None = None
     threshold: Threshold | None = None
     extract: Extract | None = None
+    order: int | None = None
+    """Place in the mission, or in the making of a number out of others: a variable never causes one of a lower
+    order. None where nothing is known."""
 
     def accepts(self, value: float) -> bool:
         """Whether `value` may be suggested for this option."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from textual import constants, on, work
+from textual import on, work
 from textual.app import App, SystemCommand
 from textual.binding import Binding, BindingType
+from textual.reactive import Reactive
 from textual.screen import Screen
 from textual.scrollbar import ScrollBar, ScrollBarRender
 from textual.worker import Worker, get_current_worker
@@ -25,7 +27,6 @@ from care_tui.widgets.step_bar import STEPS
 
 THEME = "ansi-dark"
 """The terminal's own colours: right on any background, with 16 colours, and half the bytes on a slow link."""
-TEXTUAL_THEME = "textual-dark"
 
 
 class PlainScrollBar(ScrollBarRender):
@@ -38,6 +39,8 @@ class CareApp(App[int], inherit_bindings=False):
     """Owns the log being diagnosed, the exit code and the keys that work everywhere."""
 
     TITLE = "care"
+    # Set before the app is built: only then does Textual honour NO_COLOR with the terminal's own colours.
+    theme = Reactive(os.environ.get("TEXTUAL_THEME", THEME))
     CSS_PATH: ClassVar[list[str | Path]] = ["styles/app.tcss", "styles/diagnosis.tcss", "styles/dialogs.tcss"]  # type: ignore[assignment]
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("question_mark,f1", "help", "Help", key_display="?", id="app.help"),
@@ -57,8 +60,6 @@ class CareApp(App[int], inherit_bindings=False):
         super().__init__()
         self.animation_level = "none"
         ScrollBar.renderer = PlainScrollBar
-        if constants.DEFAULT_THEME == TEXTUAL_THEME:
-            self.theme = THEME
         self.set_class(ascii, "-ascii")
         self.code = ExitCode.INTERRUPTED
         self._log_path = log
@@ -149,6 +150,10 @@ class CareApp(App[int], inherit_bindings=False):
             if active.enabled and description and active.binding.id:
                 keys.setdefault(description, []).append(self.get_key_display(active.binding.with_key(key)))
         return [(" ".join(shown), description) for description, shown in keys.items()]
+
+    def get_key_display(self, binding: Binding) -> str:
+        """How a key is written; by its name where arrows and the like cannot be drawn."""
+        return (binding.key_display or binding.key) if self._glyphs is ASCII else super().get_key_display(binding)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
         """What the command palette offers."""

@@ -17,7 +17,7 @@ from care_core.profile.model import Model, OutcomeRecord, StageRecord
 from care_core.run import is_known
 from care_core.variables import Threshold
 
-PERSISTENCE = 0.5
+PERSISTENCE = 0.7
 """Share of a run's noise variance that the next run under the same conditions meets again."""
 INTERVAL = (0.1, 0.9)
 

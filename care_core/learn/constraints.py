@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from care_core.profile.schema import Schema
 from care_core.variables import Role
@@ -25,6 +25,7 @@ ALWAYS: Mapping[tuple[Role, Role], str] = {
     (Y, M): _NOT_FROM_RESULT,
     (O, Y): "an option acts on an objective through metrics (Problem 2.1); what remains is tested apart",
 }
+_TOO_LATE = "it is settled after the other (declared order)"
 RANDOMISED: Mapping[tuple[Role, Role], str] = {
     (C, O): "options were drawn without regard to the context",
 }
@@ -36,14 +37,20 @@ class Constraints:
 
     roles: Mapping[str, Role]
     observational: bool = False
+    order: Mapping[str, int | None] = field(default_factory=dict)
+    """Declared place of each variable in the mission; a later one never causes an earlier one."""
 
     @classmethod
     def of(cls, schema: Schema) -> Constraints:
-        return cls({name: variable.role for name, variable in schema.variables.items()}, schema.observational)
+        variables = schema.variables.values()
+        return cls({v.name: v.role for v in variables}, schema.observational, {v.name: v.order for v in variables})
 
     def reason(self, cause: str, effect: str) -> str | None:
         """Why the directed edge cannot be, None where it can."""
         pair = (self.roles[cause], self.roles[effect])
+        placed, after = self.order.get(cause), self.order.get(effect)
+        if pair in ((M, M), (Y, Y)) and placed is not None and after is not None and placed > after:
+            return _TOO_LATE
         return ALWAYS.get(pair) or (None if self.observational else RANDOMISED.get(pair))
 
     def forbids(self, cause: str, effect: str) -> bool:

@@ -10,10 +10,10 @@ import pandas as pd
 
 from care_core.causal.graph import CausalGraph
 from care_core.errors import LearningError
+from care_core.learn.completion import DirectEdge, complete
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import FisherZ, Pag, discover
 from care_core.learn.orientation import resolve
-from care_core.learn.residual import Residual, residual_direct_edges, residual_metric_edges
 from care_core.learn.screening import pairwise_correlation, screen_options
 from care_core.learn.table import normal_scores
 from care_core.profile.schema import Schema
@@ -31,7 +31,7 @@ class Structure:
     pag: Pag
     kept_options: tuple[str, ...]
     dropped_options: tuple[str, ...]
-    direct: tuple[Residual, ...]
+    direct: tuple[DirectEdge, ...]
     """Option to objective edges that were allowed, because the metrics do not carry the whole effect."""
     notes: tuple[str, ...]
 
@@ -41,7 +41,7 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
 
     Args:
         frame: a checked table (`table.read_table`), one row a run.
-        alpha: significance level of the independence tests, and false discovery rate of residual edges.
+        alpha: significance level of the independence tests.
         rng: starts of the latent search.
 
     Raises:
@@ -66,29 +66,20 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
         frozenset(edge for edge in resolved.directed if not constraints.forbids(*edge)),
         resolved.bidirected,
     )
-    metric_edges = () if schema.observational else residual_metric_edges(frame, schema, graph, screening.kept, alpha)
-    graph = _with_edges(graph, metric_edges)
-    direct = residual_direct_edges(frame, schema, graph, screening.kept, alpha)
+    completion = complete(frame, schema, graph, screening.kept)
     return Structure(
-        graph=_with_edges(graph, direct),
+        graph=completion.graph,
         pag=pag,
         kept_options=screening.kept,
         dropped_options=screening.dropped,
-        direct=direct,
+        direct=completion.direct,
         notes=(
             *(f"'{name}' never varies in the table." for name in schema.variables if name not in varying),
             *_repeats(frame, [v.name for v in schema.metrics if v.name in varying]),
             *resolved.notes,
-            *(
-                f"{a} -> {b} was added: there is dependence beyond its other causes (p = {p:.2g})."
-                for a, b, p in metric_edges
-            ),
+            *completion.notes,
         ),
     )
-
-
-def _with_edges(graph: CausalGraph, edges: Sequence[Residual]) -> CausalGraph:
-    return CausalGraph(graph.nodes, graph.directed | {(a, b) for a, b, _ in edges}, graph.bidirected)
 
 
 def _repeats(frame: pd.DataFrame, metrics: Sequence[str]) -> list[str]:

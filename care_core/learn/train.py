@@ -151,7 +151,7 @@ def _edge_record(edge: Edge, kind: str, support: Mapping[Edge, float], effects: 
         source=edge[0],
         target=edge[1],
         kind="directed" if kind == "directed" else "bidirected",
-        support=support.get(edge, 0.0),
+        support=support.get(edge if kind == "directed" else frozenset(edge), 0.0),
         effect=measured.effect.magnitude if measured else 0.0,
         direction=measured.effect.direction if measured else "none",
     )

@@ -44,6 +44,7 @@ class _Variable(_Strict):
     kind: Kind | None = None
     threshold: _Threshold | None = None
     extract: dict[str, Any] | None = None
+    order: int | None = None
 
     @model_validator(mode="after")
     def _fits_role(self) -> _Variable:
@@ -197,6 +198,7 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         kind=v.kind,
         threshold=None if v.threshold is None else Threshold(v.threshold.op, v.threshold.value),
         extract=extract,
+        order=v.order,
     )
 
 

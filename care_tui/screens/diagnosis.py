@@ -8,7 +8,7 @@ from typing import ClassVar
 from textual import on, work
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.widgets import ContentSwitcher, Footer
+from textual.widgets import ContentSwitcher
 
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError
@@ -24,6 +24,7 @@ from care_tui.messages import (
 from care_tui.render import Glyphs
 from care_tui.screens.base import CareScreen
 from care_tui.screens.export import ExportDialog
+from care_tui.widgets.key_hints import KeyHints
 from care_tui.widgets.step_bar import STEPS, StepBar
 from care_tui.widgets.steps import CausesStep, DiffStep, FixStep, ObjectivesStep, ReportStep, Step
 
@@ -70,7 +71,7 @@ class DiagnosisScreen(CareScreen):
             yield FixStep(diagnosis, glyphs, id="step-3")
             yield DiffStep(diagnosis, glyphs, id="step-4")
             yield ReportStep(diagnosis, glyphs, id="step-5")
-        yield Footer()
+        yield KeyHints()
 
     def on_mount(self) -> None:
         self._explain(self._objective)

@@ -9,13 +9,14 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Vertical
 from textual.content import Content
-from textual.widgets import Footer, Static
+from textual.widgets import Static
 
 from care_core.errors import CareError
 from care_core.text import clean
 from care_tui import render
 from care_tui.render import Glyphs
 from care_tui.screens.base import CareScreen
+from care_tui.widgets.key_hints import KeyHints
 from care_tui.widgets.lines import Lines
 
 
@@ -35,7 +36,7 @@ class LoadingScreen(CareScreen):
             yield Static(Content(f"Diagnosing {clean(self._log.name)}"), classes="title")
             yield Static("starting", id="step", markup=False)
             yield Static(render.progress_bar(0.0, self._glyphs), id="progress")
-        yield Footer()
+        yield KeyHints()
 
     def advance(self, step: str, fraction: float) -> None:
         """Show the step the engine is at."""
@@ -57,4 +58,4 @@ class ErrorScreen(CareScreen):
         with Vertical(classes="message"):
             yield Static("No diagnosis", classes="title", markup=False)
             yield Lines(render.error_rows(self.error), id="error")
-        yield Footer()
+        yield KeyHints()
