@@ -2,8 +2,8 @@
 
     python benchmarks/diagnosis.py --shared DIR [--platform arducopter] [--tables DIR] [--verbose]
 
-`--tables` holds the training runs for the peers (made by `care ingest` on the training logs). Every truth row says which
-resets were really flown and which fixed the mission.
+`--tables` holds the training runs for the peers (made by `care ingest` on the training logs). Every truth row says
+which resets were really flown and which fixed the mission.
 """
 
 from __future__ import annotations
@@ -95,7 +95,9 @@ def objectives_differ(diagnosis: Diagnosis, truth: Mapping[str, Any], platform: 
             true = true / JOULES_PER_WH
         assert result.threshold is not None
         expected = "ok" if result.threshold.met(true) else "fault"
-        near = abs(true - result.threshold.value) <= (0.35 if name == "path_error_max" else 0.05 * result.threshold.value)
+        near = abs(true - result.threshold.value) <= (
+            0.35 if name == "path_error_max" else 0.05 * result.threshold.value
+        )
         if result.status != expected and not (near and result.status in ("ok", "fault")):
             differ.append(f"{name}: {result.status} {result.value}, truth {true}")
     return differ
@@ -167,7 +169,11 @@ def _count(
         tally.fix_flown += suggested in flown
         tally.fix_confirmed += flown.get(suggested, False)
     if verbose:
-        fix = [f"{c.option.name} {c.current:g}->{c.suggested:g}" for c in diagnosis.fix.changes] if diagnosis.fix else None
+        fix = (
+            [f"{c.option.name} {c.current:g}->{c.suggested:g}" for c in diagnosis.fix.changes]
+            if diagnosis.fix
+            else None
+        )
         print(truth["tag"], "care:", rankings["care"][:3], "true:", truth["fixing"], "fix:", fix,
               f"{diagnosis.fix.p_fixed:.2f}" if diagnosis.fix else diagnosis.abstained)  # fmt: skip
 
@@ -206,21 +212,27 @@ def show(platform: str, tally: Tally) -> None:
         p = np.array(odds)
         print(f"  odds of {len(p)} flown resets, {name}: calibration error {calibration_error(p, outcomes):.3f}, "
               f"Brier {((p - outcomes) ** 2).mean():.3f}")  # fmt: skip
-    print("  reliability (predicted, met, n): "
-          + "; ".join(f"{a:.2f} {b:.2f} {c}" for a, b, c in reliability(np.array(tally.odds["care"]), outcomes)))
+    print(
+        "  reliability (predicted, met, n): "
+        + "; ".join(f"{a:.2f} {b:.2f} {c}" for a, b, c in reliability(np.array(tally.odds["care"]), outcomes))
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--shared", type=Path, required=True, help="folder that holds data/")
     parser.add_argument("--platform", choices=PLATFORMS, action="append", help="default: both")
-    parser.add_argument("--tables", type=Path, help="folder with PLATFORM.parquet or .csv, the training runs of the peers")
+    parser.add_argument(
+        "--tables", type=Path, help="folder with PLATFORM.parquet or .csv, the training runs of the peers"
+    )
     parser.add_argument("--verbose", action="store_true", help="one line a fault")
     args = parser.parse_args()
     for platform in args.platform or PLATFORMS:
         table = None
         if args.tables is not None:
-            table = next(p for p in (args.tables / f"{platform}.parquet", args.tables / f"{platform}.csv") if p.exists())
+            table = next(
+                p for p in (args.tables / f"{platform}.parquet", args.tables / f"{platform}.csv") if p.exists()
+            )
         show(platform, evaluate(platform, args.shared, table, args.verbose))
 
 

@@ -188,11 +188,8 @@ def diagnose(
     mission: int | None = None,
 ) -> Diagnosis:
     """From a log file to its diagnosis, with progress on stderr."""
-    from dataclasses import replace
-
     from care_core.configs import read_configs
     from care_core.diagnose.triage import triage as run_triage
-    from care_core.extract.settings import disagreements
     from care_core.logs import open_log
 
     with Progress() as progress:
@@ -201,7 +198,7 @@ def diagnose(
         log = open_log(path)
         chosen, choice = _choose(log, profile)
         schema = chosen.schema
-        diagnosis = run_triage(
+        return run_triage(
             log,
             chosen,
             choice,
@@ -212,8 +209,6 @@ def diagnose(
             top=top,
             progress=progress,
         )
-    notes = disagreements(schema, diagnosis.run.config, overrides)
-    return replace(diagnosis, notes=(*diagnosis.notes, *notes))
 
 
 def _choose(log: Log, profile: str | None) -> tuple[Profile, ProfileChoice]:

@@ -27,7 +27,6 @@ def diagnose_log(path: Path, profile: str | None, configs: Sequence[Path], progr
     """The whole line from a log file to its diagnosis, the same as `care triage` runs."""
     from care_core.configs import read_configs
     from care_core.diagnose.triage import triage
-    from care_core.extract.settings import disagreements
     from care_core.logs import open_log
     from care_core.profile.select import choose_profile
     from care_core.profile.store import available_profiles, load_profile
@@ -37,9 +36,7 @@ def diagnose_log(path: Path, profile: str | None, configs: Sequence[Path], progr
     log = open_log(path)
     names: list[Path] | list[str] = available_profiles() if profile is None else [profile]
     chosen, choice = choose_profile(log, [load_profile(name) for name in names])
-    diagnosis = triage(log, chosen, choice, configs=overrides, progress=progress)
-    notes = disagreements(chosen.schema, diagnosis.run.config, overrides)
-    return replace(diagnosis, notes=(*diagnosis.notes, *notes))
+    return triage(log, chosen, choice, configs=overrides, progress=progress)
 
 
 def diff_of(run: Run, fix: Fix) -> str:

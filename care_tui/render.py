@@ -386,8 +386,10 @@ def change_rows(change: Change, glyphs: Glyphs) -> list[Row]:
 
 def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs) -> Content:
     """`✓ OK  139, 131 to 150 s, odds 91 %`."""
-    span = f"  {predicted.value:.4g}, {predicted.low:.4g} to {measure(predicted.high, variable.unit)}"
     odds = "" if predicted.p_ok is None else f", odds {percent(predicted.p_ok)}"
+    if variable.kind == "functional":  # a yes-or-no objective has odds, not a value
+        return status(predicted.status(), glyphs) + text(odds.replace(",", " ", 1))
+    span = f"  {predicted.value:.4g}, {predicted.low:.4g} to {measure(predicted.high, variable.unit)}"
     return status(predicted.status(), glyphs) + text(f"{span}{odds}")
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
+
+if TYPE_CHECKING:
+    from care_core.profile.store import Profile
 
 
 class Outcome(NamedTuple):
@@ -40,6 +43,19 @@ def recorded() -> Path:
     if not folder:
         pytest.skip("CARE_SHARED does not name a folder of recorded runs")
     return Path(folder)
+
+
+@pytest.fixture(scope="session")
+def planted(tmp_path_factory: pytest.TempPathFactory) -> Profile:
+    """A profile trained on 250 missions of the robot in `planted`, written and read as an installed one is."""
+    from care_core.learn.train import train
+    from care_core.profile.model import write_model
+    from care_core.profile.store import Profile
+    from tests.planted import SCHEMA, SETTINGS, fly_many
+
+    folder = tmp_path_factory.mktemp("planted")
+    write_model(train(fly_many(250), SCHEMA, SETTINGS), folder)
+    return Profile(folder, SCHEMA)
 
 
 @pytest.fixture

@@ -94,11 +94,7 @@ class World:
         here = self._chance(mechanism, stage.passes, [self.config])[0]
         if passed is None:
             return chance
-        same_noise = (
-            np.minimum(1.0, chance / here)
-            if passed
-            else np.maximum(0.0, (chance - here) / (1.0 - here))
-        )
+        same_noise = np.minimum(1.0, chance / here) if passed else np.maximum(0.0, (chance - here) / (1.0 - here))
         blended: FloatArray = PERSISTENCE * same_noise + (1 - PERSISTENCE) * chance
         return np.clip(blended, TAIL, 1 - TAIL)
 

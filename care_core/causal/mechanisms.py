@@ -10,7 +10,7 @@ so it learns from few missions, says how sure it is away from the data, and stor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -43,7 +43,7 @@ def restored(values: FloatArray, transform: Transform) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """The covariance above on scaled inputs. `relevance` has shape (p,); amplitudes and `noise` are standard deviations."""
+    """The covariance above on scaled inputs. `relevance`: shape (p,); amplitudes, `noise`: standard deviations."""
 
     relevance: FloatArray
     additive: float
@@ -104,7 +104,7 @@ class Mechanism:
     @cached_property
     def _inverse(self) -> FloatArray:
         covariance = self.kernel(self.points, self.points)
-        return np.linalg.inv(covariance + np.eye(len(self.points)) * (self.kernel.noise**2 + JITTER))
+        return np.asarray(np.linalg.inv(covariance + np.eye(len(self.points)) * (self.kernel.noise**2 + JITTER)))
 
     @cached_property
     def _weights(self) -> FloatArray:
@@ -160,6 +160,6 @@ class Mechanism:
         return self.odds(x) if self.binary else restored(self.latent(x), self.transform)
 
 
-def columns(rows: Sequence[dict[str, float]], names: Sequence[str]) -> FloatArray:
+def columns(rows: Sequence[Mapping[str, float]], names: Sequence[str]) -> FloatArray:
     """Configurations as a matrix, shape (len(rows), len(names))."""
     return np.array([[row[name] for name in names] for row in rows], dtype=float).reshape(len(rows), len(names))

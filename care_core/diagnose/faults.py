@@ -36,7 +36,9 @@ def judge(
 def _judge_one(objective: Variable, run: Run, bound: Threshold | None, summary: Summary | None) -> ObjectiveResult:
     value = run.objectives.get(objective.name)
     if value is None:
-        return ObjectiveResult(objective, None, bound, "not_evaluated", "the profile does not say how to read it from a log")
+        return ObjectiveResult(
+            objective, None, bound, "not_evaluated", "the profile does not say how to read it from a log"
+        )
     if isinstance(value, Unavailable):
         reason = f"{value.reason} ({value.hint})" if value.hint else value.reason
         return ObjectiveResult(objective, None, bound, "not_evaluated", reason)

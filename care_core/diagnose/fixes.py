@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from itertools import product
 
 import numpy as np
@@ -91,7 +91,7 @@ def _widened(
 
 
 def _ranked(
-    world: World, options: Mapping[str, Variable], sets: list[Assignment]
+    world: World, options: Mapping[str, Variable], sets: Sequence[Assignment]
 ) -> list[tuple[Assignment, float]]:
     if not sets:
         return []

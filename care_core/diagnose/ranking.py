@@ -64,11 +64,11 @@ def suspects(world: World, objective: str, reference: Config) -> tuple[Suspect, 
     paths = best_paths(world.model, objective)
     effects = world.model.effects
     names = [
-        name
-        for name in deviating(world.config, reference)
-        if name in paths and effects[name, objective].identified
+        name for name in deviating(world.config, reference) if name in paths and effects[name, objective].identified
     ]
-    shares = _shapley(names, lambda sets: world.predict(objective, [_reset(world.config, reference, s) for s in sets]).p_ok)
+    shares = _shapley(
+        names, lambda sets: world.predict(objective, [_reset(world.config, reference, s) for s in sets]).p_ok
+    )
     found = [Suspect(n, share, paths[n], effects[n, objective]) for n, share in zip(names, shares, strict=True)]
     return tuple(sorted(found, key=lambda s: (-s.contribution, -s.effect.effect, s.option)))
 

@@ -1,9 +1,9 @@
-"""The whole line in one place: log -> run -> faults -> causes -> fix. The only module that strings the steps together."""
+"""The whole line in one place: log -> run -> faults -> causes -> fix. Nothing else strings the steps together."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import Config, World
 from care_core.diagnose.faults import judge, thresholds_in_force
@@ -19,6 +19,7 @@ from care_core.diagnose.fixes import (
 from care_core.diagnose.ranking import Suspect, describe_path, deviating, reference_config, suspects
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
 from care_core.extract.read import read_run
+from care_core.extract.settings import disagreements
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
 from care_core.run import Run, Setting, is_known
@@ -76,7 +77,8 @@ def triage(
     overrides = dict(thresholds or {})
     run = read_run(log, profile.schema, overrides=configs or {}, mission=mission, judge_anyway=tuple(overrides))
     report("judging the objectives", 0.6)
-    return diagnose(run, profile, choice, keep=keep, thresholds=overrides, top=top, progress=progress)
+    diagnosis = diagnose(run, profile, choice, keep=keep, thresholds=overrides, top=top, progress=progress)
+    return replace(diagnosis, notes=(*diagnosis.notes, *disagreements(profile.schema, run.config, configs or {})))
 
 
 def diagnose(
@@ -103,7 +105,9 @@ def diagnose(
     reference = {**reference_config(schema, model), **met}
     config = {**reference, **run.config}
     world = World(model, config, {**run.metrics, **run.objectives}, bounds)
-    case = _Case(profile, choice, run, world, reference, keep, frozenset(v.name for v in schema.options) - frozenset(run.config))
+    case = _Case(
+        profile, choice, run, world, reference, keep, frozenset(v.name for v in schema.options) - frozenset(run.config)
+    )
     found = {result.variable.name: suspects(world, result.variable.name, reference) for result in broken}
     faults = tuple(Fault(result, _causes(case, result, found[result.variable.name], top)) for result in broken)
     report("searching for a fix", 0.85)

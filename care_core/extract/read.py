@@ -9,8 +9,10 @@ from collections.abc import Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
+# Importing them registers their extractors and mission kinds.
+import care_core.extract.ardupilot
+import care_core.extract.navigation  # noqa: F401
 from care_core.errors import ProfileError, UsageError, nearest
-from care_core.extract import ardupilot, navigation  # registers the extractors and mission kinds
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
 from care_core.extract.settings import configuration, in_force
 from care_core.logs import log_digest
@@ -18,8 +20,6 @@ from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.run import Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable
-
-__all__ = ["ardupilot", "navigation", "read_run", "read_runs"]
 
 
 def read_run(

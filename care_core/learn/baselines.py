@@ -31,7 +31,7 @@ def largest_deviation(config: Config, reference: Config, schema: Schema, suspect
 
 @dataclass(frozen=True)
 class Predicate:
-    """"Option within [low, high]": what cooperative bug isolation counts."""
+    """ "Option within [low, high]": what cooperative bug isolation counts."""
 
     low: float
     high: float

@@ -51,9 +51,8 @@ def _graph(model: Model) -> str:
         text += f"\n\nOptions that nothing was found to depend on: {', '.join(model.training.screened_out)}."
     if model.training.direct_edges:
         rows = ((a, b, f"{p:.2g}") for a, b, p in model.training.direct_edges)
-        text += (
-            "\n\nEffects that the metrics do not carry in full, kept as direct edges:\n\n"
-            + _table(("option", "objective", "p"), rows)
+        text += "\n\nEffects that the metrics do not carry in full, kept as direct edges:\n\n" + _table(
+            ("option", "objective", "p"), rows
         )
     return text
 

@@ -16,9 +16,20 @@ from scipy.optimize import minimize
 from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism, Transform, transformed
 from care_core.errors import LearningError
 
-MAX_POINTS = 600
-"""Training rows a mechanism keeps; more are thinned at random (a kernel over n rows costs n^2 memory)."""
-ITERATIONS = 60
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard to fit: training rows a mechanism keeps (more are thinned at random: a kernel over n rows costs n^2
+    memory and n^3 time) and steps of the optimiser."""
+
+    points: int
+    iterations: int
+
+
+OUTCOME = Effort(points=600, iterations=60)
+"""For objectives: odds and fixes rest on them."""
+METRIC = Effort(points=300, iterations=30)
+"""For metrics and edges: they draw the path and size its edges."""
 RELEVANCE_SCALE = 0.1
 """Relevance below which an input counts as unused in the penalty."""
 NOISE, BINARY_NOISE = 0.02, 0.3
@@ -37,21 +48,21 @@ class Inputs:
 
 
 def fit_mechanism(
-    x: FloatArray, y: FloatArray, inputs: Inputs, *, binary: bool, rng: np.random.Generator, iterations: int = ITERATIONS
+    x: FloatArray, y: FloatArray, inputs: Inputs, *, binary: bool, rng: np.random.Generator, effort: Effort = OUTCOME
 ) -> Mechanism:
     """Fit one mechanism.
 
     Args:
         x: shape (n, p), inputs in their own units. y: shape (n,), 0 or 1 when `binary`. No NaN.
-        rng: only used to thin tables of more than `MAX_POINTS` rows.
+        rng: only used to thin tables of more than `effort.points` rows.
 
     Raises:
         LearningError: too few rows.
     """
     if len(y) < MIN_ROWS:
         raise LearningError(f"A mechanism needs {MIN_ROWS} runs, the table has {len(y)}.", hint="Record more missions.")
-    if len(y) > MAX_POINTS:
-        keep = np.sort(rng.choice(len(y), MAX_POINTS, replace=False))
+    if len(y) > effort.points:
+        keep = np.sort(rng.choice(len(y), effort.points, replace=False))
         x, y = x[keep], y[keep]
     transform: Transform = "identity" if binary else best_transform(y)
     coded = 2.0 * y - 1.0 if binary else transformed(y, transform)
@@ -61,7 +72,7 @@ def fit_mechanism(
     points = ((raw - centre) / spread).astype(np.float32).astype(float)
     mean, scale = float(coded.mean()), float(coded.std()) or 1.0
     targets = ((coded - mean) / scale).astype(np.float32).astype(float)
-    kernel = _fit_kernel(points, targets, iterations, BINARY_NOISE if binary else NOISE)
+    kernel = _fit_kernel(points, targets, effort.iterations, BINARY_NOISE if binary else NOISE)
     errors, spreads = _leave_one_out(kernel, points, targets)
     calibration = _logistic(mean + scale * (targets - errors), y) if binary else _residual_levels(errors / spreads)
     return Mechanism(
@@ -85,7 +96,7 @@ def _skewness(values: FloatArray) -> float:
 
 
 def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_noise: float) -> Kernel:
-    n, p = points.shape
+    p = points.shape[1]
     if p == 0 or np.ptp(targets) == 0:
         return Kernel(np.zeros(p), 0.0, 0.0, 1.0)
     squared = (points[:, None, :] - points[None, :, :]) ** 2
@@ -104,7 +115,9 @@ def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_
     return Kernel(theta[:p], float(theta[p]), float(theta[p + 1]), float(theta[p + 2]))
 
 
-def _negative_log_posterior(log_theta: FloatArray, squared: FloatArray, targets: FloatArray) -> tuple[float, FloatArray]:
+def _negative_log_posterior(
+    log_theta: FloatArray, squared: FloatArray, targets: FloatArray
+) -> tuple[float, FloatArray]:
     """Value and gradient with respect to the logarithms of (relevances, additive, joint, noise)."""
     n, p = len(targets), squared.shape[2]
     relevance, (additive, joint, noise) = np.exp(log_theta[:p]), np.exp(log_theta[p:])

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Mechanism
-from care_core.learn.fitting import MIN_ROWS, Inputs, fit_mechanism
+from care_core.learn.fitting import MIN_ROWS, Effort, Inputs, fit_mechanism
 from care_core.profile.model import OutcomeRecord, StageRecord
 from care_core.profile.schema import Schema
 from care_core.variables import Role, Variable
@@ -53,8 +53,7 @@ def met(objective: Variable, frame: pd.DataFrame) -> FloatArray:
     """1 where the objective keeps its threshold, 0 where not, NaN where it has no value; shape (n,)."""
     values = frame[objective.name].to_numpy(dtype=float)
     bound = objective.threshold
-    kept = np.array([np.nan if np.isnan(v) else float(bound.met(v)) if bound else 1.0 for v in values])
-    return kept
+    return np.array([np.nan if np.isnan(v) else float(bound.met(v)) if bound else 1.0 for v in values])
 
 
 def find_stages(objective: Variable, schema: Schema, frame: pd.DataFrame) -> tuple[Stage, ...]:
@@ -97,16 +96,16 @@ def _both_ways(stage: Stage) -> bool:
 
 
 def fit_outcomes(
-    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, iterations: int
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, effort: Effort
 ) -> tuple[dict[str, OutcomeRecord], dict[str, Mechanism]]:
     """Mechanisms of every objective that the graph gives a cause and the table gives values."""
     outcomes: dict[str, OutcomeRecord] = {}
     mechanisms: dict[str, Mechanism] = {}
     for objective in schema.objectives:
         if objective.kind == "functional":
-            fitted = _fit_functional(objective, frame, schema, graph, rng, iterations)
+            fitted = _fit_functional(objective, frame, schema, graph, rng, effort)
         else:
-            fitted = _fit_continuous(objective, frame, schema, graph, rng, iterations)
+            fitted = _fit_continuous(objective, frame, schema, graph, rng, effort)
         if fitted is not None:
             outcomes[objective.name], found = fitted
             mechanisms.update(found)
@@ -117,7 +116,12 @@ Fitted = tuple[OutcomeRecord, dict[str, Mechanism]]
 
 
 def _fit_functional(
-    objective: Variable, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, iterations: int
+    objective: Variable,
+    frame: pd.DataFrame,
+    schema: Schema,
+    graph: CausalGraph,
+    rng: np.random.Generator,
+    effort: Effort,
 ) -> Fitted | None:
     records, mechanisms = [], {}
     for stage in find_stages(objective, schema, frame):
@@ -128,30 +132,35 @@ def _fit_functional(
         x = frame.loc[stage.reached, list(names)].to_numpy(dtype=float)
         one = stage.passed if stage.passes == 1.0 else ~stage.passed
         y = one[stage.reached].astype(float)
-        mechanisms[key] = fit_mechanism(x, y, inputs_of(names, schema), binary=True, rng=rng, iterations=iterations)
+        mechanisms[key] = fit_mechanism(x, y, inputs_of(names, schema), binary=True, rng=rng, effort=effort)
         records.append(StageRecord(variable=stage.variable, passes=stage.passes, mechanism=key))
     return (OutcomeRecord(objective=objective.name, stages=tuple(records)), mechanisms) if records else None
 
 
 def _fit_continuous(
-    objective: Variable, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, iterations: int
+    objective: Variable,
+    frame: pd.DataFrame,
+    schema: Schema,
+    graph: CausalGraph,
+    rng: np.random.Generator,
+    effort: Effort,
 ) -> Fitted | None:
-    mechanism = fit_total(objective.name, frame, schema, graph, rng, iterations=iterations)
+    mechanism = fit_total(objective.name, frame, schema, graph, rng, effort=effort)
     if mechanism is None:
         return None
     return OutcomeRecord(objective=objective.name, mechanism=objective.name), {objective.name: mechanism}
 
 
 def fit_total(
-    name: str, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, iterations: int
+    name: str, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, effort: Effort
 ) -> Mechanism | None:
     """The variable as a function of the exogenous variables that cause it; None where it has no cause or no values."""
     names = causes_of(name, graph, schema)
-    return fit_on(names, name, frame, schema, rng, iterations=iterations) if names else None
+    return fit_on(names, name, frame, schema, rng, effort=effort) if names else None
 
 
 def fit_on(
-    names: Sequence[str], target: str, frame: pd.DataFrame, schema: Schema, rng: np.random.Generator, *, iterations: int
+    names: Sequence[str], target: str, frame: pd.DataFrame, schema: Schema, rng: np.random.Generator, *, effort: Effort
 ) -> Mechanism | None:
     """The target as a function of `names`, on the runs that hold them all; None where too few runs do."""
     known = frame[[*names, target]].dropna()
@@ -160,7 +169,7 @@ def fit_on(
     y = known[target].to_numpy(dtype=float)
     binary = set(np.unique(y)) <= {0.0, 1.0}
     x = known[list(names)].to_numpy(dtype=float)
-    return fit_mechanism(x, y, inputs_of(names, schema), binary=binary, rng=rng, iterations=iterations)
+    return fit_mechanism(x, y, inputs_of(names, schema), binary=binary, rng=rng, effort=effort)
 
 
 def groups_that_move_together(schema: Schema, frame: pd.DataFrame) -> tuple[tuple[str, ...], ...]:
@@ -169,7 +178,7 @@ def groups_that_move_together(schema: Schema, frame: pd.DataFrame) -> tuple[tupl
     if len(names) < 2:
         return ()
     # Ranks by pandas, so that Spearman's correlation needs no further library.
-    correlation: Mapping[str, Mapping[str, float]] = frame[names].rank().corr().to_dict()  # type: ignore[assignment]
+    correlation: Mapping[str, Mapping[str, float]] = frame[names].rank().corr().to_dict()
     groups: list[list[str]] = []
     for name in names:
         home = next((g for g in groups if all(abs(correlation[name][other]) > MOVES_TOGETHER for other in g)), None)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray
+from care_core.learn.fitting import OUTCOME
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
 from care_core.profile.model import Model, Training
 from care_core.profile.schema import Schema
@@ -19,14 +20,14 @@ BINS = 10
 
 
 def cross_validated_skill(
-    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, folds: int, iterations: int
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, folds: int
 ) -> dict[str, dict[str, float]]:
-    """Per objective, and for `all` of them, skill of the odds on held-out runs; the graph is kept, mechanisms refitted."""
+    """Per objective, and for `all` of them, skill of the odds on held-out runs. The graph is kept."""
     fold = rng.permutation(len(frame)) % folds
     odds: dict[str, FloatArray] = {}
     for k in range(folds):
         held_out = fold == k
-        predicted = _odds(frame[~held_out], frame[held_out], schema, graph, rng, iterations)
+        predicted = _odds(frame[~held_out], frame[held_out], schema, graph, rng)
         for name, values in predicted.items():
             odds.setdefault(name, np.full(len(frame), np.nan))[held_out] = values
     truth: dict[str, FloatArray] = {objective.name: met(objective, frame) for objective in schema.objectives}
@@ -40,9 +41,8 @@ def _odds(
     schema: Schema,
     graph: CausalGraph,
     rng: np.random.Generator,
-    iterations: int,
 ) -> Mapping[str, FloatArray]:
-    outcomes, mechanisms = fit_outcomes(train, schema, graph, rng, iterations=iterations)
+    outcomes, mechanisms = fit_outcomes(train, schema, graph, rng, effort=OUTCOME)
     training = Training(
         origin="", runs=len(train), seed=0, alpha=0.0, resamples=0,
         moves_together=groups_that_move_together(schema, train),

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from joblib import Parallel, delayed, parallel_config
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from care_core.causal.effects import Effect, acceptable_values, average_causal_effect
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Mechanism
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.learn.bootstrap import edge_support
+from care_core.learn.fitting import METRIC, OUTCOME
 from care_core.learn.identification import identify
 from care_core.learn.outcomes import fit_on, fit_outcomes, fit_total, groups_that_move_together
 from care_core.learn.skill import cross_validated_skill
@@ -28,7 +33,6 @@ BACKGROUND = 32
 """Training runs over which an effect is averaged."""
 EFFECT_RESAMPLES = 20
 """Bootstrap resamples behind the intervals of effects (mechanisms are refitted with their kernels kept)."""
-ITERATIONS = 60
 FOLDS = 5
 TOP_PATHS = 20
 QUANTILES = np.linspace(0, 1, 21)
@@ -51,7 +55,11 @@ def train(frame: pd.DataFrame, schema: Schema, settings: Settings, progress: Pro
     Raises:
         LearningError: too few runs, or no option has an effect that the table can show.
     """
-    report = progress or (lambda _step, _share: None)
+    with threadpool_limits(1):
+        return _train(frame, schema, settings, progress or (lambda _step, _share: None))
+
+
+def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Progress) -> Model:
     rng = np.random.default_rng(settings.seed)
     report("learning the graph", 0.0)
     structure = learn_structure(frame, schema, alpha=settings.alpha, rng=rng)
@@ -61,16 +69,13 @@ def train(frame: pd.DataFrame, schema: Schema, settings: Settings, progress: Pro
     )
     graph = structure.graph
     report("fitting mechanisms", 0.4)
-    outcomes, mechanisms = fit_outcomes(frame, schema, graph, rng, iterations=ITERATIONS)
-    for metric in schema.metrics:
-        fitted = fit_total(metric.name, frame, schema, graph, rng, iterations=ITERATIONS)
-        if fitted is not None:
-            mechanisms[metric.name] = fitted
+    outcomes, mechanisms = fit_outcomes(frame, schema, graph, rng, effort=OUTCOME)
+    mechanisms |= _metric_mechanisms(frame, schema, graph, settings)
     report("measuring effects", 0.6)
     resamples = _Resamples.draw(len(frame), rng)
-    edges = _edge_effects(frame, schema, graph, rng, resamples)
+    edges = _edge_effects(frame, schema, graph, settings, resamples)
     report("cross-validating", 0.8)
-    skill = cross_validated_skill(frame, schema, graph, rng, folds=FOLDS, iterations=ITERATIONS)
+    skill = cross_validated_skill(frame, schema, graph, rng, folds=FOLDS)
     return Model(
         schema_digest=schema.digest,
         graph=graph,
@@ -90,7 +95,7 @@ def train(frame: pd.DataFrame, schema: Schema, settings: Settings, progress: Pro
 class _Resamples:
     """Row numbers of each bootstrap resample, shape (EFFECT_RESAMPLES, n): the same for every mechanism."""
 
-    rows: FloatArray
+    rows: NDArray[np.int64]
 
     @classmethod
     def draw(cls, n: int, rng: np.random.Generator) -> _Resamples:
@@ -105,47 +110,79 @@ class _Measured:
     resampled: FloatArray
 
 
-def _measure(name: str, mechanism: Mechanism, frame: pd.DataFrame, schema: Schema, resamples: _Resamples) -> _Measured:
-    """Eq. 1 of input `name` on the mechanism's target, averaged over a background of training runs."""
-    position = mechanism.inputs.index(name)
-    raw = frame[list(mechanism.inputs)].dropna()
-    step = max(1, len(raw) // BACKGROUND)
-    background = raw.to_numpy(dtype=float)[::step][:BACKGROUND]
-    values = acceptable_values(schema.variables[name], frame[name])
-    grid = np.repeat(background, len(values), axis=0)
-    grid[:, position] = np.tile(values, len(background))
-
-    def response(m: Mechanism) -> FloatArray:
-        answer = m.odds(grid) if m.binary else m.latent(grid)
-        mean: FloatArray = answer.reshape(len(background), len(values)).mean(axis=0)
-        return mean
-
+def _measure(
+    names: Sequence[str], mechanism: Mechanism, frame: pd.DataFrame, schema: Schema, resamples: _Resamples
+) -> dict[str, _Measured]:
+    """Eq. 1 of each named input on the mechanism's target, averaged over a background of training runs."""
+    raw = frame[list(mechanism.inputs)].dropna().to_numpy(dtype=float)
+    background = raw[:: max(1, len(raw) // BACKGROUND)][:BACKGROUND]
+    levels = [acceptable_values(schema.variables[name], frame[name]) for name in names]
+    grids = []
+    for name, values in zip(names, levels, strict=True):
+        grid = np.repeat(background, len(values), axis=0)
+        grid[:, mechanism.inputs.index(name)] = np.tile(values, len(background))
+        grids.append(grid)
+    stacked, ends = np.vstack(grids), np.cumsum([len(grid) for grid in grids])[:-1]
     spread = 0.5 * mechanism.scale if mechanism.binary else mechanism.scale
-    drawn = [average_causal_effect(response(_refitted(mechanism, rows)), spread).magnitude for rows in resamples.rows]
-    return _Measured(average_causal_effect(response(mechanism), spread), np.array(drawn))
+
+    def effects(m: Mechanism) -> list[Effect]:
+        answers = np.split(m.odds(stacked) if m.binary else m.latent(stacked), ends)
+        responses = [a.reshape(len(background), -1).mean(axis=0) for a in answers]
+        return [average_causal_effect(response, spread) for response in responses]
+
+    drawn = [[e.magnitude for e in effects(_refitted(mechanism, rows))] for rows in resamples.rows]
+    by_name = zip(names, effects(mechanism), np.transpose(drawn), strict=True)
+    return {name: _Measured(effect, resampled) for name, effect, resampled in by_name}
 
 
-def _refitted(mechanism: Mechanism, rows: FloatArray) -> Mechanism:
+def _refitted(mechanism: Mechanism, rows: NDArray[np.int64]) -> Mechanism:
     """The mechanism on resampled training points, its kernel kept."""
     chosen = (rows % len(mechanism.targets))[: len(mechanism.targets)]
     return dataclasses.replace(mechanism, points=mechanism.points[chosen], targets=mechanism.targets[chosen])
 
 
+def _metric_mechanisms(
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: Settings
+) -> dict[str, Mechanism]:
+    """Every metric as a function of the options that cause it."""
+
+    def fit(i: int, name: str) -> Mechanism | None:
+        return fit_total(name, frame, schema, graph, np.random.default_rng([settings.seed, i]), effort=METRIC)
+
+    names = [metric.name for metric in schema.metrics]
+    fitted = _in_parallel(settings, (delayed(fit)(i, name) for i, name in enumerate(names)))
+    return {name: mechanism for name, mechanism in zip(names, fitted, strict=True) if mechanism is not None}
+
+
 def _edge_effects(
-    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, resamples: _Resamples
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: Settings, resamples: _Resamples
 ) -> dict[Edge, _Measured]:
     """Direct effect of every directed edge: the child's mechanism over all its parents, the others held."""
-    effects: dict[Edge, _Measured] = {}
-    for child in graph.topological_order():
+
+    def measure(i: int, child: str) -> dict[Edge, _Measured]:
         parents = sorted(graph.parents(child))
-        mechanism = fit_on(parents, child, frame, schema, rng, iterations=ITERATIONS) if parents else None
-        if mechanism is not None:
-            for parent in parents:
-                effects[parent, child] = _measure(parent, mechanism, frame, schema, resamples)
-    return effects
+        rng = np.random.default_rng([settings.seed, i])
+        mechanism = fit_on(parents, child, frame, schema, rng, effort=METRIC) if parents else None
+        if mechanism is None:
+            return {}
+        effects = _measure(parents, mechanism, frame, schema, resamples)
+        return {(parent, child): effect for parent, effect in effects.items()}
+
+    order = graph.topological_order()
+    measured = _in_parallel(settings, (delayed(measure)(i, child) for i, child in enumerate(order)))
+    return {edge: effect for part in measured for edge, effect in part.items()}
 
 
-def _edge_record(edge: Edge, kind: str, support: Mapping[Edge, float], effects: Mapping[Edge, _Measured]) -> EdgeRecord:
+def _in_parallel(settings: Settings, calls: Iterable[Any]) -> list[Any]:
+    """Run on `n_jobs` processes, one thread each: the matrices are too small to share between threads."""
+    with parallel_config("loky", n_jobs=settings.n_jobs, inner_max_num_threads=1):
+        answers: list[Any] = Parallel()(calls)
+    return answers
+
+
+def _edge_record(
+    edge: Edge, kind: str, support: Mapping[Edge | frozenset[str], float], effects: Mapping[Edge, _Measured]
+) -> EdgeRecord:
     measured = effects.get(edge) if kind == "directed" else None
     return EdgeRecord(
         source=edge[0],
@@ -169,14 +206,15 @@ def _total_effects(
     records: dict[Edge, EffectRecord] = {}
     for objective, outcome in outcomes.items():
         keys = [stage.mechanism for stage in outcome.stages] or [outcome.mechanism]
-        for option in (v.name for v in schema.options if v.name in graph.ancestors(objective)):
+        options = [v.name for v in schema.options if v.name in graph.ancestors(objective)]
+        by_stage = [
+            _measure([name for name in options if name in m.inputs], m, frame, schema, resamples)
+            for m in (mechanisms[key] for key in keys)
+        ]
+        for option in options:
             answer = identify(graph, option, objective)
             # A functional objective is as sensitive to an option as its most sensitive stage.
-            measured = [
-                _measure(option, mechanisms[key], frame, schema, resamples)
-                for key in keys
-                if option in mechanisms[key].inputs
-            ]
+            measured = [effects[option] for effects in by_stage if option in effects]
             if not measured:
                 continue
             best = max(measured, key=lambda m: m.effect.magnitude)
@@ -243,5 +281,3 @@ def _training(frame: pd.DataFrame, schema: Schema, structure: Structure, setting
         moves_together=groups_that_move_together(schema, frame),
         notes=tuple(structure.notes),
     )
-
-

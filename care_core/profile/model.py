@@ -21,8 +21,6 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Kernel, Mechanism, Transform
 from care_core.errors import ProfileError
 
-MODEL_VERSION = 1
-
 
 class _Record(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -163,7 +161,7 @@ class Model:
 def write_model(model: Model, folder: Path) -> None:
     """Write `model.json` and `mechanisms.npz` into a profile folder, each atomically."""
     record = _ModelFile(
-        model_version=MODEL_VERSION,
+        model_version=1,
         schema_digest=model.schema_digest,
         nodes=model.graph.nodes,
         edges=(*model.edges.values(), *model.bidirected),
@@ -174,7 +172,9 @@ def write_model(model: Model, folder: Path) -> None:
         skill={name: dict(values) for name, values in model.skill.items()},
         training=model.training,
         mechanisms={
-            key: _MechanismRecord(target=key.removeprefix("stage:"), inputs=m.inputs, transform=m.transform, binary=m.binary)
+            key: _MechanismRecord(
+                target=key.removeprefix("stage:"), inputs=m.inputs, transform=m.transform, binary=m.binary
+            )
             for key, m in model.mechanisms.items()
         },
     )

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from care_core.configs import apply_commands, format_for, unified_diff
-from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean
+from care_core.variables import Variable
 
 WIDTH = 80
 EVIDENCE_SHOWN = 5
@@ -71,7 +72,7 @@ def _measured(objective: ObjectiveResult) -> str:
 
 def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     run, profile = diagnosis.run, diagnosis.profile
-    facts = "".join(f", {fact}" for fact in run.log.facts.values())
+    facts = "".join(f", {name} {fact}" for name, fact in run.log.facts.items())
     mission = f"mission {run.mission.index} of {run.mission.count}"
     duration = f"{run.mission.end_s - run.mission.start_s:.0f} s"
     yield from _wrapped(f"{Path(run.log.path).name}, {mission}, {duration}{facts}", "Log      ")
@@ -125,7 +126,7 @@ def _cause(cause: Cause) -> Iterator[str]:
 
 def _node(node: PathNode) -> str:
     here = "unknown" if node.value is None else f"{node.value:.4g} {node.unit}".rstrip()
-    expected = "" if node.expected is None else f", {node.expected:.4g} expected"
+    expected = "" if node.expected is None else f", {node.expected:.3g} expected"
     return f"{node.name}: {here} in this run{expected}"
 
 
@@ -141,13 +142,23 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
         yield from _wrapped(f"{option.name}  {values}{restart}", "  ", "    ")
         for note in change.notes:
             yield from _wrapped(note, "    ! ")
-    for name, predicted in fix.predicted.items():
-        interval = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g})"
-        yield from _wrapped(f"predicted {name}: {interval}  {STATUS_WORDS[predicted.status()]}", "  ", "    ")
+    for objective in (result.variable for result in diagnosis.objectives):
+        if objective.name in fix.predicted:
+            yield from _wrapped(_prediction(objective, fix.predicted[objective.name]), "  ", "    ")
     yield ""
     yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix).splitlines())
     yield ""
     yield from (f"  {line}" for line in apply_commands(fix.changes, format_for(diagnosis.run.log.format)))
+
+
+def _prediction(objective: Variable, predicted: Prediction) -> str:
+    """A yes-or-no objective has odds, not a value."""
+    odds = "" if predicted.p_ok is None else f"{predicted.p_ok:.0%} odds"
+    word = STATUS_WORDS[predicted.status()]
+    if objective.kind == "functional":
+        return f"predicted {objective.name}: {odds}  {word}"
+    interval = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
+    return f"predicted {objective.name}: {interval}, {odds}  {word}"
 
 
 def _evidence(diagnosis: Diagnosis) -> Iterator[str]:

@@ -1,0 +1,105 @@
+"""Retrains the bundled profiles from their data.
+
+    python -m benchmarks.train_profiles [--shared DIR] [--only NAME]... [--tables DIR]
+
+The two platforms with recorded missions are ingested from the logs themselves; the others from published tables.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tarfile
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from care_core.extract.table import find_logs, ingest, write_table
+from care_core.learn.card import model_card
+from care_core.learn.table import read_table
+from care_core.learn.train import Settings, train
+from care_core.profile.model import write_model
+from care_core.profile.schema import Schema, read_schema
+from care_core.resources import bundled
+
+RESAMPLES = 50
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a profile's runs come from: an archive of logs, or a table. `origin` goes into the model card."""
+
+    path: str
+    origin: str
+
+
+SOURCES = {
+    "arducopter": Source(
+        "data/arducopter/train.tar.xz",
+        "411 missions of the ArduCopter V4.5.4 firmware in its software-in-the-loop simulator, recorded by this "
+        "project under random configurations and winds; DataFlash logs, read by `care ingest`.",
+    ),
+    "move_base": Source(
+        "data/move_base/train.tar.xz",
+        "301 missions of the ROS noetic navigation stack (move_base, navfn, dwa_local_planner, costmap_2d) driving a "
+        "simulated Husky-sized robot, recorded by this project under random configurations; ROS 1 bags, read by "
+        "`care ingest`.",
+    ),
+    "husky": Source(
+        "data/care/cure_husky_1000.csv",
+        "1000 Husky missions in Gazebo from the CURE artifact (Hossen et al. 2025, MIT license).",
+    ),
+    "turtlebot3": Source(
+        "data/care/cure_turtlebot3_1000.csv",
+        "1000 TurtleBot 3 missions in Gazebo from the CURE artifact (Hossen et al. 2025, MIT license).",
+    ),
+    "husky-care": Source(
+        "data/care/care_husky_sim_399.csv",
+        "399 Husky missions in Gazebo from the CaRE artifact (Hossen et al. 2023, MIT license).",
+    ),
+}
+
+
+def runs_table(source: Source, schema: Schema, shared: Path, folder: Path) -> Path:
+    """The table of runs: the published one, or one made from the logs."""
+    path = shared / source.path
+    if path.suffix == ".csv":
+        return path
+    with tarfile.open(path) as archive:
+        archive.extractall(folder / schema.name, filter="data")
+    rows, failures = ingest(find_logs([folder / schema.name]), schema, progress=lambda _step, _share: None)
+    for failure in failures:
+        print(f"  {failure.path.name}: {failure.reason}")
+    table = folder / f"{schema.name}.parquet"
+    write_table(table, rows, schema)
+    return table
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--shared", type=Path, default=os.environ.get("CARE_SHARED"), help="folder that holds data/")
+    parser.add_argument("--only", action="append", choices=sorted(SOURCES), help="default: all five")
+    parser.add_argument("--tables", type=Path, help="keep the tables made from logs in this folder")
+    parser.add_argument("--resamples", type=int, default=RESAMPLES, help="bootstrap resamples of the graph")
+    args = parser.parse_args()
+    if args.shared is None:
+        parser.error("give --shared DIR or set CARE_SHARED")
+    for name in args.only or SOURCES:
+        folder = bundled("profiles", name)
+        schema = read_schema(folder / "profile.yaml")
+        started = time.monotonic()
+        print(name, flush=True)
+        with tempfile.TemporaryDirectory() as scratch:
+            place = args.tables or Path(scratch)
+            place.mkdir(parents=True, exist_ok=True)
+            frame = read_table(runs_table(SOURCES[name], schema, args.shared, place), schema)
+        settings = Settings(resamples=args.resamples, origin=SOURCES[name].origin)
+        model = train(frame, schema, settings, lambda step, _share: print(f"  {step}", flush=True))
+        write_model(model, folder)
+        (folder / "MODEL_CARD.md").write_text(model_card(schema, model), encoding="utf-8")
+        print(f"{name}: {len(frame)} runs, {time.monotonic() - started:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,209 @@
+"""Faults planted in a robot whose mechanisms are known: the engine must name them, and its fix must work for real."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from care_core.diagnose.records import Diagnosis, ProfileChoice
+from care_core.diagnose.triage import diagnose
+from care_core.learn.train import train
+from care_core.profile.model import write_model
+from care_core.profile.store import Profile
+from care_core.run import Run, Unavailable
+from tests.planted import CALM, DEFAULTS, OPTIONS, SCHEMA, SETTINGS, fly, fly_many, planted_run, with_variable
+
+CHOICE = ProfileChoice("planted", "1", "Simulated robot", "named by the test")
+BY_NAME = {option.name: option for option in OPTIONS}
+CASES: tuple[tuple[str, float, str], ...] = (
+    ("min_sats", 13, "success"),
+    ("radius", 0.95, "success"),
+    ("radius", 0.1, "success"),
+    ("speed", 1.5, "time"),
+    ("planner", 2, "time"),
+    ("reserve", 58, "time"),
+    ("accel", 3.9, "energy"),
+)
+
+
+def diagnosed(run: Run, profile: Profile, keep: tuple[str, ...] = (), **thresholds: float) -> Diagnosis:
+    return diagnose(run, profile, CHOICE, keep=keep, thresholds=thresholds)
+
+
+def repaired(diagnosis: Diagnosis, noise: Mapping[str, float] = CALM) -> bool:
+    """Whether the run meets every threshold when the fix is flown in the true robot."""
+    assert diagnosis.fix is not None
+    config = {**diagnosis.run.config, **{c.option.name: c.suggested for c in diagnosis.fix.changes}}
+    outcome = fly(config, noise)
+    return all(o.threshold is not None and o.threshold.met(outcome[o.name]) for o in SCHEMA.objectives)
+
+
+@pytest.mark.parametrize(("option", "value", "objective"), CASES)
+def test_the_planted_option_is_named_and_its_fix_works(
+    planted: Profile, option: str, value: float, objective: str
+) -> None:
+    run = planted_run(**{option: value})
+    diagnosis = diagnosed(run, planted)
+    assert diagnosis.abstained is None
+    assert [f.objective.variable.name for f in diagnosis.faults] == [objective]
+    cause = diagnosis.faults[0].causes[0]
+    assert (cause.rank, cause.option.name, cause.current) == (1, option, value)
+    names = [node.name for node in cause.path]
+    assert (names[0], names[-1]) == (option, objective)
+    assert all(edge in planted.model.edges for edge in zip(names, names[1:], strict=False))
+    assert diagnosis.fix is not None
+    assert option in {c.option.name for c in diagnosis.fix.changes}
+    for change in diagnosis.fix.changes:
+        assert change.current == run.config[change.option.name]
+        assert change.option.accepts(change.suggested)
+        assert planted.model.supports(change.option.name, change.suggested)
+    assert diagnosis.fix.p_fixed > 0.5
+    assert repaired(diagnosis)
+
+
+def test_two_planted_causes_are_both_named_and_both_moved(planted: Profile) -> None:
+    diagnosis = diagnosed(planted_run(speed=1.4, planner=2), planted)
+    (fault,) = diagnosis.faults
+    assert {cause.option.name for cause in fault.causes[:2]} == {"speed", "planner"}
+    assert diagnosis.fix is not None
+    assert {c.option.name for c in diagnosis.fix.changes} == {"speed", "planner"}
+    assert repaired(diagnosis)
+
+
+def test_faults_of_two_objectives_are_fixed_together(planted: Profile) -> None:
+    diagnosis = diagnosed(planted_run(reserve=58, accel=3.9), planted)
+    assert {f.objective.variable.name: f.causes[0].option.name for f in diagnosis.faults} == {
+        "time": "reserve",
+        "energy": "accel",
+    }
+    assert repaired(diagnosis)
+
+
+def test_an_innocent_option_off_its_default_is_not_blamed_first(planted: Profile) -> None:
+    diagnosis = diagnosed(planted_run(reserve=58, inert=0.02, filter=0, accel=1.2), planted)
+    (fault,) = diagnosis.faults
+    assert fault.causes[0].option.name == "reserve"
+    assert "inert" not in {c.option.name for c in fault.causes}
+    assert "filter" not in {c.option.name for c in fault.causes}
+
+
+def test_a_refused_mission_is_explained_by_its_stage(planted: Profile) -> None:
+    run = planted_run(min_sats=13, radius=0.8)
+    assert isinstance(run.metrics["tracking_error"], Unavailable)
+    diagnosis = diagnosed(run, planted)
+    status = {o.variable.name: o.status for o in diagnosis.objectives}
+    assert status == {"success": "fault", "time": "not_evaluated", "energy": "not_evaluated"}
+    (fault,) = diagnosis.faults
+    assert [node.name for node in fault.causes[0].path] == ["min_sats", "armed", "success"]
+    assert repaired(diagnosis)
+
+
+def test_a_mission_that_armed_is_not_blamed_on_arming(planted: Profile) -> None:
+    (fault,) = diagnosed(planted_run(CALM | {"sats": 2.5}, min_sats=12, radius=0.95), planted).faults
+    assert fault.causes[0].option.name == "radius"
+
+
+def test_a_pinned_option_stays_and_is_still_named(planted: Profile) -> None:
+    diagnosis = diagnosed(planted_run(speed=1.4, planner=2), planted, keep=("speed",))
+    changed = {c.option.name for f in (diagnosis.fix, *diagnosis.alternatives) if f for c in f.changes}
+    assert "speed" not in changed
+    pinned = next(c for c in diagnosis.faults[0].causes if c.option.name == "speed")
+    assert pinned.suggested is None
+    assert pinned.p_fixed is None
+    assert any("--keep" in note for note in pinned.notes)
+
+
+def test_with_the_only_cause_pinned_the_engine_abstains(planted: Profile) -> None:
+    diagnosis = diagnosed(planted_run(min_sats=14), planted, keep=("min_sats",))
+    assert diagnosis.fix is None
+    assert diagnosis.abstained
+    assert diagnosis.faults[0].causes[0].option.name == "min_sats"
+
+
+def test_a_safety_option_never_goes_past_its_default(planted: Profile) -> None:
+    """Less reserve would be faster still, in truth and in the model."""
+    diagnosis = diagnosed(planted_run(speed=1.9, reserve=40), planted, time=140)
+    fixes = [fix for fix in (diagnosis.fix, *diagnosis.alternatives) if fix is not None]
+    moves = [c.suggested for fix in fixes for c in fix.changes if c.option.name == "reserve"]
+    moves += [c.suggested for f in diagnosis.faults for c in f.causes if c.option.name == "reserve" and c.suggested]
+    assert moves
+    assert min(moves) >= DEFAULTS["reserve"]
+
+
+def test_an_option_at_its_default_is_never_moved(planted: Profile) -> None:
+    diagnosis = diagnosed(planted_run(reserve=58), planted)
+    assert diagnosis.fix is not None
+    assert {c.option.name for c in diagnosis.fix.changes} == {"reserve"}
+
+
+def test_a_fault_that_no_option_explains_abstains(planted: Profile) -> None:
+    """Every option at its default, and a wind that the profile does not know."""
+    diagnosis = diagnosed(planted_run(CALM | {"error": 9.0}), planted)
+    assert [o.status for o in diagnosis.objectives][0] == "fault"
+    assert diagnosis.abstained is not None
+    assert "no option" in diagnosis.abstained
+    assert diagnosis.fix is None
+    assert diagnosis.alternatives == ()
+
+
+def test_a_threshold_out_of_reach_abstains(planted: Profile) -> None:
+    diagnosis = diagnosed(planted_run(reserve=58), planted, time=50)
+    assert diagnosis.fix is None
+    assert diagnosis.abstained is not None
+
+
+@pytest.mark.parametrize("bound", [0.0, -1.0])
+def test_a_threshold_that_no_value_can_meet_abstains_without_a_warning(planted: Profile, bound: float) -> None:
+    diagnosis = diagnosed(planted_run(reserve=58), planted, time=bound)
+    assert diagnosis.fix is None
+    assert diagnosis.abstained is not None
+
+
+def test_nothing_faulty_nothing_to_fix(planted: Profile) -> None:
+    diagnosis = diagnosed(planted_run(), planted)
+    assert {o.status for o in diagnosis.objectives} == {"ok"}
+    assert diagnosis.faults == ()
+    assert diagnosis.fix is None
+    assert diagnosis.abstained is None
+
+
+def test_an_operators_threshold_makes_the_fault(planted: Profile) -> None:
+    run = planted_run(accel=2.2)
+    assert diagnosed(run, planted).faults == ()
+    (fault,) = diagnosed(run, planted, energy=17.5).faults
+    assert fault.causes[0].option.name == "accel"
+
+
+def test_a_value_outside_the_support_lowers_the_confidence(planted: Profile) -> None:
+    cause = diagnosed(planted_run(reserve=90), planted).faults[0].causes[0]
+    assert cause.option.name == "reserve"
+    assert not cause.in_support
+    assert cause.confidence == "low"
+    assert any("support" in note for note in cause.notes)
+
+
+def test_options_that_no_source_holds_are_assumed_and_said_so(planted: Profile) -> None:
+    run = planted_run(reserve=58)
+    run = replace(run, config={name: value for name, value in run.config.items() if name != "accel"})
+    diagnosis = diagnosed(run, planted)
+    assert any("accel" in note for note in diagnosis.notes)
+    assert diagnosis.faults[0].causes[0].option.name == "reserve"
+
+
+def test_the_same_seed_gives_the_same_files_and_the_same_diagnosis(planted: Profile, tmp_path: Path) -> None:
+    write_model(train(fly_many(250), SCHEMA, SETTINGS), tmp_path)
+    for name in ("model.json", "mechanisms.npz"):
+        assert (tmp_path / name).read_bytes() == (planted.path / name).read_bytes()
+    run = planted_run(speed=1.4, planner=2)
+    first, again = diagnosed(run, planted), diagnosed(run, Profile(tmp_path, SCHEMA))
+    assert first == again
+
+
+def test_a_safety_option_with_codes_never_takes_a_looser_one(planted: Profile) -> None:
+    schema = with_variable(SCHEMA, replace(BY_NAME["planner"], safety=True))
+    diagnosis = diagnosed(planted_run(planner=2), Profile(planted.path, schema))
+    assert diagnosis.fix is not None
+    assert [c.suggested for c in diagnosis.fix.changes] == [DEFAULTS["planner"]]
