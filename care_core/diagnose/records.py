@@ -77,6 +77,8 @@ class Cause:
     confidence: Confidence
     in_support: bool
     notes: tuple[str, ...] = ()
+    is_lead: bool = False
+    """Not shown to cost this run anything, only not ruled out: what to look at next when no cause convinces."""
 
 
 @dataclass(frozen=True, slots=True)

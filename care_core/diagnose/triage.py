@@ -16,7 +16,14 @@ from care_core.diagnose.fixes import (
     smallest_good,
     to_fix,
 )
-from care_core.diagnose.ranking import Suspect, describe_path, deviating, reference_config, suspects
+from care_core.diagnose.ranking import (
+    Suspect,
+    describe_path,
+    deviating,
+    not_ruled_out,
+    reference_config,
+    suspects,
+)
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
 from care_core.extract.read import read_run
 from care_core.extract.settings import disagreements
@@ -28,7 +35,10 @@ MIN_CONTRIBUTION = 0.02
 """Odds an option must cost before it is called a cause of this run."""
 MIN_ODDS = 0.2
 """Best odds below which the engine abstains: a confident wrong answer costs a field day."""
-HIGH_ODDS, LOW_ODDS = 0.7, 0.4
+CONVINCING, LEADS = 0.5, 3
+"""A cause that costs less than this leaves room for others: up to so many options are then named in all."""
+SURE, UNSURE = 0.4, 0.1
+"""Contributions from which a cause may be called high confidence, and below which it is low."""
 HIGH_SUPPORT, LOW_SUPPORT = 0.8, 0.5
 
 Progress = Callable[[str, float], None]
@@ -127,8 +137,13 @@ def diagnose(
 
 
 def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
-    weighty = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION][:top]
-    return tuple(_cause(case, result, suspect, rank) for rank, suspect in enumerate(weighty, start=1))
+    """Options that cost this run; where none of them convinces, a few leads that are not ruled out behind them."""
+    named = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION]
+    if not named or named[0].contribution < CONVINCING:
+        weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION]
+        weak += not_ruled_out(case.world, result.variable.name, case.reference, case.profile.schema, found)
+        named += weak[: max(0, LEADS - len(named))]
+    return tuple(_cause(case, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
 
 
 def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) -> Cause:
@@ -144,7 +159,7 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         option=option,
         path=path,
         path_ace=suspect.path.ace,
-        total_effect=suspect.effect.effect,
+        total_effect=suspect.total_effect,
         contribution=suspect.contribution,
         current=world.config[name],
         suggested=None if best is None else best[0],
@@ -153,25 +168,30 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         confidence=_confidence(case, suspect.contribution, in_support, weakest),
         in_support=in_support,
         notes=_cause_notes(case, suspect, in_support, weakest),
+        is_lead=suspect.contribution < MIN_CONTRIBUTION,
     )
 
 
 def _confidence(case: _Case, contribution: float, in_support: bool, weakest_edge: float) -> Confidence:
     """High where the option explains most of the fault along edges that nearly every resample holds."""
     doubtful = not in_support or bool(case.choice.warnings) or not case.run.mission.fits
-    if doubtful or weakest_edge < LOW_SUPPORT or contribution < LOW_ODDS / 4:
+    if doubtful or weakest_edge < LOW_SUPPORT or contribution < UNSURE:
         return "low"
-    if weakest_edge >= HIGH_SUPPORT and contribution >= LOW_ODDS:
+    if weakest_edge >= HIGH_SUPPORT and contribution >= SURE:
         return "high"
     return "medium"
 
 
 def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, weakest_edge: float) -> tuple[str, ...]:
     notes = []
+    if suspect.effect is None:
+        notes.append(f"no effect on {suspect.path.nodes[-1]} was seen in training: not ruled out")
+    elif suspect.contribution < MIN_CONTRIBUTION:
+        notes.append("costs this run little: not ruled out")
     if not in_support:
         summary = case.world.model.summaries[suspect.option]
         notes.append(f"outside the training support ({summary.low:g} to {summary.high:g})")
-    if weakest_edge < LOW_SUPPORT:
+    if suspect.effect is not None and weakest_edge < LOW_SUPPORT:
         notes.append(f"an edge of this path was found in only {weakest_edge:.0%} of resamples")
     if suspect.option in case.keep:
         notes.append("pinned by --keep: not changed")
@@ -205,7 +225,7 @@ def _has_effect(case: _Case, option: str) -> bool:
 
 
 def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str | None:
-    if not any(fault.causes for fault in faults):
+    if not any(not cause.is_lead for fault in faults for cause in fault.causes):
         return (
             "no option that this profile models explains the fault: look at what the run met "
             "(wind, battery, positioning, obstacles) or at parameters outside the profile"

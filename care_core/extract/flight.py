@@ -30,6 +30,8 @@ NEEDS: Wanted = {
 }
 """What `analyse` and the search for missions read."""
 
+FILL_S = 0.05
+"""Spacing to which a thinned track is filled in before distances are taken from it."""
 AIRBORNE_M = 2.0
 """Height above home from which a vehicle counts as airborne."""
 
@@ -76,6 +78,16 @@ class Track:
         """Whether the vehicle was higher than `AIRBORNE_M` at times `t`."""
         return np.asarray(np.interp(t, self.t, self.height) > AIRBORNE_M)
 
+    def filled_in(self) -> Track:
+        """The same track at `FILL_S` or closer: cubic Hermite between positions, velocities by central differences."""
+        span = float(self.t[-1] - self.t[0]) if len(self.t) > 2 else 0.0
+        if span <= 0 or span / len(self.t) <= FILL_S or (np.diff(self.t) <= 0).any():
+            return self
+        t = np.union1d(self.t, np.arange(self.t[0], self.t[-1], FILL_S))
+        return Track(
+            t, _hermite(t, self.t, self.north), _hermite(t, self.t, self.east), np.interp(t, self.t, self.height)
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Flight:
@@ -92,11 +104,15 @@ class Flight:
     phases: Mapping[tuple[str, int], Phase]
 
     def path_errors(self) -> Floats:
-        """Horizontal distance in metres from the legs (home, waypoints, home) at every airborne position."""
+        """Horizontal distance in metres from the legs (home, waypoints, home) while airborne, along the track as flown.
+
+        A vehicle turns between two positions of a thinned log, so the corners are filled in first.
+        """
         if self.track is None:
             return np.empty(0)
-        up = self.track.height > AIRBORNE_M
-        points = np.column_stack((self.track.north[up], self.track.east[up]))
+        track = self.track.filled_in()
+        up = track.height > AIRBORNE_M
+        points = np.column_stack((track.north[up], track.east[up]))
         corners = np.vstack((np.zeros(2), self.route, np.zeros(2)))
         return distance_to_legs(points, corners)
 
@@ -117,6 +133,17 @@ def analyse(mission: Mission) -> Flight:
         track=track,
         phases=_phases(mission, track, numbers, started, reached),
     )
+
+
+def _hermite(t: Floats, known_t: Floats, known: Floats) -> Floats:
+    """Cubic Hermite interpolation with central-difference slopes."""
+    slope = np.gradient(known, known_t)
+    i = np.clip(np.searchsorted(known_t, t, side="right") - 1, 0, len(known_t) - 2)
+    width = known_t[i + 1] - known_t[i]
+    u = (t - known_t[i]) / width
+    from_left = (1 + 2 * u) * (1 - u) ** 2 * known[i] + u * (1 - u) ** 2 * width * slope[i]
+    from_right = u**2 * (3 - 2 * u) * known[i + 1] + u**2 * (u - 1) * width * slope[i + 1]
+    return np.asarray(from_left + from_right)
 
 
 def distance_to_legs(points: Floats, corners: Floats) -> Floats:

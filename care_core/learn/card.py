@@ -72,10 +72,10 @@ def _skill(model: Model) -> str:
         (
             OBJECTIVE_WORDS.get(name, name),
             f"{s['runs']:.0f}",
-            f"{s.get('base_rate', 0):.2f}",
-            f"{s.get('log_loss', 0):.3f}",
-            f"{s.get('auc', 0):.3f}",
-            f"{s.get('calibration_error', 0):.3f}",
+            f"{s['base_rate']:.2f}",
+            f"{s['log_loss']:.3f}",
+            f"{s['auc']:.3f}" if "auc" in s else "none: one outcome only",
+            f"{s['calibration_error']:.3f}",
         )
         for name, s in model.skill.items()
         if s["runs"]

@@ -169,12 +169,16 @@ def _p_of(frame: pd.DataFrame, name: str, given: Sequence[str], target: str) -> 
 
 
 def _features(values: FloatArray) -> FloatArray:
-    """Scores and their magnitude, and where the value is missing; shape (n, 1 to 3), constant columns left out."""
+    """Scores and their magnitude, and where the value is missing, as orthonormal columns; shape (n, 0 to 3).
+
+    A yes-or-no variable has one column, since its magnitude repeats its score: a test counts what is really added.
+    """
     scores = normal_scores(values)
     missing = np.isnan(scores)
     scores = np.nan_to_num(scores)
     columns = np.column_stack([scores, np.abs(scores), missing.astype(float)])
-    return np.asarray(columns[:, np.ptp(columns, axis=0) > 0])
+    columns = columns[:, np.ptp(columns, axis=0) > 0]
+    return _span(columns - columns.mean(axis=0)) if columns.size else columns
 
 
 def _span(columns: FloatArray) -> FloatArray:

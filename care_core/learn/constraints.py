@@ -49,7 +49,7 @@ class Constraints:
         """Why the directed edge cannot be, None where it can."""
         pair = (self.roles[cause], self.roles[effect])
         placed, after = self.order.get(cause), self.order.get(effect)
-        if pair in ((M, M), (Y, Y)) and placed is not None and after is not None and placed > after:
+        if pair in ((M, M), (M, Y), (Y, Y)) and placed is not None and after is not None and placed > after:
             return _TOO_LATE
         return ALWAYS.get(pair) or (None if self.observational else RANDOMISED.get(pair))
 

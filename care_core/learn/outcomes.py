@@ -91,8 +91,8 @@ def _stage(metric: Variable, frame: pd.DataFrame, success: FloatArray, reached: 
 
 
 def _both_ways(stage: Stage) -> bool:
-    passed = int((stage.reached & stage.passed).sum())
-    return passed >= MIN_CLASS and int(stage.reached.sum()) - passed >= MIN_CLASS
+    reached, passed = int(stage.reached.sum()), int((stage.reached & stage.passed).sum())
+    return reached >= MIN_ROWS and MIN_CLASS <= passed <= reached - MIN_CLASS
 
 
 def fit_outcomes(

@@ -60,26 +60,28 @@ def _odds(
 
 
 def score(odds: FloatArray, truth: FloatArray) -> dict[str, float]:
-    """Log loss, Brier score, AUC, calibration error and the base rate, over the runs that have a truth."""
+    """Log loss, Brier score, AUC, calibration error and the base rate, over the runs that have a truth.
+
+    Where all met or all missed the threshold there is no AUC.
+    """
     known = np.isfinite(odds) & np.isfinite(truth)
     p, y = odds[known], truth[known]
     if not len(y):
         return {"runs": 0.0}
     clipped = np.clip(p, 1e-3, 1 - 1e-3)
+    auc = {} if y.min() == y.max() else {"auc": _auc(p, y == 1.0)}
     return {
         "runs": float(len(y)),
         "base_rate": float(y.mean()),
         "log_loss": float(-(y * np.log(clipped) + (1 - y) * np.log(1 - clipped)).mean()),
         "brier": float(((p - y) ** 2).mean()),
-        "auc": _auc(p, y == 1.0),
+        **auc,
         "calibration_error": calibration_error(p, y),
     }
 
 
 def _auc(p: FloatArray, positive: NDArray[np.bool_]) -> float:
     """Share of (met, missed) pairs in which the met run had the higher odds; ties count half."""
-    if positive.all() or not positive.any():
-        return float("nan")
     ranks = pd.Series(p).rank().to_numpy()
     n = int(positive.sum())
     return float((ranks[positive].sum() - n * (n + 1) / 2) / (n * (len(p) - n)))

@@ -8,6 +8,8 @@ from __future__ import annotations
 import io
 import json
 import os
+import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +25,7 @@ from care_core.errors import ProfileError
 
 
 class _Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class EdgeRecord(_Record):
@@ -228,6 +230,7 @@ def read_model(folder: Path) -> Model:
             frozenset((e.source, e.target) for e in record.edges if e.kind == "directed"),
             frozenset((e.source, e.target) for e in record.edges if e.kind == "bidirected"),
         )
+        _check_references(record)
     except OSError as err:
         raise ProfileError(
             f"The profile has no readable model: {err.strerror or err}.",
@@ -240,11 +243,19 @@ def read_model(folder: Path) -> Model:
         raise ProfileError(
             f"'{key}': {first['msg']}.", hint="Train the profile again with 'care train'.", where=str(path)
         ) from err
-    except (ValueError, KeyError) as err:
+    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as err:
         raise ProfileError(
             f"The model is damaged: {err}.", hint="Train the profile again with 'care train'.", where=str(folder)
         ) from err
     return _to_model(record, graph, mechanisms)
+
+
+def _check_references(record: _ModelFile) -> None:
+    for outcome in record.outcomes:
+        keys = [stage.mechanism for stage in outcome.stages] or [outcome.mechanism]
+        for key in keys:
+            if key not in record.mechanisms:
+                raise ValueError(f"'{outcome.objective}' is predicted by '{key}', which is not there")
 
 
 def _to_model(record: _ModelFile, graph: CausalGraph, mechanisms: Mapping[str, Mechanism]) -> Model:
@@ -275,9 +286,11 @@ def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArr
 
     logs, centre, spread, relevance = floats("scaling")
     additive, joint, noise, mean, scale = floats("numbers")
-    points = floats("points")
-    if points.ndim != 2 or points.shape[1] != len(record.inputs) or len(logs) != len(record.inputs):
+    points, targets, calibration = floats("points"), floats("targets"), floats("calibration")
+    if points.shape != (len(targets), len(record.inputs)) or len(logs) != len(record.inputs):
         raise ValueError(f"{key} does not match its inputs")
+    if calibration.ndim != 1 or (len(calibration) != 2 if record.binary else not len(calibration)):
+        raise ValueError(f"{key} has no calibration of its kind")
     return Mechanism(
         inputs=record.inputs,
         log_inputs=logs.astype(bool),
@@ -285,10 +298,10 @@ def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArr
         spread=spread,
         kernel=Kernel(relevance, float(additive), float(joint), float(noise)),
         points=points,
-        targets=floats("targets"),
+        targets=targets,
         mean=float(mean),
         scale=float(scale),
         transform=record.transform,
         binary=record.binary,
-        calibration=floats("calibration"),
+        calibration=calibration,
     )

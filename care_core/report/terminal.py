@@ -99,10 +99,14 @@ def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _causes(fault: Fault) -> Iterator[str]:
     yield f"Causes of {fault.objective.variable.name}"
-    if not fault.causes:
+    shown = [cause for cause in fault.causes if not cause.is_lead]
+    if not shown:
         yield "  none was found among the options of the profile"
-    for cause in fault.causes:
+    for cause in shown:
         yield from _cause(cause)
+    leads = [f"{c.option.name} ({c.option.show(c.current)})" for c in fault.causes if c.is_lead]
+    if leads:
+        yield from _wrapped(f"not ruled out: {', '.join(leads)}", "  ", "    ")
 
 
 def _cause(cause: Cause) -> Iterator[str]:

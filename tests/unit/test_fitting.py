@@ -1,0 +1,130 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import check_grad
+
+from care_core.causal.mechanisms import FloatArray, Mechanism
+from care_core.errors import LearningError
+from care_core.learn.fitting import Effort, Inputs, _negative_log_posterior, best_transform, fit_mechanism
+
+RNG = np.random.default_rng
+FULL = Effort(points=300, iterations=60)
+
+
+def inputs(count: int, *logs: int) -> Inputs:
+    return Inputs(tuple("abcdefgh"[:count]), np.isin(np.arange(count), logs))
+
+
+def fitted(x: FloatArray, y: FloatArray, *, binary: bool = False, effort: Effort = FULL) -> Mechanism:
+    return fit_mechanism(x, y, inputs(x.shape[1]), binary=binary, rng=RNG(0), effort=effort)
+
+
+def test_recovers_a_known_function_from_clean_data() -> None:
+    def truth(x: FloatArray) -> FloatArray:
+        return np.asarray(50 + np.sin(3 * x[:, 0]) + x[:, 1] ** 2 + x[:, 0] * x[:, 2])
+
+    x, new = RNG(0).uniform(-1, 1, (200, 4)), RNG(1).uniform(-0.9, 0.9, (200, 4))
+    m = fitted(x, truth(x))
+    error = m.expected(new) - truth(new)
+    assert np.sqrt((error**2).mean()) < 0.05 * truth(new).std()
+    assert m.kernel.relevance[3] < 0.2 * m.kernel.relevance[:3].min()
+
+
+def test_knows_less_away_from_the_data() -> None:
+    x = RNG(0).uniform(0, 1, (80, 2))
+    m = fitted(x, x[:, 0] + 0.1 * RNG(1).normal(size=80))
+    inside, outside = m.ignorance(np.array([[0.5, 0.5]])), m.ignorance(np.array([[4.0, 0.5]]))
+    assert inside[0] < 0.1 < outside[0]
+
+
+def test_intervals_hold_what_they_promise() -> None:
+    """Of new runs, eight of ten fall inside the 80 % interval."""
+    x, new = RNG(0).uniform(0, 1, (200, 3)), RNG(1).uniform(0, 1, (1000, 3))
+    noise = 0.2 * RNG(2).standard_t(5, size=1200)
+    m = fitted(x, 2 * x[:, 0] + noise[:200])
+    y = 2 * new[:, 0] + noise[200:]
+    spread = np.sqrt(m.latent_spread(new) ** 2 + m.noise_spread**2)
+    below = m.share_below(((y if m.transform == "identity" else np.log(y)) - m.latent(new)) / spread)
+    assert 0.74 < ((below > 0.1) & (below < 0.9)).mean() < 0.86
+
+
+def test_odds_are_better_than_the_base_rate_and_calibrated() -> None:
+    x = RNG(0).uniform(-1, 1, (1300, 4))
+    chance = 1 / (1 + np.exp(-(4 * x[:, 0] + 3 * x[:, 1] ** 2 - 1)))
+    y = (RNG(1).random(1300) < chance).astype(float)
+    m = fitted(x[:300], y[:300], binary=True)
+    odds, seen = m.odds(x[300:]), y[300:]
+    base = y[:300].mean()
+
+    def log_loss(p: FloatArray) -> float:
+        return float(-(seen * np.log(p) + (1 - seen) * np.log(1 - p)).mean())
+
+    assert log_loss(odds) < 0.8 * log_loss(np.full(1000, base))
+    assert log_loss(odds) < 1.1 * log_loss(chance[300:])
+    for low, high in ((0, 0.25), (0.25, 0.5), (0.5, 0.75), (0.75, 1)):
+        here = (odds >= low) & (odds < high)
+        assert abs(odds[here].mean() - seen[here].mean()) < 0.12
+
+
+def test_odds_of_what_no_input_explains_are_the_base_rate() -> None:
+    x, y = RNG(0).uniform(size=(200, 3)), (RNG(1).random(200) < 0.2).astype(float)
+    odds = fitted(x, y, binary=True).odds(RNG(2).uniform(size=(50, 3)))
+    np.testing.assert_allclose(odds, y.mean(), atol=0.1)
+
+
+def test_all_of_one_class_is_no_error() -> None:
+    odds = fitted(RNG(0).uniform(size=(30, 2)), np.ones(30), binary=True).odds(np.array([[0.5, 0.5]]))
+    assert odds[0] > 0.9
+
+
+def test_a_constant_input_and_a_constant_target_are_no_error() -> None:
+    x = np.column_stack([RNG(0).uniform(size=40), np.ones(40)])
+    assert fitted(x, np.full(40, 7.0)).expected(x[:2]).tolist() == pytest.approx([7.0, 7.0])
+    assert np.isfinite(fitted(x, x[:, 0]).expected(x)).all()
+
+
+def test_too_few_runs_are_refused() -> None:
+    with pytest.raises(LearningError, match="needs 20 runs"):
+        fitted(np.zeros((19, 1)), np.zeros(19))
+
+
+def test_a_long_table_is_thinned_and_the_seed_decides_how() -> None:
+    x = RNG(0).uniform(size=(90, 2))
+    effort = Effort(points=40, iterations=20)
+    first, again = fitted(x, x[:, 0], effort=effort), fitted(x, x[:, 0], effort=effort)
+    assert first.points.shape == (40, 2)
+    np.testing.assert_array_equal(first.points, again.points)
+
+
+def test_log_inputs_act_as_ratios() -> None:
+    x = np.exp(RNG(0).uniform(0, 7, (120, 1)))
+    m = fit_mechanism(x, 10 + np.log(x[:, 0]), inputs(1, 0), binary=False, rng=RNG(0), effort=FULL)
+    np.testing.assert_allclose(m.expected(np.array([[np.e], [np.e**5]])), [11, 15], atol=0.2)
+
+
+@pytest.mark.parametrize(
+    ("y", "expected"),
+    [
+        (RNG(0).normal(size=500), "identity"),
+        (np.exp(RNG(0).normal(size=500)), "log"),
+        (np.r_[0.0, np.expm1(np.abs(3 + RNG(0).normal(size=500)))], "log1p"),
+        (np.ones(5), "identity"),
+    ],
+)
+def test_the_transform_takes_the_skew_away(y: FloatArray, expected: str) -> None:
+    assert best_transform(y) == expected
+
+
+def test_the_gradient_is_the_gradient() -> None:
+    points, targets = RNG(0).normal(size=(25, 3)), RNG(1).normal(size=25)
+    squared = (points[:, None, :] - points[None, :, :]) ** 2
+
+    def value(theta: FloatArray) -> float:
+        return _negative_log_posterior(theta, squared, targets)[0]
+
+    def gradient(theta: FloatArray) -> FloatArray:
+        return _negative_log_posterior(theta, squared, targets)[1]
+
+    for seed in range(3):
+        assert check_grad(value, gradient, RNG(seed).uniform(-1, 0.5, 6)) < 1e-3

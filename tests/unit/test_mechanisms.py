@@ -1,0 +1,113 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from care_core.causal import mechanisms
+from care_core.causal.mechanisms import (
+    LEAST,
+    TAIL,
+    FloatArray,
+    Kernel,
+    Mechanism,
+    Transform,
+    columns,
+    restored,
+    transformed,
+)
+
+SETTINGS = st.floats(-1e3, 1e3)
+
+
+def mechanism(*, binary: bool = False, transform: Transform = "identity", n: int = 30) -> Mechanism:
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(n, 2))
+    return Mechanism(
+        inputs=("a", "b"),
+        log_inputs=np.array([False, True]),
+        centre=np.array([1.0, 0.5]),
+        spread=np.array([2.0, 1.5]),
+        kernel=Kernel(np.array([0.5, 1.0]), 0.7, 0.4, 0.2),
+        points=points,
+        targets=np.sin(points[:, 0]),
+        mean=0.3,
+        scale=2.0,
+        transform=transform,
+        binary=binary,
+        calibration=np.array([2.0, -0.1]) if binary else np.sort(rng.normal(size=101)),
+    )
+
+
+@pytest.mark.parametrize("transform", ["identity", "log", "log1p"])
+def test_restored_undoes_transformed(transform: Transform) -> None:
+    values = np.array([0.1, 1.0, 250.0])
+    np.testing.assert_allclose(restored(transformed(values, transform), transform), values)
+    assert (values > LEAST[transform]).all()
+
+
+@given(arrays(float, (4, 2), elements=SETTINGS))
+def test_odds_stay_off_zero_and_one(x: FloatArray) -> None:
+    odds = mechanism(binary=True).odds(x)
+    assert ((odds >= TAIL) & (odds <= 1 - TAIL)).all()
+
+
+@given(st.lists(SETTINGS, min_size=1, max_size=20))
+def test_the_distribution_of_errors_never_falls(z: list[float]) -> None:
+    share = mechanism().share_below(np.sort(np.array(z)))
+    assert (np.diff(share) >= 0).all()
+    assert ((share >= TAIL) & (share <= 1 - TAIL)).all()
+
+
+@given(arrays(float, (5, 2), elements=SETTINGS), st.permutations(range(5)))
+def test_predictions_do_not_depend_on_the_order_of_rows(x: FloatArray, order: list[int]) -> None:
+    m = mechanism()
+    np.testing.assert_allclose(m.latent(x)[order], m.latent(x[order]), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(m.latent_spread(x)[order], m.latent_spread(x[order]), rtol=1e-9, atol=1e-12)
+
+
+@given(arrays(float, (6, 2), elements=st.floats(-5, 5)))
+def test_a_covariance_is_symmetric_and_never_negative(x: FloatArray) -> None:
+    kernel = mechanism().kernel
+    covariance = kernel(x, x)
+    np.testing.assert_allclose(covariance, covariance.T)
+    np.testing.assert_allclose(np.diag(covariance), kernel.variance)
+    assert np.linalg.eigvalsh(covariance).min() > -1e-9
+
+
+def test_spread_is_the_root_of_the_covariances_diagonal() -> None:
+    m, x = mechanism(), np.array([[0.0, 1.0], [3.0, 9.0], [1.0, 2.0]])
+    np.testing.assert_allclose(m.latent_spread(x) ** 2, np.diag(m.latent_covariance(x)))
+
+
+def test_far_away_the_model_falls_back_to_the_mean_and_knows_nothing() -> None:
+    m = mechanism()
+    near, far = np.array([[1.0, np.exp(0.5)]]), np.array([[1e4, 1e12]])
+    assert m.ignorance(near)[0] < 0.2
+    assert m.ignorance(far)[0] == pytest.approx(1.0)
+    assert m.latent(far)[0] == pytest.approx(m.mean)
+
+
+def test_blocks_bound_memory_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    m, x = mechanism(), np.random.default_rng(1).uniform(1, 2, size=(50, 2))
+    whole = m.latent(x)
+    monkeypatch.setattr(mechanisms, "BLOCK", 100)
+    np.testing.assert_allclose(m.latent(x), whole)
+
+
+def test_a_value_that_has_no_logarithm_is_not_an_error() -> None:
+    assert np.isfinite(mechanism().latent(np.array([[1.0, 0.0], [1.0, -3.0]]))).all()
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_expected_is_in_the_targets_own_unit(binary: bool) -> None:
+    m, x = mechanism(binary=binary, transform="identity" if binary else "log"), np.array([[0.0, 1.0]])
+    np.testing.assert_allclose(m.expected(x), m.odds(x) if binary else np.exp(m.latent(x)))
+
+
+def test_columns_follow_the_names() -> None:
+    rows = [{"a": 1.0, "b": 2.0, "c": 3.0}, {"c": 6.0, "b": 5.0, "a": 4.0}]
+    assert columns(rows, ["c", "a"]).tolist() == [[3.0, 1.0], [6.0, 4.0]]
+    assert columns([], ["c", "a"]).shape == (0, 2)
