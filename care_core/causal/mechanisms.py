@@ -59,7 +59,7 @@ class Kernel:
 
     def _block(self, a: FloatArray, b: FloatArray) -> FloatArray:
         exponent = -0.5 * ((a[:, None, :] - b[None, :, :]) * self.relevance) ** 2
-        covariance: FloatArray = self.additive**2 * np.exp(exponent).mean(axis=-1)
+        covariance: FloatArray = self.additive**2 * np.exp(exponent).sum(axis=-1) / max(1, len(self.relevance))
         covariance += self.joint**2 * np.exp(exponent.sum(axis=-1))
         return covariance
 
@@ -80,6 +80,7 @@ class Mechanism:
         inputs: names, shape (p,), in the order of the columns that `predict` expects.
         points: shape (n, p), scaled training inputs.
         targets: shape (n,), scaled training targets.
+        weights: shape (n,), (K + noise)^-1 targets: the posterior mean is a kernel times these.
         calibration: binary: (slope, offset) of the logistic of the regression. Continuous: sorted standardised
             leave-one-out residuals, the distribution of this mechanism's own errors.
     """
@@ -91,6 +92,7 @@ class Mechanism:
     kernel: Kernel
     points: FloatArray
     targets: FloatArray
+    weights: FloatArray
     mean: float
     scale: float
     transform: Transform
@@ -108,14 +110,9 @@ class Mechanism:
         covariance = self.kernel(self.points, self.points)
         return np.asarray(np.linalg.inv(covariance + np.eye(len(self.points)) * (self.kernel.noise**2 + JITTER)))
 
-    @cached_property
-    def _weights(self) -> FloatArray:
-        weights: FloatArray = self._inverse @ self.targets
-        return weights
-
     def latent(self, x: FloatArray) -> FloatArray:
         """Posterior mean on the transformed scale. x: (m, p) -> (m,)."""
-        mean: FloatArray = self.mean + self.scale * (self.kernel(self.scaled(x), self.points) @ self._weights)
+        mean: FloatArray = self.mean + self.scale * (self.kernel(self.scaled(x), self.points) @ self.weights)
         return mean
 
     def latent_covariance(self, x: FloatArray) -> FloatArray:
@@ -160,6 +157,12 @@ class Mechanism:
     def expected(self, x: FloatArray) -> FloatArray:
         """Expected value in the target's own unit; the odds of 1 for binary targets."""
         return self.odds(x) if self.binary else restored(self.latent(x), self.transform)
+
+
+def solve(kernel: Kernel, points: FloatArray, targets: FloatArray) -> FloatArray:
+    """Weights of the posterior mean, shape (n,), for scaled points (n, p) and targets (n,)."""
+    covariance = kernel(points, points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
+    return np.asarray(np.linalg.solve(covariance, targets))
 
 
 def columns(rows: Sequence[Mapping[str, float]], names: Sequence[str]) -> FloatArray:

@@ -45,4 +45,6 @@ def _judge_one(objective: Variable, run: Run, bound: Threshold | None, summary: 
     if bound is None:
         return ObjectiveResult(objective, value, None, "not_evaluated", "no threshold: give one with --threshold")
     status: Status = "ok" if bound.met(value) else "fault"
-    return ObjectiveResult(objective, value, bound, status, percentile=summary.percentile(value) if summary else None)
+    # A yes-or-no result has no place among others.
+    percentile = summary.percentile(value) if summary and objective.kind == "non-functional" else None
+    return ObjectiveResult(objective, value, bound, status, percentile=percentile)

@@ -9,6 +9,7 @@ from care_core.causal.counterfactual import Config, World
 from care_core.diagnose.faults import judge, thresholds_in_force
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
+    Assignment,
     best_alone,
     change_notes,
     prediction,
@@ -214,9 +215,15 @@ def _fixes(case: _Case, options: set[str]) -> list[Fix]:
     without = [name for name in free if name not in found[chosen][0]]
     detour = search(case.world, variables, without, case.reference)
     others += [detour[smallest_good(detour)]] if detour else []
-    ranked = [found[chosen], *sorted(others, key=lambda pair: -pair[1])]
-    useful = [pair for i, pair in enumerate(ranked) if i == 0 or pair[1] >= MIN_ODDS]
-    return [to_fix(case.world, variables, assignment, odds) for assignment, odds in useful[: 1 + MAX_ALTERNATIVES]]
+    useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
+    ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
+    return [to_fix(case.world, variables, assignment, odds) for assignment, odds in ranked]
+
+
+def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]) -> bool:
+    """Whether an operator might prefer it: likely enough, and not the same changes with one more for nothing."""
+    adds_for_nothing = chosen[0].keys() <= other[0].keys() and other[1] < chosen[1] + MIN_CONTRIBUTION
+    return other[1] >= MIN_ODDS and not adds_for_nothing
 
 
 def _has_effect(case: _Case, option: str) -> bool:

@@ -26,6 +26,7 @@ _REFUSAL = re.compile(r"(?:Pre)?Arm: (.*)")
 _REFUSAL_REPEAT_S = 35.0
 _WAYPOINT_TOLERANCE_M = 5.0
 _MIN_ROWS = 5
+_AUTO = 3  # ArduCopter's flight mode number
 _PHASE_ARGS = {
     "phase": "only this part of the flight: takeoff, leg, return, return_climb, return_cruise, descent, touchdown",
     "index": "number of the leg, from 1",
@@ -201,6 +202,16 @@ def _in_flight(mission: Mission, kind: str, about: str = "") -> Value:
     return _has_event(mission, kind, about) if _is_armed(mission) else _NOT_FLOWN
 
 
+def _flew_automatically(mission: Mission) -> bool:
+    """Whether Auto mode was in force at any time of the mission; a log without MODE is given the benefit."""
+    modes = mission.tables.get("MODE")
+    if modes is None or not len(modes):
+        return True
+    until = np.append(modes.t[1:], np.inf)
+    in_force = (modes.t <= mission.end_s) & (until > mission.start_s)
+    return bool((modes["ModeNum"][in_force] == _AUTO).any())
+
+
 @extractor("mission_success", needs=NEEDS, unit="")
 def mission_success(mission: Mission, args: Args) -> Value:
     """1 when every waypoint was reached, the vehicle landed near home (`tolerance_m` of the mission) and disarmed by
@@ -214,6 +225,10 @@ def mission_success(mission: Mission, args: Args) -> Value:
     flight = mission.shared(analyse)
     if not flight.waypoints:
         return Unavailable("the log names no waypoints", "record CMD")
+    if "MSG" not in mission.tables:
+        return Unavailable("the log does not say which waypoints were reached", "record MSG")
+    if not _flew_automatically(mission):
+        return Unavailable("the mission was never started (no Auto mode in flight)", "judge a flight of the mission")
     if flight.reached < len(flight.waypoints):
         return 0.0
     off_m = landing_error(mission, {})

@@ -136,19 +136,27 @@ def _p_of_each(frame: pd.DataFrame, names: Sequence[str], target: str) -> FloatA
     blocks = [_features(known[name].to_numpy(dtype=float)) for name in names]
     held = _held(blocks, y)
     x = np.column_stack([np.ones((len(y), 1)), *(blocks[i] for i in held)])
-    inverse = np.linalg.pinv(x.T @ x, hermitian=True)
+    inverse = np.linalg.pinv(x.T @ x, rcond=1e-10, hermitian=True)
     b = inverse @ (x.T @ y)
     left = y - x @ b
-    freedom = len(y) - x.shape[1]
+    # Metrics of missions that never flew are missing together: columns repeat each other, and only what is a
+    # block's own is tested. `repeated` projects on the combinations of columns that cancel.
+    repeated = np.eye(x.shape[1]) - inverse @ (x.T @ x)
+    rank = x.shape[1] - round(float(np.trace(repeated)))
+    freedom = len(y) - rank
     noise = max(float((left**2).sum()) / freedom, 1e-12)
     start = 1
     for i in held:
         part = slice(start, start + blocks[i].shape[1])
         start = part.stop
-        explained = float(b[part] @ np.linalg.pinv(inverse[part, part], hermitian=True) @ b[part])
-        p[i] = f_distribution.sf(explained / blocks[i].shape[1] / noise, blocks[i].shape[1], freedom)
+        share, directions = np.linalg.eigh(repeated[part, part])
+        own = directions[:, share < 1e-6]
+        if own.size:
+            effect = own.T @ b[part]
+            explained = float(effect @ np.linalg.solve(own.T @ inverse[part, part] @ own, effect))
+            p[i] = f_distribution.sf(explained / own.shape[1] / noise, own.shape[1], freedom)
     for i in set(range(len(names))) - set(held):
-        p[i] = _f_test(left, blocks[i] - x @ (inverse @ (x.T @ blocks[i])), x.shape[1])
+        p[i] = _f_test(left, blocks[i] - x @ (inverse @ (x.T @ blocks[i])), rank)
     return p
 
 

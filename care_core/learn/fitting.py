@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve
 from scipy.optimize import minimize
 
-from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism, Transform, transformed
+from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism, Transform, solve, transformed
 from care_core.errors import LearningError
 
 
@@ -76,7 +76,19 @@ def fit_mechanism(
     errors, spreads = _leave_one_out(kernel, points, targets)
     calibration = _logistic(mean + scale * (targets - errors), y) if binary else _residual_levels(errors / spreads)
     return Mechanism(
-        inputs.names, inputs.log, centre, spread, kernel, points, targets, mean, scale, transform, binary, calibration
+        inputs=inputs.names,
+        log_inputs=inputs.log,
+        centre=centre,
+        spread=spread,
+        kernel=kernel,
+        points=points,
+        targets=targets,
+        weights=solve(kernel, points, targets),
+        mean=mean,
+        scale=scale,
+        transform=transform,
+        binary=binary,
+        calibration=calibration,
     )
 
 

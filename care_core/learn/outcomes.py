@@ -125,16 +125,20 @@ def _fit_functional(
 ) -> Fitted | None:
     records, mechanisms = [], {}
     for stage in find_stages(objective, schema, frame):
+        # A stage that no option moves stays in, with its base rate: else its failures would be laid to a later one.
         names = causes_of(stage.variable, graph, schema)
-        if not names:
-            continue
         key = f"stage:{stage.variable}"
-        x = frame.loc[stage.reached, list(names)].to_numpy(dtype=float)
+        known = stage.reached & frame[list(names)].notna().all(axis=1).to_numpy()
+        if int(known.sum()) < MIN_ROWS:
+            continue
+        x = frame.loc[known, list(names)].to_numpy(dtype=float)
         one = stage.passed if stage.passes == 1.0 else ~stage.passed
-        y = one[stage.reached].astype(float)
+        y = one[known].astype(float)
         mechanisms[key] = fit_mechanism(x, y, inputs_of(names, schema), binary=True, rng=rng, effort=effort)
         records.append(StageRecord(variable=stage.variable, passes=stage.passes, mechanism=key))
-    return (OutcomeRecord(objective=objective.name, stages=tuple(records)), mechanisms) if records else None
+    if not any(mechanism.inputs for mechanism in mechanisms.values()):
+        return None
+    return OutcomeRecord(objective=objective.name, stages=tuple(records)), mechanisms
 
 
 def _fit_continuous(

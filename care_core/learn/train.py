@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from care_core.causal.effects import Effect, acceptable_values, average_causal_effect
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import FloatArray, Mechanism
+from care_core.causal.mechanisms import FloatArray, Mechanism, solve
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.learn.bootstrap import edge_support
 from care_core.learn.fitting import METRIC, OUTCOME
@@ -114,6 +114,8 @@ def _measure(
     names: Sequence[str], mechanism: Mechanism, frame: pd.DataFrame, schema: Schema, resamples: _Resamples
 ) -> dict[str, _Measured]:
     """Eq. 1 of each named input on the mechanism's target, averaged over a background of training runs."""
+    if not names:
+        return {}
     raw = frame[list(mechanism.inputs)].dropna().to_numpy(dtype=float)
     background = raw[:: max(1, len(raw) // BACKGROUND)][:BACKGROUND]
     levels = [acceptable_values(schema.variables[name], frame[name]) for name in names]
@@ -138,7 +140,10 @@ def _measure(
 def _refitted(mechanism: Mechanism, rows: NDArray[np.int64]) -> Mechanism:
     """The mechanism on resampled training points, its kernel kept."""
     chosen = (rows % len(mechanism.targets))[: len(mechanism.targets)]
-    return dataclasses.replace(mechanism, points=mechanism.points[chosen], targets=mechanism.targets[chosen])
+    points, targets = mechanism.points[chosen], mechanism.targets[chosen]
+    return dataclasses.replace(
+        mechanism, points=points, targets=targets, weights=solve(mechanism.kernel, points, targets)
+    )
 
 
 def _metric_mechanisms(

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
@@ -69,7 +69,7 @@ class Summary(_Record):
     count: int
     mean: float
     spread: float
-    quantiles: tuple[float, ...]
+    quantiles: tuple[float, ...] = Field(min_length=2)
 
     @property
     def low(self) -> float:
@@ -210,6 +210,7 @@ def _arrays(mechanisms: Mapping[str, Mechanism]) -> dict[str, np.ndarray[Any, An
         arrays[f"{key}/numbers"] = np.array([k.additive, k.joint, k.noise, m.mean, m.scale])
         arrays[f"{key}/points"] = m.points.astype(np.float32)
         arrays[f"{key}/targets"] = m.targets.astype(np.float32)
+        arrays[f"{key}/weights"] = m.weights
         arrays[f"{key}/calibration"] = m.calibration.astype(np.float32)
     return arrays
 
@@ -287,7 +288,12 @@ def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArr
     logs, centre, spread, relevance = floats("scaling")
     additive, joint, noise, mean, scale = floats("numbers")
     points, targets, calibration = floats("points"), floats("targets"), floats("calibration")
-    if points.shape != (len(targets), len(record.inputs)) or len(logs) != len(record.inputs):
+    weights = floats("weights")
+    if (
+        points.shape != (len(targets), len(record.inputs))
+        or weights.shape != targets.shape
+        or len(logs) != len(record.inputs)
+    ):
         raise ValueError(f"{key} does not match its inputs")
     if calibration.ndim != 1 or (len(calibration) != 2 if record.binary else not len(calibration)):
         raise ValueError(f"{key} has no calibration of its kind")
@@ -299,6 +305,7 @@ def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArr
         kernel=Kernel(relevance, float(additive), float(joint), float(noise)),
         points=points,
         targets=targets,
+        weights=weights,
         mean=float(mean),
         scale=float(scale),
         transform=record.transform,

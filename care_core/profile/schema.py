@@ -136,7 +136,7 @@ def read_schema(path: Path) -> Schema:
         ProfileError: no such file, not YAML, or a key or value that does not belong, with the nearest known key.
     """
     try:
-        data = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
+        data = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
     except OSError as err:
         raise ProfileError(f"Cannot read the profile: {err.strerror}.", where=str(path)) from err
     except (YAMLError, UnicodeDecodeError) as err:

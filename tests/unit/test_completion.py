@@ -23,10 +23,10 @@ def empty(schema: Schema, *edges: tuple[str, str]) -> CausalGraph:
     return CausalGraph(tuple(schema.variables), frozenset(edges))
 
 
-def table(n: int, seed: int, **columns: FloatArray) -> pd.DataFrame:
+def table(count: int, seed: int, **columns: FloatArray) -> pd.DataFrame:
     """Three options drawn evenly from -1 to 1, and the columns."""
     rng = np.random.default_rng(seed)
-    return pd.DataFrame({**{name: rng.uniform(-1, 1, n) for name in "abc"}, **columns})
+    return pd.DataFrame({**{name: rng.uniform(-1, 1, count) for name in "abc"}, **columns})
 
 
 def exact_p(frame: pd.DataFrame, name: str, held: list[str], target: str) -> float:
@@ -165,11 +165,15 @@ def test_constants_and_targets_without_values_give_one() -> None:
     assert _p_of_each(frame.assign(y=frame.a), ["a", "constant"], "y")[1] == 1.0
 
 
-def test_a_missing_value_is_a_value_of_its_own() -> None:
-    """Missions that never flew differ in the objective: that they never flew is what explains it."""
+def test_columns_that_repeat_each_other_are_counted_once() -> None:
+    """An option that alone decides whether a mission flies adds nothing to a metric that only flights have."""
     rng = np.random.default_rng(0)
     flew = rng.random(200) < 0.6
-    frame = table(200, 0, m=np.where(flew, rng.normal(size=200), np.nan), y=flew + 0.1 * rng.normal(size=200))
-    given_m, alone = _p_of(frame.assign(late=flew.astype(float)), "late", ["m"], "y"), _p_of(frame, "a", [], "y")
-    assert given_m > 0.01
-    assert alone > 0.001
+    flight = {name: np.where(flew, rng.normal(size=200), np.nan) for name in ("m", "second")}
+    frame = table(200, 0, permit=flew.astype(float), y=flew + 0.3 * rng.normal(size=200), **flight)
+    assert _p_of(frame, "permit", ["a"], "y") < 1e-9
+    assert _p_of(frame, "permit", ["a", "m"], "y") == 1.0
+    assert _p_of(frame, "second", ["m"], "y") > 0.01
+    names = ["m", "second", "a"]
+    exact = [exact_p(frame, name, [n for n in names if n != name], "y") for name in names]
+    np.testing.assert_allclose(_p_of_each(frame, names, "y"), exact, rtol=1e-6)

@@ -44,6 +44,11 @@ def test_the_later_never_causes_the_earlier(pair: str) -> None:
     assert "order" in (rules.reason(late, early) or "")
 
 
+def test_a_number_made_of_others_is_not_caused_by_what_comes_after_it() -> None:
+    assert Constraints(ROLES, order={"m": 2, "y": 1}).forbids("m", "y")
+    assert not Constraints(ROLES, order={"m": 1, "y": 2}).forbids("m", "y")
+
+
 @pytest.mark.parametrize("order", [{"m": 1, "n": 1}, {"m": 1}, {"n": 1}, {"m": None, "n": 1}, {}])
 def test_what_has_no_place_or_the_same_may_cause_either_way(order: dict[str, int | None]) -> None:
     rules = Constraints(ROLES, order=order)

@@ -13,10 +13,9 @@ from care_core.causal.graph import CausalGraph
 from care_core.errors import LearningError
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import FisherZ, Mark, Pag, discover
-from care_core.learn.residual import residual_direct_edges, residual_metric_edges
 from care_core.learn.structure import learn_structure
 from care_core.variables import Role
-from tests.simulated import schema_of, simulate
+from tests.simulated import simulate
 
 METRICS = tuple("abcdef")
 FREE = Constraints(dict.fromkeys(METRICS, Role.METRIC))
@@ -175,32 +174,6 @@ def test_recovers_a_simulated_robot() -> None:
         wrong += len(learned.directed - truth.directed)
     assert found / (found + missed) > 0.8
     assert found / (found + wrong) > 0.8
-
-
-def test_an_effect_that_metrics_do_not_carry_gets_a_direct_edge() -> None:
-    rng = np.random.default_rng(0)
-    a, b = rng.uniform(size=(2, 500))
-    m = a + 0.2 * rng.normal(size=500)
-    schema = schema_of({"a": O, "b": O, "m": M, "y": Y})
-    frame, _, _ = simulate(500, rng, options=1, inert=0, metrics=1)
-    frame = frame.assign(a=a, b=b, m=m, y=np.exp(m) + b + 0.2 * rng.normal(size=500))[["a", "b", "m", "y"]]
-    structure = learn_structure(frame, schema, rng=rng)
-    assert [edge[:2] for edge in structure.direct] == [("b", "y")]
-    assert structure.graph.directed == {("a", "m"), ("m", "y"), ("b", "y")}
-    graph = CausalGraph(tuple(schema.variables), frozenset({("a", "m"), ("m", "y")}))
-    assert [e[:2] for e in residual_direct_edges(frame, schema, graph, ["a", "b"], 0.01)] == [("b", "y")]
-
-
-def test_residual_edges_find_an_optimum_inside_and_ignore_ties() -> None:
-    rng = np.random.default_rng(0)
-    a, b, c = rng.uniform(-1, 1, size=(3, 400))
-    frame, _, _ = simulate(400, rng, options=1, inert=0, metrics=1)
-    rare = (b + 0.3 * rng.normal(size=400) > 0.8).astype(float)
-    frame = frame.assign(a=a, b=b, c=c, m=a**2 + 0.3 * rng.normal(size=400), r=rare, y=rng.normal(size=400))
-    schema = schema_of({"a": O, "b": O, "c": O, "m": M, "r": M, "y": Y})
-    graph = CausalGraph(tuple(schema.variables), frozenset({("b", "r")}))
-    found = residual_metric_edges(frame, schema, graph, ["a", "b", "c"], 0.01)
-    assert [edge[:2] for edge in found] == [("a", "m")]
 
 
 def test_a_table_without_variation_carries_no_graph() -> None:

@@ -25,14 +25,16 @@ SETTINGS = st.floats(-1e3, 1e3)
 def mechanism(*, binary: bool = False, transform: Transform = "identity", n: int = 30) -> Mechanism:
     rng = np.random.default_rng(0)
     points = rng.normal(size=(n, 2))
+    targets, kernel = np.sin(points[:, 0]), Kernel(np.array([0.5, 1.0]), 0.7, 0.4, 0.2)
     return Mechanism(
         inputs=("a", "b"),
         log_inputs=np.array([False, True]),
         centre=np.array([1.0, 0.5]),
         spread=np.array([2.0, 1.5]),
-        kernel=Kernel(np.array([0.5, 1.0]), 0.7, 0.4, 0.2),
+        kernel=kernel,
         points=points,
-        targets=np.sin(points[:, 0]),
+        targets=targets,
+        weights=solve(kernel, points, targets),
         mean=0.3,
         scale=2.0,
         transform=transform,

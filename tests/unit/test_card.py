@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+from care_core.learn.card import model_card
+from care_core.profile.store import Profile
+from tests.planted import SCHEMA
+
+
+def test_the_card_tells_what_the_model_is_made_of(planted: Profile) -> None:
+    card = model_card(SCHEMA, planted.model)
+    assert card == model_card(SCHEMA, planted.model)
+    assert card.startswith("# Model card: planted\n")
+    for part in ("Data", "Graph", "Strongest paths", "Skill", "Total effects", "Support", "Limits"):
+        assert f"\n## {part}" in card
+    assert "250 runs" in card
+    assert "simulated" in card
+    assert "reserve -> hold_s -> time" in card
+    assert "all objectives together" in card
+    assert "set at random" in card
+    assert "nan" not in card
+
+
+def test_tables_have_as_many_cells_as_heads(planted: Profile) -> None:
+    lines = model_card(SCHEMA, planted.model).splitlines()
+    widths = [line.count("|") for line in lines if line.startswith("|")]
+    starts = [i for i, line in enumerate(lines) if line.startswith("|---")]
+    for i in starts:
+        block = []
+        for line in lines[i - 1 :]:
+            if not line.startswith("|"):
+                break
+            block.append(line.count("|"))
+        assert len(set(block)) == 1
+    assert widths
+
+
+def test_what_the_model_cannot_say_is_said(planted: Profile) -> None:
+    model = planted.model
+    outcomes = {name: outcome for name, outcome in model.outcomes.items() if name != "energy"}
+    effects = dict(model.effects)
+    effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
+    training = model.training.model_copy(
+        update={
+            "screened_out": ("inert",),
+            "direct_edges": (("planner", "time", 1e-5),),
+            "notes": ("'filter' never varies in the table.",),
+        }
+    )
+    bare = replace(
+        model,
+        outcomes=outcomes,
+        effects=effects,
+        training=training,
+        skill={"time": {"runs": 0.0}, "all": score_of_one()},
+    )
+    card = model_card(replace(SCHEMA, observational=True), bare)
+    assert "No option was found to move: energy" in card
+    assert "no: not ranked" in card
+    assert "depend on: inert" in card
+    assert "| planner | time | 1e-05 |" in card
+    assert "- 'filter' never varies in the table." in card
+    assert "observational" in card
+    assert "| time | 0 |" not in card
+    assert "one outcome only" in card
+
+
+def score_of_one() -> dict[str, float]:
+    """Skill where every run met its thresholds: there is no AUC."""
+    return {"runs": 9.0, "base_rate": 1.0, "log_loss": 0.1, "brier": 0.0, "calibration_error": 0.0}

@@ -1,0 +1,148 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from care_core.causal.counterfactual import World
+from care_core.causal.mechanisms import TAIL
+from care_core.profile.store import Profile
+from care_core.run import Unavailable
+from care_core.variables import Threshold
+from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run
+
+BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
+CONFIGS = st.fixed_dictionaries(
+    {
+        o.name: st.sampled_from([code for code, _ in o.labels]) if o.labels else st.floats(*(o.range or (0.0, 1.0)))
+        for o in OPTIONS
+    }
+)
+QUICK = settings(deadline=None, max_examples=30)
+
+
+def world(
+    profile: Profile,
+    observed: Mapping[str, object] | None = None,
+    bounds: Mapping[str, Threshold] = BOUNDS,
+    **options: float,
+) -> World:
+    """The world of a run with these options off their default; what it met is read off unless `observed` is given."""
+    run = planted_run(**options)
+    seen = {**run.metrics, **run.objectives} if observed is None else observed
+    return World(profile.model, run.config, seen, bounds)
+
+
+@QUICK
+@given(driven=CONFIGS, other=CONFIGS)
+def test_odds_are_probabilities_and_intervals_hold_their_value(
+    planted: Profile, driven: dict[str, float], other: dict[str, float]
+) -> None:
+    here = world(planted, **driven)
+    odds = here.odds([driven, other])
+    assert ((odds >= 0) & (odds <= 1)).all()
+    for name in planted.model.outcomes:
+        p = here.predict(name, [driven, other])
+        assert ((p.p_ok >= 0) & (p.p_ok <= 1)).all()
+        assert (p.low <= p.high).all()
+        assert np.isfinite(p.value).all()
+
+
+@QUICK
+@given(configs=st.lists(CONFIGS, min_size=2, max_size=5), data=st.data())
+def test_predictions_do_not_depend_on_the_order_of_configurations(
+    planted: Profile, configs: list[dict[str, float]], data: st.DataObject
+) -> None:
+    here = world(planted, speed=1.5)
+    order = data.draw(st.permutations(range(len(configs))))
+    shuffled = [configs[i] for i in order]
+    np.testing.assert_allclose(here.odds(configs)[order], here.odds(shuffled), atol=1e-9)
+    alone = [here.odds([config])[0] for config in configs]
+    np.testing.assert_allclose(here.odds(configs), alone, atol=1e-9)
+
+
+def test_without_a_change_the_run_repeats_its_own_outcome(planted: Profile) -> None:
+    run = planted_run(reserve=58)
+    p = world(planted, reserve=58).predict("time", [run.config])
+    assert p.value[0] == pytest.approx(run.objectives["time"])
+    assert p.low[0] < p.value[0] < p.high[0]
+
+
+def test_what_the_run_met_is_carried_over(planted: Profile) -> None:
+    """A run 20 s slower than expected would also have been slower with another option."""
+    expected = float(world(planted, {}).predict("time", [DEFAULTS]).value[0])
+    slow = world(planted, {"time": expected + 20})
+    faster = {**DEFAULTS, "speed": 8.0}
+    usual = float(world(planted, {}).predict("time", [faster]).value[0])
+    assert float(slow.predict("time", [faster]).value[0]) > usual + 10
+
+
+def test_an_unknown_outcome_is_predicted_from_the_options_alone(planted: Profile) -> None:
+    gone = world(planted, {"time": Unavailable("no end in the log")})
+    np.testing.assert_array_equal(
+        gone.predict("time", [DEFAULTS]).value, world(planted, {}).predict("time", [DEFAULTS]).value
+    )
+
+
+def test_interventions_follow_the_true_mechanism(planted: Profile) -> None:
+    here = world(planted, reserve=50)
+    values = [20.0, 35.0, 50.0, 60.0]
+    predicted = here.predict("time", [{**DEFAULTS, "reserve": v} for v in values]).value
+    truth = [float(planted_run(reserve=v).objectives["time"]) for v in values]  # type: ignore[arg-type]
+    np.testing.assert_allclose(predicted, truth, atol=8)
+
+
+def test_a_run_that_failed_a_stage_keeps_failing_until_an_option_changes(planted: Profile) -> None:
+    refused = world(planted, min_sats=12)
+    blind = World(planted.model, refused.config, {}, BOUNDS)
+    same, reset = refused.config, {**refused.config, "min_sats": 6.0}
+    assert refused.predict("success", [same]).p_ok[0] <= blind.predict("success", [same]).p_ok[0] + 1e-9
+    assert refused.predict("success", [reset]).p_ok[0] > 0.7
+
+
+def test_a_stage_passed_speaks_for_the_run(planted: Profile) -> None:
+    """It armed with many satellites asked for: it would probably arm again."""
+    armed = world(planted, {"armed": 1.0}, min_sats=11)
+    blind = world(planted, {}, min_sats=11)
+    assert armed.predict("success", [armed.config]).p_ok[0] > blind.predict("success", [blind.config]).p_ok[0]
+
+
+def test_all_thresholds_count_and_only_those_in_force(planted: Profile) -> None:
+    config = [{**DEFAULTS, "accel": 2.4}]
+    every = world(planted, {}).odds(config)[0]
+    some = world(planted, {}, {"time": BOUNDS["time"], "success": BOUNDS["success"]}).odds(config)[0]
+    assert every < some
+    assert world(planted, {}, {}).odds(config)[0] == 1.0
+
+
+def test_without_a_threshold_there_are_no_odds(planted: Profile) -> None:
+    p = world(planted, {}, {}).predict("time", [DEFAULTS])
+    assert np.isnan(p.p_ok[0])
+    assert np.isfinite(p.value[0])
+
+
+def test_objectives_that_move_together_count_once(planted: Profile) -> None:
+    training = planted.model.training.model_copy(update={"moves_together": (("time", "energy"),)})
+    model = replace(planted.model, training=training)
+    bounds = {"time": BOUNDS["time"], "energy": BOUNDS["energy"]}
+    config = [{**DEFAULTS, "speed": 3.0, "accel": 2.2}]
+    apart, together = (World(m, DEFAULTS, {}, bounds) for m in (planted.model, model))
+    each = [apart.predict(name, config).p_ok[0] for name in bounds]
+    assert together.odds(config)[0] == pytest.approx(min(each))
+    assert apart.odds(config)[0] == pytest.approx(each[0] * each[1])
+
+
+def test_a_bound_above_and_a_bound_below_are_complements(planted: Profile) -> None:
+    below = world(planted, {}, {"time": Threshold("<=", 150)}).predict("time", [DEFAULTS]).p_ok[0]
+    above = world(planted, {}, {"time": Threshold(">", 150)}).predict("time", [DEFAULTS]).p_ok[0]
+    assert below + above == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("op", "odds"), [("<=", TAIL), (">=", 1 - TAIL)])
+def test_a_bound_outside_what_the_target_can_be(planted: Profile, op: str, odds: float) -> None:
+    bound = Threshold(op, -5.0)  # type: ignore[arg-type]
+    assert world(planted, bounds={"time": bound}).predict("time", [DEFAULTS]).p_ok[0] == pytest.approx(odds)

@@ -1,0 +1,149 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from care_core.causal.counterfactual import World
+from care_core.diagnose.fixes import (
+    MAX_CHANGES,
+    best_alone,
+    candidate_values,
+    change_notes,
+    prediction,
+    search,
+    smallest_good,
+    to_fix,
+)
+from care_core.profile.store import Profile
+from care_core.variables import Role, Variable
+from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run
+
+BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
+BY_NAME = {option.name: option for option in OPTIONS}
+QUICK = settings(deadline=None, max_examples=40)
+
+
+def world(profile: Profile, **options: float) -> World:
+    run = planted_run(**options)
+    return World(profile.model, run.config, {**run.metrics, **run.objectives}, BOUNDS)
+
+
+@given(data=st.data(), option=st.sampled_from(OPTIONS))
+def test_every_candidate_is_acceptable_supported_and_a_change(
+    planted: Profile, data: st.DataObject, option: Variable
+) -> None:
+    low, high = option.range or (-1.0, 3.0)
+    current, reference = (data.draw(st.floats(low - (high - low), high + (high - low))) for _ in range(2))
+    values = candidate_values(option, current, reference, planted.model)
+    assert len(set(values)) == len(values)
+    for value in values:
+        assert value != current
+        assert option.accepts(value)
+        assert planted.model.supports(option.name, value)
+
+
+@given(current=st.integers(0, 80))
+def test_a_safety_option_only_moves_towards_its_default(planted: Profile, current: int) -> None:
+    values = candidate_values(BY_NAME["reserve"], float(current), 20.0, planted.model)
+    assert all(value >= 20 for value in values) or current < 20
+    assert all(min(current, 20) <= value <= max(current, 20) for value in values if current >= 10)
+
+
+def test_of_a_safety_options_codes_only_the_default_is_left(planted: Profile) -> None:
+    assert candidate_values(replace(BY_NAME["planner"], safety=True), 2.0, 1.0, planted.model) == (1.0,)
+    assert candidate_values(replace(BY_NAME["planner"], safety=True), 1.0, 1.0, planted.model) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "current", "first"), [("speed", 1.5, 5.0), ("planner", 2, 1), ("filter", 0, 1), ("accel", 4.0, 1.5)]
+)
+def test_the_reference_comes_first(planted: Profile, name: str, current: float, first: float) -> None:
+    assert candidate_values(BY_NAME[name], current, DEFAULTS[name], planted.model)[0] == first
+
+
+def test_a_ratio_is_walked_in_ratios(planted: Profile) -> None:
+    gain = Variable("gain", Role.OPTION, range=(0.01, 10.0), default=0.1)
+    assert candidate_values(gain, 10.0, 0.1, planted.model) == (0.1, 0.2512, 0.631, 1.585, 3.981)
+
+
+def test_one_planted_cause_needs_one_change(planted: Profile) -> None:
+    here = world(planted, reserve=58)
+    found = search(here, BY_NAME, ["reserve", "speed"], DEFAULTS)
+    assignment, odds = found[smallest_good(found)]
+    assert set(assignment) == {"reserve"}
+    assert odds == pytest.approx(here.odds([{**here.config, **assignment}])[0])
+
+
+def test_two_planted_causes_need_two(planted: Profile) -> None:
+    here = world(planted, speed=1.4, planner=2)
+    found = search(here, BY_NAME, ["planner", "radius", "speed"], DEFAULTS)
+    assert set(found[smallest_good(found)][0]) == {"speed", "planner"}
+
+
+@QUICK
+@given(driven=st.fixed_dictionaries({o.name: st.floats(*o.range).map(o.snap) for o in OPTIONS if o.range is not None}))
+def test_sets_grow_by_one_and_stay_inside(planted: Profile, driven: dict[str, float]) -> None:
+    here = world(planted, **driven)
+    free = sorted(name for name in driven if driven[name] != DEFAULTS[name])
+    found = search(here, BY_NAME, free, DEFAULTS)
+    assert [len(assignment) for assignment, _ in found] == list(range(1, 1 + min(len(found), MAX_CHANGES)))
+    for assignment, odds in found:
+        assert set(assignment) <= set(free)
+        assert 0 <= odds <= 1
+        assert all(BY_NAME[name].accepts(value) for name, value in assignment.items())
+        assert all(planted.model.supports(name, value) for name, value in assignment.items())
+
+
+def test_nothing_free_nothing_found(planted: Profile) -> None:
+    assert search(world(planted, reserve=58), BY_NAME, [], DEFAULTS) == []
+    assert best_alone(world(planted), BY_NAME, "reserve", DEFAULTS) is None
+
+
+def test_the_best_value_alone(planted: Profile) -> None:
+    here = world(planted, reserve=58)
+    best = best_alone(here, BY_NAME, "reserve", DEFAULTS)
+    assert best is not None
+    assert best[1] == pytest.approx(here.odds([{**here.config, "reserve": best[0]}])[0])
+    assert best[1] > 0.8
+
+
+@pytest.mark.parametrize(
+    ("odds", "chosen"),
+    [
+        ([0.8], 0),
+        ([0.8, 0.85], 0),
+        ([0.5, 0.65], 1),
+        ([0.5, 0.55, 0.75], 2),
+        ([0.5, 0.65, 0.7], 1),
+        ([0.4, 0.3, 0.2], 0),
+    ],
+)
+def test_one_more_change_must_be_worth_it(odds: list[float], chosen: int) -> None:
+    assert smallest_good([({str(j): 0.0 for j in range(i + 1)}, p) for i, p in enumerate(odds)]) == chosen
+
+
+def test_a_fix_tells_every_objective_and_the_change_that_does_most_first(planted: Profile) -> None:
+    here = world(planted, speed=1.4, planner=2)
+    fix = to_fix(here, BY_NAME, {"planner": 1.0, "speed": 5.0}, 0.9)
+    assert set(fix.predicted) == {"success", "time", "energy"}
+    alone = [here.odds([{**here.config, c.option.name: c.suggested}])[0] for c in fix.changes]
+    assert alone == sorted(alone, reverse=True)
+    assert {c.option.name: (c.current, c.suggested) for c in fix.changes} == {"speed": (1.4, 5.0), "planner": (2, 1.0)}
+
+
+def test_without_a_threshold_a_prediction_has_no_odds(planted: Profile) -> None:
+    run = planted_run()
+    here = World(planted.model, run.config, {}, {})
+    p = prediction(here, "time", run.config)
+    assert p.p_ok is None
+    assert p.status() == "not_evaluated"
+    assert p.low < p.value < p.high
+
+
+def test_an_operator_is_told_what_a_change_takes() -> None:
+    assert change_notes(BY_NAME["accel"]) == ("takes effect after a reboot",)
+    assert change_notes(BY_NAME["radius"]) == ("sets 2 keys: /a/radius, /b/radius",)
+    assert change_notes(BY_NAME["speed"]) == ()

@@ -1,0 +1,165 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from care_core.causal.counterfactual import World
+from care_core.causal.graph import CausalGraph
+from care_core.learn.fitting import Effort
+from care_core.learn.outcomes import (
+    causes_of,
+    find_stages,
+    fit_on,
+    fit_outcomes,
+    fit_total,
+    groups_that_move_together,
+    met,
+)
+from care_core.profile.model import Model
+from care_core.profile.schema import Schema
+from care_core.profile.store import Profile
+from care_core.variables import Role, Threshold, Variable
+from tests.planted import SCHEMA, SUCCESS, TIME, fly_many
+
+QUICK = Effort(points=120, iterations=15)
+FLAGS = ("armed", "located")
+SMALL = replace(
+    SCHEMA,
+    variables={
+        v.name: v
+        for v in (
+            Variable("gain", Role.OPTION, range=(0.0, 1.0), default=0.5),
+            Variable("wind", Role.CONTEXT),
+            *(Variable(name, Role.METRIC, "bool") for name in FLAGS),
+            Variable("error", Role.METRIC),
+            SUCCESS,
+            TIME,
+        )
+    },
+)
+GRAPH = CausalGraph(
+    tuple(SMALL.variables),
+    frozenset(
+        {("gain", "armed"), ("armed", "success"), ("located", "success"), ("error", "success"), ("gain", "error")}
+    ),
+)
+
+
+def missions(n: int = 160) -> pd.DataFrame:
+    """Refused where the gain is high; lost at random, whatever the gain; else failed where the gain is low."""
+    rng = np.random.default_rng(0)
+    gain = rng.uniform(size=n)
+    armed = gain < 0.8
+    located = np.where(armed, rng.random(n) < 0.7, np.nan)
+    flew = located == 1
+    error = np.where(flew, 1 - gain + 0.1 * rng.normal(size=n), np.nan)
+    success = flew & (np.nan_to_num(error, nan=9) < 0.8)
+    time = np.where(success, 100 + 50 * error, np.nan)
+    wind = np.where(armed, rng.normal(size=n), np.nan)
+    columns = {"gain": gain, "wind": wind, "armed": armed, "located": located, "error": error, "success": success}
+    return pd.DataFrame({**columns, "time": time}).astype(float)
+
+
+def stages(frame: pd.DataFrame, schema: Schema = SMALL) -> list[tuple[str, int, int]]:
+    return [
+        (s.variable, int(s.reached.sum()), int((s.reached & s.passed).sum()))
+        for s in find_stages(SUCCESS, schema, frame)
+    ]
+
+
+def test_met_is_one_zero_or_unknown() -> None:
+    frame = pd.DataFrame({"time": [100.0, 500.0, np.nan]})
+    np.testing.assert_array_equal(met(TIME, frame), [1.0, 0.0, np.nan])
+
+
+def test_stages_come_in_order_each_on_the_missions_that_reached_it() -> None:
+    frame = missions()
+    armed, located = int(frame.armed.sum()), int((frame.located == 1).sum())
+    assert stages(frame) == [
+        ("armed", len(frame), armed),
+        ("located", armed, located),
+        ("success", located, int(frame.success.sum())),
+    ]
+
+
+def test_a_stage_may_pass_at_zero() -> None:
+    frame = missions()
+    turned = frame.assign(armed=1 - frame.armed)
+    found = find_stages(SUCCESS, SMALL, turned)
+    assert [(s.variable, s.passes) for s in found] == [("armed", 0.0), ("located", 1.0), ("success", 1.0)]
+
+
+def test_a_metric_that_successful_missions_can_fail_is_no_stage() -> None:
+    frame = missions()
+    frame.loc[frame.index[frame.success == 1][0], "armed"] = 0.0
+    assert "armed" not in [name for name, _, _ in stages(frame)]
+
+
+def test_a_stage_with_too_few_missions_is_left_out_and_training_goes_on() -> None:
+    """Fifteen missions get past arming: enough of each kind, too few to learn from."""
+    frame = missions(60)
+    frame = frame.assign(armed=0.0, located=np.nan, error=np.nan, success=0.0, time=np.nan)
+    frame.loc[:14, "armed"] = 1.0
+    frame.loc[:7, "success"] = 1.0
+    assert [name for name, _, _ in stages(frame)] == ["armed"]
+    outcomes, _ = fit_outcomes(frame, SMALL, GRAPH, np.random.default_rng(0), effort=QUICK)
+    assert [s.variable for s in outcomes["success"].stages] == ["armed"]
+
+
+def test_a_run_lost_at_a_stage_that_no_option_moves_is_not_laid_to_a_later_one(planted: Profile) -> None:
+    frame = missions()
+    outcomes, mechanisms = fit_outcomes(frame, SMALL, GRAPH, np.random.default_rng(0), effort=QUICK)
+    assert [s.variable for s in outcomes["success"].stages] == ["armed", "located", "success"]
+    rate = frame.located.mean()
+    assert mechanisms["stage:located"].odds(np.zeros((1, 0)))[0] == pytest.approx(rate, abs=0.05)
+    model: Model = replace(planted.model, outcomes=outcomes, mechanisms=mechanisms)
+    lost = World(model, {"gain": 0.6}, {"armed": 1.0, "located": 0.0, "success": 0.0}, {"success": Threshold(">=", 1)})
+    flown = World(model, {"gain": 0.6}, {"armed": 1.0, "located": 1.0, "success": 1.0}, lost.thresholds)
+    configs = [{"gain": g} for g in (0.3, 0.5, 0.6, 0.7)]
+    assert lost.odds(configs).max() < 0.35 < flown.odds(configs).max()
+
+
+def test_an_objective_that_nothing_moves_has_no_outcome() -> None:
+    bare = CausalGraph(tuple(SMALL.variables))
+    assert fit_outcomes(missions(), SMALL, bare, np.random.default_rng(0), effort=QUICK) == ({}, {})
+
+
+def test_contexts_are_read_only_where_operators_chose_by_them() -> None:
+    graph = CausalGraph(tuple(SMALL.variables), GRAPH.directed | {("wind", "error")})
+    assert causes_of("success", graph, SMALL) == ("gain",)
+    assert causes_of("success", graph, replace(SMALL, observational=True)) == ("gain", "wind")
+    assert causes_of("gain", graph, SMALL) == ("gain",)
+
+
+def test_a_context_that_refused_missions_do_not_have_is_no_error() -> None:
+    graph = CausalGraph(tuple(SMALL.variables), GRAPH.directed | {("wind", "armed")})
+    schema = replace(SMALL, observational=True)
+    outcomes, mechanisms = fit_outcomes(missions(), schema, graph, np.random.default_rng(0), effort=QUICK)
+    assert outcomes["success"].stages
+    assert all(np.isfinite(m.points).all() for m in mechanisms.values())
+
+
+def test_the_middle_of_the_line_is_fitted_on_the_missions_that_have_it() -> None:
+    frame, rng = missions(), np.random.default_rng(0)
+    m = fit_total("error", frame, SMALL, GRAPH, rng, effort=QUICK)
+    assert m is not None
+    assert len(m.targets) == min(120, int(frame.error.notna().sum()))
+    assert m.expected(np.array([[0.3]]))[0] == pytest.approx(0.7, abs=0.1)
+    assert fit_total("gain", frame, SMALL, CausalGraph(GRAPH.nodes), rng, effort=QUICK) is not None
+    assert fit_total("time", frame, SMALL, GRAPH, rng, effort=QUICK) is None
+
+
+def test_too_few_or_constant_values_give_no_mechanism() -> None:
+    frame, rng = missions(), np.random.default_rng(0)
+    assert fit_on(["gain"], "time", frame.iloc[:15], SMALL, rng, effort=QUICK) is None
+    assert fit_on(["gain"], "time", frame.assign(time=3.0), SMALL, rng, effort=QUICK) is None
+
+
+def test_objectives_that_nearly_repeat_each_other_are_grouped() -> None:
+    frame = fly_many(100)
+    assert groups_that_move_together(SCHEMA, frame) == ()
+    assert groups_that_move_together(SCHEMA, frame.assign(energy=np.exp(frame.time / 50))) == (("time", "energy"),)
+    assert groups_that_move_together(SCHEMA, frame.assign(energy=np.nan)) == ()

@@ -1,0 +1,132 @@
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from care_core.causal.counterfactual import World
+from care_core.diagnose.ranking import (
+    _shapley,
+    best_paths,
+    describe_path,
+    deviating,
+    reference_config,
+    suspects,
+)
+from care_core.profile.store import Profile
+from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run, with_variable
+
+BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
+GAMES = st.integers(1, 6).flatmap(
+    lambda n: st.tuples(st.just(n), st.lists(st.floats(0, 1), min_size=2**n, max_size=2**n))
+)
+
+
+def world(profile: Profile, **options: float) -> World:
+    run = planted_run(**options)
+    return World(profile.model, run.config, {**run.metrics, **run.objectives}, BOUNDS)
+
+
+@given(GAMES)
+def test_shapley_values_add_up_to_the_whole_change(game: tuple[int, list[float]]) -> None:
+    n, worth = game
+    names = [f"x{i}" for i in range(n)]
+
+    def odds(sets: Sequence[frozenset[str]]) -> NDArray[np.float64]:
+        return np.array([worth[sum(2 ** names.index(name) for name in s)] for s in sets])
+
+    assert _shapley(names, odds).sum() == pytest.approx(worth[-1] - worth[0], abs=1e-9)
+
+
+def test_shapley_values_share_an_interaction_and_ignore_a_bystander() -> None:
+    def odds(sets: Sequence[frozenset[str]]) -> NDArray[np.float64]:
+        return np.array([0.8 * ({"a", "b"} <= s) + 0.1 * ("c" in s) for s in sets])
+
+    np.testing.assert_allclose(_shapley(["a", "b", "c", "d"], odds), [0.4, 0.4, 0.1, 0.0], atol=1e-12)
+    assert _shapley([], odds).shape == (0,)
+
+
+def test_contributions_add_up_to_what_a_full_reset_would_bring(planted: Profile) -> None:
+    here = world(planted, speed=1.4, planner=2, reserve=45, accel=0.6)
+    found = suspects(here, "time", DEFAULTS)
+    before, after = here.predict("time", [here.config, {**here.config, **DEFAULTS}]).p_ok
+    assert sum(s.contribution for s in found) == pytest.approx(after - before)
+    assert [s.contribution for s in found] == sorted((s.contribution for s in found), reverse=True)
+
+
+def test_only_options_off_their_reference_with_a_path_are_suspects(planted: Profile) -> None:
+    found = suspects(world(planted, speed=1.4, accel=3.0, inert=0.0), "time", DEFAULTS)
+    names = {s.option for s in found}
+    assert "speed" in names
+    assert "planner" not in names
+    assert names <= {"speed", "accel", "inert"}
+    graph = planted.model.graph
+    for suspect in found:
+        nodes = suspect.path.nodes
+        assert (nodes[0], nodes[-1]) == (suspect.option, "time")
+        assert set(zip(nodes, nodes[1:], strict=False)) <= graph.directed
+
+
+def test_an_effect_that_is_not_identified_is_not_ranked(planted: Profile) -> None:
+    effects = dict(planted.model.effects)
+    effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
+    here = world(planted, speed=1.4, planner=2)
+    blind = World(replace(planted.model, effects=effects), here.config, here.observed, here.thresholds)
+    assert "speed" not in {s.option for s in suspects(blind, "time", DEFAULTS)}
+
+
+def test_the_reference_is_the_default_or_the_middle_of_the_training_runs(planted: Profile) -> None:
+    assert reference_config(SCHEMA, planted.model) == DEFAULTS
+    bare = with_variable(SCHEMA, replace(OPTIONS[0], default=None))
+    quantiles = planted.model.summaries["speed"].quantiles
+    assert reference_config(bare, planted.model)["speed"] == OPTIONS[0].snap(quantiles[10])
+
+
+@pytest.mark.parametrize(("value", "off"), [(5.0, False), (5.0 + 1e-9, False), (5.001, True), (-5.0, True)])
+def test_a_deviation_is_more_than_rounding(value: float, off: bool) -> None:
+    assert deviating({"speed": value}, {"speed": 5.0, "accel": 1.0}) == (("speed",) if off else ())
+
+
+def test_zero_is_no_deviation_from_zero() -> None:
+    assert deviating({"a": 0.0, "b": 1e-3}, {"a": 0.0, "b": 0.0}) == ("b",)
+
+
+def test_one_path_an_option_the_strongest(planted: Profile) -> None:
+    model = planted.model
+    found = best_paths(model, "time")
+    assert found["reserve"].nodes == ("reserve", "hold_s", "time")
+    for option, path in found.items():
+        rivals = [record.ace for record in model.paths["time"] if record.nodes[0] == option]
+        assert path.ace >= max(rivals, default=0.0) - 1e-4
+
+
+def test_a_path_tells_what_the_run_met_and_what_it_would_have(planted: Profile) -> None:
+    run, here = planted_run(reserve=58), world(planted, reserve=58)
+    path = describe_path(best_paths(planted.model, "time")["reserve"], here, SCHEMA, run, DEFAULTS)
+    option, hold, time = path
+    assert (option.value, option.expected) == (58, 20)
+    assert hold.value == run.metrics["hold_s"]
+    assert hold.expected == pytest.approx(18, abs=2)
+    assert time.expected == pytest.approx(planted_run().objectives["time"], abs=8)
+    assert option.effect is not None
+    assert option.effect > 0
+    assert (time.effect, time.support) == (None, None)
+    assert all(0 <= node.support <= 1 for node in path[:-1] if node.support is not None)
+
+
+def test_a_decreasing_edge_is_negative(planted: Profile) -> None:
+    run, here = planted_run(speed=1.4), world(planted, speed=1.4)
+    path = describe_path(best_paths(planted.model, "time")["speed"], here, SCHEMA, run, DEFAULTS)
+    signs = {node.name: node.effect for node in path if node.effect is not None}
+    assert signs["mean_speed"] < 0 < signs["speed"]
+
+
+def test_a_refused_mission_has_unknown_values_on_the_path(planted: Profile) -> None:
+    run, here = planted_run(min_sats=14), world(planted, min_sats=14)
+    path = describe_path(best_paths(planted.model, "success")["radius"], here, SCHEMA, run, DEFAULTS)
+    assert [node.value for node in path] == [0.5, None, 0.0]
