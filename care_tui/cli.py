@@ -111,6 +111,7 @@ def _open(
     log: Annotated[Path | None, typer.Argument(metavar="[LOG]", show_default=False)] = None,
     profile: ProfileName = None,
     config: ConfigPaths = None,
+    ascii: Annotated[bool, typer.Option("--ascii", help="Draw without box characters.")] = False,
 ) -> None:
     """Open a log in the terminal app: the newest one when none is named."""
     from care_core.logs import sniff
@@ -121,7 +122,7 @@ def _open(
         raise UsageError("The terminal app needs a terminal.", hint="Use 'care triage LOG' here.")
     from care_tui.app import run
 
-    raise typer.Exit(run(path, profile, config or []))
+    raise typer.Exit(run(path, profile, config or [], ascii=ascii))
 
 
 def newest_log(places: Iterable[Path]) -> Path:

@@ -108,7 +108,8 @@ def fly_many(n: int, seed: int = 0) -> pd.DataFrame:
     rng = np.random.default_rng(seed)
     configs = [draw_config(rng) for _ in range(n)]
     table = pd.DataFrame([{**config, **fly(config, draw_noise(rng))} for config in configs])
-    return table[[v.name for v in VARIABLES]].astype(float)
+    runs: pd.DataFrame = table[[v.name for v in VARIABLES]].astype(float)
+    return runs
 
 
 def run_of(config: Mapping[str, float], outcome: Mapping[str, float]) -> Run:

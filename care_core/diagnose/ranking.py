@@ -66,6 +66,8 @@ def suspects(world: World, objective: str, reference: Config) -> tuple[Suspect, 
     rise when the option goes back to its reference, averaged over the orders in which the others may go back, so an
     interaction is shared by those who take part in it and the contributions add up to the whole change.
     """
+    if objective not in world.model.outcomes:
+        return ()
     paths = best_paths(world.model, objective)
     effects = world.model.effects
     names = [
@@ -86,6 +88,8 @@ def not_ruled_out(
     Options whose effect is not identified are left out; the rest have no path in the graph, and get a direct one of no
     effect.
     """
+    if objective not in world.model.outcomes:
+        return ()
     named = {suspect.option for suspect in found}
     others = [
         name

@@ -107,8 +107,8 @@ def diagnose(
     model, schema = profile.model, profile.schema
     bounds = thresholds_in_force(schema, thresholds or {})
     objectives = judge(run, schema, bounds, model.summaries)
-    broken = [result for result in objectives if result.status == "fault" and result.variable.name in model.outcomes]
-    if not any(result.status == "fault" for result in objectives):
+    broken = [result for result in objectives if result.status == "fault"]
+    if not broken:
         return Diagnosis(choice, run, objectives, (), None)
     report("ranking the causes", 0.7)
     # A context is met, not set: the reference configuration is judged under this run's.

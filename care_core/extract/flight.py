@@ -32,6 +32,8 @@ NEEDS: Wanted = {
 
 FILL_S = 0.05
 """Spacing to which a thinned track is filled in before distances are taken from it."""
+FILLABLE_S = 0.6
+"""Median spacing above which a corner between two positions could be anything, and nothing is filled in."""
 AIRBORNE_M = 2.0
 """Height above home from which a vehicle counts as airborne."""
 
@@ -80,8 +82,8 @@ class Track:
 
     def filled_in(self) -> Track:
         """The same track at `FILL_S` or closer: cubic Hermite between positions, velocities by central differences."""
-        span = float(self.t[-1] - self.t[0]) if len(self.t) > 2 else 0.0
-        if span <= 0 or span / len(self.t) <= FILL_S or (np.diff(self.t) <= 0).any():
+        steps = np.diff(self.t)
+        if len(steps) < 2 or not FILL_S < np.median(steps) <= FILLABLE_S or (steps <= 0).any():
             return self
         t = np.union1d(self.t, np.arange(self.t[0], self.t[-1], FILL_S))
         return Track(

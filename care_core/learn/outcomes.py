@@ -177,15 +177,20 @@ def fit_on(
 
 
 def groups_that_move_together(schema: Schema, frame: pd.DataFrame) -> tuple[tuple[str, ...], ...]:
-    """Non-functional objectives whose rank correlation over the runs exceeds 0.9."""
+    """Non-functional objectives that get worse together: rank correlation over the runs above 0.9, both taken in the
+    direction of their thresholds."""
     names = [v.name for v in schema.objectives if v.kind == "non-functional"]
     if len(names) < 2:
         return ()
+    sign = {
+        v.name: -1.0 if v.threshold is not None and v.threshold.op in (">=", ">") else 1.0 for v in schema.objectives
+    }
     # Ranks by pandas, so that Spearman's correlation needs no further library.
-    correlation: Mapping[str, Mapping[str, float]] = frame[names].rank().corr().to_dict()
+    badness = frame[names].mul([sign[name] for name in names]).rank()
+    correlation: Mapping[str, Mapping[str, float]] = badness.corr().to_dict()
     groups: list[list[str]] = []
     for name in names:
-        home = next((g for g in groups if all(abs(correlation[name][other]) > MOVES_TOGETHER for other in g)), None)
+        home = next((g for g in groups if all(correlation[name][other] > MOVES_TOGETHER for other in g)), None)
         if home is None:
             groups.append([name])
         else:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from care_core.causal.effects import Direction
@@ -224,7 +225,7 @@ def read_model(folder: Path) -> Model:
     path = folder / "model.json"
     try:
         record = _ModelFile.model_validate_json(path.read_text(encoding="utf-8"))
-        with np.load(folder / "mechanisms.npz", allow_pickle=False) as arrays:
+        with _open_arrays(folder / "mechanisms.npz") as arrays:
             mechanisms = {key: _mechanism(key, m, arrays) for key, m in record.mechanisms.items()}
         graph = CausalGraph(
             record.nodes,
@@ -244,11 +245,18 @@ def read_model(folder: Path) -> Model:
         raise ProfileError(
             f"'{key}': {first['msg']}.", hint="Train the profile again with 'care train'.", where=str(path)
         ) from err
-    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as err:
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as err:
         raise ProfileError(
             f"The model is damaged: {err}.", hint="Train the profile again with 'care train'.", where=str(folder)
         ) from err
     return _to_model(record, graph, mechanisms)
+
+
+def _open_arrays(path: Path) -> NpzFile:
+    arrays = np.load(path, allow_pickle=False)
+    if not isinstance(arrays, NpzFile):
+        raise ValueError(f"{path.name} is not an archive of arrays")
+    return arrays
 
 
 def _check_references(record: _ModelFile) -> None:

@@ -54,6 +54,8 @@ class _Variable(_Strict):
             raise ValueError("only objectives have a 'threshold'")
         if self.role is not Role.OPTION and self.parameter:
             raise ValueError("only options have a 'parameter'")
+        if self.safety and self.default is None:
+            raise ValueError("a 'safety' option needs 'default', the value past which it is never moved")
         if self.range is not None and self.range[0] >= self.range[1]:
             raise ValueError("'range' must be [low, high] with low < high")
         if self.extract is not None and "kind" not in self.extract:

@@ -108,10 +108,10 @@ def differences(log: Log, schema: Schema) -> tuple[str, ...]:
 def _nothing_fits(log: Log, fits: Sequence[Fit]) -> ProfileError:
     if len(fits) == 1:
         schema = fits[0].schema
-        formats = " or ".join(schema.logs) or "no log at all"
+        reads = f"It reads {' or '.join(schema.logs)}" if schema.logs else "It comes from a table and reads no log"
         return ProfileError(
             f"Profile '{schema.name}' does not fit the log: none of its parameters or sources are in it.",
-            hint=f"It reads {formats}, this is {log.format.value}; leave --profile out to have one chosen.",
+            hint=f"{reads}, this is {log.format.value}; leave --profile out to have one chosen.",
             where=str(log.path),
         )
     names = ", ".join(fit.schema.name for fit in fits if log.format.value in fit.schema.logs)

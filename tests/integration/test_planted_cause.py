@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -53,7 +54,7 @@ def test_the_planted_option_is_named_and_its_fix_works(
     assert (cause.rank, cause.option.name, cause.current) == (1, option, value)
     names = [node.name for node in cause.path]
     assert (names[0], names[-1]) == (option, objective)
-    assert all(edge in planted.model.edges for edge in zip(names, names[1:], strict=False))
+    assert all(edge in planted.model.edges for edge in pairwise(names))
     assert diagnosis.fix is not None
     assert option in {c.option.name for c in diagnosis.fix.changes}
     for change in diagnosis.fix.changes:
@@ -142,7 +143,7 @@ def test_an_option_at_its_default_is_never_moved(planted: Profile) -> None:
 def test_a_fault_that_no_option_explains_abstains(planted: Profile) -> None:
     """Every option at its default, and a wind that the profile does not know."""
     diagnosis = diagnosed(planted_run(CALM | {"error": 9.0}), planted)
-    assert [o.status for o in diagnosis.objectives][0] == "fault"
+    assert diagnosis.objectives[0].status == "fault"
     assert diagnosis.abstained is not None
     assert "no option" in diagnosis.abstained
     assert diagnosis.fix is None

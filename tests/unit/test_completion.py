@@ -26,7 +26,8 @@ def empty(schema: Schema, *edges: tuple[str, str]) -> CausalGraph:
 def table(count: int, seed: int, **columns: FloatArray) -> pd.DataFrame:
     """Three options drawn evenly from -1 to 1, and the columns."""
     rng = np.random.default_rng(seed)
-    return pd.DataFrame({**{name: rng.uniform(-1, 1, count) for name in "abc"}, **columns})
+    made: pd.DataFrame = pd.DataFrame({**{name: rng.uniform(-1, 1, count) for name in "abc"}, **columns})
+    return made
 
 
 def exact_p(frame: pd.DataFrame, name: str, held: list[str], target: str) -> float:

@@ -34,8 +34,8 @@ def test_contexts_cause_options_only_where_operators_chose_them() -> None:
     assert Constraints(ROLES, observational=True).is_exogenous("c")
 
 
-@pytest.mark.parametrize("pair", ["mn", "yz"])
-def test_the_later_never_causes_the_earlier(pair: str) -> None:
+@pytest.mark.parametrize("pair", [("m", "n"), ("y", "z")])
+def test_the_later_never_causes_the_earlier(pair: tuple[str, str]) -> None:
     early, late = pair
     rules = Constraints(ROLES, order={early: 1, late: 2})
     assert rules.forbids(late, early)

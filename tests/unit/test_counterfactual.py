@@ -42,7 +42,8 @@ def world(
 def test_odds_are_probabilities_and_intervals_hold_their_value(
     planted: Profile, driven: dict[str, float], other: dict[str, float]
 ) -> None:
-    here = world(planted, **driven)
+    run = planted_run(**driven)
+    here = World(planted.model, run.config, {**run.metrics, **run.objectives}, BOUNDS)
     odds = here.odds([driven, other])
     assert ((odds >= 0) & (odds <= 1)).all()
     for name in planted.model.outcomes:

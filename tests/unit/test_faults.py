@@ -16,7 +16,7 @@ SUMMARIES = {"time": Summary(count=100, mean=150, spread=20, quantiles=tuple(100
 
 
 def test_the_profiles_thresholds_hold_unless_the_operator_says_otherwise() -> None:
-    assert BOUNDS == {v.name: v.threshold for v in SCHEMA.objectives}
+    assert {v.name: v.threshold for v in SCHEMA.objectives} == BOUNDS
     assert thresholds_in_force(SCHEMA, {"time": 90.0})["time"] == Threshold("<=", 90.0)
     assert thresholds_in_force(SCHEMA, {"success": 0.5})["success"] == Threshold(">=", 0.5)
 

@@ -7,8 +7,8 @@ from threadpoolctl import threadpool_limits
 
 from care_core.causal.mechanisms import FloatArray, Mechanism
 from care_core.errors import LearningError
-from care_core.learn.skill import calibration_error
 from care_core.learn.fitting import Effort, Inputs, _negative_log_posterior, best_transform, fit_mechanism
+from care_core.learn.skill import calibration_error
 
 RNG = np.random.default_rng
 FULL = Effort(points=300, iterations=60)
@@ -18,9 +18,9 @@ def inputs(count: int, *logs: int) -> Inputs:
     return Inputs(tuple("abcdefgh"[:count]), np.isin(np.arange(count), logs))
 
 
-@threadpool_limits.wrap(limits=1)
 def fitted(x: FloatArray, y: FloatArray, *, binary: bool = False, effort: Effort = FULL) -> Mechanism:
-    return fit_mechanism(x, y, inputs(x.shape[1]), binary=binary, rng=RNG(0), effort=effort)
+    with threadpool_limits(1):
+        return fit_mechanism(x, y, inputs(x.shape[1]), binary=binary, rng=RNG(0), effort=effort)
 
 
 def test_recovers_a_known_function_from_clean_data() -> None:

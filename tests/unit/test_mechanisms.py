@@ -16,6 +16,7 @@ from care_core.causal.mechanisms import (
     Transform,
     columns,
     restored,
+    solve,
     transformed,
 )
 

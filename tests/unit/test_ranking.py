@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -69,7 +70,7 @@ def test_only_options_off_their_reference_with_a_path_are_suspects(planted: Prof
     for suspect in found:
         nodes = suspect.path.nodes
         assert (nodes[0], nodes[-1]) == (suspect.option, "time")
-        assert set(zip(nodes, nodes[1:], strict=False)) <= graph.directed
+        assert set(pairwise(nodes)) <= graph.directed
 
 
 def test_an_effect_that_is_not_identified_is_not_ranked(planted: Profile) -> None:
