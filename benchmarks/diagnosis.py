@@ -119,9 +119,8 @@ def evaluate(platform: str, shared: Path, table: Path | None, verbose: bool) -> 
         if not diagnosis.faults:
             # The outside measurement says failed, the log says just inside: the operator lowers the threshold to match.
             tally.too_close.append(truth["tag"])
-            tightened = {
-                r.variable.name: LOWERED * r.value for r in diagnosis.objectives if _is_near(r, truth, platform)
-            }
+            near = [r for r in diagnosis.objectives if _is_near(r, truth, platform)]
+            tightened = {r.variable.name: LOWERED * r.value for r in near if r.value is not None}
             diagnosis = triage(log, profile, choice, top=10, thresholds=tightened)
         _count(tally, diagnosis, truth, platform, reference, profile, peers, verbose)
     return tally

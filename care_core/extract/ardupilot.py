@@ -202,6 +202,17 @@ def _in_flight(mission: Mission, kind: str, about: str = "") -> Value:
     return _has_event(mission, kind, about) if _is_armed(mission) else _NOT_FLOWN
 
 
+def _nothing_to_judge(mission: Mission, flight: Flight) -> Unavailable | None:
+    """Why a flight says nothing about a mission, None when it does."""
+    if not flight.waypoints:
+        return Unavailable("the log names no waypoints", "record CMD")
+    if "MSG" not in mission.tables:
+        return Unavailable("the log does not say which waypoints were reached", "record MSG")
+    if not _flew_automatically(mission):
+        return Unavailable("the mission was never started (no Auto mode in flight)", "judge a flight of the mission")
+    return None
+
+
 def _flew_automatically(mission: Mission) -> bool:
     """Whether Auto mode was in force at any time of the mission; a log without MODE is given the benefit."""
     modes = mission.tables.get("MODE")
@@ -223,12 +234,9 @@ def mission_success(mission: Mission, args: Args) -> Value:
     if _forced(mission) or _has_event(mission, "crash") or _has_event(mission, "failsafe"):
         return 0.0
     flight = mission.shared(analyse)
-    if not flight.waypoints:
-        return Unavailable("the log names no waypoints", "record CMD")
-    if "MSG" not in mission.tables:
-        return Unavailable("the log does not say which waypoints were reached", "record MSG")
-    if not _flew_automatically(mission):
-        return Unavailable("the mission was never started (no Auto mode in flight)", "judge a flight of the mission")
+    unknown = _nothing_to_judge(mission, flight)
+    if unknown is not None:
+        return unknown
     if flight.reached < len(flight.waypoints):
         return 0.0
     off_m = landing_error(mission, {})

@@ -98,22 +98,24 @@ def read_contents(bag: mmap) -> Contents:
     """Walk over a bag's records."""
     contents = Contents()
     pos, size = len(MAGIC), len(bag)
-    index_pos = connection_count = 0
+    index_pos = connection_count = chunk_count = chunk_infos = 0
     while pos < size:
         try:
             record = _read_record(bag, pos, size)
             if record.op == _BAG:
                 index_pos, connection_count = record.number(b"index_pos"), record.number(b"conn_count")
+                chunk_count = record.number(b"chunk_count")
                 contents.is_encrypted = bool(record.fields.get(b"encryptor"))
             _take(bag, record, contents)
+            chunk_infos += record.op == _CHUNK_INFO
         except BrokenRecordError as err:
             contents.damage.append(Damage(f"the log breaks off: {err}", pos))
             break
         pos = record.end
     if index_pos == 0:
         contents.damage.insert(0, Damage("the recording was not closed, so the bag has no index", len(MAGIC)))
-    elif len(contents.connections) < connection_count and not contents.damage:
-        contents.damage.append(Damage("the log breaks off before its index", size))
+    elif (len(contents.connections) < connection_count or chunk_infos < chunk_count) and not contents.damage:
+        contents.damage.append(Damage("the log breaks off before the end of its index", size))
     _complete(bag, contents)
     return contents
 
