@@ -114,28 +114,19 @@ class World:
     def _continuous(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
         mechanism = self.model.mechanisms[outcome.mechanism]
         x = columns(configs, mechanism.inputs)
-        centre = mechanism.latent(x)
-        spread = np.sqrt(mechanism.latent_spread(x) ** 2 + mechanism.noise_spread**2)
         seen = self._known(outcome.objective)
         if seen is not None and seen > LEAST[mechanism.transform]:
-            centre, spread = self._carried_over(mechanism, configs, x, seen)
+            # This run's noise is carried over, y' = y + f(x') - f(x), but for the share that does not persist.
+            change, unsure = mechanism.change(x, columns([self.config], mechanism.inputs))
+            centre = float(transformed(np.array(seen), mechanism.transform)) + change
+            spread = np.sqrt(unsure**2 + 2 * (1 - PERSISTENCE) * mechanism.noise_spread**2)
+        else:
+            centre = mechanism.latent(x)
+            spread = np.sqrt(mechanism.latent_spread(x) ** 2 + mechanism.noise_spread**2)
         bound = self.thresholds.get(outcome.objective)
         low, high = (restored(centre + mechanism.error_quantile(q) * spread, mechanism.transform) for q in INTERVAL)
         p_ok = np.full(len(configs), np.nan) if bound is None else _odds_of(mechanism, bound, centre, spread)
         return Predicted(restored(centre, mechanism.transform), low, high, p_ok)
-
-    def _carried_over(
-        self, mechanism: Mechanism, configs: Sequence[Config], x: FloatArray, seen: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """Mean and spread given this run's own outcome: y' = y + f(x') - f(x), and the noise that does not persist."""
-        here = columns([self.config], mechanism.inputs)
-        both = np.vstack([here, x])
-        covariance = mechanism.latent_covariance(both)
-        mean = mechanism.latent(both)
-        value = float(transformed(np.array(seen), mechanism.transform))
-        difference = np.maximum(np.diag(covariance)[1:] + covariance[0, 0] - 2 * covariance[0, 1:], 0.0)
-        spread = np.sqrt(difference + 2 * (1 - PERSISTENCE) * mechanism.noise_spread**2)
-        return value + mean[1:] - mean[0], spread
 
 
 def _odds_of(mechanism: Mechanism, bound: Threshold, centre: FloatArray, spread: FloatArray) -> FloatArray:

@@ -115,18 +115,27 @@ class Mechanism:
         mean: FloatArray = self.mean + self.scale * (self.kernel(self.scaled(x), self.points) @ self.weights)
         return mean
 
-    def latent_covariance(self, x: FloatArray) -> FloatArray:
-        """Posterior covariance of the noise-free value on the transformed scale. x: (m, p) -> (m, m)."""
-        z = self.scaled(x)
-        cross = self.kernel(z, self.points)
-        posterior: FloatArray = self.scale**2 * (self.kernel(z, z) - cross @ self._inverse @ cross.T)
-        return posterior
-
     def latent_spread(self, x: FloatArray) -> FloatArray:
         """Posterior standard deviation of the noise-free value, shape (m,)."""
-        cross = self.kernel(self.scaled(x), self.points)
-        explained = np.einsum("ij,jk,ik->i", cross, self._inverse, cross)
-        spread: FloatArray = self.scale * np.sqrt(np.maximum(self.kernel.variance - explained, 1e-12))
+        return self._spread(np.full(len(x), self.kernel.variance), self.kernel(self.scaled(x), self.points))
+
+    def change(self, x: FloatArray, here: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """f(x) - f(here) on the transformed scale: posterior mean and standard deviation, both of shape (m,).
+
+        What is not known at both places cancels, so a small change is known better than either value.
+
+        Args:
+            x: shape (m, p). here: shape (1, p).
+        """
+        z, origin = self.scaled(x), self.scaled(here)
+        cross = self.kernel(z, self.points) - self.kernel(origin, self.points)
+        prior = 2 * (self.kernel.variance - self.kernel(z, origin)[:, 0])
+        mean: FloatArray = self.scale * (cross @ self.weights)
+        return mean, self._spread(prior, cross)
+
+    def _spread(self, prior: FloatArray, cross: FloatArray) -> FloatArray:
+        explained = ((cross @ self._inverse) * cross).sum(axis=1)
+        spread: FloatArray = self.scale * np.sqrt(np.maximum(prior - explained, 1e-12))
         return spread
 
     def ignorance(self, x: FloatArray) -> FloatArray:

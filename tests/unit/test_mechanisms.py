@@ -80,9 +80,12 @@ def test_a_covariance_is_symmetric_and_never_negative(x: FloatArray) -> None:
     assert np.linalg.eigvalsh(covariance).min() > -1e-9
 
 
-def test_spread_is_the_root_of_the_covariances_diagonal() -> None:
+def test_a_change_is_known_better_than_the_values_it_lies_between() -> None:
     m, x = mechanism(), np.array([[0.0, 1.0], [3.0, 9.0], [1.0, 2.0]])
-    np.testing.assert_allclose(m.latent_spread(x) ** 2, np.diag(m.latent_covariance(x)))
+    change, spread = m.change(x, x[:1])
+    np.testing.assert_allclose(change, m.latent(x) - m.latent(x[:1]), atol=1e-9)
+    assert spread[0] < 1e-4
+    assert (spread <= 2 * m.latent_spread(x).max() + 1e-6).all()
 
 
 def test_far_away_the_model_falls_back_to_the_mean_and_knows_nothing() -> None:
