@@ -19,9 +19,11 @@ from scipy.stats import f as f_distribution
 
 from care_core.causal.graph import CausalGraph
 from care_core.learn.constraints import Constraints
+from care_core.learn.outcomes import find_stages
 from care_core.learn.screening import discoveries
 from care_core.learn.table import FloatArray, normal_scores
 from care_core.profile.schema import Schema
+from care_core.variables import Variable
 
 ROWS_PER_COLUMN = 3
 """Runs that each fitted column must have; with fewer, only options that matter marginally are held."""
@@ -77,6 +79,9 @@ class _Completer:
             for option, p in effects[metric]:
                 if option not in self.graph.ancestors(metric) and self._may_add(option, metric):
                     self._add(option, metric, f"depends on it given all other options (p = {p:.2g})")
+        for objective in self.schema.objectives:
+            if objective.kind == "functional" and objective.name in self.objectives:
+                self._link_stages(objective)
         for objective in self.objectives:
             for option, p in effects[objective]:
                 if option not in self.graph.ancestors(objective):
@@ -95,6 +100,13 @@ class _Completer:
             )
             for i, target in enumerate(targets)
         }
+
+    def _link_stages(self, objective: Variable) -> None:
+        """A condition that no mission fails without missing the objective causes it, however few missions fail it."""
+        for stage in find_stages(objective, self.schema, self.frame):
+            known = {objective.name, *self.graph.ancestors(objective.name)}
+            if stage.variable not in known and self._may_add(stage.variable, objective.name):
+                self._add(stage.variable, objective.name, "is missed by every mission that fails there")
 
     def _link(self, option: str, objective: str, p: float) -> None:
         """Give the option a path to the objective: through the metric that best carries it, else directly."""
