@@ -5,6 +5,7 @@ Data goes to stdout and talk to stderr (`console`); exit codes are `care_core.er
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from collections.abc import Iterable, Mapping
@@ -232,11 +233,14 @@ def _bound(text: str, schema: Schema) -> tuple[str, float]:
     name, _, value = text.partition("=")
     objective = _known(name.strip(), schema.objectives, "objective", "--threshold")
     try:
-        return objective.name, float(value)
+        bound = float(value)
     except ValueError:
-        raise UsageError(
-            f"'{text}' is no bound.", hint=f"Write --threshold {name}=NUMBER.", where="--threshold"
-        ) from None
+        bound = math.nan
+    if not math.isfinite(bound):
+        raise UsageError(f"'{text}' is no bound.", hint=f"Write --threshold {name}=NUMBER.", where="--threshold")
+    if objective.kind == "functional" and bound not in (0, 1):
+        raise UsageError(f"{objective.name} is 0 or 1, never {bound:g}.", hint="Write 0 or 1.", where="--threshold")
+    return objective.name, bound
 
 
 def _format_of(out: Path | None) -> str | None:

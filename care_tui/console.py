@@ -9,7 +9,7 @@ import time
 import traceback
 from pathlib import Path
 
-from care_core.errors import CareError, ExitCode
+from care_core.errors import CareError, ExitCode, UsageError
 from care_core.text import clean
 
 PIPE_CLOSED = 128 + 13
@@ -38,6 +38,10 @@ def emit(text: str, out: Path | None = None) -> None:
         # The interpreter flushes stdout once more when it ends, which must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise SystemExit(PIPE_CLOSED) from None
+    except OSError as err:
+        # What is left in the buffer would fail again when the interpreter ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise UsageError(f"Cannot write the output: {err.strerror}.", hint="Write it to another place.") from None
 
 
 def say(text: str) -> None:

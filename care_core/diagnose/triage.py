@@ -153,7 +153,7 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
     best = None if name in case.keep else best_alone(world, case.profile.schema.variables, name, case.reference)
     path = describe_path(suspect.path, world, case.profile.schema, case.run, case.reference)
     in_support = world.model.supports(name, world.config[name])
-    weakest = min((node.support for node in path if node.support is not None), default=0.0)
+    support = (suspect.effect.support if suspect.effect is not None else None) or 0.0
     changed = world.config if best is None else {**world.config, name: best[0]}
     return Cause(
         rank=rank,
@@ -166,24 +166,24 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         suggested=None if best is None else best[0],
         predicted=None if best is None else prediction(world, result.variable.name, changed),
         p_fixed=None if best is None else best[1],
-        confidence=_confidence(case, suspect.contribution, in_support, weakest),
+        confidence=_confidence(case, suspect.contribution, in_support, support),
         in_support=in_support,
-        notes=_cause_notes(case, suspect, in_support, weakest),
+        notes=_cause_notes(case, suspect, in_support, support),
         is_lead=suspect.contribution < MIN_CONTRIBUTION,
     )
 
 
-def _confidence(case: _Case, contribution: float, in_support: bool, weakest_edge: float) -> Confidence:
-    """High where the option explains most of the fault along edges that nearly every resample holds."""
+def _confidence(case: _Case, contribution: float, in_support: bool, support: float) -> Confidence:
+    """High where the option explains most of the fault and nearly every resample gives it a path there."""
     doubtful = not in_support or bool(case.choice.warnings) or not case.run.mission.fits
-    if doubtful or weakest_edge < LOW_SUPPORT or contribution < UNSURE:
+    if doubtful or support < LOW_SUPPORT or contribution < UNSURE:
         return "low"
-    if weakest_edge >= HIGH_SUPPORT and contribution >= SURE:
+    if support >= HIGH_SUPPORT and contribution >= SURE:
         return "high"
     return "medium"
 
 
-def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, weakest_edge: float) -> tuple[str, ...]:
+def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float) -> tuple[str, ...]:
     notes = []
     if suspect.effect is None:
         notes.append(f"no effect on {suspect.path.nodes[-1]} was seen in training: not ruled out")
@@ -192,8 +192,8 @@ def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, weakest_edge: 
     if not in_support:
         summary = case.world.model.summaries[suspect.option]
         notes.append(f"outside the training support ({summary.low:g} to {summary.high:g})")
-    if suspect.effect is not None and weakest_edge < LOW_SUPPORT:
-        notes.append(f"an edge of this path was found in only {weakest_edge:.0%} of resamples")
+    if suspect.effect is not None and support < LOW_SUPPORT:
+        notes.append(f"a path to {suspect.path.nodes[-1]} was found in only {support:.0%} of resamples")
     if suspect.option in case.keep:
         notes.append("pinned by --keep: not changed")
     notes += change_notes(case.profile.schema.variables[suspect.option])

@@ -1,9 +1,10 @@
-"""How often an edge is learned again from a part of the runs."""
+"""How often an edge, or a way from an option to an objective, is learned again from a part of the runs."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -17,11 +18,23 @@ from care_core.profile.schema import Schema
 SHARE = 0.632
 """Share of the runs in a resample: as many different runs as a bootstrap resample has. They are drawn without
 replacement, since a run that is there twice passes for two independent ones in every test of the graph search."""
-AnyEdge = Edge | frozenset[str]
-"""A directed edge as (cause, effect), a bidirected one as the set of its ends."""
 
 
-def edge_support(
+@dataclass(frozen=True)
+class Reaches:
+    """That an option has a directed path to an objective, whichever metrics it goes through."""
+
+    option: str
+    objective: str
+
+
+Finding = Edge | frozenset[str] | Reaches
+"""A directed edge as (cause, effect), a bidirected one as the set of its ends, or an option that reaches an objective.
+
+Metrics that repeat each other share the resamples between them: each edge is seen in few, the effect in all."""
+
+
+def support(
     frame: pd.DataFrame,
     schema: Schema,
     *,
@@ -29,8 +42,8 @@ def edge_support(
     rng: np.random.Generator,
     n_jobs: int = 1,
     alpha: float = 0.01,
-) -> Mapping[AnyEdge, float]:
-    """Share of resamples whose learned graph holds the edge; edges of no resample are left out.
+) -> Mapping[Finding, float]:
+    """Share of resamples whose learned graph holds each finding; those of no resample are left out.
 
     Screening is part of every resample, so the share covers the whole way from the table to the graph.
 
@@ -39,16 +52,14 @@ def edge_support(
         n_jobs: processes.
     """
     seeds = rng.bit_generator.seed_seq.spawn(resamples)  # type: ignore[attr-defined]  # numpy's stub lacks spawn
-    tasks = (delayed(_edges_of_resample)(frame, schema, seed, alpha) for seed in seeds)
-    counts: Counter[AnyEdge] = Counter()
-    for edges in Parallel(n_jobs=min(n_jobs, resamples))(tasks) if resamples else ():
-        counts.update(edges)
-    return {edge: count / resamples for edge, count in counts.items()}
+    tasks = (delayed(_findings)(frame, schema, seed, alpha) for seed in seeds)
+    counts: Counter[Finding] = Counter()
+    for findings in Parallel(n_jobs=min(n_jobs, resamples))(tasks) if resamples else ():
+        counts.update(findings)
+    return {finding: count / resamples for finding, count in counts.items()}
 
 
-def _edges_of_resample(
-    frame: pd.DataFrame, schema: Schema, seed: np.random.SeedSequence, alpha: float
-) -> tuple[AnyEdge, ...]:
+def _findings(frame: pd.DataFrame, schema: Schema, seed: np.random.SeedSequence, alpha: float) -> tuple[Finding, ...]:
     rng = np.random.default_rng(seed)
     rows = rng.choice(len(frame), size=round(SHARE * len(frame)), replace=False)
     resample = frame.iloc[np.sort(rows)].reset_index(drop=True)
@@ -56,4 +67,10 @@ def _edges_of_resample(
         graph = learn_structure(resample, schema, alpha=alpha, rng=rng).graph
     except LearningError:  # a rare outcome may be in no run of the resample
         return ()
-    return (*sorted(graph.directed), *(frozenset(edge) for edge in sorted(graph.bidirected)))
+    options = {option.name for option in schema.options}
+    reached = (
+        Reaches(option, objective.name)
+        for objective in schema.objectives
+        for option in sorted(options & set(graph.ancestors(objective.name)))
+    )
+    return (*sorted(graph.directed), *(frozenset(edge) for edge in sorted(graph.bidirected)), *reached)

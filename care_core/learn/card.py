@@ -90,8 +90,10 @@ def _effects(model: Model) -> str:
     for objective in dict.fromkeys(e.objective for e in ranked):
         for e in [e for e in ranked if e.objective == objective][:TOP]:
             known = "yes" if e.identified else "no: not ranked"
-            rows.append((objective, e.option, f"{e.effect:.2f} ({e.low:.2f} to {e.high:.2f})", e.direction, known))
-    header = ("objective", "option", "effect (90 % interval)", "direction", "identified")
+            seen = "" if e.support is None else f"{e.support:.0%}"
+            size = f"{e.effect:.2f} ({e.low:.2f} to {e.high:.2f})"
+            rows.append((objective, e.option, size, e.direction, seen, known))
+    header = ("objective", "option", "effect (90 % interval)", "direction", "path in resamples", "identified")
     return "## Total effects\n\nEq. 1 on scaled variables.\n\n" + _table(header, rows)
 
 

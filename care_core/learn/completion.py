@@ -79,9 +79,9 @@ class _Completer:
             for option, p in effects[metric]:
                 if option not in self.graph.ancestors(metric) and self._may_add(option, metric):
                     self._add(option, metric, f"depends on it given all other options (p = {p:.2g})")
-        for objective in self.schema.objectives:
-            if objective.kind == "functional" and objective.name in self.objectives:
-                self._link_stages(objective)
+        for declared in self.schema.objectives:
+            if declared.kind == "functional" and declared.name in self.objectives:
+                self._link_stages(declared)
         for objective in self.objectives:
             for option, p in effects[objective]:
                 if option not in self.graph.ancestors(objective):

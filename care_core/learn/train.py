@@ -17,7 +17,8 @@ from care_core.causal.effects import Effect, acceptable_values, average_causal_e
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Mechanism, solve
 from care_core.causal.paths import CausalPath, rank_paths
-from care_core.learn.bootstrap import edge_support
+from care_core.learn.bootstrap import Finding, Reaches
+from care_core.learn.bootstrap import support as measure_support
 from care_core.learn.fitting import METRIC, OUTCOME
 from care_core.learn.identification import identify
 from care_core.learn.outcomes import fit_on, fit_outcomes, fit_total, groups_that_move_together
@@ -64,7 +65,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Prog
     report("learning the graph", 0.0)
     structure = learn_structure(frame, schema, alpha=settings.alpha, rng=rng)
     report(f"bootstrapping the graph, {settings.resamples} resamples", 0.1)
-    support = edge_support(
+    support = measure_support(
         frame, schema, resamples=settings.resamples, rng=rng, n_jobs=settings.n_jobs, alpha=settings.alpha
     )
     graph = structure.graph
@@ -81,7 +82,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Prog
         graph=graph,
         edges={edge: _edge_record(edge, "directed", support, edges) for edge in sorted(graph.directed)},
         bidirected=tuple(_edge_record(edge, "bidirected", support, edges) for edge in sorted(graph.bidirected)),
-        effects=_total_effects(frame, schema, graph, outcomes, mechanisms, resamples),
+        effects=_total_effects(frame, schema, graph, outcomes, mechanisms, resamples, support),
         paths=_paths(schema, graph, edges),
         outcomes=outcomes,
         summaries=_summaries(frame, schema),
@@ -186,7 +187,7 @@ def _in_parallel(settings: Settings, calls: Iterable[Any]) -> list[Any]:
 
 
 def _edge_record(
-    edge: Edge, kind: str, support: Mapping[Edge | frozenset[str], float], effects: Mapping[Edge, _Measured]
+    edge: Edge, kind: str, support: Mapping[Finding, float], effects: Mapping[Edge, _Measured]
 ) -> EdgeRecord:
     measured = effects.get(edge) if kind == "directed" else None
     return EdgeRecord(
@@ -206,6 +207,7 @@ def _total_effects(
     outcomes: Mapping[str, OutcomeRecord],
     mechanisms: Mapping[str, Mechanism],
     resamples: _Resamples,
+    support: Mapping[Finding, float],
 ) -> dict[Edge, EffectRecord]:
     """Every option with a directed path to an objective: is the effect identified, and how large is it?"""
     records: dict[Edge, EffectRecord] = {}
@@ -234,6 +236,7 @@ def _total_effects(
                 low=float(low),
                 high=float(high),
                 direction=best.effect.direction,
+                support=support.get(Reaches(option, objective), 0.0),
             )
     return records
 

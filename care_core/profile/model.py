@@ -52,6 +52,8 @@ class EffectRecord(_Record):
     low: float
     high: float
     direction: Direction
+    support: float | None = None
+    """Share of bootstrap resamples in which the option has a directed path to the objective; None: not measured."""
 
 
 class PathRecord(_Record):

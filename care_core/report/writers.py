@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
 from care_core.errors import UsageError
-from care_core.report.document import CauseEntry, FixSet, ObjectiveEntry, Report, TriageDocument
+from care_core.report.document import CauseEntry, FixSet, ObjectiveEntry, PredictedValue, Report, TriageDocument
 
 STATUS_WORDS = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
 
@@ -73,12 +73,13 @@ def _markdown(report: Report) -> Iterator[str]:
 
 def _verdict(report: Report) -> str:
     broken = [objective.name for objective in report.objectives if objective.status == "fault"]
+    names = ", ".join(f"`{name}`" for name in broken)
     if report.abstained:
-        return f"**No answer**: {_escape(report.abstained)}"
+        found = f"**Fault**: {names}. " if broken else ""
+        return f"{found}**No answer**: {_escape(report.abstained)}"
     if not broken:
         unknown = any(objective.status == "not_evaluated" for objective in report.objectives)
         return "**No fault found**, but not everything could be evaluated." if unknown else "**No fault found.**"
-    names = ", ".join(f"`{name}`" for name in broken)
     if report.fix is None:
         return f"**Fault**: {names}."
     changes = ", ".join(f"`{change.option}` from {change.from_:g} to {change.to:g}" for change in report.fix.changes)
@@ -104,9 +105,10 @@ def _cause_row(cause: CauseEntry) -> tuple[str, ...]:
 def _fix_section(report: Report, fix: FixSet) -> Iterator[str]:
     yield "## Fix"
     yield ""
+    objectives = {objective.name: objective for objective in report.objectives}
     rows = (
-        (f"`{name}`", f"{p.value:.4g} ({p.low:.4g} to {p.high:.4g})", STATUS_WORDS[p.status])
-        for name, p in fix.predicted.items()
+        (f"`{name}`", _prediction(objectives[name], predicted), STATUS_WORDS[predicted.status])
+        for name, predicted in fix.predicted.items()
     )
     yield from _table(("Objective", "Predicted (80 %)", "Status"), rows)
     yield ""
@@ -119,9 +121,16 @@ def _fix_section(report: Report, fix: FixSet) -> Iterator[str]:
     yield "```"
 
 
+def _prediction(objective: ObjectiveEntry, predicted: PredictedValue) -> str:
+    """A yes-or-no objective has odds, not a value."""
+    if objective.kind == "functional":
+        return f"{predicted.value:.0%} odds"
+    return f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
+
+
 def _origin(report: Report) -> Iterator[str]:
     log, profile = report.log, report.profile
-    yield f"Log `{_escape(log.path)}`, {log.format}, {log.duration_s:.0f} s, SHA-256 `{log.sha256}`."
+    yield f"Log {_code(log.path)}, {log.format}, {log.duration_s:.0f} s, SHA-256 `{log.sha256}`."
     yield f"Profile {profile.name} {profile.version} ({profile.platform})."
     for damage in log.damage:
         yield f"Damage: {_escape(damage.what)}."
@@ -137,6 +146,13 @@ def _table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]
 
 def _escape(text: str) -> str:
     return _MARKDOWN_SPECIAL.sub(r"\\\1", text)
+
+
+def _code(text: str) -> str:
+    """A code span: nothing in it is escaped, so its fence is longer than any run of backticks inside."""
+    fence = "`" * (1 + max(map(len, re.findall("`+", text)), default=0))
+    pad = " " if "`" in text else ""
+    return f"{fence}{pad}{text}{pad}{fence}"
 
 
 def write_atomically(path: Path, text: str) -> None:
