@@ -45,7 +45,8 @@ class CareApp(App[int], inherit_bindings=False):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("question_mark,f1", "help", "Help", key_display="?", id="app.help"),
         Binding("q", "quit", "Quit", id="app.quit"),
-        Binding("ctrl+c", "interrupt", "Interrupt", show=False, id="app.interrupt"),
+        # With priority, for a dialog shuts out the keys of the app.
+        Binding("ctrl+c", "interrupt", "Interrupt", show=False, priority=True, id="app.interrupt"),
     ]
 
     def __init__(
@@ -145,7 +146,8 @@ class CareApp(App[int], inherit_bindings=False):
     def _keys_of(self, screen: Screen[None]) -> Keys:
         """Every key that works on the screen, keys of one action together, in the order they are looked up."""
         keys: dict[str, list[str]] = {}
-        for key, active in screen.active_bindings.items():
+        # Keys with priority come first there; they are those of the app and belong at the end.
+        for key, active in sorted(screen.active_bindings.items(), key=lambda item: item[1].binding.priority):
             description = active.binding.description
             if active.enabled and description and active.binding.id:
                 keys.setdefault(description, []).append(self.get_key_display(active.binding.with_key(key)))

@@ -8,14 +8,14 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
-from care_core.errors import ExitCode, LogError, UsageError, nearest
+from care_core.errors import CareError, ExitCode, LogError, UsageError, nearest
 from care_tui import __version__
 from care_tui.console import Progress, emit, explain, painted, say
 
@@ -321,12 +321,11 @@ def ingest(
 ) -> None:
     """Read many logs into a table of runs, one row a mission, for 'care train'."""
     from care_core.extract.table import check_table_path, find_logs, ingest, write_table
-    from care_core.logs import open_log
     from care_core.profile.store import load_profile
 
     check_table_path(out)
     paths = find_logs(logs)
-    schema = load_profile(profile).schema if profile else _choose(open_log(paths[0]), None)[0].schema
+    schema = load_profile(profile).schema if profile else _schema_for(paths)
     with Progress() as progress:
         rows, failures = ingest(paths, schema, workers=workers, progress=progress)
     for failure in failures:
@@ -335,6 +334,18 @@ def ingest(
         raise LogError(f"None of the {len(paths)} logs could be read.", hint="Look at one with 'care inspect'.")
     write_table(out, rows, schema)
     say(f"wrote {out}: {len(rows)} runs of {len(paths) - len(failures)} logs, {len(failures)} logs failed")
+
+
+def _schema_for(paths: Sequence[Path]) -> Schema:
+    """The schema that fits the first log that can be read."""
+    from care_core.logs import open_log
+
+    for path in paths:
+        try:
+            return _choose(open_log(path), None)[0].schema
+        except CareError:  # 'ingest' tells why, of every log
+            continue
+    raise LogError(f"None of the {len(paths)} logs fits a profile.", hint="Look at one with 'care inspect'.")
 
 
 @app.command()

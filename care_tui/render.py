@@ -399,7 +399,9 @@ def no_fix_rows(diagnosis: Diagnosis) -> Rows:
         return Rows([Row(Content("No fix is suggested.")), warning("Reason", diagnosis.abstained)])
     if diagnosis.faults:
         return Rows([Row(Content("No change of options is predicted to keep all thresholds."))])
-    return Rows([Row(Content("No fault was found: there is nothing to change."))])
+    if all(objective.status == "ok" for objective in diagnosis.objectives):
+        return Rows([Row(Content("No fault was found: there is nothing to change."))])
+    return Rows([Row(Content("No fault was found, but not everything could be evaluated: no change is suggested."))])
 
 
 # Steps 4 and 5: diff and report

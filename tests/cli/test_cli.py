@@ -157,6 +157,27 @@ def test_a_report_is_written_in_the_format_of_its_name(care: Care, made: dict[st
     assert care("triage", "a.BIN", "--out", tmp_path / "none" / "report.json").code == 2
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_behind_stdout_is_said() -> None:
+    with Path("/dev/full").open("w") as full:
+        outcome = subprocess.run(
+            [sys.executable, "-c", "from care_tui.cli import main; main()", "schema", "triage"],
+            stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, check=False, cwd=ROOT,
+        )  # fmt: skip
+    assert outcome.returncode == 2
+    assert outcome.stderr.startswith("care: Cannot write the output: ")
+
+
+def test_ingest_chooses_the_profile_by_a_log_that_can_be_read(
+    care: Care, flights: tuple[Path, ...], tmp_path: Path
+) -> None:
+    empty = tmp_path / "empty.BIN"
+    empty.touch()
+    outcome = care("ingest", empty, flights[0], "-o", tmp_path / "runs.csv")
+    assert outcome.code == 0
+    assert "1 logs failed" in outcome.stderr
+
+
 def test_only_one_format_can_be_printed(care: Care, made: dict[str, Any]) -> None:
     assert care("triage", "a.BIN", "--json", "--yaml").code == 2
 
@@ -167,6 +188,9 @@ def test_only_one_format_can_be_printed(care: Care, made: dict[str, Any]) -> Non
         ("--keep", "WPNAV_SPED", "Did you mean 'WPNAV_SPEED'?"),
         ("--threshold", "enery=3", "Did you mean 'energy'?"),
         ("--threshold", "energy=much", "--threshold energy=NUMBER"),
+        ("--threshold", "energy=nan", "--threshold energy=NUMBER"),
+        ("--threshold", "energy=inf", "--threshold energy=NUMBER"),
+        ("--threshold", "mission_success=5", "0 or 1"),
         ("--profile", "arducoptr", "Did you mean 'arducopter'?"),
     ],
 )

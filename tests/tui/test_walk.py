@@ -116,7 +116,7 @@ async def test_enter_on_a_cause_opens_the_fix_that_changes_it(make_app: MakeApp)
     [
         (sample.all_ok(), "nothing to explain", "nothing to change"),
         (sample.abstaining(), "mean lean 19 deg", "mean lean 19 deg"),
-        (sample.not_evaluated(), "nothing to explain", "nothing to change"),
+        (sample.not_evaluated(), "nothing to explain", "not everything could be evaluated"),
     ],
 )
 async def test_without_a_cause_every_step_says_why(
@@ -215,3 +215,11 @@ def test_every_binding_has_an_id() -> None:
             assert not isinstance(binding, tuple)
             assert binding.id
             assert not {f"ctrl+{letter}" for letter in "sqjimhba"} & set(binding.key.split(","))
+
+
+@pytest.mark.parametrize("keys", [("1",), ("question_mark",), ("5", "e")])
+async def test_ctrl_c_leaves_from_anywhere(make_app: MakeApp, keys: tuple[str, ...]) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, *keys, "ctrl+c")
+    assert app.return_value == ExitCode.INTERRUPTED

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
+from care_core.diagnose.records import Prediction
 from care_core.errors import UsageError
 from care_core.report import (
     build_document,
@@ -126,7 +128,26 @@ def test_the_other_headlines() -> None:
     assert "No answer: nothing in the profile" in to_text(lost)
     assert "**No fault found.**" in to_markdown(build_document(fine))
     assert "not everything" in to_markdown(build_document(unknown))
-    assert "**No answer**" in to_markdown(build_document(lost))
+    assert "**Fault**: `mission_time`. **No answer**: nothing" in to_markdown(build_document(lost))
+
+
+def test_markdown_gives_odds_for_a_yes_or_no_objective_and_a_unit_for_a_measured_one() -> None:
+    diagnosis = made_diagnosis()
+    fix = diagnosis.fix
+    assert fix is not None
+    name = next(o.variable.name for o in diagnosis.objectives if o.variable.kind == "functional")
+    predicted = {**fix.predicted, name: Prediction(0.94, 1.0, 1.0, p_ok=0.94)}
+    text = to_markdown(build_document(replace(diagnosis, fix=replace(fix, predicted=predicted))))
+    assert f"| `{name}` | 94% odds |" in text
+    assert re.search(r"\| `mission_time` \| .* to .*\) s \|", text)
+
+
+@pytest.mark.parametrize(("path", "span"), [("a_b*.BIN", "`a_b*.BIN`"), ("a``b`.BIN", "``` a``b`.BIN ```")])
+def test_a_path_in_markdown_is_shown_as_it_is(path: str, span: str) -> None:
+    diagnosis = made_diagnosis()
+    log = replace(diagnosis.run.log, path=path)
+    text = to_markdown(build_document(replace(diagnosis, run=replace(diagnosis.run, log=log))))
+    assert f"Log {span}, " in text
 
 
 @given(st.text())
