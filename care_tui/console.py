@@ -78,7 +78,7 @@ class Progress:
         if self._in_place:
             print(f"\r\x1b[K{clean(step)} {share:.0%}"[:100], end="", file=sys.stderr, flush=True)
             self._said = True
-        elif not self._said and time.monotonic() - self._started > QUIET_S:
+        elif share < 1.0 and not self._said and time.monotonic() - self._started > QUIET_S:
             say(f"{step} ...")
             self._said = True
 

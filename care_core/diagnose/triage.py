@@ -239,7 +239,8 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str |
         )
     now = float(case.world.odds([case.world.config])[0])
     if not fixes or fixes[0].p_fixed < max(MIN_ODDS, now + MIN_CONTRIBUTION):
-        return "no change inside the acceptable ranges is likely enough to meet every threshold"
+        pinned = f", with {', '.join(sorted(case.keep))} kept as it is" if case.keep else ""
+        return f"no change inside the acceptable ranges is likely enough to meet every threshold{pinned}"
     return None
 
 

@@ -122,6 +122,7 @@ class _Source:
 
     def run(self, index: int, overrides: Mapping[str, Setting], judge_anyway: Collection[str]) -> Run:
         found = self.missions[index]
+        found = replace(found, ended=found.ended and not _cut_short(found, self.log))
         driven = {name: in_force(history, found.end_s) for name, history in self.settings.items()}
         config, settings = configuration(self.schema.options, driven, overrides)
         mission = replace(found, settings={name: setting.value for name, setting in driven.items()})
@@ -161,6 +162,12 @@ def _pointed(evidence: Evidence, schema: Schema) -> Evidence:
     text = evidence.text.casefold()
     named = [option for rule, options in schema.evidence if rule.casefold() in text for option in options]
     return replace(evidence, options=tuple(dict.fromkeys((*evidence.options, *named))))
+
+
+def _cut_short(mission: Mission, log: LogInfo) -> bool:
+    """Whether the log breaks off while the mission lasts: an arming refused so far may be granted later."""
+    runs_out = mission.end_s >= log.duration_s - 1e-3
+    return runs_out and any(d.time_s is None or d.time_s >= mission.end_s - 1.0 for d in log.damage)
 
 
 def _gated(

@@ -41,6 +41,8 @@ _FIELD_TYPES: dict[str, tuple[str, float]] = {
 
 # GPS time runs ahead of UTC by the leap seconds since 1980: 18 since 2017, and none is announced.
 _GPS_EPOCH = datetime(1980, 1, 6, tzinfo=timezone.utc) - timedelta(seconds=18)
+# A week that no receiver has reached yet is a flipped bit.
+_LAST_WEEK, _WEEK_MS = 5200, 7 * 24 * 3600 * 1000
 _FIRMWARE = re.compile(r"(Ardu\w+|APM:\w+|AntennaTracker|Blimp|Rover) V\d")
 
 
@@ -162,7 +164,7 @@ class DataFlashLog:
         gps = self.read({"GPS": ("GWk", "GMS")}).get("GPS")
         if gps is None or not {"GWk", "GMS"} <= gps.columns.keys():
             return None
-        known = gps.where(gps["GWk"] > 0)
+        known = gps.where((gps["GWk"] > 0) & (gps["GWk"] <= _LAST_WEEK) & (gps["GMS"] < _WEEK_MS))
         if not len(known):
             return None
         fix = _GPS_EPOCH + timedelta(weeks=float(known["GWk"][0]), milliseconds=float(known["GMS"][0]))
@@ -348,7 +350,8 @@ def _decode(data: Bytes, offsets: Offsets, field: Field) -> NDArray[Any]:
         rows = np.empty(len(values), dtype=object)
         rows[:] = [tuple(row) for row in values.tolist()]
         return rows
-    return values.astype(np.float64) / field.divisor
+    with np.errstate(invalid="ignore"):  # flipped bits make signalling NaNs of floats
+        return np.asarray(values.astype(np.float64) / field.divisor)
 
 
 def _inner_strides(dtype: np.dtype[Any]) -> tuple[int, ...]:

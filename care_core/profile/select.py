@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from care_core.diagnose.records import ProfileChoice
-from care_core.errors import ProfileError
+from care_core.errors import LogError, ProfileError
 from care_core.extract.read import reading_plan
 from care_core.extract.settings import readable
 from care_core.logs.base import Log
@@ -58,7 +58,7 @@ def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice]
     order = sorted(range(len(fits)), key=lambda i: (-fits[i].found, -fits[i].names, fits[i].schema.name))
     usable = [i for i in order if fits[i].found]
     if not usable:
-        raise _nothing_fits(log, fits)
+        raise _nothing_readable(log) or _nothing_fits(log, fits)
     best = fits[usable[0]]
     others = [fits[i].schema.name for i in usable[1:] if fits[i].found >= NEARLY_AS_WELL * best.found]
     return candidates[usable[0]], _choice(log, best, others)
@@ -102,6 +102,17 @@ def differences(log: Log, schema: Schema) -> tuple[str, ...]:
         f"the log's {key} is '{log.facts[key]}', the profile is for '{text}'"
         for key, text in schema.match.items()
         if log.facts.get(key) and text.casefold() not in log.facts[key].casefold()
+    )
+
+
+def _nothing_readable(log: Log) -> LogError | None:
+    """A damaged log without a single message left is no question of profiles."""
+    if not log.damage or any(channel.count for channel in log.channels()):
+        return None
+    return LogError(
+        f"No message of the log can be read: {log.damage[-1].what}.",
+        hint="Copy it from the robot again, or use another recording.",
+        where=str(log.path),
     )
 
 
