@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar
 
@@ -16,7 +16,7 @@ from textual.scrollbar import ScrollBar, ScrollBarRender
 from textual.worker import Worker, get_current_worker
 
 from care_core.errors import CareError, ExitCode
-from care_tui.jobs import CancelledError, Engine, as_care_error, exit_code
+from care_tui.jobs import CancelledError, Engine, Request, as_care_error, exit_code
 from care_tui.messages import DiagnosisFailed, DiagnosisReady, Progressed
 from care_tui.render import ASCII, UNICODE
 from care_tui.screens.base import CareScreen
@@ -51,9 +51,7 @@ class CareApp(App[int], inherit_bindings=False):
 
     def __init__(
         self,
-        log: Path,
-        profile: str | None = None,
-        configs: Sequence[Path] = (),
+        request: Request,
         *,
         engine: Engine | None = None,
         ascii: bool = False,
@@ -63,15 +61,13 @@ class CareApp(App[int], inherit_bindings=False):
         ScrollBar.renderer = PlainScrollBar
         self.set_class(ascii, "-ascii")
         self.code = ExitCode.INTERRUPTED
-        self._log_path = log
-        self._profile = profile
-        self._configs = tuple(configs)
+        self._request = request
         self._engine = engine or Engine()
         self._glyphs = ASCII if ascii else UNICODE
         self._job: Worker[None] | None = None
 
     def on_mount(self) -> None:
-        self.push_screen(LoadingScreen(self._log_path, self._glyphs))
+        self.push_screen(LoadingScreen(self._request.log, self._glyphs))
         self._job = self._diagnose()
 
     # The work
@@ -86,7 +82,7 @@ class CareApp(App[int], inherit_bindings=False):
             self.post_message(Progressed(step, fraction))
 
         try:
-            diagnosis = self._engine.diagnose(self._log_path, self._profile, self._configs, progress)
+            diagnosis = self._engine.diagnose(self._request, progress)
             progress("Done", 1.0)
         except CancelledError:
             return
@@ -125,7 +121,7 @@ class CareApp(App[int], inherit_bindings=False):
 
     def action_retry(self) -> None:
         self.code = ExitCode.INTERRUPTED
-        self._replace(LoadingScreen(self._log_path, self._glyphs))
+        self._replace(LoadingScreen(self._request.log, self._glyphs))
         self._job = self._diagnose()
 
     # Keys and commands that work everywhere
@@ -168,8 +164,8 @@ class CareApp(App[int], inherit_bindings=False):
         yield SystemCommand("Quit", "Leave care", self.action_quit)
 
 
-def run(log: Path, profile: str | None, configs: Sequence[Path], *, ascii: bool = False) -> int:
+def run(request: Request, *, ascii: bool = False) -> int:
     """Open the app on a log; answers the exit code."""
-    app = CareApp(log, profile, configs, ascii=ascii)
+    app = CareApp(request, ascii=ascii)
     answer = app.run()
     return int(app.code if answer is None else answer)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from care_core.diagnose.records import Diagnosis, Fix
 from care_core.errors import CareError, ExitCode
-from care_core.run import Run
+
+if TYPE_CHECKING:
+    from care_core.diagnose.records import Diagnosis, Fix
+    from care_core.run import Run
 
 Progress = Callable[[str, float], None]
 ReportFormat = Literal["yaml", "markdown", "json"]
@@ -23,20 +25,43 @@ class CancelledError(Exception):
     """The operator took the work back. Raised out of a progress call to unwind the engine."""
 
 
-def diagnose_log(path: Path, profile: str | None, configs: Sequence[Path], progress: Progress) -> Diagnosis:
-    """The whole line from a log file to its diagnosis, the same as `care triage` runs."""
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What an operator asks: a log, and how to look at it. The fields are the options of `care triage`."""
+
+    log: Path
+    profile: str | None = None
+    configs: tuple[Path, ...] = ()
+    keep: tuple[str, ...] = ()
+    thresholds: Mapping[str, float] = field(default_factory=dict)
+    top: int = 5
+    mission: int | None = None
+
+
+def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
+    """The whole line from a log file to its diagnosis. Raises CareError."""
     from care_core.configs import read_configs
     from care_core.diagnose.triage import triage
     from care_core.logs import open_log
     from care_core.profile.select import choose_profile
     from care_core.profile.store import available_profiles, load_profile
 
-    overrides = read_configs(configs)
+    configs = read_configs(request.configs)
     progress("opening the log", 0.0)
-    log = open_log(path)
-    names: list[Path] | list[str] = available_profiles() if profile is None else [profile]
+    log = open_log(request.log)
+    names: list[Path] | list[str] = available_profiles() if request.profile is None else [request.profile]
     chosen, choice = choose_profile(log, [load_profile(name) for name in names])
-    return triage(log, chosen, choice, configs=overrides, progress=progress)
+    return triage(
+        log,
+        chosen,
+        choice,
+        configs=configs,
+        keep=request.keep,
+        thresholds=request.thresholds,
+        mission=request.mission,
+        top=request.top,
+        progress=progress,
+    )
 
 
 def diff_of(run: Run, fix: Fix) -> str:
@@ -65,7 +90,7 @@ def save_report(path: Path, text: str) -> None:
 class Engine:
     """Everything the app asks of care_core."""
 
-    diagnose: Callable[[Path, str | None, Sequence[Path], Progress], Diagnosis] = diagnose_log
+    diagnose: Callable[[Request, Progress], Diagnosis] = diagnose_log
     diff: Callable[[Run, Fix], str] = diff_of
     report: Callable[[Diagnosis, ReportFormat], str] = report_of
     save: Callable[[Path, str], None] = save_report

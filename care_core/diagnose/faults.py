@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from care_core.diagnose.records import ObjectiveResult, Status
+from care_core.errors import UsageError, nearest
 from care_core.profile.model import Summary
 from care_core.profile.schema import Schema
 from care_core.run import Run, Unavailable
@@ -21,6 +22,24 @@ def thresholds_in_force(schema: Schema, overrides: Mapping[str, float]) -> dict[
         if bound is not None:
             bounds[objective.name] = bound
     return bounds
+
+
+def check_wishes(schema: Schema, keep: Iterable[str], thresholds: Mapping[str, float]) -> None:
+    """Refuse options to keep and thresholds that the profile does not have. Raises UsageError."""
+    for name in keep:
+        _known(name, schema.options, "option", "--keep")
+    for name, bound in thresholds.items():
+        objective = _known(name, schema.objectives, "objective", "--threshold")
+        if objective.kind == "functional" and bound not in (0, 1):
+            raise UsageError(f"{name} is 0 or 1, never {bound:g}.", hint="Write 0 or 1.", where="--threshold")
+
+
+def _known(name: str, variables: Iterable[Variable], what: str, where: str) -> Variable:
+    by_name = {variable.name: variable for variable in variables}
+    if name not in by_name:
+        hint = nearest(name, by_name) or f"Known are {', '.join(by_name)}."
+        raise UsageError(f"The profile has no {what} '{name}'.", hint=hint, where=where)
+    return by_name[name]
 
 
 def judge(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import Config, World
-from care_core.diagnose.faults import judge, thresholds_in_force
+from care_core.diagnose.faults import check_wishes, judge, thresholds_in_force
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
     Assignment,
@@ -81,11 +81,12 @@ def triage(
         top: most causes to report per fault.
 
     Raises:
-        CareError: the log holds no such mission, or the profile has no usable model.
+        CareError: the log holds no such mission, the profile has no usable model, or no such option or objective.
     """
     report = progress or (lambda _step, _share: None)
     report("reading the log", 0.0)
     overrides = dict(thresholds or {})
+    check_wishes(profile.schema, keep, overrides)
     run = read_run(log, profile.schema, overrides=configs or {}, mission=mission, judge_anyway=tuple(overrides))
     report("judging the objectives", 0.6)
     diagnosis = diagnose(run, profile, choice, keep=keep, thresholds=overrides, top=top, progress=progress)

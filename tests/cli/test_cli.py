@@ -17,8 +17,11 @@ import pytest
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import UsageError
 from care_core.profile.store import load_profile
-from care_tui import __version__, cli, console
-from care_tui.cli import newest_log, route
+from care_tui import __version__, console
+from care_tui.cli import route
+from care_tui.commands import diagnosing
+from care_tui.commands.opening import newest_log
+from care_tui.jobs import Request
 from tests.conftest import Care
 from tests.made import made_diagnosis
 
@@ -44,12 +47,12 @@ def made(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Puts a diagnosis made by hand in the place of the engine, and keeps what the engine was asked."""
     asked: dict[str, Any] = {"answer": made_diagnosis()}
 
-    def diagnose(path: Path, profile: str | None, **options: Any) -> Diagnosis:
-        asked.update(options, path=path, profile=profile)
+    def diagnose(request: Request, progress: object) -> Diagnosis:
+        asked["request"] = request
         answer: Diagnosis = asked["answer"]
         return answer
 
-    monkeypatch.setattr(cli, "diagnose", diagnose)
+    monkeypatch.setattr(diagnosing, "diagnose_log", diagnose)
     return asked
 
 
@@ -129,16 +132,15 @@ def test_triage_passes_its_options_on(care: Care, made: dict[str, Any]) -> None:
         "triage", "a.BIN", "-p", "arducopter", "--config", "b.param", "--config", "c.param", "--keep", "A",
         "--threshold", "energy=12", "--mission", "2", "--top", "3",
     )  # fmt: skip
-    made.pop("answer")
-    assert made == {
-        "path": Path("a.BIN"),
-        "profile": "arducopter",
-        "configs": [Path("b.param"), Path("c.param")],
-        "keep": ["A"],
-        "thresholds": ["energy=12"],
-        "mission": 2,
-        "top": 3,
-    }
+    assert made["request"] == Request(
+        Path("a.BIN"),
+        "arducopter",
+        (Path("b.param"), Path("c.param")),
+        ("A",),
+        {"energy": 12.0},
+        top=3,
+        mission=2,
+    )
 
 
 def test_the_exit_code_says_what_was_found(care: Care, made: dict[str, Any]) -> None:
@@ -267,10 +269,6 @@ def test_profiles_are_listed_and_shown(care: Care) -> None:
 
 
 def test_the_demo_finds_its_fault(care: Care) -> None:
-    from care_core.resources import bundled
-
-    if not bundled("samples", cli.SAMPLE).is_file():
-        pytest.skip("the sample is not bundled yet")
     outcome = care("demo")
     assert outcome.code == 1, outcome.stderr
     assert outcome.stdout.startswith("FAULT: ")
@@ -281,7 +279,7 @@ def test_an_unexpected_error_is_one_sentence(care: Care, monkeypatch: pytest.Mon
     def fail(*_: object, **__: object) -> Diagnosis:
         raise RuntimeError("oops \x1b[31m")
 
-    monkeypatch.setattr(cli, "diagnose", fail)
+    monkeypatch.setattr(diagnosing, "diagnose_log", fail)
     outcome = care("triage", "a.BIN")
     assert outcome.code == 2
     assert outcome.stderr == (
@@ -295,7 +293,7 @@ def test_interrupted(care: Care, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(*_: object, **__: object) -> Diagnosis:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(cli, "diagnose", interrupt)
+    monkeypatch.setattr(diagnosing, "diagnose_log", interrupt)
     assert care("triage", "a.BIN").code == 130
 
 

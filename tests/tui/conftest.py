@@ -11,7 +11,7 @@ from textual.pilot import Pilot
 from care_core.diagnose.records import Diagnosis, Fix
 from care_core.run import Run
 from care_tui.app import CareApp
-from care_tui.jobs import Engine, Progress, ReportFormat
+from care_tui.jobs import Engine, Progress, ReportFormat, Request
 
 LOG = Path("/flights/00000042.BIN")
 MakeApp = Callable[..., CareApp]
@@ -35,13 +35,13 @@ def make_app() -> MakeApp:
     """An app that shows a given diagnosis, or raises a given error instead."""
 
     def make(outcome: Diagnosis | Exception, *, ascii: bool = False) -> CareApp:
-        def diagnose(path: Path, profile: str | None, configs: object, progress: Progress) -> Diagnosis:
+        def diagnose(request: Request, progress: Progress) -> Diagnosis:
             progress("reading the log", 0.5)
             if isinstance(outcome, Exception):
                 raise outcome
             return outcome
 
-        return CareApp(LOG, engine=Engine(diagnose, fake_diff, fake_report), ascii=ascii)
+        return CareApp(Request(LOG), engine=Engine(diagnose, fake_diff, fake_report), ascii=ascii)
 
     return make
 

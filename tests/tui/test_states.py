@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from pathlib import Path
 
 import pytest
 from textual.widgets import Static
@@ -11,7 +10,7 @@ from textual.widgets import Static
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError, ExitCode, LogError, ProfileError
 from care_tui.app import CareApp
-from care_tui.jobs import Engine, Progress
+from care_tui.jobs import Engine, Progress, Request
 from care_tui.screens.diagnosis import DiagnosisScreen
 from care_tui.screens.loading import ErrorScreen, LoadingScreen
 from care_tui.widgets.lines import Lines
@@ -27,7 +26,7 @@ class SlowEngine:
         self.go_on = threading.Event()
         self.finished = False
 
-    def diagnose(self, path: Path, profile: str | None, configs: object, progress: Progress) -> Diagnosis:
+    def diagnose(self, request: Request, progress: Progress) -> Diagnosis:
         progress("reading \x1b[31m[red]the log", 0.25)
         self.reached.set()
         assert self.go_on.wait(5)
@@ -38,7 +37,7 @@ class SlowEngine:
 
 def slow_app() -> tuple[CareApp, SlowEngine]:
     slow = SlowEngine()
-    return CareApp(LOG, engine=Engine(slow.diagnose, fake_diff, fake_report)), slow
+    return CareApp(Request(LOG), engine=Engine(slow.diagnose, fake_diff, fake_report)), slow
 
 
 async def test_loading_shows_step_and_share_done() -> None:
@@ -112,7 +111,7 @@ async def test_a_diff_that_fails_is_shown_in_its_step() -> None:
     def no_diff(run: object, fix: object) -> str:
         raise CareError("No configuration format.", hint="Report it.")
 
-    app = CareApp(LOG, engine=Engine(lambda *_: sample.faulty(), no_diff, fake_report))
+    app = CareApp(Request(LOG), engine=Engine(lambda *_: sample.faulty(), no_diff, fake_report))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4")
         assert "No configuration format." in app.screen.query_one("#diff", Lines).plain

@@ -1,0 +1,1 @@
+"""The commands, one module a subject; `care_tui.cli` puts them together."""

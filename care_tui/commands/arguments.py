@@ -1,0 +1,18 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="The log to read.", show_default=False)]
+ProfileName = Annotated[
+    str | None, typer.Option("--profile", "-p", help="Name or folder; chosen by the log if absent.")
+]
+ConfigPaths = Annotated[
+    list[Path] | None, typer.Option("--config", help="The robot's configuration file, for what the log lacks.")
+]
+Out = Annotated[Path | None, typer.Option("--out", "-o", help="Write to this file instead of stdout.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]

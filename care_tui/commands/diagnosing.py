@@ -1,0 +1,97 @@
+"""Commands that diagnose: triage, demo."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from care_core.errors import LogError, UsageError
+from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Out, ProfileName
+from care_tui.console import Progress, emit, painted
+from care_tui.jobs import Request, diagnose_log, exit_code
+
+if TYPE_CHECKING:
+    from care_core.diagnose.records import Diagnosis
+
+app = typer.Typer()
+
+SAMPLE = "arducopter_failed.BIN"
+
+
+@app.command()
+def triage(
+    log: LogPath,
+    profile: ProfileName = None,
+    config: ConfigPaths = None,
+    json: AsJson = False,
+    yaml: Annotated[bool, typer.Option("--yaml", help="Print YAML, with the diff and its commands.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print Markdown for a ticket.")] = False,
+    out: Out = None,
+    top: Annotated[int, typer.Option("--top", min=1, help="How many causes a fault may have.")] = 5,
+    keep: Annotated[
+        list[str] | None, typer.Option("--keep", metavar="OPTION", help="Never change this option.")
+    ] = None,
+    threshold: Annotated[
+        list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")
+    ] = None,
+    mission: Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last.")] = None,
+) -> None:
+    """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
+    formats = [name for name, wanted in (("json", json), ("yaml", yaml), ("markdown", markdown)) if wanted]
+    if len(formats) > 1:
+        raise UsageError("Only one of --json, --yaml and --markdown can be printed.", hint="Leave the others out.")
+    request = Request(
+        log, profile, tuple(config or ()), tuple(keep or ()), bounds(threshold or ()), top=top, mission=mission
+    )
+    with Progress() as progress:
+        diagnosis = diagnose_log(request, progress)
+    emit(_written(diagnosis, formats[0] if formats else _format_of(out), to_file=out is not None), out)
+    raise typer.Exit(exit_code(diagnosis))
+
+
+@app.command()
+def demo() -> None:
+    """Triage the failed flight that comes with the program."""
+    from care_core.resources import bundled
+
+    path = bundled("samples", SAMPLE)
+    if not path.is_file():
+        raise LogError("The bundled sample is missing.", hint="Install the program again.", where=str(path))
+    with Progress() as progress:
+        diagnosis = diagnose_log(Request(path), progress)
+    emit(_written(diagnosis, None, to_file=False))
+    raise typer.Exit(exit_code(diagnosis))
+
+
+def bounds(texts: Iterable[str]) -> dict[str, float]:
+    """The operator's thresholds out of NAME=VALUE. Raises UsageError for a value that is no number."""
+    found = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            bound = float(value)
+        except ValueError:
+            bound = math.nan
+        if not math.isfinite(bound):
+            raise UsageError(f"'{text}' is no bound.", hint=f"Write --threshold {name}=NUMBER.", where="--threshold")
+        found[name.strip()] = bound
+    return found
+
+
+def _format_of(out: Path | None) -> str | None:
+    suffixes = {".json": "json", ".yaml": "yaml", ".yml": "yaml", ".md": "markdown"}
+    return None if out is None else suffixes.get(out.suffix.lower())
+
+
+def _written(diagnosis: Diagnosis, format: str | None, *, to_file: bool) -> str:
+    from care_core import report
+
+    if format is None:
+        text = report.to_text(diagnosis)
+        return text if to_file else painted(text)
+    write = {"json": report.to_json, "yaml": report.to_yaml, "markdown": report.to_markdown}[format]
+    return write(report.build_document(diagnosis))

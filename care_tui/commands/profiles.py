@@ -1,0 +1,81 @@
+"""`care profiles`: what is installed, and whether it is sound."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from care_tui.console import emit, say
+
+if TYPE_CHECKING:
+    from care_core.profile.schema import Schema
+    from care_core.variables import Variable
+
+app = typer.Typer(help="What is installed, and whether it is sound.", rich_markup_mode=None)
+
+
+@app.callback()
+def _profiles(ctx: typer.Context) -> None:
+    if ctx.invoked_subcommand is None:
+        list_profiles()
+
+
+@app.command("list")
+def list_profiles() -> None:
+    """List the profiles that come with this installation."""
+    from care_core.profile.store import available_profiles, load_profile
+
+    rows = [(s.name, s.version, s.platform) for s in (load_profile(path).schema for path in available_profiles())]
+    if not rows:
+        say("No profile is installed.")
+    widths = [max((len(row[column]) for row in rows), default=0) for column in range(2)]
+    emit("".join(f"{name:<{widths[0]}}  {version:<{widths[1]}}  {platform}\n" for name, version, platform in rows))
+
+
+@app.command("show")
+def show(name: Annotated[str, typer.Argument(metavar="PROFILE")]) -> None:
+    """Show what a profile knows: its variables, ranges and thresholds."""
+    from care_core.profile.store import load_profile
+
+    schema = load_profile(name).schema
+    lines = [f"{schema.name} {schema.version}: {schema.platform}", schema.doc]
+    for role, variables in _by_role(schema).items():
+        lines += ["", f"{role} ({len(variables)})", *(f"  {_described(variable)}" for variable in variables)]
+    emit("\n".join(lines) + "\n")
+
+
+def _by_role(schema: Schema) -> Mapping[str, tuple[Variable, ...]]:
+    return {
+        "options": schema.options,
+        "context": schema.contexts,
+        "metrics": schema.metrics,
+        "objectives": schema.objectives,
+    }
+
+
+def _described(variable: Variable) -> str:
+    facts = [variable.name]
+    if variable.range is not None:
+        facts.append(f"{variable.range[0]:g} to {variable.range[1]:g}")
+    if variable.threshold is not None:
+        facts.append(str(variable.threshold))
+    facts += [text for text in (variable.unit, variable.doc) if text]
+    return "  ".join(facts)
+
+
+@app.command("check")
+def check(name: Annotated[str | None, typer.Argument(metavar="[PROFILE]")] = None) -> None:
+    """Check that profiles are sound: their files, their extractors, and that the model fits the schema."""
+    from care_core.extract.read import reading_plan
+    from care_core.profile.store import available_profiles, load_profile
+
+    paths: list[Path] | list[str] = available_profiles() if name is None else [name]
+    for path in paths:
+        profile = load_profile(path)
+        if profile.schema.logs:
+            reading_plan(profile.schema)
+        edges = len(profile.model.edges)
+        emit(f"{profile.schema.name}: sound, {len(profile.schema.variables)} variables, {edges} edges\n")
