@@ -42,8 +42,8 @@ class Predicate:
 
 def cooperative_bug_isolation(
     frame: pd.DataFrame, failed: NDArray[np.bool_], config: Config, schema: Schema, suspects: Sequence[str]
-) -> list[str]:
-    """Options by the Importance of the predicate that holds in this run (Liblit et al. 2005, section 3).
+) -> dict[str, float]:
+    """Options with the Importance of the predicate that holds in this run (Liblit et al. 2005, section 3), best first.
 
     Predicates are the quantile bins of an option's training values (its reference a bin of its own). A predicate
     whose Increase is not above 0 with 95 % confidence has no importance.
@@ -52,7 +52,7 @@ def cooperative_bug_isolation(
         name: _importance(_predicate_of(frame, config[name], schema.variables[name]), frame[name].to_numpy(), failed)
         for name in suspects
     }
-    return sorted(suspects, key=lambda name: (-scores[name], name))
+    return {name: scores[name] for name in sorted(suspects, key=lambda name: (-scores[name], name))}
 
 
 def _predicate_of(frame: pd.DataFrame, value: float, option: Variable) -> Predicate:
