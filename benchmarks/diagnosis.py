@@ -149,7 +149,7 @@ class _Peers:
         off = deviating(config, reference)
         return {
             "largest deviation": largest_deviation(config, reference, self.schema, off),
-            "CBI": cooperative_bug_isolation(self.frame, ~self.met_all, config, self.schema, off),
+            "CBI": list(cooperative_bug_isolation(self.frame, ~self.met_all, config, self.schema, off)),
             "plain classifier": self.classifier.rank(config, reference, off),
         }
 

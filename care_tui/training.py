@@ -1,23 +1,44 @@
-"""What `care train` does: a table of runs and a schema become a profile folder."""
+"""What `care train`, `update` and `evaluate` do: tables of runs become profile folders, and profiles are graded."""
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from io import StringIO
+from json import dumps
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from care_core.errors import UsageError
 from care_core.extract.table import INSTALL_LEARN
 from care_core.profile.model import write_model
-from care_core.profile.schema import read_schema
-from care_core.profile.store import PROFILE_FILE
+from care_core.profile.schema import parse_schema, read_schema
+from care_core.profile.store import PROFILE_FILE, load_profile
+
+if TYPE_CHECKING:
+    from care_core.learn.evaluation import Evaluation
+    from care_core.learn.transfer import OutOfSupport
+    from care_core.profile.model import Model
+    from care_core.profile.schema import Schema
 
 CARD_FILE = "MODEL_CARD.md"
+SIGNIFICANT = 4
+
+Progress = Callable[[str, float], None]
 
 
-def train_profile(
-    runs: Path, schema_path: Path, out: Path, *, seed: int, resamples: int, progress: Callable[[str, float], None]
-) -> None:
+@contextmanager
+def _learning() -> Iterator[None]:
+    """Turns a missing learning library into a sentence."""
+    try:
+        yield
+    except ModuleNotFoundError as err:
+        raise UsageError(f"Learning needs {err.name}, which is not installed.", hint=f"{INSTALL_LEARN}.") from err
+
+
+def train_profile(runs: Path, schema_path: Path, out: Path, *, seed: int, resamples: int, progress: Progress) -> None:
     """Learn the model and write it into `out` with `profile.yaml` and the model card.
 
     Raises:
@@ -26,19 +47,121 @@ def train_profile(
         LearningError: the table cannot be read, or cannot carry a model.
     """
     schema = read_schema(schema_path)
-    try:
-        from care_core.learn.card import model_card
+    with _learning():
         from care_core.learn.table import read_table
         from care_core.learn.train import Settings, train
-    except ModuleNotFoundError as err:
-        raise UsageError(f"Learning needs {err.name}, which is not installed.", hint=f"{INSTALL_LEARN}.") from err
     frame = read_table(runs, schema)
     model = train(frame, schema, Settings(seed=seed, resamples=resamples, origin=runs.name), progress)
+    _write(out, schema, model, schema_path.read_text(encoding="utf-8"))
+
+
+def update_profile(source: str, runs: Path, out: Path, *, seed: int, progress: Progress) -> tuple[str, ...]:
+    """Carry a profile over to the robot of `runs`; answers the options outside the source's support, a line each.
+
+    The new `profile.yaml` is the source's with the name of the folder and, where the robot left the source's support,
+    with the span of its runs as acceptable range.
+
+    Raises:
+        As `train_profile`; UsageError also when `out` is the source itself.
+    """
+    profile = load_profile(source)
+    if out.resolve() == profile.path.resolve():
+        raise UsageError("The new profile would replace its source.", hint="Choose another --out.", where=str(out))
+    with _learning():
+        from care_core.learn.table import read_table
+        from care_core.learn.train import Settings
+        from care_core.learn.transfer import out_of_support, update
+    frame = read_table(runs, profile.schema)
+    outside = out_of_support(profile.model, profile.schema, frame)
+    text = _retargeted((profile.path / PROFILE_FILE).read_text(encoding="utf-8"), out.name, runs.name, outside)
+    schema = parse_schema(text, runs)
+    model = update(profile.model, schema, frame, Settings(seed=seed, origin=runs.name), progress)
+    _write(out, schema, model, text)
+    return tuple(map(str, outside))
+
+
+def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]) -> str:
+    """The source's `profile.yaml` for the other robot, its comments kept."""
+    from ruamel.yaml import YAML
+
+    yaml = YAML()
+    yaml.width = 120
+    data: Any = yaml.load(text)
+    data["name"] = name
+    data["doc"] = f"{str(data.get('doc', '')).strip()} Carried over from profile '{data['name']}' with {runs}.".strip()
+    for option in outside:
+        entry = data["variables"][option.option]
+        low, high = option.target
+        whole = entry.get("type") in ("int", "enum", "bool")
+        entry["range"] = [math.floor(low), math.ceil(high)] if whole else [low, high]
+        if "default" in entry and not low <= entry["default"] <= high:
+            del entry["default"]
+    stream = StringIO()
+    yaml.dump(data, stream)
+    return stream.getvalue()
+
+
+def _write(out: Path, schema: Schema, model: Model, schema_text: str) -> None:
+    from care_core.learn.card import model_card
+    from care_core.report.writers import write_atomically
+
     try:
         out.mkdir(parents=True, exist_ok=True)
         write_model(model, out)
-        if schema_path.resolve() != (out / PROFILE_FILE).resolve():
-            shutil.copyfile(schema_path, out / PROFILE_FILE)
-        (out / CARD_FILE).write_text(model_card(schema, model), encoding="utf-8")
     except OSError as err:
         raise UsageError(f"Cannot write the profile: {err.strerror}.", where=str(out)) from err
+    write_atomically(out / PROFILE_FILE, schema_text)
+    write_atomically(out / CARD_FILE, model_card(schema, model))
+
+
+def evaluate_profile(name: str, faults: Path, truths: Sequence[Path]) -> Evaluation:
+    """Grade a profile on faults with known causes. Raises CareError."""
+    profile = load_profile(name)
+    with _learning():
+        from care_core.learn.evaluation import evaluate, read_faults
+    return evaluate(profile.schema, profile.model, read_faults(faults, profile.schema, truths))
+
+
+def evaluation_as_json(evaluation: Evaluation) -> str:
+    """Per method the measures, as fractions; `causes_per_fault` holds them for other numbers of causes."""
+    from care_core.learn.evaluation import CAUSES
+
+    def rounded(scores: Any) -> dict[str, float]:
+        return {key: round(value, SIGNIFICANT) for key, value in asdict(scores).items()}
+
+    document = {
+        **{method: rounded(scores) for method, scores in evaluation.scores[CAUSES].items()},
+        "causes": CAUSES,
+        "causes_per_fault": {
+            str(count): {method: rounded(scores) for method, scores in by_method.items()}
+            for count, by_method in evaluation.scores.items()
+        },
+        "faults": [
+            {
+                "name": fault.name,
+                "true": sorted(fault.true),
+                "not_in_the_file": sorted(fault.fixed),
+                **{method: sorted(answers[fault.name]) for method, answers in evaluation.predicted.items()},
+            }
+            for fault in evaluation.faults
+        ],
+    }
+    return dumps(document, indent=2) + "\n"
+
+
+def evaluation_as_text(evaluation: Evaluation) -> str:
+    """A table of the measures, and what of the truth cannot come from the files."""
+    from care_core.learn.evaluation import CAUSES
+
+    faults = evaluation.faults
+    options = sum(len(fault.true) for fault in faults)
+    hidden = sum(len(fault.fixed) for fault in faults)
+    lines = [f"{len(faults)} faults, {options} true causes, {hidden} of which never vary in their fault's file", ""]
+    lines.append(f"{'causes named':24s}{'accuracy':>10s}{'precision':>11s}{'recall':>9s}{'F1':>7s}{'RMSE':>8s}")
+    for count, by_method in evaluation.scores.items():
+        for method, s in by_method.items():
+            if method == "published" and count != CAUSES:
+                continue
+            label = "published" if method == "published" else f"{method}, {count} per fault"
+            lines.append(f"{label:24s}{s.accuracy:10.1%}{s.precision:11.1%}{s.recall:9.1%}{s.f1:7.1%}{s.rmse:8.3f}")
+    return "\n".join(lines) + "\n"

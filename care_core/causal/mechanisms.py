@@ -83,6 +83,8 @@ class Mechanism:
         weights: shape (n,), (K + noise)^-1 targets: the posterior mean is a kernel times these.
         calibration: binary: (slope, offset) of the logistic of the regression. Continuous: sorted standardised
             leave-one-out residuals, the distribution of this mechanism's own errors.
+        prior: of a mechanism carried over from another platform: that platform's mechanism and the share of its
+            prediction that is kept. The regression is then of what that leaves.
     """
 
     inputs: tuple[str, ...]
@@ -98,6 +100,7 @@ class Mechanism:
     transform: Transform
     binary: bool
     calibration: FloatArray
+    prior: tuple[Mechanism, float] | None = None
 
     def scaled(self, x: FloatArray) -> FloatArray:
         """Inputs in their own units, shape (m, p), to the scale the kernel sees."""
@@ -113,7 +116,15 @@ class Mechanism:
     def latent(self, x: FloatArray) -> FloatArray:
         """Posterior mean on the transformed scale. x: (m, p) -> (m,)."""
         mean: FloatArray = self.mean + self.scale * (self.kernel(self.scaled(x), self.points) @ self.weights)
-        return mean
+        return mean + self._carried_over(x)
+
+    def _carried_over(self, x: FloatArray) -> FloatArray:
+        """What the other platform's mechanism says, shape (m,); zero without one."""
+        if self.prior is None:
+            return np.zeros(len(x))
+        source, share = self.prior
+        places = [self.inputs.index(name) for name in source.inputs]
+        return share * source.latent(x[:, places])
 
     def latent_spread(self, x: FloatArray) -> FloatArray:
         """Posterior standard deviation of the noise-free value, shape (m,)."""
@@ -131,7 +142,7 @@ class Mechanism:
         cross = self.kernel(z, self.points) - self.kernel(origin, self.points)
         prior = 2 * (self.kernel.variance - self.kernel(z, origin)[:, 0])
         mean: FloatArray = self.scale * (cross @ self.weights)
-        return mean, self._spread(prior, cross)
+        return mean + self._carried_over(x) - self._carried_over(here), self._spread(prior, cross)
 
     def _spread(self, prior: FloatArray, cross: FloatArray) -> FloatArray:
         explained = ((cross @ self._inverse) * cross).sum(axis=1)

@@ -125,9 +125,7 @@ def rank_by_cbi(schema: Schema, fault: FaultFile) -> list[str]:
     return [name for name in sorted(best, key=lambda name: (-best[name], name)) if best[name] > 0]
 
 
-def score(
-    schema: Schema, model: Model, faults: Iterable[FaultFile], predicted: Mapping[str, frozenset[str]]
-) -> Scores:
+def score(schema: Schema, model: Model, faults: Iterable[FaultFile], predicted: Mapping[str, frozenset[str]]) -> Scores:
     """The paper's measures. RMSE weighs every wrong cell with the option's ACE on the fault's objective in the model:
     sqrt(mean over cells of (ACE(o) ([o true] - [o predicted]))^2)."""
     true, named, weight = [], [], []

@@ -48,13 +48,21 @@ class Inputs:
 
 
 def fit_mechanism(
-    x: FloatArray, y: FloatArray, inputs: Inputs, *, binary: bool, rng: np.random.Generator, effort: Effort = OUTCOME
+    x: FloatArray,
+    y: FloatArray,
+    inputs: Inputs,
+    *,
+    binary: bool,
+    rng: np.random.Generator,
+    effort: Effort = OUTCOME,
+    transform: Transform | None = None,
 ) -> Mechanism:
     """Fit one mechanism.
 
     Args:
         x: shape (n, p), inputs in their own units. y: shape (n,), 0 or 1 when `binary`. No NaN.
         rng: only used to thin tables of more than `effort.points` rows.
+        transform: the scale of the target, `best_transform` when None.
 
     Raises:
         LearningError: too few rows.
@@ -64,7 +72,7 @@ def fit_mechanism(
     if len(y) > effort.points:
         keep = np.sort(rng.choice(len(y), effort.points, replace=False))
         x, y = x[keep], y[keep]
-    transform: Transform = "identity" if binary else best_transform(y)
+    transform = "identity" if binary else transform or best_transform(y)
     coded = 2.0 * y - 1.0 if binary else transformed(y, transform)
     raw = np.where(inputs.log, np.log(np.where(inputs.log, np.maximum(x, 1e-12), 1.0)), x)
     centre, spread = raw.mean(axis=0), raw.std(axis=0)
@@ -73,8 +81,8 @@ def fit_mechanism(
     mean, scale = float(coded.mean()), float(coded.std()) or 1.0
     targets = ((coded - mean) / scale).astype(np.float32).astype(float)
     kernel = _fit_kernel(points, targets, effort.iterations, BINARY_NOISE if binary else NOISE)
-    errors, spreads = _leave_one_out(kernel, points, targets)
-    calibration = _logistic(mean + scale * (targets - errors), y) if binary else _residual_levels(errors / spreads)
+    errors, spreads = leave_one_out(kernel, points, targets)
+    calibration = logistic(mean + scale * (targets - errors), y) if binary else residual_levels(errors / spreads)
     return Mechanism(
         inputs=inputs.names,
         log_inputs=inputs.log,
@@ -158,7 +166,7 @@ def _negative_log_posterior(
     return float(value + np.log1p(ratio).sum()), gradient
 
 
-def _leave_one_out(kernel: Kernel, points: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
+def leave_one_out(kernel: Kernel, points: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Leave-one-out errors and their predicted spreads (Rasmussen and Williams 2006, Eq. 5.12)."""
     covariance = kernel(points, points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
     inverse = np.linalg.inv(covariance)
@@ -166,12 +174,12 @@ def _leave_one_out(kernel: Kernel, points: FloatArray, targets: FloatArray) -> t
     return (inverse @ targets) / diagonal, 1.0 / np.sqrt(diagonal)
 
 
-def _residual_levels(standardised: FloatArray) -> FloatArray:
+def residual_levels(standardised: FloatArray) -> FloatArray:
     levels: FloatArray = np.quantile(standardised, (np.arange(RESIDUAL_LEVELS) + 0.5) / RESIDUAL_LEVELS)
     return levels
 
 
-def _logistic(score: FloatArray, y: FloatArray) -> FloatArray:
+def logistic(score: FloatArray, y: FloatArray) -> FloatArray:
     """Platt's calibration of leave-one-out scores: (slope, offset), slope never negative, targets smoothed."""
     positive, negative = y.sum(), len(y) - y.sum()
     smoothed = np.where(y > 0.5, (positive + 1) / (positive + 2), 1 / (negative + 2))

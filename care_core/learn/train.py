@@ -72,7 +72,32 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Prog
     report("fitting mechanisms", 0.4)
     outcomes, mechanisms = fit_outcomes(frame, schema, graph, rng, effort=OUTCOME)
     mechanisms |= _metric_mechanisms(frame, schema, graph, settings)
+    learned = Learned(graph, support, outcomes, mechanisms, _training(frame, schema, structure, settings))
+    return assemble(frame, schema, learned, settings, rng, report)
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """A graph with the share of resamples that hold each finding, and the mechanisms on it."""
+
+    graph: CausalGraph
+    support: Mapping[Finding, float]
+    outcomes: Mapping[str, OutcomeRecord]
+    mechanisms: Mapping[str, Mechanism]
+    training: Training
+
+
+def assemble(
+    frame: pd.DataFrame,
+    schema: Schema,
+    learned: Learned,
+    settings: Settings,
+    rng: np.random.Generator,
+    report: Progress,
+) -> Model:
+    """Measure effects and skill on the table, and put the model together."""
     report("measuring effects", 0.6)
+    graph, support = learned.graph, learned.support
     resamples = _Resamples.draw(len(frame), rng)
     edges = _edge_effects(frame, schema, graph, settings, resamples)
     report("cross-validating", 0.8)
@@ -82,13 +107,13 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Prog
         graph=graph,
         edges={edge: _edge_record(edge, "directed", support, edges) for edge in sorted(graph.directed)},
         bidirected=tuple(_edge_record(edge, "bidirected", support, edges) for edge in sorted(graph.bidirected)),
-        effects=_total_effects(frame, schema, graph, outcomes, mechanisms, resamples, support),
+        effects=_total_effects(frame, schema, graph, learned.outcomes, learned.mechanisms, resamples, support),
         paths=_paths(schema, graph, edges),
-        outcomes=outcomes,
+        outcomes=learned.outcomes,
         summaries=_summaries(frame, schema),
         skill=skill,
-        training=_training(frame, schema, structure, settings),
-        mechanisms=mechanisms,
+        training=learned.training,
+        mechanisms=learned.mechanisms,
     )
 
 

@@ -11,7 +11,7 @@ import os
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,6 +23,9 @@ from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Kernel, Mechanism, Transform
 from care_core.errors import ProfileError
+
+PRIOR = "prior:"
+"""Begins the key of a mechanism that belongs to the platform a profile was carried over from."""
 
 
 class _Record(BaseModel):
@@ -124,6 +127,8 @@ class _MechanismRecord(_Record):
     inputs: tuple[str, ...]
     transform: Transform
     binary: bool
+    prior: str = ""
+    """Key of the mechanism of another platform that this one starts from."""
 
 
 class _ModelFile(_Record):
@@ -165,6 +170,7 @@ class Model:
 
 def write_model(model: Model, folder: Path) -> None:
     """Write `model.json` and `mechanisms.npz` into a profile folder, each atomically."""
+    stored = _with_priors(model.mechanisms)
     record = _ModelFile(
         model_version=1,
         schema_digest=model.schema_digest,
@@ -176,18 +182,33 @@ def write_model(model: Model, folder: Path) -> None:
         summaries=dict(model.summaries),
         skill={name: dict(values) for name, values in model.skill.items()},
         training=model.training,
-        mechanisms={
-            key: _MechanismRecord(
-                target=key.removeprefix("stage:"), inputs=m.inputs, transform=m.transform, binary=m.binary
-            )
-            for key, m in model.mechanisms.items()
-        },
+        mechanisms={key: _mechanism_record(key, m) for key, m in stored.items()},
     )
     text = json.dumps(_rounded(record.model_dump(mode="json")), indent=1, ensure_ascii=False) + "\n"
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **_arrays(model.mechanisms))  # type: ignore[arg-type]
+    np.savez_compressed(buffer, **_arrays(stored))  # type: ignore[arg-type]
     _replace(folder / "model.json", text.encode())
     _replace(folder / "mechanisms.npz", buffer.getvalue())
+
+
+def _with_priors(mechanisms: Mapping[str, Mechanism]) -> dict[str, Mechanism]:
+    """The mechanisms, and those of other platforms that they start from under keys of their own."""
+    stored: dict[str, Mechanism] = {}
+    for key, mechanism in mechanisms.items():
+        stored[key] = mechanism
+        if mechanism.prior is not None:
+            stored |= _with_priors({_prior_key(key): mechanism.prior[0]})
+    return stored
+
+
+def _prior_key(key: str) -> str:
+    return f"{PRIOR}{key}"
+
+
+def _mechanism_record(key: str, m: Mechanism) -> _MechanismRecord:
+    target = key.removeprefix("stage:")
+    prior = "" if m.prior is None else _prior_key(key)
+    return _MechanismRecord(target=target, inputs=m.inputs, transform=m.transform, binary=m.binary, prior=prior)
 
 
 def _rounded(value: Any) -> Any:
@@ -215,6 +236,8 @@ def _arrays(mechanisms: Mapping[str, Mechanism]) -> dict[str, np.ndarray[Any, An
         arrays[f"{key}/targets"] = m.targets.astype(np.float32)
         arrays[f"{key}/weights"] = m.weights
         arrays[f"{key}/calibration"] = m.calibration.astype(np.float32)
+        if m.prior is not None:
+            arrays[f"{key}/share"] = np.array([m.prior[1]])
     return arrays
 
 
@@ -228,7 +251,7 @@ def read_model(folder: Path) -> Model:
     try:
         record = _ModelFile.model_validate_json(path.read_text(encoding="utf-8"))
         with _open_arrays(folder / "mechanisms.npz") as arrays:
-            mechanisms = {key: _mechanism(key, m, arrays) for key, m in record.mechanisms.items()}
+            mechanisms = _mechanisms(record.mechanisms, arrays)
         graph = CausalGraph(
             record.nodes,
             frozenset((e.source, e.target) for e in record.edges if e.kind == "directed"),
@@ -286,6 +309,22 @@ def _to_model(record: _ModelFile, graph: CausalGraph, mechanisms: Mapping[str, M
         training=record.training,
         mechanisms=mechanisms,
     )
+
+
+def _mechanisms(records: Mapping[str, _MechanismRecord], arrays: Mapping[str, FloatArray]) -> Mapping[str, Mechanism]:
+    """Every mechanism by its key, each with the one that it starts from, which has no entry of its own."""
+
+    def read(key: str) -> Mechanism:
+        record = records[key]
+        mechanism = _mechanism(key, record, arrays)
+        # A prior's key is longer than its owner's, so a damaged file cannot send this in circles.
+        if not record.prior:
+            return mechanism
+        if record.prior != _prior_key(key):
+            raise ValueError(f"{key} starts from {record.prior}, which is not its own")
+        return replace(mechanism, prior=(read(record.prior), float(arrays[f"{key}/share"][0])))
+
+    return {key: read(key) for key in records if not key.startswith(PRIOR)}
 
 
 def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArray]) -> Mechanism:

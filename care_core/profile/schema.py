@@ -138,10 +138,19 @@ def read_schema(path: Path) -> Schema:
         ProfileError: no such file, not YAML, or a key or value that does not belong, with the nearest known key.
     """
     try:
-        data = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except OSError as err:
         raise ProfileError(f"Cannot read the profile: {err.strerror}.", where=str(path)) from err
-    except (YAMLError, UnicodeDecodeError) as err:
+    except UnicodeDecodeError as err:
+        raise ProfileError("Not a profile: it is not text.", where=str(path)) from err
+    return parse_schema(text, path)
+
+
+def parse_schema(text: str, path: Path) -> Schema:
+    """Check the text of a `profile.yaml`; `path` names it in errors. Raises ProfileError as `read_schema`."""
+    try:
+        data = YAML(typ="safe").load(text)
+    except YAMLError as err:
         detail = " ".join(str(err).split())[:200]
         raise ProfileError(f"Not valid YAML: {detail}", where=str(path)) from err
     if not isinstance(data, dict):

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from care_tui.console import Progress, say
+from care_tui.commands.arguments import AsJson
+from care_tui.console import Progress, emit, say
 
 app = typer.Typer()
 
@@ -26,3 +27,36 @@ def train(
     with Progress() as progress:
         train_profile(runs, schema, out, seed=seed, resamples=resamples, progress=progress)
     say(f"wrote {out}")
+
+
+@app.command()
+def update(
+    profile: Annotated[str, typer.Argument(metavar="PROFILE", help="The profile to start from: name or folder.")],
+    runs: Annotated[Path, typer.Argument(metavar="RUNS", help="Runs of the other robot: .csv or .parquet.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The folder of the new profile.")],
+    seed: Annotated[int, typer.Option("--seed", help="Seed of every random choice.")] = 0,
+) -> None:
+    """Carry a profile over to another robot with a few of its runs."""
+    from care_tui.training import update_profile
+
+    with Progress() as progress:
+        outside = update_profile(profile, runs, out, seed=seed, progress=progress)
+    for option in outside:
+        say(option)
+    say(f"wrote {out}")
+
+
+@app.command()
+def evaluate(
+    profile: Annotated[str, typer.Argument(metavar="PROFILE", help="Name or folder.")],
+    faults: Annotated[Path, typer.Option("--faults", help="The folder of the faults and their true causes.")],
+    truth: Annotated[
+        list[Path] | None, typer.Option("--truth", help="Table of true causes; found beside the faults if absent.")
+    ] = None,
+    json: AsJson = False,
+) -> None:
+    """Compare a profile's causes with the true ones: accuracy, precision, recall, F1, RMSE, and baselines beside it."""
+    from care_tui.training import evaluate_profile, evaluation_as_json, evaluation_as_text
+
+    evaluation = evaluate_profile(profile, faults, truth or ())
+    emit(evaluation_as_json(evaluation) if json else evaluation_as_text(evaluation))

@@ -31,7 +31,7 @@ def test_ties_are_broken_by_name_whatever_the_order(names: list[str]) -> None:
 def test_bug_isolation_finds_what_refuses_to_arm(frame: pd.DataFrame) -> None:
     failed = frame.success.to_numpy() == 0
     config = {**DEFAULTS, "min_sats": 14.0, "inert": 0.9, "filter": 0.0}
-    ranked = cooperative_bug_isolation(frame, failed, config, SCHEMA, ["filter", "inert", "min_sats"])
+    ranked = list(cooperative_bug_isolation(frame, failed, config, SCHEMA, ["filter", "inert", "min_sats"]))
     assert ranked[0] == "min_sats"
     assert sorted(ranked) == ["filter", "inert", "min_sats"]
 
@@ -46,7 +46,7 @@ def test_bug_isolation_outside_what_was_seen(frame: pd.DataFrame, value: float) 
 @pytest.mark.parametrize("share", [0.0, 1.0])
 def test_bug_isolation_without_contrast_ranks_by_name(frame: pd.DataFrame, share: float) -> None:
     failed = np.full(len(frame), bool(share))
-    assert cooperative_bug_isolation(frame, failed, DEFAULTS, SCHEMA, NAMES) == sorted(NAMES)
+    assert list(cooperative_bug_isolation(frame, failed, DEFAULTS, SCHEMA, NAMES)) == sorted(NAMES)
 
 
 def test_the_classifier_ranks_by_what_each_reset_brings(frame: pd.DataFrame) -> None:

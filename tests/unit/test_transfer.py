@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from care_core.causal.mechanisms import Mechanism
+from care_core.errors import LearningError
+from care_core.learn.transfer import carry_over, out_of_support, update
+from care_core.profile.model import read_model, write_model
+from care_core.profile.store import Profile
+from tests.planted import DEFAULTS, SCHEMA, SETTINGS, fly_many
+
+
+def heavier(frame: pd.DataFrame) -> pd.DataFrame:
+    """The planted robot with a load: everything takes longer, and drawing current tells more."""
+    loaded: pd.DataFrame = frame.assign(time=1.3 * frame["time"] + 10, energy=frame["energy"] + 3 * frame["sag"])
+    return loaded
+
+
+def error(mechanisms: Mapping[str, Mechanism], test: pd.DataFrame, name: str) -> float:
+    known = test.dropna(subset=[name])
+    mechanism = mechanisms[name]
+    x = known[list(mechanism.inputs)].to_numpy(float)
+    return float(np.sqrt(np.mean((mechanism.expected(x) - known[name]) ** 2)))
+
+
+@pytest.mark.parametrize("name", ["time", "energy"])
+def test_target_runs_bring_the_prediction_to_the_target(planted: Profile, name: str) -> None:
+    test, few, many = heavier(fly_many(150, seed=7)), heavier(fly_many(40, seed=8)), heavier(fly_many(150, seed=9))
+    graph, rng = planted.model.graph, np.random.default_rng(0)
+    errors = [error(planted.model.mechanisms, test, name)]
+    for runs in (few, many):
+        _, mechanisms = carry_over(planted.model, SCHEMA, runs, graph, rng)
+        errors.append(error(mechanisms, test, name))
+    assert errors[0] > 1.5 * errors[1] > 1.5 * 0.9 * errors[2]
+
+
+def test_an_updated_model_survives_the_disk_and_answers_the_same(planted: Profile, tmp_path: Path) -> None:
+    model = update(planted.model, SCHEMA, heavier(fly_many(60, seed=8)), replace(SETTINGS, origin="runs.csv"))
+    write_model(model, tmp_path)
+    again = read_model(tmp_path)
+    assert again.mechanisms.keys() == model.mechanisms.keys() == planted.model.mechanisms.keys()
+    for key, mechanism in model.mechanisms.items():
+        assert mechanism.prior is not None or key not in ("time", "energy")
+        x = np.array([[DEFAULTS[name] for name in mechanism.inputs]])
+        np.testing.assert_allclose(again.mechanisms[key].expected(x), mechanism.expected(x), rtol=1e-5)
+        np.testing.assert_allclose(again.mechanisms[key].change(x, x)[0], 0.0, atol=1e-9)
+    assert "carried over with runs.csv" in again.training.origin
+    assert again.effects
+
+
+def test_updating_twice_keeps_the_whole_history(planted: Profile, tmp_path: Path) -> None:
+    graph, rng = planted.model.graph, np.random.default_rng(0)
+    _, once = carry_over(planted.model, SCHEMA, heavier(fly_many(60, seed=8)), graph, rng)
+    first = replace(planted.model, mechanisms=once)
+    _, twice = carry_over(first, SCHEMA, heavier(fly_many(60, seed=9)), graph, rng)
+    write_model(replace(planted.model, mechanisms=twice), tmp_path)
+    prior = read_model(tmp_path).mechanisms["time"].prior
+    assert prior is not None
+    assert prior[0].prior is not None
+
+
+def test_options_that_left_the_source_are_named(planted: Profile) -> None:
+    runs = fly_many(40, seed=3)
+    for option in SCHEMA.options:
+        summary = planted.model.summaries[option.name]
+        runs[option.name] = runs[option.name].clip(summary.low, summary.high)
+    assert out_of_support(planted.model, SCHEMA, runs) == ()
+    runs.loc[0, "speed"] = 25.0
+    (found,) = out_of_support(planted.model, SCHEMA, runs)
+    assert found.option == "speed"
+    assert "'speed' is outside the source's support" in str(found)
+
+
+def test_too_few_runs_are_refused(planted: Profile) -> None:
+    with pytest.raises(LearningError, match="are needed"):
+        update(planted.model, SCHEMA, fly_many(5), SETTINGS)
