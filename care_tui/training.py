@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from care_core.learn.transfer import OutOfSupport
     from care_core.profile.model import Model
     from care_core.profile.schema import Schema
+    from care_core.profile.store import Profile
 
-CARD_FILE = "MODEL_CARD.md"
 SIGNIFICANT = 4
 
 Progress = Callable[[str, float], None]
@@ -103,6 +103,7 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
 
 def _write(out: Path, schema: Schema, model: Model, schema_text: str) -> None:
     from care_core.learn.card import model_card
+    from care_core.learn.recheck import CARD_FILE
     from care_core.report.writers import write_atomically
 
     try:
@@ -112,6 +113,15 @@ def _write(out: Path, schema: Schema, model: Model, schema_text: str) -> None:
         raise UsageError(f"Cannot write the profile: {err.strerror}.", where=str(out)) from err
     write_atomically(out / PROFILE_FILE, schema_text)
     write_atomically(out / CARD_FILE, model_card(schema, model))
+
+
+def relearned_problems(profile: Profile) -> tuple[str, ...] | None:
+    """What recomputing with the learning libraries finds; None where they are not installed."""
+    try:
+        from care_core.learn.recheck import recomputed
+    except ModuleNotFoundError:
+        return None
+    return recomputed(profile)
 
 
 def evaluate_profile(name: str, faults: Path, truths: Sequence[Path]) -> Evaluation:

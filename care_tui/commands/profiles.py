@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from care_core.errors import ExitCode
 from care_tui.console import emit, say
 
 if TYPE_CHECKING:
@@ -68,14 +69,24 @@ def _described(variable: Variable) -> str:
 
 @app.command("check")
 def check(name: Annotated[str | None, typer.Argument(metavar="[PROFILE]")] = None) -> None:
-    """Check that profiles are sound: their files, their extractors, and that the model fits the schema."""
+    """Check that profiles are sound, by recomputing from their files what can be recomputed."""
     from care_core.extract.read import reading_plan
+    from care_core.profile.check import problems
     from care_core.profile.store import available_profiles, load_profile
+    from care_tui.training import relearned_problems
 
     paths: list[Path] | list[str] = available_profiles() if name is None else [name]
+    unsound = False
     for path in paths:
         profile = load_profile(path)
         if profile.schema.logs:
             reading_plan(profile.schema)
-        edges = len(profile.model.edges)
-        emit(f"{profile.schema.name}: sound, {len(profile.schema.variables)} variables, {edges} edges\n")
+        relearned = relearned_problems(profile)
+        found = (*problems(profile), *(relearned or ()))
+        unsound = unsound or bool(found)
+        rest = "; identification and model card not recomputed (needs the extra 'learn')" if relearned is None else ""
+        counts = f"{len(profile.schema.variables)} variables, {len(profile.model.edges)} edges"
+        emit(f"{profile.schema.name}: {'not sound' if found else 'sound'}, {counts}{rest}\n")
+        emit("".join(f"  {sentence}\n" for sentence in found))
+    if unsound:
+        raise typer.Exit(ExitCode.USAGE)
