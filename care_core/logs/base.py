@@ -22,6 +22,8 @@ class LogFormat(str, Enum):
 
     DATAFLASH_BIN = "dataflash-bin"
     ROS1_BAG = "ros1-bag"
+    ROS2_DB3 = "ros2-db3"
+    MCAP = "mcap"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ Format: wiki.ros.org/Bags/Format/2.0.
 
 from __future__ import annotations
 
-import bz2
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,11 +14,11 @@ from mmap import mmap
 from typing import Any
 
 import numpy as np
-from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]  # a dependency of rosbags
 from numpy.typing import NDArray
 
-from care_core.logs.ros1_message import Buffer
-from care_core.run import Damage
+from care_core.logs.compression import CannotUnpackError, unpack
+from care_core.logs.ros_log import Connection, Flaw
+from care_core.logs.ros_message import Buffer
 
 MAGIC = b"#ROSBAG V2.0\n"
 
@@ -36,15 +35,6 @@ class BrokenRecordError(Exception):
     """Bytes that are no record. Stays inside the reader."""
 
 
-@dataclass(frozen=True, slots=True)
-class Connection:
-    """A publisher's side of a topic; the same topic may have several, even of different types."""
-
-    topic: str
-    type: str
-    definition: str
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Chunk:
     """A chunk: where its data lies in the file, and per connection id the entries of its messages."""
@@ -59,7 +49,10 @@ class Chunk:
         """The chunk's plain data as (buffer, begin, end); what is there of a cut one. Raises BrokenRecordError."""
         if self.compression == "none":
             return bag, self.start, self.end
-        plain = _decompress(self.compression, bag[self.start : self.end])
+        try:
+            plain = unpack(self.compression, bag[self.start : self.end])
+        except CannotUnpackError as err:
+            raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
 
 
@@ -69,7 +62,7 @@ class Contents:
 
     connections: dict[int, Connection] = field(default_factory=dict)
     chunks: list[Chunk] = field(default_factory=list)
-    damage: list[Damage] = field(default_factory=list)
+    flaws: dict[str, Flaw] = field(default_factory=dict)
     is_encrypted: bool = False
 
 
@@ -95,7 +88,7 @@ class _Record:
 
 
 def read_contents(bag: mmap) -> Contents:
-    """Walk over a bag's records."""
+    """Walk over a bag's records; behind a broken one, go on where the index says that the next chunk is."""
     contents = Contents()
     pos, size = len(MAGIC), len(bag)
     index_pos = connection_count = chunk_count = chunk_infos = 0
@@ -108,16 +101,31 @@ def read_contents(bag: mmap) -> Contents:
                 contents.is_encrypted = bool(record.fields.get(b"encryptor"))
             _take(bag, record, contents)
             chunk_infos += record.op == _CHUNK_INFO
+            pos = record.end
         except BrokenRecordError as err:
-            contents.damage.append(Damage(f"the log breaks off: {err}", pos))
-            break
-        pos = record.end
+            resumed = next((known for known in _indexed(bag, index_pos) if known > pos), None)
+            contents.flaws[f"record {pos}"] = Flaw(str(err), pos, cuts=resumed is None)
+            if resumed is None:
+                break
+            pos = resumed
     if index_pos == 0:
-        contents.damage.insert(0, Damage("the recording was not closed, so the bag has no index", len(MAGIC)))
-    elif (len(contents.connections) < connection_count or chunk_infos < chunk_count) and not contents.damage:
-        contents.damage.append(Damage("the log breaks off before the end of its index", size))
+        unclosed = Flaw("the recording was not closed, so the bag has no index", len(MAGIC))
+        contents.flaws = {"unclosed": unclosed, **contents.flaws}
+    elif (len(contents.connections) < connection_count or chunk_infos < chunk_count) and not contents.flaws:
+        contents.flaws["end"] = Flaw("the end of its index is missing", size, cuts=True)
     _complete(bag, contents)
     return contents
+
+
+def _indexed(bag: mmap, index_pos: int) -> list[int]:
+    """Where the index at the end of a bag says that chunks are, and where it is itself, in order."""
+    if not len(MAGIC) < index_pos < len(bag):
+        return []
+    known = [index_pos]
+    for record in _complete_records(bag, index_pos, len(bag)):
+        if record.op == _CHUNK_INFO and len(record.fields.get(b"chunk_pos", b"")) == 8:
+            known.append(record.number(b"chunk_pos"))
+    return sorted(known)
 
 
 def locate(buffer: Buffer, begin: int, end: int, offset: int) -> tuple[int, int]:
@@ -174,7 +182,7 @@ def _complete(bag: mmap, contents: Contents) -> None:
         try:
             found = _scan(chunk, bag, contents)
         except BrokenRecordError as err:
-            contents.damage.append(Damage(str(err), chunk.pos))
+            contents.flaws[f"chunk {chunk.pos}"] = Flaw(str(err), chunk.pos)
             continue
         if not chunk.index:
             chunk.index.update({number: np.array(entries, ENTRY) for number, entries in found.items()})
@@ -231,18 +239,6 @@ def _fields(buffer: Buffer, pos: int, end: int) -> dict[bytes, bytes]:
         fields[name] = value
         pos += size
     return fields
-
-
-def _decompress(compression: str, data: bytes) -> bytes:
-    """Plain data of a chunk, of a chunk cut short the part that is there."""
-    try:
-        if compression == "bz2":
-            return bz2.BZ2Decompressor().decompress(data)
-        if compression == "lz4":
-            return bytes(LZ4FrameDecompressor().decompress(data))
-    except (OSError, RuntimeError, EOFError) as err:
-        raise BrokenRecordError(f"a {compression} chunk cannot be unpacked") from err
-    raise BrokenRecordError(f"a chunk of unknown compression '{compression}'")
 
 
 def _normal(topic: str) -> str:

@@ -1,0 +1,95 @@
+"""Which fields a ROS message has: from the definition in the log, else from the message sets of the distributions."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+
+from care_core.logs.cdr_message import wide_size
+from care_core.logs.ros_message import Field, MalformedMessageError, Types, parse_definition, short_name
+
+_DISTROS = ("humble", "foxy", "jazzy", "galactic", "kilted", "iron", "eloquent", "dashing")
+"""Tried in this order where a log names neither its definitions nor its distribution."""
+
+_IDL_SEPARATOR = re.compile(r"^=+\s*\nIDL: (\S+)\s*$", re.MULTILINE)
+_PADDING_FIELD = Field("structure_needs_at_least_one_member", "uint8", None)
+"""What ROS 2 puts into a message that has no field."""
+
+
+def cdr_types(type_name: str, definition: str, language: str, distro: str, sample: bytes) -> tuple[Types, int]:
+    """The fields of a ROS 2 type, and the bytes a character of its wstrings takes.
+
+    Args:
+        definition: as the log holds it; empty where it holds none.
+        language: `ros2msg` or `ros2idl`.
+        distro: the log's ROS distribution, empty where unknown.
+        sample: a message of the type; with a choice, the first definition that takes exactly its bytes is right.
+
+    Raises:
+        MalformedMessageError: the definition is not understood, or nobody knows the type.
+    """
+    known = _given(type_name, definition, language) if definition or language else None
+    if known is not None:
+        return known, wide_size(type_name, known, sample) or 4
+    found = None
+    for candidate in _bundled(type_name, distro):
+        wide = wide_size(type_name, candidate, sample)
+        if wide is not None:
+            return candidate, wide
+        found = found or candidate
+    if found is None:
+        raise MalformedMessageError(f"the log holds no definition of {type_name}, and it is no standard message")
+    return found, 4
+
+
+def _given(type_name: str, definition: str, language: str) -> Types | None:
+    if language == "ros2idl":
+        return _from_idl(type_name, definition)
+    if language not in ("", "ros2msg"):
+        return None
+    return _without_empty(parse_definition(type_name, definition))
+
+
+def _without_empty(types: Types) -> Types:
+    return {name: fields or [_PADDING_FIELD] for name, fields in types.items()}
+
+
+def _from_idl(type_name: str, definition: str) -> Types:
+    from rosbags.typesys import Stores, get_types_from_idl, get_typestore
+
+    _, *rest = _IDL_SEPARATOR.split(definition)
+    try:
+        store = get_typestore(Stores.EMPTY)
+        for text in rest[1::2] or [definition]:
+            store.register({name: fields for name, fields in get_types_from_idl(text).items() if name not in store.fielddefs})
+        text, _ = store.generate_msgdef(_long_name(type_name), ros_version=2)
+    except Exception as err:  # the grammar raises whatever it met
+        raise MalformedMessageError(f"definition of {type_name} not understood") from err
+    return _without_empty(parse_definition(type_name, text))
+
+
+def _bundled(type_name: str, distro: str) -> Iterator[Types]:
+    """The type as the distributions define it, the log's own first."""
+    for name in dict.fromkeys((distro, *_DISTROS)):
+        text = _bundled_text(name, _long_name(type_name))
+        if text is not None:
+            yield _without_empty(parse_definition(type_name, text))
+
+
+@lru_cache(maxsize=256)
+def _bundled_text(distro: str, type_name: str) -> str | None:
+    from rosbags.typesys import Stores, get_typestore
+
+    try:
+        store = get_typestore(Stores(f"ros2_{distro}"))
+    except ValueError:  # a distribution that this version of rosbags does not know
+        return None
+    if type_name not in store.fielddefs:
+        return None
+    text, _ = store.generate_msgdef(type_name, ros_version=2)
+    return text
+
+
+def _long_name(type_name: str) -> str:
+    return type_name if type_name.count("/") > 1 else short_name(type_name).replace("/", "/msg/")
