@@ -12,15 +12,23 @@ from care_core.logs.base import Log, LogFormat
 READERS = {
     LogFormat.DATAFLASH_BIN: ("care_core.logs.dataflash", "DataFlashLog"),
     LogFormat.ROS1_BAG: ("care_core.logs.ros1_bag", "Ros1Bag"),
+    LogFormat.ROS2_DB3: ("care_core.logs.ros2_db3", "Ros2Db3"),
+    LogFormat.MCAP: ("care_core.logs.mcap_log", "McapLog"),
 }
 """Module and class per format, imported only when a log of that format is opened."""
 
-READABLE = "ArduPilot DataFlash (.BIN) and ROS 1 bags (.bag)"
+READABLE = "ArduPilot DataFlash (.BIN), ROS 1 bags (.bag) and ROS 2 bags (.db3, .mcap)"
+
+ROS_MAGIC = (
+    (b"#ROSBAG V2.0", LogFormat.ROS1_BAG),
+    (b"SQLite format 3\0", LogFormat.ROS2_DB3),
+    (b"\x89MCAP0\r\n", LogFormat.MCAP),
+)
+"""How the files of a ROS recording begin; each may be packed with zstd."""
 
 UNREADABLE_MAGIC = (
-    (b"#ROSBAG V1", "a ROS bag of format 1.x", "Convert it with 'rosbag fix' or 'rosbag reindex'."),
-    (b"SQLite format 3\0", "a ROS 2 bag (SQLite)", "Convert it to a ROS 1 bag with 'rosbags-convert'."),
-    (b"\x89MCAP0\r\n", "an MCAP file", "Convert it to a ROS 1 bag with 'rosbags-convert'."),
+    (b"#ROSBAG V1", "a ROS bag of format 1.x", "Bring it to format 2.0 with 'rosbag fix' of ROS 1."),
+    (b"#ROSRECORD V1", "a ROS bag of format 1.x", "Bring it to format 2.0 with 'rosbag fix' of ROS 1."),
     (b"ULog\x01\x12\x35", "a PX4 ULog", ""),
     (b"\x1f\x8b", "a gzip archive", "Unpack it first."),
     (b"PK\x03\x04", "a zip archive", "Unpack it first."),
@@ -44,10 +52,12 @@ def open_log(path: str | Path) -> Log:
 
 
 def sniff(path: Path) -> LogFormat:
-    """The format of a file, told from its first bytes. Raises LogError as `open_log`."""
+    """The format of a file, or of the recording in a folder, told from its first bytes. Raises LogError as `open_log`."""
     head = _read_head(path)
-    if head.startswith(b"#ROSBAG V2.0"):
-        return LogFormat.ROS1_BAG
+    plain = _unpacked(head)
+    for magic, ros_format in ROS_MAGIC:
+        if plain.startswith(magic):
+            return ros_format
     for magic, what, hint in UNREADABLE_MAGIC:
         if head.startswith(magic):
             raise _unreadable(path, what, hint)
@@ -62,23 +72,25 @@ def sniff(path: Path) -> LogFormat:
 
 
 def log_digest(path: str | Path) -> str:
-    """SHA-256 of the file in hex, read in pieces."""
+    """SHA-256 of the file, or of a folder's files one after the other by name, in hex, read in pieces."""
+    path = Path(path)
     digest = hashlib.sha256()
     try:
-        with Path(path).open("rb") as stream:
-            while piece := stream.read(1 << 20):
-                digest.update(piece)
+        files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+        for file in files:
+            with file.open("rb") as stream:
+                while piece := stream.read(1 << 20):
+                    digest.update(piece)
     except OSError as err:
-        raise _cannot_open(Path(path), err) from err
+        raise _cannot_open(path, err) from err
     return digest.hexdigest()
 
 
 def _read_head(path: Path) -> bytes:
     if path.is_dir():
-        is_ros2 = (path / "metadata.yaml").is_file()
-        if is_ros2:
-            raise _unreadable(path, "a ROS 2 bag folder", "Convert it to a ROS 1 bag with 'rosbags-convert'.")
-        raise LogError("A folder, not a log.", hint="Name one log file in it.", where=str(path))
+        from care_core.logs.recording import recording_at
+
+        path = recording_at(path).files[0]
     try:
         with path.open("rb") as stream:
             head = stream.read(_SNIFF_BYTES)
@@ -87,6 +99,15 @@ def _read_head(path: Path) -> bytes:
     if not head:
         raise LogError("The file is empty.", hint="Was the recording stopped properly?", where=str(path))
     return head
+
+
+def _unpacked(head: bytes) -> bytes:
+    """The first bytes without zstd around them."""
+    if not head.startswith(b"\x28\xb5\x2f\xfd"):
+        return head
+    from care_core.logs.compression import unpack_head
+
+    return unpack_head(head)
 
 
 def _cannot_open(path: Path, err: OSError) -> LogError:

@@ -48,32 +48,35 @@ def unpack(compression: str, data: bytes, limit: int = MOST_BYTES) -> bytes:
     return plain
 
 
-def unpack_file(path: Path) -> tuple[TemporaryDirectory[str], Path, bool]:
-    """A zstd file unpacked into a temporary folder, which goes when the answer's first part does.
+class PlainFile:
+    """A log file to read from: itself, or, of a zstd file, a plain copy in a temporary folder that goes with this."""
 
-    Returns:
-        The folder, the plain file in it, and whether the file was cut short or is broken.
+    def __init__(self, path: Path) -> None:
+        """Unpack the file where need be. Raises LogError when it cannot be read or the disk has no room."""
+        self.path = path
+        self.is_cut = False
+        try:
+            with path.open("rb") as stream:
+                if stream.read(len(ZSTD_MAGIC)) == ZSTD_MAGIC:
+                    stream.seek(0)
+                    self._unpack(stream)
+        except OSError as err:
+            raise LogError(f"Cannot read the log: {err.strerror or err}.", where=str(path)) from err
 
-    Raises:
-        LogError: the file cannot be read, or the disk has no room.
-    """
-    folder = TemporaryDirectory(prefix="care-")
-    plain = Path(folder.name) / path.stem
-    try:
-        with path.open("rb") as packed, plain.open("wb") as target:
-            whole = False
+    def _unpack(self, packed: IO[bytes]) -> None:
+        self._folder = TemporaryDirectory(prefix="care-")
+        where, self.path = self.path, Path(self._folder.name) / self.path.stem
+        self.is_cut = True
+        with self.path.open("wb") as target:
             for piece in _zstd_pieces(packed):
-                whole = not piece
+                self.is_cut = bool(piece)
                 target.write(piece)
-                if shutil.disk_usage(folder.name).free < _DISK_MARGIN:
+                if shutil.disk_usage(self._folder.name).free < _DISK_MARGIN:
                     raise LogError(
                         "There is no room to unpack the log.",
                         hint="Free some of the temporary folder, or set TMPDIR to a larger one.",
-                        where=str(path),
+                        where=str(where),
                     )
-    except OSError as err:
-        raise LogError(f"Cannot unpack the log: {err.strerror or err}.", where=str(path)) from err
-    return folder, plain, not whole
 
 
 def unpack_head(packed: bytes) -> bytes:

@@ -259,8 +259,7 @@ class RosLog:
             return message_decoder(one.type, one.definition, fields, self._low_ns)
         if one.encoding != "cdr":
             raise MalformedMessageError(f"they are {one.encoding or 'of no named encoding'}")
-        _, _, buffer, pos, end = next(part.messages(frozenset([number])), (0, 0, b"", 0, 0))
-        types, wide = cdr_types(one.type, one.definition, one.language, self._metadata.distro, buffer[pos:end])
+        types, wide = cdr_types(one.type, one.definition, one.language, self._metadata.distro, _first(part, number))
         return CdrDecoder(one.type, types, fields, self._low_ns, wide)
 
     def _note_broken(self, topic: str, why: str, time_ns: int | None) -> None:
@@ -370,6 +369,13 @@ class _Gathered:
             self.done.append(_Piece(np.array(self.times_ns, np.int64), _columns(self.decoder, self.rows)))
             self.times_ns, self.rows = [], []
         return self.done
+
+
+def _first(part: Part, number: int) -> bytes:
+    """The bytes of a connection's first message, none where it has none."""
+    for _, _, buffer, pos, end in part.messages(frozenset([number])):
+        return buffer[pos:end]
+    return b""
 
 
 def _believable(every: Sequence[NDArray[np.int64]]) -> tuple[int, int, int]:

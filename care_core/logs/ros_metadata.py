@@ -16,6 +16,8 @@ _PARAMETERS = "ros__parameters"
 _MOST_TEXT = 16 << 20
 _MOST_VALUES = 50_000
 _LONGEST_NOTE = 200
+_NO_DISTRO = "rosbags"
+"""What the library of that name writes for a distribution."""
 _UNSET_NS = 2**63 - 1
 
 
@@ -74,8 +76,9 @@ def parse_metadata(text: str) -> Metadata:
     duration_ns = _count(_inner(given.get("duration"), "nanoseconds"))
     custom = given.get("custom_data")
     files = given.get("relative_file_paths")
+    distro = str(given.get("ros_distro") or "")
     return Metadata(
-        distro=str(given.get("ros_distro") or ""),
+        distro="" if distro == _NO_DISTRO else distro,
         duration_s=duration_ns / 1e9 if duration_ns else None,
         message_count=_count(given.get("message_count")) or None,
         files=tuple(str(name) for name in files) if isinstance(files, list) else (),

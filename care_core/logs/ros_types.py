@@ -12,6 +12,7 @@ from care_core.logs.ros_message import Field, MalformedMessageError, Types, pars
 _DISTROS = ("humble", "foxy", "jazzy", "galactic", "kilted", "iron", "eloquent", "dashing")
 """Tried in this order where a log names neither its definitions nor its distribution."""
 
+_LANGUAGES = ("", "ros2msg", "ros2idl", "omgidl")
 _IDL_SEPARATOR = re.compile(r"^=+\s*\nIDL: (\S+)\s*$", re.MULTILINE)
 _PADDING_FIELD = Field("structure_needs_at_least_one_member", "uint8", None)
 """What ROS 2 puts into a message that has no field."""
@@ -29,8 +30,9 @@ def cdr_types(type_name: str, definition: str, language: str, distro: str, sampl
     Raises:
         MalformedMessageError: the definition is not understood, or nobody knows the type.
     """
-    known = _given(type_name, definition, language) if definition or language else None
-    if known is not None:
+    if definition.strip() and language in _LANGUAGES:
+        known = _from_idl(type_name, definition) if "idl" in language else parse_definition(type_name, definition)
+        known = _filled(known)
         return known, wide_size(type_name, known, sample) or 4
     found = None
     for candidate in _bundled(type_name, distro):
@@ -43,15 +45,8 @@ def cdr_types(type_name: str, definition: str, language: str, distro: str, sampl
     return found, 4
 
 
-def _given(type_name: str, definition: str, language: str) -> Types | None:
-    if language == "ros2idl":
-        return _from_idl(type_name, definition)
-    if language not in ("", "ros2msg"):
-        return None
-    return _without_empty(parse_definition(type_name, definition))
-
-
-def _without_empty(types: Types) -> Types:
+def _filled(types: Types) -> Types:
+    """With the byte that ROS 2 puts into a message without fields."""
     return {name: fields or [_PADDING_FIELD] for name, fields in types.items()}
 
 
@@ -66,7 +61,7 @@ def _from_idl(type_name: str, definition: str) -> Types:
         text, _ = store.generate_msgdef(_long_name(type_name), ros_version=2)
     except Exception as err:  # the grammar raises whatever it met
         raise MalformedMessageError(f"definition of {type_name} not understood") from err
-    return _without_empty(parse_definition(type_name, text))
+    return parse_definition(type_name, text)
 
 
 def _bundled(type_name: str, distro: str) -> Iterator[Types]:
@@ -74,7 +69,7 @@ def _bundled(type_name: str, distro: str) -> Iterator[Types]:
     for name in dict.fromkeys((distro, *_DISTROS)):
         text = _bundled_text(name, _long_name(type_name))
         if text is not None:
-            yield _without_empty(parse_definition(type_name, text))
+            yield _filled(parse_definition(type_name, text))
 
 
 @lru_cache(maxsize=256)

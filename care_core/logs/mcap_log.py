@@ -1,0 +1,124 @@
+"""MCAP files with ROS 1 or ROS 2 messages. Times are log times; only chunks that hold a wanted topic are touched."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from mmap import mmap
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.logs.base import LogFormat
+from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, unpack
+from care_core.logs.mapped import mapped
+from care_core.logs.mcap_records import MAGIC, BrokenRecordError, Chunk, Contents, locate, read_contents
+from care_core.logs.recording import recording_at
+from care_core.logs.ros_log import Connection, Flaw, Message, RosLog
+from care_core.logs.ros_message import Buffer
+from care_core.logs.ros_metadata import Metadata, parse_metadata
+
+_WHAT = "an MCAP file"
+_ROSBAG2, _SERIALIZED = "rosbag2", "serialized_metadata"
+
+
+class McapLog(RosLog):
+    """An MCAP file, or the files of a split recording."""
+
+    def __init__(self, path: Path) -> None:
+        """Walk over the record headers. Raises LogError when it is no readable file, or nothing can be decoded."""
+        recording = recording_at(path)
+        parts = [McapPart(file) for file in recording.files]
+        super().__init__(
+            path, LogFormat.MCAP, parts,
+            metadata=recording.metadata, missing=recording.missing, notes=recording.notes,
+        )  # fmt: skip
+
+
+class McapPart:
+    """One MCAP file, fulfilling `Part`."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = PlainFile(path)
+        with mapped(self._file.path, MAGIC, _WHAT) as log:
+            contents = read_contents(log)
+        self._chunks = contents.chunks
+        self._checked: set[int] = set()
+        self.flaws: dict[str, Flaw] = contents.flaws
+        if self._file.is_cut:
+            self.flaws["zstd"] = Flaw("the zstd file is cut short or broken")
+        self.connections: Mapping[int, Connection] = contents.connections()
+        self.times_ns = _times_by_channel(contents)
+        self.metadata = _metadata(contents)
+
+    def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
+        """The messages of some channels, chunk by chunk."""
+        with mapped(self._file.path, MAGIC, _WHAT) as log:
+            for chunk in self._chunks:
+                wanted = [number for number in chunk.index if number in numbers]
+                if wanted and (opened := self._open(chunk, log)):
+                    for number in wanted:
+                        yield from self._of_channel(chunk, number, *opened)
+
+    def _open(self, chunk: Chunk, log: mmap) -> tuple[Buffer, int, int] | None:
+        key = f"chunk {chunk.pos}"
+        try:
+            opened = chunk.open(log)
+        except BrokenRecordError as err:
+            self.flaws.setdefault(key, Flaw(str(err), chunk.pos, _first_ns(chunk)))
+            return None
+        if chunk.pos not in self._checked:
+            self._checked.add(chunk.pos)
+            why = chunk.flaw(*opened)
+            if why:
+                self.flaws.setdefault(key, Flaw(why, chunk.pos, _first_ns(chunk)))
+        return opened
+
+    def _of_channel(self, chunk: Chunk, number: int, buffer: Buffer, begin: int, end: int) -> Iterator[Message]:
+        entries = chunk.index[number]
+        is_cdr = self.connections[number].encoding == "cdr"
+        for time_ns, offset in zip(_times_ns(entries).tolist(), entries["offset"].tolist(), strict=True):
+            try:
+                pos, after = locate(buffer, begin, end, offset, number)
+                # No CDR message begins so: the recorder packed each message by itself.
+                if is_cdr and buffer[pos : pos + len(ZSTD_MAGIC)] == ZSTD_MAGIC:
+                    plain = unpack("zstd", buffer[pos:after])
+                    yield number, time_ns, plain, 0, len(plain)
+                else:
+                    yield number, time_ns, buffer, pos, after
+            except (BrokenRecordError, CannotUnpackError) as err:
+                self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
+
+
+def _metadata(contents: Contents) -> Metadata:
+    """What the recorder wrote into the file: its own record, the statistics, and whatever else was noted."""
+    found = []
+    for record in contents.metadata:
+        if record.name == _ROSBAG2:
+            found.append(parse_metadata(record.metadata.get(_SERIALIZED, "")))
+        else:
+            found.append(Metadata(custom={f"{record.name}.{key}": text for key, text in record.metadata.items()}))
+    counted = contents.statistics
+    if counted is not None:
+        span_s = (counted.message_end_time - counted.message_start_time) / 1e9
+        found.append(Metadata(duration_s=span_s, message_count=counted.message_count))
+    return Metadata.merged(found)
+
+
+def _times_by_channel(contents: Contents) -> dict[int, NDArray[np.int64]]:
+    parts: dict[int, list[NDArray[np.int64]]] = {}
+    for chunk in contents.chunks:
+        for number, entries in chunk.index.items():
+            if len(entries) and number in contents.channels:
+                parts.setdefault(number, []).append(_times_ns(entries))
+    return {number: np.concatenate(times) for number, times in parts.items()}
+
+
+def _first_ns(chunk: Chunk) -> int | None:
+    return min((int(_times_ns(entries).min()) for entries in chunk.index.values() if len(entries)), default=None)
+
+
+def _times_ns(entries: NDArray[np.void]) -> NDArray[np.int64]:
+    """Log times; one beyond the year 2262 wraps and is no believable time either way."""
+    return entries["time"].astype(np.int64)

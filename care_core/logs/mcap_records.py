@@ -1,0 +1,319 @@
+"""The container of an MCAP file: chunks, channels, and where each message lies.
+
+One walk over the record headers finds everything, so a file without summary, or cut short, is read by the same code
+as a sound one; only chunks without message index are looked into. Format: mcap.dev/spec.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from array import array
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from io import BytesIO
+from mmap import mmap
+from typing import Any, NamedTuple
+
+import numpy as np
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Header, Metadata, Schema, Statistics
+from numpy.typing import NDArray
+
+from care_core.logs.compression import CannotUnpackError, unpack
+from care_core.logs.ros_log import Connection, Flaw
+from care_core.logs.ros_message import Buffer
+
+MAGIC = b"\x89MCAP0\r\n"
+
+ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
+"""A message index's entry: log time in ns, offset of the message's record in the plain chunk."""
+
+_RECORD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<BQHIQQ")
+_CHUNK = struct.Struct("<QQQII")
+_FOOTER = struct.Struct("<QQI")
+_CHUNK_INDEX = struct.Struct("<QQQ")
+_SIZE = struct.Struct("<Q")
+_INDEX = struct.Struct("<HI")
+_TEXT_SIZE = struct.Struct("<I")
+_LONGEST_NAME = 64
+
+
+class BrokenRecordError(Exception):
+    """Bytes that are no record. Stays inside the reader."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chunk:
+    """A chunk: where its packed records lie in the file, and per channel the entries of its messages."""
+
+    pos: int
+    start: int
+    end: int
+    is_whole: bool
+    compression: str = ""
+    size: int = 0
+    """Bytes of the plain records."""
+    checksum: int = 0
+    """CRC-32 of the plain records, 0 where the recorder made none."""
+    index: dict[int, NDArray[Any]] = field(default_factory=dict)
+
+    def open(self, log: mmap) -> tuple[Buffer, int, int]:
+        """The plain records as (buffer, begin, end); what is there of a cut chunk. Raises BrokenRecordError."""
+        if not self.compression:
+            return log, self.start, self.end
+        try:
+            plain = unpack(self.compression, log[self.start : self.end], self.size)
+        except CannotUnpackError as err:
+            raise BrokenRecordError(str(err)) from err
+        return plain, 0, len(plain)
+
+    def flaw(self, buffer: Buffer, begin: int, end: int) -> str:
+        """Why the plain records cannot all be trusted, empty where they can."""
+        if not self.is_whole:
+            return "a chunk is cut short"
+        if self.compression and end - begin < self.size:
+            return "the rest of a chunk cannot be unpacked"
+        with memoryview(buffer) as view, view[begin:end] as plain:
+            if self.checksum and zlib.crc32(plain) != self.checksum:
+                return "a chunk does not match its checksum: values in it may be wrong"
+        return ""
+
+
+@dataclass(slots=True)
+class Contents:
+    """What a walk over a file finds."""
+
+    profile: str = ""
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    chunks: list[Chunk] = field(default_factory=list)
+    metadata: list[Metadata] = field(default_factory=list)
+    statistics: Statistics | None = None
+    flaws: dict[str, Flaw] = field(default_factory=dict)
+    is_closed: bool = False
+
+    def connections(self) -> dict[int, Connection]:
+        return {number: self._connection(channel) for number, channel in self.channels.items()}
+
+    def _connection(self, channel: Channel) -> Connection:
+        schema = self.schemas.get(channel.schema_id)
+        if schema is None:
+            return Connection(channel.topic, "", "", channel.message_encoding)
+        definition = schema.data.decode("utf-8", "replace")
+        return Connection(channel.topic, schema.name, definition, channel.message_encoding, schema.encoding)
+
+
+class _Record(NamedTuple):
+    pos: int
+    op: int
+    start: int
+    end: int
+
+
+def read_contents(log: mmap) -> Contents:
+    """Walk over a file's records; behind a broken one, go on where the summary says that the next chunk is."""
+    contents = Contents()
+    loose = _Loose()
+    pos, size = len(MAGIC), len(log)
+    while pos < size and not contents.is_closed:
+        try:
+            record = _read_record(log, pos, size)
+            if record.op == Opcode.MESSAGE:
+                loose.add(log, record)
+            else:
+                _take(log, record, contents)
+            pos = record.end
+        except BrokenRecordError as err:
+            resumed = next((known for known in _summarised(log) if known > pos), None)
+            contents.flaws[f"record {pos}"] = Flaw(str(err), pos, cuts=resumed is None)
+            if resumed is None:
+                break
+            pos = resumed
+    if not contents.is_closed and not contents.flaws:
+        contents.flaws["end"] = Flaw("the recording was not closed", size, cuts=True)
+    chunk_count = contents.statistics.chunk_count if contents.statistics else 0
+    if len(contents.chunks) < chunk_count and not contents.flaws:
+        contents.flaws["chunks"] = Flaw(f"{chunk_count - len(contents.chunks)} of {chunk_count} chunks are not found")
+    contents.chunks.extend(loose.chunks(size))
+    _complete(log, contents)
+    return contents
+
+
+def locate(buffer: Buffer, begin: int, end: int, offset: int, number: int) -> tuple[int, int]:
+    """Where the data of a channel's message at an index entry's offset lies. Raises BrokenRecordError."""
+    pos = begin + offset
+    if pos + _MESSAGE.size > end:
+        raise BrokenRecordError("a message lies beyond the end of its chunk")
+    op, size, channel, _, _, _ = _MESSAGE.unpack_from(buffer, pos)
+    after = pos + _RECORD.size + size
+    if op != Opcode.MESSAGE or channel != number or after > end or after < pos + _MESSAGE.size:
+        raise BrokenRecordError("a message is not where the index says")
+    return pos + _MESSAGE.size, after
+
+
+class _Loose:
+    """Messages outside chunks, as entries per channel: their offsets count from the beginning of the file."""
+
+    def __init__(self) -> None:
+        self.times: dict[int, array[int]] = {}
+        self.offsets: dict[int, array[int]] = {}
+
+    def add(self, log: mmap, record: _Record) -> None:
+        if record.end - record.pos < _MESSAGE.size:
+            raise BrokenRecordError("a message is too short")
+        _, _, number, _, time_ns, _ = _MESSAGE.unpack_from(log, record.pos)
+        self.times.setdefault(number, array("Q")).append(time_ns)
+        self.offsets.setdefault(number, array("Q")).append(record.pos)
+
+    def chunks(self, size: int) -> Iterator[Chunk]:
+        if self.times:
+            index = {number: _entries(times, self.offsets[number]) for number, times in self.times.items()}
+            yield Chunk(0, 0, size, is_whole=True, index=index)
+
+
+def _take(log: mmap, record: _Record, contents: Contents) -> None:
+    """Add what a top-level record says to the contents."""
+    if record.op == Opcode.CHUNK:
+        contents.chunks.append(_chunk(log, record))
+        if record.end > len(log):
+            raise BrokenRecordError("its last record is cut short")
+    elif record.op == Opcode.MESSAGE_INDEX and contents.chunks:
+        _take_index(log, record, contents.chunks[-1])
+    elif record.op == Opcode.FOOTER:
+        if log[record.end : record.end + len(MAGIC)] != MAGIC:
+            raise BrokenRecordError("the end mark is missing")
+        contents.is_closed = True
+    else:
+        _take_described(log, record, contents)
+
+
+def _take_index(log: mmap, record: _Record, chunk: Chunk) -> None:
+    if record.end - record.start < _INDEX.size:
+        raise BrokenRecordError("a message index of the wrong size")
+    number, size = _INDEX.unpack_from(log, record.start)
+    if size % ENTRY.itemsize or size != record.end - record.start - _INDEX.size:
+        raise BrokenRecordError("a message index of the wrong size")
+    if size:
+        chunk.index[number] = np.frombuffer(log[record.start + _INDEX.size : record.end], ENTRY)
+
+
+def _take_described(log: Buffer, record: _Record, contents: Contents) -> None:
+    """Take records that the mcap library reads: schemas, channels, metadata, statistics."""
+    kinds: Mapping[int, Any] = {
+        Opcode.HEADER: Header, Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
+        Opcode.STATISTICS: Statistics,
+    }  # fmt: skip
+    kind = kinds.get(record.op)
+    if kind is None:
+        return
+    try:
+        read = kind.read(ReadDataStream(BytesIO(log[record.start : record.end])))
+    except (McapError, struct.error, UnicodeDecodeError) as err:
+        raise BrokenRecordError(f"a {kind.__name__.lower()} record is broken") from err
+    if isinstance(read, Header):
+        contents.profile = read.profile
+    elif isinstance(read, Schema):
+        contents.schemas.setdefault(read.id, read)
+    elif isinstance(read, Channel):
+        contents.channels.setdefault(read.id, read)
+    elif isinstance(read, Metadata):
+        contents.metadata.append(read)
+    else:
+        contents.statistics = read
+
+
+def _chunk(log: mmap, record: _Record) -> Chunk:
+    """A chunk record; of one that is cut short, what is there."""
+    end = min(record.end, len(log))
+    name_at = record.start + _CHUNK.size
+    if name_at > end:
+        raise BrokenRecordError("its last record is cut short")
+    _, _, size, checksum, name_size = _CHUNK.unpack_from(log, record.start)
+    start = name_at + name_size + _SIZE.size
+    if name_size > _LONGEST_NAME or start > end:
+        raise BrokenRecordError("a chunk's header is broken")
+    (packed,) = _SIZE.unpack_from(log, start - _SIZE.size)
+    if start + packed != record.end:
+        raise BrokenRecordError("a chunk of the wrong size")
+    compression = log[name_at : name_at + name_size].decode("ascii", "replace")
+    return Chunk(record.pos, start, end, end == record.end, compression, size, checksum)
+
+
+def _complete(log: mmap, contents: Contents) -> None:
+    """Look into chunks for what their message index and the summary do not say."""
+    for chunk in contents.chunks:
+        is_indexed = bool(chunk.index) or not chunk.size
+        if is_indexed and all(number in contents.channels for number in chunk.index):
+            continue
+        try:
+            found = _scan(chunk, log, contents)
+        except BrokenRecordError as err:
+            contents.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos))
+            continue
+        if not chunk.index:
+            chunk.index.update(found)
+
+
+def _scan(chunk: Chunk, log: mmap, contents: Contents) -> dict[int, NDArray[Any]]:
+    """Index entries of a chunk's complete messages per channel; takes its schemas and channels on the way."""
+    buffer, begin, end = chunk.open(log)
+    times: dict[int, array[int]] = {}
+    offsets: dict[int, array[int]] = {}
+    pos = begin
+    while pos < end:
+        try:
+            record = _read_record(buffer, pos, end)
+        except BrokenRecordError:
+            break
+        if record.end > end:
+            break
+        if record.op == Opcode.MESSAGE and record.end - pos >= _MESSAGE.size:
+            _, _, number, _, time_ns, _ = _MESSAGE.unpack_from(buffer, pos)
+            times.setdefault(number, array("Q")).append(time_ns)
+            offsets.setdefault(number, array("Q")).append(pos - begin)
+        elif record.op in (Opcode.SCHEMA, Opcode.CHANNEL):
+            _take_described(buffer, record, contents)
+        pos = record.end
+    return {number: _entries(stamps, offsets[number]) for number, stamps in times.items()}
+
+
+def _entries(times: array[int], offsets: array[int]) -> NDArray[Any]:
+    entries = np.empty(len(times), ENTRY)
+    entries["time"], entries["offset"] = times, offsets
+    return entries
+
+
+def _summarised(log: mmap) -> list[int]:
+    """Where the summary at the end of a file says that chunks are, and where it is itself, in order."""
+    footer = len(log) - len(MAGIC) - _FOOTER.size
+    if footer < len(MAGIC) or log[-len(MAGIC) :] != MAGIC:
+        return []
+    start, _, _ = _FOOTER.unpack_from(log, footer)
+    known = [start, footer - _RECORD.size]
+    pos = start
+    while len(MAGIC) < pos < footer:
+        try:
+            record = _read_record(log, pos, footer)
+        except BrokenRecordError:
+            break
+        if record.op == Opcode.CHUNK_INDEX and record.end - record.start >= _CHUNK_INDEX.size:
+            known.append(_CHUNK_INDEX.unpack_from(log, record.start)[2])
+        pos = record.end
+    return sorted(known)
+
+
+def _read_record(buffer: Buffer, pos: int, end: int) -> _Record:
+    """The record at a position; only a chunk may reach beyond the end."""
+    if pos + _RECORD.size > end:
+        raise BrokenRecordError("a record header is cut short")
+    op, size = _RECORD.unpack_from(buffer, pos)
+    start = pos + _RECORD.size
+    if not op:
+        raise BrokenRecordError("these bytes are no record")
+    if start + size > end and op != Opcode.CHUNK:
+        raise BrokenRecordError("its last record is cut short")
+    return _Record(pos, op, start, start + size)

@@ -1,0 +1,284 @@
+"""ROS 2 bags in SQLite (.db3). Times are the recorder's; the file, and what lies beside it, is never written to."""
+
+from __future__ import annotations
+
+import shutil
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.errors import LogError
+from care_core.logs.base import LogFormat
+from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, unpack
+from care_core.logs.mapped import mapped
+from care_core.logs.recording import recording_at
+from care_core.logs.ros_log import Connection, Flaw, Message, RosLog
+from care_core.logs.ros_metadata import Metadata, parse_metadata
+from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, Row, is_blob, is_text
+
+_WHAT = "a SQLite file"
+_SMALLEST_ROW = 8
+"""No row takes fewer bytes, so a damaged tree that gives more rows than fit runs in circles."""
+
+_MESSAGE_COLUMNS, _DEFINITION_COLUMNS, _DISTRO_COLUMNS, _METADATA_COLUMNS = 4, 5, 2, 3
+_LANGUAGES = ("ros2msg", "ros2idl", "unknown")
+
+
+class Ros2Db3(RosLog):
+    """A ROS 2 bag of one or more SQLite files."""
+
+    def __init__(self, path: Path) -> None:
+        """Read topics and record times. Raises LogError when it is no ROS 2 bag."""
+        recording = recording_at(path)
+        parts = [Db3Part(file) for file in recording.files]
+        super().__init__(
+            path, LogFormat.ROS2_DB3, parts,
+            metadata=recording.metadata, missing=recording.missing, notes=recording.notes,
+        )  # fmt: skip
+
+
+class Db3Part:
+    """One SQLite file, fulfilling `Part`."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = PlainFile(path)
+        self.flaws: dict[str, Flaw] = {}
+        self._store: _Store = _Database(self._file.path)
+        try:
+            contents = self._store.contents()
+        except sqlite3.Error as err:
+            contents = self._salvage(str(err)).contents()
+        if not contents.is_bag:
+            raise LogError("A SQLite file, but no ROS 2 bag.", hint="Name a .db3 of 'ros2 bag record'.", where=str(path))
+        if self._file.is_cut:
+            self.flaws["zstd"] = Flaw("the zstd file is cut short or broken")
+        self.connections: Mapping[int, Connection] = contents.connections()
+        self.times_ns = {number: times for number, times in contents.times_ns.items() if number in self.connections}
+        self.metadata = Metadata.merged(
+            [Metadata(distro=contents.distro), *(parse_metadata(text) for text in contents.metadata)]
+        )
+
+    def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
+        """The messages of some topics; behind a place that SQLite cannot read, what the pages hold."""
+        last = -1
+        try:
+            for row, number, time_ns, data in self._store.rows(numbers):
+                last = row
+                yield from self._message(number, time_ns, data)
+            return
+        except sqlite3.Error as err:
+            salvaged = self._salvage(str(err))
+        for row, number, time_ns, data in salvaged.rows(numbers):
+            if row > last:
+                yield from self._message(number, time_ns, data)
+
+    def _message(self, number: int, time_ns: int, data: Any) -> Iterator[Message]:
+        if not isinstance(data, bytes):
+            self.flaws.setdefault("row", Flaw("a message is not there", time_ns=time_ns))
+            return
+        try:
+            plain = unpack("zstd", data) if data.startswith(ZSTD_MAGIC) else data
+        except CannotUnpackError:
+            self.flaws.setdefault("packed", Flaw("a packed message cannot be unpacked", time_ns=time_ns))
+        else:
+            yield number, time_ns, plain, 0, len(plain)
+
+    def _salvage(self, why: str) -> _SalvagedPages:
+        self._store = pages = _SalvagedPages(self._file.path)
+        size = self._file.path.stat().st_size
+        promised = pages.promised_size()
+        if size < promised:
+            self.flaws["cut"] = Flaw(f"{promised - size} bytes are missing", size, cuts=True)
+        else:
+            self.flaws.setdefault("broken", Flaw(f"the database is damaged ({why}); what its pages hold is read"))
+        return pages
+
+
+@dataclass(slots=True)
+class _Contents:
+    """What a bag's tables hold beside the messages' data; `topics` has name, type and serialisation by id."""
+
+    topics: dict[int, tuple[str, str, str]] = field(default_factory=dict)
+    definitions: dict[str, tuple[str, str]] = field(default_factory=dict)
+    """Language and text by type."""
+    metadata: list[str] = field(default_factory=list)
+    distro: str = ""
+    times_ns: dict[int, NDArray[np.int64]] = field(default_factory=dict)
+    is_bag: bool = True
+
+    def connections(self) -> dict[int, Connection]:
+        made = {}
+        for number, (name, kind, encoding) in self.topics.items():
+            language, definition = self.definitions.get(kind, ("", ""))
+            made[number] = Connection(name, kind, definition, encoding, language if definition else "")
+        return made
+
+
+_DataRow = tuple[int, int, int, Any]
+"""Row id, topic id, record time in ns, data."""
+
+
+class _Store(Protocol):
+    def contents(self) -> _Contents: ...
+
+    def rows(self, numbers: frozenset[int]) -> Iterator[_DataRow]: ...
+
+
+class _Database:
+    """A sound SQLite file, read with SQLite; every method raises sqlite3.Error where it is not sound."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.is_own = False
+        self.most_rows = path.stat().st_size // _SMALLEST_ROW
+        journal = path.with_name(f"{path.name}-wal")
+        if journal.is_file() and journal.stat().st_size:
+            self._copy_with(journal)
+
+    def _copy_with(self, journal: Path) -> None:
+        """SQLite writes to the files when it takes the last transactions from a journal, so it gets copies."""
+        self._folder = TemporaryDirectory(prefix="care-")
+        copy = Path(self._folder.name) / self.path.name
+        try:
+            shutil.copyfile(self.path, copy)
+            shutil.copyfile(journal, copy.with_name(journal.name))
+        except OSError as err:
+            raise LogError(
+                f"The log's journal cannot be copied: {err.strerror or err}.",
+                hint="Free some of the temporary folder, or set TMPDIR to a larger one.",
+                where=str(journal),
+            ) from err
+        self.path, self.is_own = copy, True
+        self.most_rows += journal.stat().st_size // _SMALLEST_ROW
+
+    def contents(self) -> _Contents:
+        with closing(self._connect()) as database:
+            columns = {
+                name: [column for _, column, *_ in database.execute(f"PRAGMA table_info({name})")]
+                for name in ("topics", "messages", "message_definitions", "metadata", "schema")
+            }
+            if not columns["topics"] or not columns["messages"]:
+                return _Contents(is_bag=False)
+            contents = _Contents()
+            query = "SELECT id, name, type, serialization_format FROM topics"
+            contents.topics = {row: (str(a), str(b), str(c)) for row, a, b, c in database.execute(query)}
+            if columns["message_definitions"]:
+                query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+                contents.definitions = {str(a): (str(b), str(c)) for a, b, c in database.execute(query)}
+            if columns["metadata"]:
+                contents.metadata = [str(text) for (text,) in database.execute("SELECT metadata FROM metadata ORDER BY id")]
+            if "ros_distro" in columns["schema"]:
+                contents.distro = "".join(str(name) for (name,) in database.execute("SELECT ros_distro FROM schema"))
+            contents.times_ns = self._times(database)
+            return contents
+
+    def rows(self, numbers: frozenset[int]) -> Iterator[_DataRow]:
+        places = ", ".join(str(number) for number in sorted(numbers))
+        with closing(self._connect()) as database:
+            yield from self._bounded(
+                database.execute(
+                    f"SELECT id, topic_id, timestamp, data FROM messages WHERE topic_id IN ({places})"
+                    " AND typeof(timestamp) = 'integer' ORDER BY id"
+                )
+            )
+
+    def _times(self, database: sqlite3.Connection) -> dict[int, NDArray[np.int64]]:
+        query = (
+            "SELECT topic_id, timestamp FROM messages"
+            " WHERE typeof(topic_id) = 'integer' AND typeof(timestamp) = 'integer' ORDER BY id"
+        )
+        pairs = np.fromiter(self._bounded(database.execute(query)), np.dtype((np.int64, 2)))
+        order = np.argsort(pairs[:, 0], kind="stable")
+        numbers, firsts = np.unique(pairs[order, 0], return_index=True)
+        return dict(zip(numbers.tolist(), np.split(pairs[order, 1], firsts[1:]), strict=False))
+
+    def _bounded(self, rows: Iterable[Any]) -> Iterator[Any]:
+        for count, row in enumerate(rows):
+            if count > self.most_rows:
+                raise sqlite3.DatabaseError("its tree runs in circles")
+            yield row
+
+    def _connect(self) -> sqlite3.Connection:
+        mode = "" if self.is_own else "?mode=ro&immutable=1"
+        database = sqlite3.connect(f"{self.path.resolve().as_uri()}{mode}", uri=True)
+        database.text_factory = lambda raw: raw.decode("utf-8", "replace")
+        return database
+
+
+class _SalvagedPages:
+    """A damaged SQLite file, read page by page; rows are told apart by what their columns are."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def promised_size(self) -> int:
+        """Bytes that the file should have, as its header says."""
+        with mapped(self.path, b"", _WHAT) as log:
+            return Pages(log).size * int.from_bytes(log[28:32], "big")
+
+    def contents(self) -> _Contents:
+        contents = _Contents()
+        found: list[tuple[int, int, int]] = []
+        with mapped(self.path, MAGIC, _WHAT) as log:
+            pages = Pages(log)
+            for row in pages.rows():
+                message = _message_head(pages, row)
+                if message is not None:
+                    found.append((row.id, *message))
+                    continue
+                try:
+                    _take_described(contents, row, pages.values(row))
+                except BrokenCellError:
+                    continue
+        table = np.array(sorted(set(found)), np.int64).reshape(-1, 3)
+        for number in np.unique(table[:, 1]).tolist():
+            contents.times_ns[number] = table[table[:, 1] == number, 2]
+        contents.is_bag = bool(contents.topics)
+        return contents
+
+    def rows(self, numbers: frozenset[int]) -> Iterator[_DataRow]:
+        seen: set[int] = set()
+        with mapped(self.path, MAGIC, _WHAT) as log:
+            pages = Pages(log)
+            for row in pages.rows():
+                message = _message_head(pages, row)
+                if message is None or message[0] not in numbers or row.id in seen:
+                    continue
+                seen.add(row.id)
+                try:
+                    yield row.id, *message, pages.values(row)[-1]
+                except BrokenCellError:
+                    yield row.id, *message, None
+
+
+def _message_head(pages: Pages, row: Row) -> tuple[int, int] | None:
+    """Topic id and record time of a row of `messages`, None for a row of another table."""
+    if len(row.types) != _MESSAGE_COLUMNS or not is_blob(row.types[-1]) or row.types[0] != 0:
+        return None
+    _, *numbers = pages.numbers(row)
+    if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:  # noqa: PLR2004
+        return None
+    return numbers[0], numbers[1]
+
+
+def _take_described(contents: _Contents, row: Row, values: list[int | bytes | None]) -> None:
+    """Take a row of `topics`, `message_definitions`, `metadata` or `schema`."""
+    texts = [value.decode("utf-8", "replace") if isinstance(value, bytes) else "" for value in values]
+    if not row.types or not is_text(row.types[-1]) or row.types[0] != 0:
+        return
+    if len(texts) == _DEFINITION_COLUMNS and texts[2] in _LANGUAGES:
+        contents.definitions.setdefault(texts[1], (texts[2], texts[3]))
+    elif len(texts) >= _MESSAGE_COLUMNS and all(is_text(kind) for kind in row.types[1:]):
+        contents.topics.setdefault(row.id, (texts[1], texts[2], texts[3]))
+    elif len(texts) == _METADATA_COLUMNS:
+        contents.metadata.append(texts[-1])
+    elif len(texts) == _DISTRO_COLUMNS:
+        contents.distro = texts[-1]
