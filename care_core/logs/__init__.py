@@ -52,7 +52,7 @@ def open_log(path: str | Path) -> Log:
 
 
 def sniff(path: Path) -> LogFormat:
-    """The format of a file, or of the recording in a folder, told from its first bytes. Raises LogError as `open_log`."""
+    """The format of a file, or of the recording in a folder, by its first bytes. Raises LogError as `open_log`."""
     head = _read_head(path)
     plain = _unpacked(head)
     for magic, ros_format in ROS_MAGIC:

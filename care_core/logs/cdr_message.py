@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,8 +32,6 @@ _BIG, _LITTLE = b"\x00\x00", b"\x00\x01"
 _ENDIAN = {_BIG: ">", _LITTLE: "<"}
 _WIDTHS = (4, 2)
 _MAX_PADDING = 3
-ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-"""No CDR message begins so: rosbag2 compressed the message."""
 
 
 @dataclass(slots=True)
@@ -90,7 +88,7 @@ def wide_size(type_name: str, types: Types, message: bytes) -> int | None:
 class _Cdr:
     """Fulfils `Wire`."""
 
-    codes = CODES
+    codes: Mapping[str, str] = CODES
 
     def __init__(self, endian: str, wide: int) -> None:
         self.endian = endian
@@ -204,7 +202,7 @@ def _padded(endian: str, start: int, run: Sequence[Fixed]) -> str:
     codes, pos = [endian], start
     for one in run:
         size = struct.calcsize("<" + one.code)
-        padding = -pos % size if one.count else 0
-        codes.append("x" * padding + (one.code if one.wanted else f"{size * one.count}x"))
-        pos += padding + size * one.count
+        padding = -pos % size if one.length else 0
+        codes.append("x" * padding + (one.code if one.wanted else f"{size * one.length}x"))
+        pos += padding + size * one.length
     return "".join(codes)

@@ -78,9 +78,9 @@ class McapPart:
     def _of_channel(self, chunk: Chunk, number: int, buffer: Buffer, begin: int, end: int) -> Iterator[Message]:
         entries = chunk.index[number]
         is_cdr = self.connections[number].encoding == "cdr"
-        for time_ns, offset in zip(_times_ns(entries).tolist(), entries["offset"].tolist(), strict=True):
+        for time_ns, offset in entries.tolist():
             try:
-                pos, after = locate(buffer, begin, end, offset, number)
+                pos, after = locate(buffer, begin, end, offset, number, time_ns)
                 # No CDR message begins so: the recorder packed each message by itself.
                 if is_cdr and buffer[pos : pos + len(ZSTD_MAGIC)] == ZSTD_MAGIC:
                     plain = unpack("zstd", buffer[pos:after])

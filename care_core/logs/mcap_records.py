@@ -143,14 +143,15 @@ def read_contents(log: mmap) -> Contents:
     return contents
 
 
-def locate(buffer: Buffer, begin: int, end: int, offset: int, number: int) -> tuple[int, int]:
-    """Where the data of a channel's message at an index entry's offset lies. Raises BrokenRecordError."""
+def locate(buffer: Buffer, begin: int, end: int, offset: int, number: int, time_ns: int) -> tuple[int, int]:
+    """Where the data of the message that an index entry describes lies. Raises BrokenRecordError."""
     pos = begin + offset
     if pos + _MESSAGE.size > end:
         raise BrokenRecordError("a message lies beyond the end of its chunk")
-    op, size, channel, _, _, _ = _MESSAGE.unpack_from(buffer, pos)
+    op, size, channel, _, stamp_ns, _ = _MESSAGE.unpack_from(buffer, pos)
     after = pos + _RECORD.size + size
-    if op != Opcode.MESSAGE or channel != number or after > end or after < pos + _MESSAGE.size:
+    is_it = op == Opcode.MESSAGE and channel == number and stamp_ns == time_ns
+    if not is_it or not pos + _MESSAGE.size <= after <= end:
         raise BrokenRecordError("a message is not where the index says")
     return pos + _MESSAGE.size, after
 

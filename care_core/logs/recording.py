@@ -69,13 +69,15 @@ def _in_folder(folder: Path) -> Recording:
         )
     if FILE_NAME in names:
         raise LogError(
-            "A ROS 2 bag folder without its .db3 or .mcap files.", hint="Copy them beside metadata.yaml.", where=str(folder)
+            "A ROS 2 bag folder without its .db3 or .mcap files.",
+            hint="Copy them beside metadata.yaml.",
+            where=str(folder),
         )
     raise LogError("A folder, not a log.", hint="Name one log file in it.", where=str(folder))
 
 
 def _ros2_bag(folder: Path, present: Sequence[str]) -> Recording:
-    """The files that metadata.yaml lists, as far as they are there; without it, and for renamed files, what is there."""
+    """The files that metadata.yaml lists, as far as they are there; without it, or where renamed, what is there."""
     metadata = _metadata_beside(folder)
     listed = [Path(name).name for name in metadata.files]
     files = [name for name in listed if name in present]
@@ -87,9 +89,7 @@ def _ros2_bag(folder: Path, present: Sequence[str]) -> Recording:
     elif not listed:
         files = list(present)
     if len({_bare_suffix(name) for name in files}) > 1:
-        raise LogError(
-            "The folder holds both .db3 and .mcap files.", hint="Name the one to read.", where=str(folder)
-        )
+        raise LogError("The folder holds both .db3 and .mcap files.", hint="Name the one to read.", where=str(folder))
     flaws = tuple(Flaw(f"{name} is missing from the folder") for name in missing)
     return Recording(tuple(folder / name for name in files), metadata, flaws)
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -37,10 +38,10 @@ def message_decoder(type_name: str, definition: str, wanted: Sequence[str], zero
 class _Ros1:
     """Fulfils `Wire`."""
 
-    codes = {**CODES, "byte": "b"}
+    codes: Mapping[str, str] = MappingProxyType({**CODES, "byte": "b"})
 
     def fixed(self, run: Sequence[Fixed]) -> Step:
-        codes = [one.code if one.wanted else f"{struct.calcsize(one.code) * one.count}x" for one in run]
+        codes = [one.code if one.wanted else f"{struct.calcsize(one.code) * one.length}x" for one in run]
         layout = struct.Struct("<" + "".join(codes))
         unpack, size = layout.unpack_from, layout.size
 

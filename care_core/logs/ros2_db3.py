@@ -21,7 +21,7 @@ from care_core.logs.mapped import mapped
 from care_core.logs.recording import recording_at
 from care_core.logs.ros_log import Connection, Flaw, Message, RosLog
 from care_core.logs.ros_metadata import Metadata, parse_metadata
-from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, Row, is_blob, is_text
+from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, Row, is_blob, is_text, promised_size
 
 _WHAT = "a SQLite file"
 _SMALLEST_ROW = 8
@@ -51,13 +51,17 @@ class Db3Part:
         self.path = path
         self._file = PlainFile(path)
         self.flaws: dict[str, Flaw] = {}
-        self._store: _Store = _Database(self._file.path)
+        database = _Database(self._file.path)
+        self._store: _Store = database
         try:
-            contents = self._store.contents()
+            database.check_size()
+            contents = database.contents()
         except sqlite3.Error as err:
             contents = self._salvage(str(err)).contents()
         if not contents.is_bag:
-            raise LogError("A SQLite file, but no ROS 2 bag.", hint="Name a .db3 of 'ros2 bag record'.", where=str(path))
+            raise LogError(
+                "A SQLite file, but no ROS 2 bag.", hint="Name a .db3 of 'ros2 bag record'.", where=str(path)
+            )
         if self._file.is_cut:
             self.flaws["zstd"] = Flaw("the zstd file is cut short or broken")
         self.connections: Mapping[int, Connection] = contents.connections()
@@ -94,7 +98,7 @@ class Db3Part:
     def _salvage(self, why: str) -> _SalvagedPages:
         self._store = pages = _SalvagedPages(self._file.path)
         size = self._file.path.stat().st_size
-        promised = pages.promised_size()
+        promised = promised_size(self._file.path)
         if size < promised:
             self.flaws["cut"] = Flaw(f"{promised - size} bytes are missing", size, cuts=True)
         else:
@@ -159,6 +163,11 @@ class _Database:
         self.path, self.is_own = copy, True
         self.most_rows += journal.stat().st_size // _SMALLEST_ROW
 
+    def check_size(self) -> None:
+        """Raise sqlite3.Error for a file that is cut short: SQLite reads zeros for the missing rest of a page."""
+        if not self.is_own and self.path.stat().st_size < promised_size(self.path):
+            raise sqlite3.DatabaseError("it is cut short")
+
     def contents(self) -> _Contents:
         with closing(self._connect()) as database:
             columns = {
@@ -174,7 +183,9 @@ class _Database:
                 query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
                 contents.definitions = {str(a): (str(b), str(c)) for a, b, c in database.execute(query)}
             if columns["metadata"]:
-                contents.metadata = [str(text) for (text,) in database.execute("SELECT metadata FROM metadata ORDER BY id")]
+                contents.metadata = [
+                    str(text) for (text,) in database.execute("SELECT metadata FROM metadata ORDER BY id")
+                ]
             if "ros_distro" in columns["schema"]:
                 contents.distro = "".join(str(name) for (name,) in database.execute("SELECT ros_distro FROM schema"))
             contents.times_ns = self._times(database)
@@ -219,11 +230,6 @@ class _SalvagedPages:
     def __init__(self, path: Path) -> None:
         self.path = path
 
-    def promised_size(self) -> int:
-        """Bytes that the file should have, as its header says."""
-        with mapped(self.path, b"", _WHAT) as log:
-            return Pages(log).size * int.from_bytes(log[28:32], "big")
-
     def contents(self) -> _Contents:
         contents = _Contents()
         found: list[tuple[int, int, int]] = []
@@ -264,7 +270,7 @@ def _message_head(pages: Pages, row: Row) -> tuple[int, int] | None:
     if len(row.types) != _MESSAGE_COLUMNS or not is_blob(row.types[-1]) or row.types[0] != 0:
         return None
     _, *numbers = pages.numbers(row)
-    if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:  # noqa: PLR2004
+    if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:
         return None
     return numbers[0], numbers[1]
 

@@ -165,7 +165,9 @@ class RosLog:
         found += self._clock
         for topic, broken in self._broken.items():
             times = f"{broken.count} messages" if broken.count else "its messages"
-            found.append(Damage(f"{topic}: {times} cannot be decoded: {broken.why}", None, self._seconds(broken.time_ns)))
+            found.append(
+                Damage(f"{topic}: {times} cannot be decoded: {broken.why}", None, self._seconds(broken.time_ns))
+            )
         return tuple(found)
 
     @property
@@ -426,7 +428,9 @@ def _objects(values: Sequence[Any]) -> NDArray[Any]:
 def _table(kinds: Mapping[str, bool], pieces: Sequence[_Piece], start_ns: int) -> Table:
     """The messages of a topic in time order; `kinds` are its paths and whether they are numbers."""
     if not pieces:
-        return Table(np.empty(0), {path: np.empty(0, np.float64 if number else object) for path, number in kinds.items()})
+        return Table(
+            np.empty(0), {path: np.empty(0, np.float64 if number else object) for path, number in kinds.items()}
+        )
     times_ns = np.concatenate([piece.times_ns for piece in pieces])
     order = np.argsort(times_ns, kind="stable")
     columns = {path: np.concatenate([_column(p, path, number) for p in pieces]) for path, number in kinds.items()}

@@ -84,17 +84,18 @@ class MessageDecoder:
 
 
 class Fixed(NamedTuple):
-    """Neighbouring numbers of one type in a stretch of fixed size; only a wanted one is read (`count` is 1 then)."""
+    """Neighbouring numbers of one type in a stretch of fixed size; only a wanted one is read (`length` is 1 then)."""
 
     code: str
-    count: int
+    length: int
     wanted: bool
 
 
 class Wire(Protocol):
     """How values lie in the bytes. `count` is None for a sequence, which carries its own; `keep`: it is wanted."""
 
-    codes: Mapping[str, str]
+    @property
+    def codes(self) -> Mapping[str, str]: ...
 
     def fixed(self, run: Sequence[Fixed]) -> Step: ...
 
@@ -270,9 +271,7 @@ class _Plan:
         self.pending = []
 
 
-def read_elements(
-    each: MessageDecoder, buffer: Buffer, pos: int, end: int, size: int, values: list[Any]
-) -> int:
+def read_elements(each: MessageDecoder, buffer: Buffer, pos: int, end: int, size: int, values: list[Any]) -> int:
     """Run an element's decoder `size` times from `pos`: appends one list per wanted path, returns the next position."""
     if size > end - pos:  # no element takes less than a byte, so the count itself is broken
         raise MalformedMessageError("an array reaches beyond the message")

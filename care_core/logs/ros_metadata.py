@@ -103,7 +103,7 @@ def _file_parameters(given: Any) -> Iterator[tuple[str, float | str]]:
             return
         name, node, is_inside = pending.pop()
         if isinstance(node, Mapping):
-            for key, child in reversed(node.items()):
+            for key, child in reversed(list(node.items())):
                 if is_inside:
                     pending.append((f"{name}.{key}", child, True))
                 elif key == _PARAMETERS:

@@ -14,6 +14,7 @@ _DISTROS = ("humble", "foxy", "jazzy", "galactic", "kilted", "iron", "eloquent",
 
 _LANGUAGES = ("", "ros2msg", "ros2idl", "omgidl")
 _IDL_SEPARATOR = re.compile(r"^=+\s*\nIDL: (\S+)\s*$", re.MULTILINE)
+_DIRECTIVE = re.compile(r"^\s*#.*$", re.MULTILINE)
 _PADDING_FIELD = Field("structure_needs_at_least_one_member", "uint8", None)
 """What ROS 2 puts into a message that has no field."""
 
@@ -56,8 +57,9 @@ def _from_idl(type_name: str, definition: str) -> Types:
     _, *rest = _IDL_SEPARATOR.split(definition)
     try:
         store = get_typestore(Stores.EMPTY)
-        for text in rest[1::2] or [definition]:
-            store.register({name: fields for name, fields in get_types_from_idl(text).items() if name not in store.fielddefs})
+        for text in reversed(rest[1::2] or [definition]):  # what a type is made of comes after it
+            found = get_types_from_idl(_DIRECTIVE.sub("", text))
+            store.register({name: fields for name, fields in found.items() if name not in store.fielddefs})
         text, _ = store.generate_msgdef(_long_name(type_name), ros_version=2)
     except Exception as err:  # the grammar raises whatever it met
         raise MalformedMessageError(f"definition of {type_name} not understood") from err

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from mmap import mmap
+from pathlib import Path
 
 MAGIC = b"SQLite format 3\0"
 
@@ -19,6 +20,21 @@ _USUAL_PAGE_SIZE = 4096
 _MOST_COLUMNS = 12
 _INTEGER_SIZES = {0: 0, 1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8, 8: 0, 9: 0}
 _FIRST_BLOB, _FIRST_TEXT = 12, 13
+
+
+def promised_size(path: Path) -> int:
+    """Bytes that a file should have, as its header says; 0 where the header is missing or not up to date."""
+    with path.open("rb") as stream:
+        head = stream.read(_FIRST_PAGE_HEADER)
+    if len(head) < _FIRST_PAGE_HEADER or head[24:28] != head[92:96]:
+        return 0
+    return _page_size(head) * int.from_bytes(head[28:32], "big")
+
+
+def _page_size(head: bytes | mmap) -> int:
+    size = int.from_bytes(head[16:18], "big")
+    size = 65536 if size == 1 else size
+    return size if size in _PAGE_SIZES else _USUAL_PAGE_SIZE
 
 
 class BrokenCellError(Exception):
@@ -43,10 +59,8 @@ class Pages:
 
     def __init__(self, log: mmap) -> None:
         self.log = log
-        size = int.from_bytes(log[16:18], "big")
-        size = 65536 if size == 1 else size
-        self.size = size if size in _PAGE_SIZES else _USUAL_PAGE_SIZE
-        self.usable = self.size - log[20]
+        self.size = _page_size(log)
+        self.usable = self.size - (log[20] if len(log) > _FIRST_PAGE_HEADER else 0)
 
     def rows(self) -> Iterator[Row]:
         """Every row of every table, in the order of the pages; what is no row is passed over."""
