@@ -26,17 +26,21 @@ ROS_MAGIC = (
 )
 """How the files of a ROS recording begin; each may be packed with zstd."""
 
+_ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+
 UNREADABLE_MAGIC = (
     (b"#ROSBAG V1", "a ROS bag of format 1.x", "Bring it to format 2.0 with 'rosbag fix' of ROS 1."),
     (b"#ROSRECORD V1", "a ROS bag of format 1.x", "Bring it to format 2.0 with 'rosbag fix' of ROS 1."),
     (b"ULog\x01\x12\x35", "a PX4 ULog", ""),
     (b"\x1f\x8b", "a gzip archive", "Unpack it first."),
     (b"PK\x03\x04", "a zip archive", "Unpack it first."),
-    (b"\x28\xb5\x2f\xfd", "a zstd archive", "Unpack it first."),
+    (_ZSTD_MAGIC, "a zstd archive", "Unpack it first."),
 )
 """Formats that are recognised but not read: how the file begins, what it is, what to do."""
 
 _SNIFF_BYTES = 4096
+_ZSTD_BYTES = 1 << 18
+"""Enough for the first block of a zstd file, which unpacks as a whole."""
 
 
 def open_log(path: str | Path) -> Log:
@@ -54,7 +58,7 @@ def open_log(path: str | Path) -> Log:
 def sniff(path: Path) -> LogFormat:
     """The format of a file, or of the recording in a folder, by its first bytes. Raises LogError as `open_log`."""
     head = _read_head(path)
-    plain = _unpacked(head)
+    plain = _unpacked(path) if head.startswith(_ZSTD_MAGIC) else head
     for magic, ros_format in ROS_MAGIC:
         if plain.startswith(magic):
             return ros_format
@@ -86,14 +90,14 @@ def log_digest(path: str | Path) -> str:
     return digest.hexdigest()
 
 
-def _read_head(path: Path) -> bytes:
+def _read_head(path: Path, size: int = _SNIFF_BYTES) -> bytes:
     if path.is_dir():
         from care_core.logs.recording import recording_at
 
         path = recording_at(path).files[0]
     try:
         with path.open("rb") as stream:
-            head = stream.read(_SNIFF_BYTES)
+            head = stream.read(size)
     except OSError as err:
         raise _cannot_open(path, err) from err
     if not head:
@@ -101,13 +105,11 @@ def _read_head(path: Path) -> bytes:
     return head
 
 
-def _unpacked(head: bytes) -> bytes:
-    """The first bytes without zstd around them."""
-    if not head.startswith(b"\x28\xb5\x2f\xfd"):
-        return head
+def _unpacked(path: Path) -> bytes:
+    """The first bytes of what a zstd file holds."""
     from care_core.logs.compression import unpack_head
 
-    return unpack_head(head)
+    return unpack_head(_read_head(path, _ZSTD_BYTES))
 
 
 def _cannot_open(path: Path, err: OSError) -> LogError:

@@ -14,7 +14,7 @@ from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile,
 from care_core.logs.mapped import mapped
 from care_core.logs.mcap_records import MAGIC, BrokenRecordError, Chunk, Contents, locate, read_contents
 from care_core.logs.recording import recording_at
-from care_core.logs.ros_log import Connection, Flaw, Message, RosLog
+from care_core.logs.ros_log import Connection, Flaw, Message, RosLog, timed
 from care_core.logs.ros_message import Buffer
 from care_core.logs.ros_metadata import Metadata, parse_metadata
 
@@ -45,7 +45,7 @@ class McapPart:
             contents = read_contents(log)
         self._chunks = contents.chunks
         self._checked: set[int] = set()
-        self.flaws: dict[str, Flaw] = contents.flaws
+        self.flaws = timed(contents.flaws, [(chunk.pos, _last_ns(chunk)) for chunk in contents.chunks if chunk.index])
         if self._file.is_cut:
             self.flaws["zstd"] = Flaw("the zstd file is cut short or broken")
         self.connections: Mapping[int, Connection] = contents.connections()
@@ -117,6 +117,10 @@ def _times_by_channel(contents: Contents) -> dict[int, NDArray[np.int64]]:
 
 def _first_ns(chunk: Chunk) -> int | None:
     return min((int(_times_ns(entries).min()) for entries in chunk.index.values() if len(entries)), default=None)
+
+
+def _last_ns(chunk: Chunk) -> int:
+    return max(int(_times_ns(entries).max()) for entries in chunk.index.values())
 
 
 def _times_ns(entries: NDArray[np.void]) -> NDArray[np.int64]:

@@ -69,7 +69,7 @@ def _in_folder(folder: Path) -> Recording:
         )
     if FILE_NAME in names:
         raise LogError(
-            "A ROS 2 bag folder without its .db3 or .mcap files.",
+            "A ROS 2 bag folder without .db3 or .mcap files.",
             hint="Copy them beside metadata.yaml.",
             where=str(folder),
         )

@@ -15,7 +15,7 @@ from care_core.logs.base import LogFormat
 from care_core.logs.mapped import mapped
 from care_core.logs.recording import recording_at
 from care_core.logs.ros1_records import MAGIC, BrokenRecordError, Chunk, Contents, locate, read_contents
-from care_core.logs.ros_log import Connection, Flaw, Message, RosLog
+from care_core.logs.ros_log import Connection, Flaw, Message, RosLog, timed
 from care_core.logs.ros_metadata import Metadata
 
 _MOST_PAUSE_NS = 60_000_000_000
@@ -46,7 +46,8 @@ class Ros1Part:
         if self._contents.is_encrypted:
             raise LogError("The bag is encrypted.", hint="Decrypt it with 'rosbag decrypt' first.", where=str(path))
         self.connections: Mapping[int, Connection] = self._contents.connections
-        self.flaws: dict[str, Flaw] = self._contents.flaws
+        lasts = [(chunk.pos, last) for chunk in self._contents.chunks if (last := _last_ns(chunk)) is not None]
+        self.flaws = timed(self._contents.flaws, lasts)
         self.times_ns = _times_by_connection(self._contents)
 
     def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
@@ -98,6 +99,10 @@ def _times_by_connection(contents: Contents) -> Mapping[int, NDArray[np.int64]]:
 def _first_ns(chunk: Chunk) -> int | None:
     times = [int(_entry_times_ns(entries).min()) for entries in chunk.index.values() if len(entries)]
     return min(times, default=None)
+
+
+def _last_ns(chunk: Chunk) -> int | None:
+    return max((int(_entry_times_ns(entries).max()) for entries in chunk.index.values() if len(entries)), default=None)
 
 
 def _entry_times_ns(entries: NDArray[Any]) -> NDArray[np.int64]:

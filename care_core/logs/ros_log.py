@@ -6,7 +6,7 @@ The files (`Part`) know where messages lie; this module knows what they mean.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from functools import cached_property
 from pathlib import Path
@@ -371,6 +371,20 @@ class _Gathered:
             self.done.append(_Piece(np.array(self.times_ns, np.int64), _columns(self.decoder, self.rows)))
             self.times_ns, self.rows = [], []
         return self.done
+
+
+def timed(flaws: Mapping[str, Flaw], lasts: Sequence[tuple[int, int]]) -> dict[str, Flaw]:
+    """The flaws of a file with times: a place that has none is as late as the messages that lie before it.
+
+    Args:
+        lasts: byte and record time of the last message, of each stretch of the file.
+    """
+    found = {}
+    for key, flaw in flaws.items():
+        before = [time_ns for byte, time_ns in lasts if flaw.byte is not None and byte < flaw.byte]
+        known = flaw.time_ns is not None or not before
+        found[key] = flaw if known else replace(flaw, time_ns=max(before))
+    return found
 
 
 def _first(part: Part, number: int) -> bytes:

@@ -19,11 +19,12 @@ from care_core.logs.base import LogFormat
     ("head", "says"),
     [
         (b"SQLite format 3\0" + b"\0" * 80, "ROS 2 bag"),
-        (b"\x89MCAP0\r\n" + b"\0" * 80, "MCAP"),
+        (b"\x28\xb5\x2f\xfd" + b"\0" * 80, "zstd"),
         (b"ULog\x01\x12\x35" + b"\0" * 80, "ULog"),
         (b"\x1f\x8b\x08" + b"\0" * 80, "gzip"),
         (b"PK\x03\x04" + b"\0" * 80, "zip"),
         (b"#ROSBAG V1.2\n" + b"\0" * 80, "format 1.x"),
+        (b"#ROSRECORD V1.2\n" + b"\0" * 80, "format 1.x"),
         (b"FMT, 128, 89, FMT, BBnNZ, Type,Length\n", "text"),
         (struct.pack(">Q", 1_600_000_000_000_000) + b"\xfd\x09\0\0" + b"\0" * 80, "MAVLink"),
         (b"hello, this is no log at all", "known format"),
