@@ -78,7 +78,7 @@ class McapFile:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.writer.finish()
+        self.writer.finish()  # type: ignore[no-untyped-call]
 
     def add(
         self, topic: str, kind: str, time_ns: int, data: bytes, *, text: str | None = None, language: str = "ros2msg",

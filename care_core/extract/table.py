@@ -12,7 +12,7 @@ from pathlib import Path
 
 from care_core.errors import CareError, UsageError
 from care_core.extract.read import read_runs
-from care_core.logs import open_log
+from care_core.logs import open_log, whole_recording
 from care_core.profile.schema import Schema
 from care_core.run import Run, is_known
 
@@ -33,6 +33,8 @@ class Failure:
 def find_logs(places: Iterable[Path]) -> tuple[Path, ...]:
     """The files named, and every log below the folders named, each once, in a stable order.
 
+    A folder that is one recording of several files counts as one log.
+
     Raises:
         UsageError: a place does not exist, or there is no log at all.
     """
@@ -41,7 +43,7 @@ def find_logs(places: Iterable[Path]) -> tuple[Path, ...]:
         if not place.exists():
             raise UsageError("No such file or folder.", hint="Check the path.", where=str(place))
         inside = sorted(path for path in place.rglob("*") if path.suffix.lower() in LOG_SUFFIXES and path.is_file())
-        found.update(dict.fromkeys(inside if place.is_dir() else [place]))
+        found.update(dict.fromkeys(map(whole_recording, inside) if place.is_dir() else [place]))
     if not found:
         raise UsageError("There is no log there.", hint=f"Logs end in {' or '.join(LOG_SUFFIXES)}.")
     return tuple(found)

@@ -75,6 +75,13 @@ def sniff(path: Path) -> LogFormat:
     raise LogError("Not a log of a known format.", hint=f"Readable are {READABLE}.", where=str(path))
 
 
+def whole_recording(path: Path) -> Path:
+    """The folder of a ROS 2 bag that was split into several files, given one of them; any other file itself."""
+    from care_core.logs import recording
+
+    return recording.whole_recording(path)
+
+
 def log_digest(path: str | Path) -> str:
     """SHA-256 of the file, or of a folder's files one after the other by name, in hex, read in pieces."""
     path = Path(path)

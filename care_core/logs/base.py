@@ -87,7 +87,12 @@ class Log(Protocol):
     def channels(self) -> tuple[Channel, ...]: ...
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
-        """Configuration as driven: per parameter every value it had, in time order, at least one each."""
+        """Configuration as driven: per parameter every value it had, in time order, at least one each.
+
+        Names are those of the ecosystem: `WPNAV_SPEED` (ArduPilot); `<namespace>/<parameter>` such as
+        `/move_base/DWAPlannerROS/sim_time` (ROS 1); `<node>.<parameter>` with the node's full name and the
+        parameter's dotted one, such as `/controller_server.FollowPath.max_vel_x` (ROS 2).
+        """
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
         """Decode the wanted fields in one pass. A channel or field that the log lacks is absent from the answer."""

@@ -49,8 +49,10 @@ def recording_at(path: Path) -> Recording:
     return Recording((path,), metadata.of_one_file(), notes={"part": place})
 
 
-def folder_of(path: Path) -> Path:
+def whole_recording(path: Path) -> Path:
     """The folder of a ROS 2 bag that was split into several files, given one of them; any other file itself."""
+    if not path.name.lower().endswith(ROS2_SUFFIXES):
+        return path
     listed = [Path(name).name for name in _metadata_beside(path.parent).files]
     return path.parent if len(listed) > 1 and path.name in listed else path
 

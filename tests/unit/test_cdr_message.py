@@ -42,14 +42,13 @@ string<=5 label "x = y"
 float64[<=3] few
 int16[2] pair [1, 2]
 pkg/msg/Inner[] inners
-Inner<=1
+wstring wide
+byte last 7
 """
 
 
 def test_definitions_with_bounds_defaults_and_constants() -> None:
-    text = CORNERS.replace("Inner<=1\n", "wstring wide\nbyte last 7\n") + (
-        "=" * 80 + "\nMSG: pkg/Inner\nbool flag false\nwstring[] words\n"
-    )
+    text = CORNERS + "=" * 80 + "\nMSG: pkg/Inner\nbool flag false\nwstring[] words\n"
     types = parse_definition("pkg/msg/Outer", text)
     fields = [(one.name, one.type, one.size) for one in types["pkg/Outer"]]
     assert fields == [
@@ -79,7 +78,8 @@ def test_types_from_idl() -> None:
     text = (
         "=" * 80 + "\nIDL: pkg/msg/Outer\n#include \"pkg/msg/Inner.idl\"\nmodule pkg { module msg {\n"
         "  struct Outer { pkg::msg::Inner inner; sequence<double, 4> few; string name; };\n}; };\n"
-        + "=" * 80 + "\nIDL: pkg/msg/Inner\nmodule pkg { module msg { struct Inner { uint8 small; long number; }; }; };\n"
+        + "=" * 80 + "\nIDL: pkg/msg/Inner\nmodule pkg { module msg {\n"
+        "  struct Inner { uint8 small; long number; };\n}; };\n"
     )  # fmt: skip
     types, _ = cdr_types("pkg/msg/Outer", text, "ros2idl", "", b"")
     raw = b"\0\1\0\0" + struct.pack("<B3xiI4xd", 1, -7, 1, 2.5) + struct.pack("<I", 3) + b"ab\0"

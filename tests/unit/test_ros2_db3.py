@@ -147,7 +147,9 @@ def parameter(name: str, kind: int, value: Any) -> Any:
         False, 0, 0.0, "", np.array([], "i1"), np.array([], bool), np.array([], "i8"), np.array([], "f8"), [],
     ]  # fmt: skip
     values[kind - 1] = value
-    return make(ROS2, "rcl_interfaces/msg/Parameter", name, make(ROS2, "rcl_interfaces/msg/ParameterValue", kind, *values))
+    return make(
+        ROS2, "rcl_interfaces/msg/Parameter", name, make(ROS2, "rcl_interfaces/msg/ParameterValue", kind, *values)
+    )
 
 
 def test_parameter_events(tmp_path: Path) -> None:
