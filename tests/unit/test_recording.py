@@ -133,11 +133,11 @@ def test_ros2_logs_from_elsewhere_are_read_as_rosbags_reads_them(recorded: Path)
                 expected[connection.topic].append(reader.deserialize(raw, connection.msgtype))
         for topic, messages in expected.items():
             assert len(read[topic]) == len(messages)
-            for row in range(0, len(messages), 7):
+            for row in range(0, len(messages), 23):
                 for field in paths[topic]:
                     assert is_same(read[topic][field][row], value_at(messages[row], field, zero_ns)), (topic, field)
                     compared += 1
-    assert compared > 10_000
+    assert compared > 5_000
 
 
 def test_misconfigured_and_healthy_robot_tell_their_parameters(recorded: Path) -> None:
