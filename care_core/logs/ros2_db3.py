@@ -24,6 +24,8 @@ from care_core.logs.ros_metadata import Metadata, parse_metadata
 from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, Row, is_blob, is_text, promised_size
 
 _WHAT = "a SQLite file"
+_NOT_SOUND = (sqlite3.Error, UnicodeDecodeError)
+"""What the sqlite3 module raises for a damaged file; names in a broken schema need not be text."""
 _SMALLEST_ROW = 8
 """No row takes fewer bytes, so a damaged tree that gives more rows than fit runs in circles."""
 
@@ -56,7 +58,7 @@ class Db3Part:
         try:
             database.check_size()
             contents = database.contents()
-        except sqlite3.Error as err:
+        except _NOT_SOUND as err:
             contents = self._salvage(str(err)).contents()
         if not contents.is_bag:
             raise LogError(
@@ -78,7 +80,7 @@ class Db3Part:
                 last = row
                 yield from self._message(number, time_ns, data)
             return
-        except sqlite3.Error as err:
+        except _NOT_SOUND as err:
             salvaged = self._salvage(str(err))
         for row, number, time_ns, data in salvaged.rows(numbers):
             if row > last:
@@ -137,7 +139,7 @@ class _Store(Protocol):
 
 
 class _Database:
-    """A sound SQLite file, read with SQLite; every method raises sqlite3.Error where it is not sound."""
+    """A sound SQLite file, read with SQLite; every method raises one of `_NOT_SOUND` for another."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

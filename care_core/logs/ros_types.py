@@ -9,8 +9,8 @@ from functools import lru_cache
 from care_core.logs.cdr_message import wide_size
 from care_core.logs.ros_message import Field, MalformedMessageError, Types, parse_definition, short_name
 
-_DISTROS = ("humble", "foxy", "jazzy", "galactic", "kilted", "iron", "eloquent", "dashing")
-"""Tried in this order where a log names neither its definitions nor its distribution."""
+_DISTROS = ("humble", "foxy", "galactic")
+"""Tried in this order where a log names neither its definitions nor its distribution: later ones always do."""
 
 _LANGUAGES = ("", "ros2msg", "ros2idl", "omgidl")
 _IDL_SEPARATOR = re.compile(r"^=+\s*\nIDL: (\S+)\s*$", re.MULTILINE)
@@ -67,8 +67,11 @@ def _from_idl(type_name: str, definition: str) -> Types:
 
 
 def _bundled(type_name: str, distro: str) -> Iterator[Types]:
-    """The type as the distributions define it, the log's own first."""
-    for name in dict.fromkeys((distro, *_DISTROS)):
+    """The type as the log's own distribution defines it; where that is unknown, as each that may be meant does."""
+    from rosbags.typesys import Stores
+
+    known = {store.value.removeprefix("ros2_") for store in Stores if store.value.startswith("ros2_")}
+    for name in (distro,) if distro in known else _DISTROS:
         text = _bundled_text(name, _long_name(type_name))
         if text is not None:
             yield _filled(parse_definition(type_name, text))
@@ -78,10 +81,7 @@ def _bundled(type_name: str, distro: str) -> Iterator[Types]:
 def _bundled_text(distro: str, type_name: str) -> str | None:
     from rosbags.typesys import Stores, get_typestore
 
-    try:
-        store = get_typestore(Stores(f"ros2_{distro}"))
-    except ValueError:  # a distribution that this version of rosbags does not know
-        return None
+    store = get_typestore(Stores(f"ros2_{distro}"))
     if type_name not in store.fielddefs:
         return None
     text, _ = store.generate_msgdef(type_name, ros_version=2)

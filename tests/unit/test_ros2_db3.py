@@ -189,3 +189,13 @@ def test_what_is_no_bag(tmp_path: Path) -> None:
     (folder / "a.mcap").touch()
     with pytest.raises(LogError, match=r"both .db3 and .mcap"):
         open_log(folder)
+
+
+def test_a_schema_that_is_no_text(tmp_path: Path) -> None:
+    file = write_db3(tmp_path / "bag")
+    raw = file.read_bytes()
+    at = raw.index(b"serialization_format TEXT")
+    file.write_bytes(raw[:at] + b"\xff" * 4 + raw[at + 4 :])
+    log = open_log(file)
+    assert len(log.read(WANTED)["/note"]) == MESSAGES
+    assert "damaged" in log.damage[0].what
