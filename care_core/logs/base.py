@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,13 @@ class Channel:
     rate_hz: float | None = None
 
 
+@runtime_checkable
+class LazyColumns(Protocol):
+    """Columns that a reader decodes only when they are asked for, and then only the rows that are left."""
+
+    def where(self, mask: NDArray[np.bool_]) -> Mapping[str, NDArray[Any]]: ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
     """Decoded messages of one channel.
@@ -56,6 +63,8 @@ class Table:
         return self.where((self.t >= start_s) & (self.t <= end_s))
 
     def where(self, mask: NDArray[np.bool_]) -> Table:
+        if isinstance(self.columns, LazyColumns):
+            return Table(self.t[mask], self.columns.where(mask))
         return Table(self.t[mask], {name: column[mask] for name, column in self.columns.items()})
 
 
