@@ -21,6 +21,9 @@ class LogFormat(str, Enum):
     """The formats that are told apart by content."""
 
     DATAFLASH_BIN = "dataflash-bin"
+    DATAFLASH_TEXT = "dataflash-text"
+    MAVLINK_TLOG = "mavlink-tlog"
+    PX4_ULG = "px4-ulg"
     ROS1_BAG = "ros1-bag"
 
 
