@@ -47,10 +47,19 @@ def _cleaned(name: str, table: Table) -> Table:
     if not keep.all():
         table = table.where(keep)
     keep = np.ones(len(table), dtype=bool)
-    for field, step in jumps.items():
-        if field in table.columns:
-            keep &= ~_leaps(table[field], step)
+    for own in _instances(table):
+        for field, step in jumps.items():
+            if field in table.columns:
+                keep[own] &= ~_leaps(table[field][own], step)
     return table if keep.all() else table.where(keep)
+
+
+def _instances(table: Table) -> list[Mask]:
+    """The rows of each sensor: samples of two batteries alternate without leaping."""
+    name = next((name for name in ("Inst", "Instance", "I") if name in table.columns), None)
+    if name is None:
+        return [np.ones(len(table), dtype=bool)]
+    return [np.asarray(table[name] == number) for number in np.unique(table[name])]
 
 
 def _leaps(column: Floats, step: float) -> Mask:

@@ -63,12 +63,12 @@ def sniff(path: Path) -> LogFormat:
         return LogFormat.DATAFLASH_BIN
     if _TEXT_FORMAT.search(head):
         return LogFormat.DATAFLASH_TEXT
+    if _frame_is_followed(head, 0, stamp=0):
+        hint = "Use the .tlog that the ground station wrote beside it."
+        raise LogError("This is MAVLink without time stamps (.tlog.raw, .rlog).", hint=hint, where=str(path))
     is_lone_packet = len(head) > 8 and head[0] == 0 and head[8] in _MAVLINK_MARKERS
     if is_lone_packet or any(_frame_is_followed(head, at + 8) for at in range(len(head) - 8) if head[at] == 0):
         return LogFormat.MAVLINK_TLOG
-    if any(_frame_is_followed(head, at, stamp=0) for at in range(len(head)) if head[at] in _MAVLINK_MARKERS):
-        hint = "Use the .tlog that the ground station wrote beside it."
-        raise LogError("This is MAVLink without time stamps (.tlog.raw, .rlog).", hint=hint, where=str(path))
     raise LogError("Not a log of a known format.", hint=f"Readable are {READABLE}.", where=str(path))
 
 

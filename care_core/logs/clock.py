@@ -57,12 +57,17 @@ def find_clock(stamps_s: Floats, places: Offsets) -> tuple[Clock, NDArray[np.boo
         stamps_s: shape (n,), the stamps in seconds, in the order of the file.
         places: shape (n,), the byte at which each record begins.
     """
-    impossible = np.zeros(len(stamps_s), dtype=bool)
+    finite = np.isfinite(stamps_s)
+    impossible = ~finite
+    if impossible.any():
+        clock, beyond, jumps = find_clock(stamps_s[finite], places[finite])
+        impossible[np.flatnonzero(finite)[beyond]] = True
+        return clock, impossible, jumps
     if not len(stamps_s):
         return Clock(0.0, 0.0, np.empty(0, dtype=np.int64), np.empty(0)), impossible, []
     runs = _runs(stamps_s)
     steady = min(_STEADY, max(end - start for start, end in runs))
-    upcoming = _next_steady_start(stamps_s, runs, steady)
+    upcoming = _next_start(stamps_s, runs, steady)
     shift, now, first_s = 0.0, -np.inf, np.nan
     shifts: list[tuple[int, float]] = []
     jumps = []
@@ -89,25 +94,26 @@ def _runs(stamps_s: Floats) -> list[tuple[int, int]]:
     """Stretches of the file, first and one past the last record, in which each stamp follows from the one before."""
     cuts: list[int] = []
     for low in range(0, len(stamps_s), _PIECE):
-        with np.errstate(invalid="ignore"):
-            steps = np.diff(stamps_s[low : low + _PIECE + 1])
-            cuts += (np.flatnonzero(~((steps >= -BACK_S) & (steps <= STEP_S))) + (low + 1)).tolist()
+        steps = np.diff(stamps_s[low : low + _PIECE + 1])
+        cuts += (np.flatnonzero((steps < -BACK_S) | (steps > STEP_S)) + (low + 1)).tolist()
     bounds = [0, *cuts, len(stamps_s)]
     return list(pairwise(bounds))
 
 
-def _next_steady_start(stamps_s: Floats, runs: list[tuple[int, int]], steady: int) -> list[float]:
-    """For each run the first stamp of the next steady one, infinity where none follows."""
-    upcoming, following = [], np.inf
+def _next_start(stamps_s: Floats, runs: list[tuple[int, int]], steady: int) -> list[float]:
+    """For each run the first stamp of the next steady one, of the next at all where none is, infinity at the end."""
+    upcoming, following, is_steady = [], np.inf, False
     for start, end in reversed(runs):
         upcoming.append(following)
-        if end - start >= steady:
-            following = float(stamps_s[start])
+        if end - start >= steady or not is_steady:
+            following, is_steady = float(stamps_s[start]), end - start >= steady
     return upcoming[::-1]
 
 
 def _fits(begins: float, ends: float, now: float, following: float) -> bool:
     """Whether a few records belong between what was written before and after them."""
     after = now == -np.inf or -BACK_S <= begins - now <= PAUSE_S
+    if not following >= now - BACK_S:  # the clock starts again there, or that stamp is the wrong one
+        following = np.inf
     before = following == np.inf or -BACK_S <= following - ends <= PAUSE_S
     return after and before
