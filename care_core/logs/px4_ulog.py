@@ -44,7 +44,7 @@ class Px4Log:
     def __init__(self, path: Path) -> None:
         self.path = path
         ulog = _parse(path, None)
-        tables = {_channel(data): data.data["timestamp"] for data in ulog.data_list}
+        tables = {_channel(data): data.data["timestamp"] for data in _stamped(ulog)}
         if not tables:
             raise LogError("The log holds no message.", hint="It may have been cut off.", where=str(path))
         self._first_us = _first_us(ulog, tables.values())
@@ -71,7 +71,7 @@ class Px4Log:
         topics = {name.partition("#")[0] for name in wanted if name in self._channels}
         tables = {}
         if topics:
-            for data in _parse(self.path, sorted(topics)).data_list:
+            for data in _stamped(_parse(self.path, sorted(topics))):
                 name = _channel(data)
                 if name in wanted and name in self._channels:
                     t = self._seconds(data.data["timestamp"])
@@ -167,6 +167,11 @@ def _parse(path: Path, topics: Sequence[str] | None) -> Any:
         raise LogError(
             "The log is too damaged for pyulog.", hint="Copy it from the vehicle again.", where=str(path)
         ) from err
+
+
+def _stamped(ulog: Any) -> list[Any]:
+    """The topics that say when; a flipped bit can rename the field."""
+    return [data for data in ulog.data_list if "timestamp" in data.data]
 
 
 def _channel(data: Any) -> str:
