@@ -27,9 +27,9 @@ def test_reads_topics_parameters_texts_and_dropouts(tmp_path: Path, capfd: pytes
     assert roll[0].changed_at_s is None
     assert roll[1].changed_at_s == pytest.approx(5.0)
     assert log.settings()["COM_RC_LOSS_T"][0].value == 3.0
-    assert [(one.what, one.time_s) for one in log.damage] == [
-        ("120 ms were not recorded (dropout)", pytest.approx(5.0))
-    ]
+    (dropout,) = log.damage
+    assert dropout.what == "120 ms were not recorded (dropout)"
+    assert dropout.time_s == pytest.approx(5.0)
     assert [(one.name, one.count) for one in log.channels()] == [("battery_status", 100), ("logged_messages", 1)]
     assert log.facts == {"stack": "PX4", "firmware": "PX4", "hardware": "PX4_SITL"}
     assert log.duration_s == pytest.approx(9.9)
