@@ -184,8 +184,11 @@ def _crc_table() -> NDArray[np.uint16]:
 
 def stamps(data: Bytes, start: Offsets) -> NDArray[np.float64]:
     """The times before packets, in seconds."""
-    raw = data[start[:, None] + np.arange(STAMP_BYTES)]
-    return np.asarray(raw.view(">u8")[:, 0] / 1e6, dtype=np.float64)
+    seconds = np.empty(len(start))
+    for low in range(0, len(start), _BATCH):
+        raw = data[start[low : low + _BATCH, None] + np.arange(STAMP_BYTES)]
+        seconds[low : low + _BATCH] = raw.view(">u8")[:, 0] / 1e6
+    return seconds
 
 
 def decode(data: Bytes, start: Offsets, field: Field) -> NDArray[Any]:
