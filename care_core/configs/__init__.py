@@ -37,7 +37,12 @@ _MODULES: dict[ConfigFormat, ModuleType] = {
     ConfigFormat.ARDUPILOT_PARAM: ardupilot_param,
     ConfigFormat.ROS1_YAML: ros1_yaml,
 }
-_OF_LOG = {"dataflash-bin": ConfigFormat.ARDUPILOT_PARAM, "ros1-bag": ConfigFormat.ROS1_YAML}
+_OF_LOG = {
+    "dataflash-bin": ConfigFormat.ARDUPILOT_PARAM,
+    "dataflash-text": ConfigFormat.ARDUPILOT_PARAM,
+    "mavlink-tlog": ConfigFormat.ARDUPILOT_PARAM,
+    "ros1-bag": ConfigFormat.ROS1_YAML,
+}
 _YAML_SUFFIXES = (".yaml", ".yml")
 
 

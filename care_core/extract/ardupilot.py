@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.extract.flight import NEEDS, Flight, analyse, has, messages, waypoint_offsets
+from care_core.extract.plausible import plausible
 from care_core.extract.registry import MISSION_KINDS, Args, Mission, MissionKind, extractor, merge_needs, missing
 from care_core.logs.base import Table, Wanted
 from care_core.run import Evidence, Unavailable, Value, is_known
@@ -65,9 +66,10 @@ class ArduPilotFlight(MissionKind):
 
     def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
         spans = _armed_spans(tables, duration_s)
-        if not spans and _refusals(tables.get("MSG")):
+        if not spans and not _arm_events(tables) and _refusals(tables.get("MSG")):
             spans = [(0.0, duration_s, True)]
-        return tuple(Mission(tables, start_s, end_s, ended, spec) for start_s, end_s, ended in spans)
+        sound = plausible(tables)
+        return tuple(Mission(sound, start_s, end_s, ended, spec) for start_s, end_s, ended in spans)
 
     def mismatch(self, mission: Mission) -> str:
         expected = mission.spec.get("waypoints", ())
@@ -281,7 +283,10 @@ def ekf_trouble(mission: Mission, args: Args) -> Value:
 @extractor("forced_disarm", needs=_EVENTS, unit="")
 def forced_disarm(mission: Mission, args: Args) -> Value:
     """1 when the operator disarmed the vehicle by force, else 0."""
-    return float(_forced(mission)) if _is_armed(mission) else _NOT_FLOWN
+    if not _is_armed(mission):
+        return _NOT_FLOWN
+    arm = mission.table("ARM")
+    return float(_forced(mission)) if arm is not None and has(arm, "Forced") else missing("ARM with Forced")
 
 
 @extractor("arming_time", needs=_EVENTS, unit="s")
@@ -564,7 +569,8 @@ def _at_limit(table: Table, mission: Mission, _args: Args) -> Floats:
 
 _ATTITUDE = {"ATT": ("DesRoll", "Roll", "DesPitch", "Pitch", "DesYaw", "Yaw")}
 _RATE = {"RATE": ("R", "RDes", "ROut", "P", "PDes", "POut", "Y", "YDes", "YOut")}
-_HEIGHT = {"PSCD": ("TPD", "PD", "TVD", "VD", "TAD", "AD")}
+_LEAN = {"ATT": ("Roll", "Pitch")}
+_SINK = {"PSCD": ("VD",)}
 _OUTPUTS = {"RCOU": ("C1", "C2", "C3", "C4")}
 
 _register("attitude_error", _ATTITUDE, "deg", "Wanted minus flown attitude.", _attitude_error, stat="rms", args=_AXIS)
@@ -574,16 +580,16 @@ _register("rate_activity", _RATE, "deg/s", "Rotation rate of one axis.",
           _of_axis(lambda t, c: t[c[0]]), stat="rms", args=_AXIS)  # fmt: skip
 _register("rate_output", _RATE, "", "Output of one axis' rate controller: how hard it works.",
           _of_axis(lambda t, c: t[c[2]]), stat="rms", args=_AXIS)  # fmt: skip
-_register("lean_angle", _ATTITUDE, "deg", "Angle between the vehicle's mast and the vertical.",
+_register("lean_angle", _LEAN, "deg", "Angle between the vehicle's mast and the vertical.",
           lambda t, _m, _a: _lean(t), stat="peak")  # fmt: skip
-_register("altitude_error", _HEIGHT, "m", "Wanted minus flown height.",
+_register("altitude_error", {"PSCD": ("TPD", "PD")}, "m", "Wanted minus flown height.",
           lambda t, _m, _a: np.abs(t["TPD"] - t["PD"]), stat="rms")  # fmt: skip
-_register("climb_rate_error", _HEIGHT, "m/s", "Wanted minus flown vertical speed.",
+_register("climb_rate_error", {"PSCD": ("TVD", "VD")}, "m/s", "Wanted minus flown vertical speed.",
           lambda t, _m, _a: np.abs(t["TVD"] - t["VD"]), stat="rms")  # fmt: skip
-_register("vertical_acceleration_error", _HEIGHT, "m/s/s", "Wanted minus flown vertical acceleration.",
+_register("vertical_acceleration_error", {"PSCD": ("TAD", "AD")}, "m/s/s", "Wanted minus flown vertical acceleration.",
           lambda t, _m, _a: np.abs(t["TAD"] - t["AD"]), stat="rms")  # fmt: skip
-_register("climb_rate", _HEIGHT, "m/s", "Speed upwards.", lambda t, _m, _a: -t["VD"], stat="peak")
-_register("descent_rate", _HEIGHT, "m/s", "Speed downwards.", lambda t, _m, _a: t["VD"], stat="peak")
+_register("climb_rate", _SINK, "m/s", "Speed upwards.", lambda t, _m, _a: -t["VD"], stat="peak")
+_register("descent_rate", _SINK, "m/s", "Speed downwards.", lambda t, _m, _a: t["VD"], stat="peak")
 _register("motor_saturation", _OUTPUTS, "", "Share of the time in which a motor is at MOT_SPIN_MAX.",
           _at_limit, stat="mean")  # fmt: skip
 _register("motor_output", _OUTPUTS, "", "Mean output of the motors, as a share of their range.",

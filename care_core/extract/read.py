@@ -15,6 +15,7 @@ import care_core.extract.navigation  # noqa: F401
 from care_core.errors import ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
 from care_core.extract.settings import configuration, in_force
+from care_core.extract.telemetry import as_dataflash, explained
 from care_core.logs import log_digest
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
@@ -108,7 +109,7 @@ class _Source:
         # Hashing leaves the interpreter lock, so it costs nothing beside decoding.
         with ThreadPoolExecutor(max_workers=1) as pool:
             digest = pool.submit(log_digest, log.path)
-            tables = log.read(plan)
+            tables = as_dataflash(log).read(plan)
             settings = log.settings()
             sha256 = digest.result()
         missions = kind.missions(tables, log.duration_s, schema.mission)
@@ -148,7 +149,8 @@ class _Source:
         )
 
     def _values(self, role: Role, mission: Mission) -> dict[str, Value]:
-        return {variable.name: _extract(variable, mission) for variable in self.schema.of(role)}
+        values = {variable.name: _extract(variable, mission) for variable in self.schema.of(role)}
+        return {name: explained(value, self.log.format) for name, value in values.items()}
 
 
 def _extract(variable: Variable, mission: Mission) -> Value:

@@ -16,7 +16,7 @@ from care_core.logs import open_log, whole_recording
 from care_core.profile.schema import Schema
 from care_core.run import Run, is_known
 
-LOG_SUFFIXES = (".bin", ".bag", ".active", ".mcap", ".db3", ".zstd")
+LOG_SUFFIXES = (".bin", ".log", ".tlog", ".ulg", ".bag", ".active", ".mcap", ".db3", ".zstd")
 INSTALL_LEARN = "Install what it needs with: pip install 'care-tui[learn]'"
 
 Row = dict[str, str | int | float | None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from importlib import import_module
 from pathlib import Path
 
@@ -11,13 +12,19 @@ from care_core.logs.base import Log, LogFormat
 
 READERS = {
     LogFormat.DATAFLASH_BIN: ("care_core.logs.dataflash", "DataFlashLog"),
+    LogFormat.DATAFLASH_TEXT: ("care_core.logs.dataflash_text", "DataFlashTextLog"),
+    LogFormat.MAVLINK_TLOG: ("care_core.logs.mavlink", "MavlinkLog"),
+    LogFormat.PX4_ULG: ("care_core.logs.px4_ulog", "Px4Log"),
     LogFormat.ROS1_BAG: ("care_core.logs.ros1_bag", "Ros1Bag"),
     LogFormat.ROS2_DB3: ("care_core.logs.ros2_db3", "Ros2Db3"),
     LogFormat.MCAP: ("care_core.logs.mcap_log", "McapLog"),
 }
 """Module and class per format, imported only when a log of that format is opened."""
 
-READABLE = "ArduPilot DataFlash (.BIN), ROS 1 bags (.bag) and ROS 2 bags (.db3, .mcap)"
+READABLE = (
+    "ArduPilot DataFlash (.BIN, .log), MAVLink telemetry (.tlog), PX4 ULog (.ulg), ROS 1 bags (.bag) and ROS 2 bags"
+    " (.db3, .mcap)"
+)
 
 ROS_MAGIC = (
     (b"#ROSBAG V2.0", LogFormat.ROS1_BAG),
@@ -31,7 +38,6 @@ _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 UNREADABLE_MAGIC = (
     (b"#ROSBAG V1", "a ROS bag of format 1.x", "Bring it to format 2.0 with 'rosbag fix' of ROS 1."),
     (b"#ROSRECORD V1", "a ROS bag of format 1.x", "Bring it to format 2.0 with 'rosbag fix' of ROS 1."),
-    (b"ULog\x01\x12\x35", "a PX4 ULog", ""),
     (b"\x1f\x8b", "a gzip archive", "Unpack it first."),
     (b"PK\x03\x04", "a zip archive", "Unpack it first."),
     (_ZSTD_MAGIC, "a zstd archive", "Unpack it first."),
@@ -41,6 +47,8 @@ UNREADABLE_MAGIC = (
 _SNIFF_BYTES = 4096
 _ZSTD_BYTES = 1 << 18
 """Enough for the first block of a zstd file, which unpacks as a whole."""
+_TEXT_FORMAT = re.compile(rb"(?m)^FMT, ?\d+, ?\d+, ?\w+")
+_MAVLINK_MARKERS = (0xFD, 0xFE)
 
 
 def open_log(path: str | Path) -> Log:
@@ -65,13 +73,19 @@ def sniff(path: Path) -> LogFormat:
     for magic, what, hint in UNREADABLE_MAGIC:
         if head.startswith(magic):
             raise _unreadable(path, what, hint)
+    if head.startswith(b"ULog\x01\x12\x35"):
+        return LogFormat.PX4_ULG
     # A DataFlash log declares its message types first; damage at its very start must not hide them.
     if b"\xa3\x95\x80" in head:
         return LogFormat.DATAFLASH_BIN
-    if b"FMT, 128" in head:
-        raise _unreadable(path, "a DataFlash log as text", "Use the .BIN that the vehicle wrote.")
-    if len(head) > 8 and head[0] == 0 and head[8] in (0xFD, 0xFE):
-        raise _unreadable(path, "a MAVLink telemetry log (.tlog)", "Use the .BIN from the vehicle's memory card.")
+    if _TEXT_FORMAT.search(head):
+        return LogFormat.DATAFLASH_TEXT
+    if _frame_is_followed(head, 0, stamp=0):
+        hint = "Use the .tlog that the ground station wrote beside it."
+        raise LogError("This is MAVLink without time stamps (.tlog.raw, .rlog).", hint=hint, where=str(path))
+    is_lone_packet = len(head) > 8 and head[0] == 0 and head[8] in _MAVLINK_MARKERS
+    if is_lone_packet or any(_frame_is_followed(head, at + 8) for at in range(len(head) - 8) if head[at] == 0):
+        return LogFormat.MAVLINK_TLOG
     raise LogError("Not a log of a known format.", hint=f"Readable are {READABLE}.", where=str(path))
 
 
@@ -95,6 +109,18 @@ def log_digest(path: str | Path) -> str:
     except OSError as err:
         raise _cannot_open(path, err) from err
     return digest.hexdigest()
+
+
+def _frame_is_followed(head: bytes, at: int, stamp: int = 8) -> bool:
+    """Whether a MAVLink packet begins here, and after it and a stamp of this many bytes the next, or the file's end."""
+    if at + 3 > len(head) or head[at] not in _MAVLINK_MARKERS:
+        return False
+    is_v2 = head[at] == 0xFD
+    if is_v2 and head[at + 2] & ~1:
+        return False
+    end = at + head[at + 1] + (12 + 13 * head[at + 2] if is_v2 else 8)
+    follows = end + stamp < len(head) and head[end + stamp] in _MAVLINK_MARKERS
+    return follows or (len(head) < _SNIFF_BYTES and len(head) - 8 <= end <= len(head))
 
 
 def _read_head(path: Path, size: int = _SNIFF_BYTES) -> bytes:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ class LogFormat(str, Enum):
     """The formats that are told apart by content."""
 
     DATAFLASH_BIN = "dataflash-bin"
+    DATAFLASH_TEXT = "dataflash-text"
+    MAVLINK_TLOG = "mavlink-tlog"
+    PX4_ULG = "px4-ulg"
     ROS1_BAG = "ros1-bag"
     ROS2_DB3 = "ros2-db3"
     MCAP = "mcap"
@@ -34,6 +37,13 @@ class Channel:
     type: str
     count: int
     rate_hz: float | None = None
+
+
+@runtime_checkable
+class LazyColumns(Protocol):
+    """Columns that a reader decodes only when they are asked for, and then only the rows that are left."""
+
+    def where(self, mask: NDArray[np.bool_]) -> Mapping[str, NDArray[Any]]: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,6 +68,8 @@ class Table:
         return self.where((self.t >= start_s) & (self.t <= end_s))
 
     def where(self, mask: NDArray[np.bool_]) -> Table:
+        if isinstance(self.columns, LazyColumns):
+            return Table(self.t[mask], self.columns.where(mask))
         return Table(self.t[mask], {name: column[mask] for name, column in self.columns.items()})
 
 

@@ -8,10 +8,8 @@ operations: nothing here loops over messages.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta, timezone
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,16 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
+from care_core.logs.ardupilot import GPS_TIME, facts_of, history, shortest, wall_clock
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs.clock import Clock, find_clock
+from care_core.logs.damage import summarised
 from care_core.run import Damage, Setting
 
 Bytes = NDArray[np.uint8]
-Offsets = NDArray[np.int64]
+Offsets = NDArray[np.integer[Any]]
 
 _FMT, _FMT_LENGTH = 0x80, 89
 _MAX_TYPES = 256
 _CHUNK = 1 << 22
-_MAX_DAMAGE = 100
 
 # Format character of a field -> numpy type of its bytes, divisor of the stored integer.
 _FIELD_TYPES: dict[str, tuple[str, float]] = {
@@ -38,12 +38,6 @@ _FIELD_TYPES: dict[str, tuple[str, float]] = {
     "n": ("S4", 1), "N": ("S16", 1), "Z": ("S64", 1), "M": ("i1", 1),
     "c": ("<i2", 100), "C": ("<u2", 100), "e": ("<i4", 100), "E": ("<u4", 100), "L": ("<i4", 1e7),
 }  # fmt: skip
-
-# GPS time runs ahead of UTC by the leap seconds since 1980: 18 since 2017, and none is announced.
-_GPS_EPOCH = datetime(1980, 1, 6, tzinfo=timezone.utc) - timedelta(seconds=18)
-# A week that no receiver has reached yet is a flipped bit.
-_LAST_WEEK, _WEEK_MS = 5200, 7 * 24 * 3600 * 1000
-_FIRMWARE = re.compile(r"(Ardu\w+|APM:\w+|AntennaTracker|Blimp|Rover) V\d")
 
 
 class Field(NamedTuple):
@@ -68,9 +62,44 @@ class Format:
     @property
     def time_field(self) -> tuple[str, float] | None:
         """The name of the timestamp and its ticks per second."""
-        if "TimeUS" in self.fields:
-            return "TimeUS", 1e6
-        return ("TimeMS", 1e3) if "TimeMS" in self.fields else None
+        return time_field(self.name, self.fields)
+
+
+class _RecordColumns(Mapping[str, NDArray[Any]]):
+    """Columns of records of one layout. Numbers are decoded each time they are asked for: a log holds more than is
+    looked at. Text is slow to decode and rare, so it is kept."""
+
+    def __init__(self, read_bytes: Callable[[], Bytes], fields: Mapping[str, Field], offsets: Offsets) -> None:
+        self._read_bytes, self._fields, self._offsets = read_bytes, fields, offsets
+        self._texts: dict[str, NDArray[Any]] = {}
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        if name in self._texts:
+            return self._texts[name]
+        column = _decode(self._read_bytes(), self._offsets, self._fields[name])
+        if self._fields[name].dtype.kind == "S":
+            self._texts[name] = column
+        return column
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._fields)
+
+    def __len__(self) -> int:
+        return len(self._fields)
+
+    def where(self, mask: NDArray[np.bool_]) -> _RecordColumns:
+        part = _RecordColumns(self._read_bytes, self._fields, self._offsets[mask])
+        part._texts = {name: column[mask] for name, column in self._texts.items()}
+        return part
+
+
+def time_field(message: str, fields: Collection[str]) -> tuple[str, float] | None:
+    """The field that says when a message was written, and its ticks per second; None when it does not say."""
+    if "TimeUS" in fields:
+        return "TimeUS", 1e6
+    if message.startswith("GPS"):  # before firmware 3.2 its TimeMS was the satellites' time
+        return ("T", 1e3) if "T" in fields else None
+    return ("TimeMS", 1e3) if "TimeMS" in fields else None
 
 
 class DataFlashLog:
@@ -92,15 +121,16 @@ class DataFlashLog:
         starts = _find_headers(data)
         formats, redefined = _read_formats(data, starts)
         starts, gaps = _follow_records(data, starts, formats)
-        types = data[starts + 2]
         self._formats = {found[-1].name: found for found in _by_name(formats)}
+        self._clock, starts, untimely = self._keep_time(data, starts)
+        types = data[starts + 2]
         self._offsets = {
             declared.type: starts[types == declared.type] for found in self._formats.values() for declared in found
         }
         if not np.any(types != _FMT):
             raise LogError("The log holds no message.", hint="It may have been cut off.", where=str(path))
-        self._first_s, self.duration_s = self._span(data, starts, types)
-        self.damage = self._describe(data, starts, gaps, redefined)
+        self.duration_s = self._clock.duration_s
+        self.damage = (*redefined, *untimely, *self._describe(data, starts, gaps))
 
     def channels(self) -> tuple[Channel, ...]:
         data = self._bytes()
@@ -116,13 +146,11 @@ class DataFlashLog:
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
         data = self._bytes()
-        tables = {}
-        for name, fields in wanted.items():
-            if name in self._formats and self._count(name):
-                columns = {field: self._column(data, name, field) for field in fields}
-                present = {field: column for field, column in columns.items() if column is not None}
-                tables[name] = Table(self._times(data, name), present)
-        return tables
+        return {
+            name: Table(self._times(data, name), self._columns(data, name, fields))
+            for name, fields in wanted.items()
+            if name in self._formats and self._count(name)
+        }
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
         return self._settings
@@ -133,42 +161,20 @@ class DataFlashLog:
         if table is None or not {"Name", "Value"} <= table.columns.keys():
             return {}
         values, defaults = table["Value"], table.columns.get("Default", np.full(len(table), np.nan))
-        history: dict[str, list[Setting]] = {}
-        for t, name, value, default in zip(table.t, table["Name"], values, defaults, strict=True):
-            known = history.setdefault(name, [])
-            number = _shortest(value)
-            if not known or known[-1].value != number:
-                reference = _shortest(default) if np.isfinite(default) else None
-                changed_at = float(t) if known else None
-                known.append(Setting(name, number, "PARM", default=reference, changed_at_s=changed_at))
-        return {name: tuple(known) for name, known in history.items()}
+        references = [shortest(default) if np.isfinite(default) else None for default in defaults.tolist()]
+        rows = zip(table.t.tolist(), table["Name"].tolist(), map(shortest, values), references, strict=True)
+        return history(rows, "PARM")
 
     @cached_property
     def facts(self) -> Mapping[str, str]:
-        """`firmware` ("ArduCopter V4.5.4 (fd1bcc61)") and `frame` ("QUAD/PLUS") where the log names them."""
-        tables = self.read({"MSG": ("Message",), "VER": ("FWS",)})
-        texts = [str(text) for name, field in (("VER", "FWS"), ("MSG", "Message")) if name in tables
-                 for text in tables[name].columns.get(field, ())]  # fmt: skip
-        facts = {}
-        firmware = next((text for text in texts if _FIRMWARE.match(text)), None)
-        frame = next((text for text in texts if text.startswith("Frame: ")), None)
-        if firmware:
-            facts["firmware"] = firmware
-        if frame:
-            facts["frame"] = frame.removeprefix("Frame: ")
-        return facts
+        """`firmware`, `vehicle` and `frame`, where the log names them."""
+        tables = self.read({"VER": ("FWS",), "MSG": ("Message",)})
+        return facts_of(str(text) for table in tables.values() for column in table.columns.values() for text in column)
 
     @cached_property
     def start(self) -> str | None:
         """Wall clock of the first timestamp (UTC), from the first GPS record that knows its week."""
-        gps = self.read({"GPS": ("GWk", "GMS")}).get("GPS")
-        if gps is None or not {"GWk", "GMS"} <= gps.columns.keys():
-            return None
-        known = gps.where((gps["GWk"] > 0) & (gps["GWk"] <= _LAST_WEEK) & (gps["GMS"] < _WEEK_MS))
-        if not len(known):
-            return None
-        fix = _GPS_EPOCH + timedelta(weeks=float(known["GWk"][0]), milliseconds=float(known["GMS"][0]))
-        return (fix - timedelta(seconds=float(known.t[0]))).isoformat(timespec="seconds")
+        return wall_clock(self.read({"GPS": GPS_TIME}))
 
     def _bytes(self) -> Bytes:
         """The file as an array of bytes, mapped and not copied."""
@@ -195,36 +201,66 @@ class DataFlashLog:
             parts += list(zip(declared, np.split(self._offsets[number], cuts), strict=True))
         return [(form, offsets) for form, offsets in parts if len(offsets)]
 
-    def _column(self, data: Bytes, name: str, field: str) -> NDArray[Any] | None:
+    def _columns(self, data: Bytes, name: str, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
         parts = self._parts(name)
-        if not any(field in form.fields for form, _ in parts):
-            return None
-        pieces = [
-            _decode(data, offsets, form.fields[field]) if field in form.fields else np.full(len(offsets), np.nan)
-            for form, offsets in parts
-        ]
-        return pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
+        known = [field for field in fields if any(field in form.fields for form, _ in parts)]
+        if len(parts) == 1:
+            form, offsets = parts[0]
+            return _RecordColumns(self._bytes, {field: form.fields[field] for field in known}, offsets)
+        return {
+            field: np.concatenate([
+                _decode(data, offsets, form.fields[field]) if field in form.fields else np.full(len(offsets), np.nan)
+                for form, offsets in parts
+            ])
+            for field in known
+        }  # fmt: skip
 
     def _times(self, data: Bytes, name: str) -> NDArray[np.float64]:
-        pieces = [_clock(data, offsets, form) - self._first_s for form, offsets in self._parts(name)]
+        pieces = []
+        for form, offsets in self._parts(name):
+            if form.time_field is not None:
+                pieces.append(self._clock.seconds(_stamps(data, offsets, form), offsets))
+            elif form.type == _FMT:
+                pieces.append(np.full(len(offsets), np.nan))
+            else:
+                pieces.append(self._last_known_time(offsets))
         return np.concatenate(pieces) if pieces else np.empty(0)
 
-    def _span(self, data: Bytes, starts: Offsets, types: Bytes) -> tuple[float, float]:
-        """The first timestamp of the log and the seconds to its last, in file order."""
-        timed = np.zeros(_MAX_TYPES, dtype=bool)
-        form_of = {form.type: form for found in self._formats.values() for form in found}
-        timed[[number for number, form in form_of.items() if form.time_field]] = True
-        stamped = starts[timed[types]]
-        if not len(stamped):
-            return 0.0, 0.0
-        first, last = (
-            float(_clock(data, stamped[[at]], form_of[int(data[stamped[at] + 2])])[0]) for at in (0, len(stamped) - 1)
-        )
-        return first, max(last - first, 0.0)
+    def _last_known_time(self, offsets: Offsets) -> NDArray[np.float64]:
+        """Time of the last stamped record before each of these bytes: old firmwares stamped few of their messages."""
+        places, seconds = self._timeline
+        before = np.searchsorted(places, offsets) - 1
+        return np.where(before >= 0, seconds[before], 0.0) if len(places) else np.full(len(offsets), np.nan)
 
-    def _describe(
-        self, data: Bytes, starts: Offsets, gaps: list[tuple[int, int]], redefined: list[Damage]
-    ) -> tuple[Damage, ...]:
+    @cached_property
+    def _timeline(self) -> tuple[Offsets, NDArray[np.float64]]:
+        data = self._bytes()
+        starts = np.sort(np.concatenate(list(self._offsets.values())))
+        places, stamps = self._stamped(data, starts)
+        return places, self._clock.seconds(stamps, places)
+
+    def _stamped(self, data: Bytes, starts: Offsets) -> tuple[Offsets, NDArray[np.float64]]:
+        """Those of the records that carry a stamp, and their stamps in seconds."""
+        form_of = {form.type: form for found in self._formats.values() for form in found if form.time_field}
+        types = data[starts + 2]
+        timed = np.zeros(_MAX_TYPES, dtype=bool)
+        timed[list(form_of)] = True
+        places, types = starts[timed[types]], types[timed[types]]
+        stamps = np.empty(len(places))
+        for number, form in form_of.items():
+            own = types == number
+            stamps[own] = _stamps(data, places[own], form)
+        return places, stamps
+
+    def _keep_time(self, data: Bytes, starts: Offsets) -> tuple[Clock, Offsets, tuple[Damage, ...]]:
+        """The clock of the log, the records without those whose stamp is impossible, and what is wrong with time."""
+        places, stamps = self._stamped(data, starts)
+        clock, impossible, jumps = find_clock(stamps, places)
+        lost = [Damage("a record's time is impossible", byte) for byte in places[impossible].tolist()]
+        kept = starts[~np.isin(starts, places[impossible])] if lost else starts
+        return clock, kept, (*summarised(jumps, "clock jumps"), *summarised(lost, "records with an impossible time"))
+
+    def _describe(self, data: Bytes, starts: Offsets, gaps: list[tuple[int, int]]) -> tuple[Damage, ...]:
         form_of = {form.type: form for found in self._formats.values() for form in found}
 
         def time_at(byte: int) -> float | None:
@@ -232,22 +268,23 @@ class DataFlashLog:
             for offset in before[::-1]:
                 form = form_of[int(data[offset + 2])]
                 if form.time_field:
-                    return float(_clock(data, np.array([offset]), form)[0] - self._first_s)
+                    place = np.array([offset])
+                    return float(self._clock.seconds(_stamps(data, place, form), place)[0])
             return None
 
-        found = [Damage(_gap_text(low, high, self._size), low, time_at(low)) for low, high in gaps[:_MAX_DAMAGE]]
-        if len(gaps) > _MAX_DAMAGE:
-            found.append(Damage(f"{len(gaps) - _MAX_DAMAGE} more damaged places", gaps[_MAX_DAMAGE][0]))
-        return (*redefined, *found)
+        found = [Damage(_gap_text(low, high, self._size), low, time_at(low)) for low, high in gaps]
+        return summarised(found, "damaged places")
 
 
 def _find_headers(data: Bytes) -> Offsets:
     """Every place where the two header bytes stand with a type byte after them, true records or not."""
-    found = []
+    # A log can hold millions of records: four bytes a place do for all but the largest.
+    kind = np.int32 if len(data) < 1 << 31 else np.int64
+    found: list[Offsets] = [np.empty(0, dtype=kind)]
     for low in range(0, len(data) - 2, _CHUNK):
         piece = data[low : low + _CHUNK + 2]
-        found.append(np.flatnonzero((piece[:-2] == 0xA3) & (piece[1:-1] == 0x95)) + low)
-    return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
+        found.append((np.flatnonzero((piece[:-2] == 0xA3) & (piece[1:-1] == 0x95)) + low).astype(kind))
+    return np.concatenate(found)
 
 
 def _read_formats(data: Bytes, starts: Offsets) -> tuple[list[Format], list[Damage]]:
@@ -296,7 +333,7 @@ def _follow_records(data: Bytes, starts: Offsets, formats: list[Format]) -> tupl
     Records follow each other without space, so only the places where they do not are walked one by one.
     """
     types = data[starts + 2]
-    lengths = np.zeros(_MAX_TYPES, dtype=np.int64)
+    lengths = np.zeros(_MAX_TYPES, dtype=np.uint8)
     for form in reversed(formats):
         lengths[form.type] = form.length
     size = lengths[types]
@@ -306,27 +343,30 @@ def _follow_records(data: Bytes, starts: Offsets, formats: list[Format]) -> tupl
         if form.type in declared:
             size[(types == form.type) & (starts >= form.byte)] = form.length
         declared.add(form.type)
-    whole = (size > 0) & (starts + size <= len(data))
-    starts, ends = starts[whole], (starts + size)[whole]
+    whole = (size > 0) & (starts <= len(data) - size.astype(starts.dtype))
+    starts, size = starts[whole], size[whole]
     if not len(starts):
         return starts, [(0, len(data))]
-    at_end = np.searchsorted(starts, ends)
-    meets = (ends == len(data)) | (starts[np.minimum(at_end, len(starts) - 1)] == ends)
+    breaks = np.append(np.flatnonzero(np.diff(starts) != size[:-1]), len(starts) - 1)
+    ends = starts[breaks].astype(np.int64) + size[breaks]
+    after = np.searchsorted(starts, ends)
+    meets = (ends == len(data)) | (starts[np.minimum(after, len(starts) - 1)] == ends)
+    confirmed = np.ones(len(starts), dtype=bool)
+    confirmed[breaks[~meets]] = False
     keep = np.ones(len(starts), dtype=bool)
-    confirmed = np.flatnonzero(meets)
     gaps = [(0, int(starts[0]))] if starts[0] else []
     position = 0
-    for place in np.flatnonzero(~meets | (at_end != np.arange(1, len(starts) + 1))).tolist():
+    for place, end, met, next_place in zip(breaks.tolist(), ends.tolist(), meets, after.tolist(), strict=True):
         if place < position:
             continue
-        position = int(at_end[place])
-        if not meets[place]:
-            later = int(np.searchsorted(confirmed, place + 1))
-            position = int(confirmed[later]) if later < len(confirmed) else len(starts)
+        position = next_place
+        if not met:
+            later = int(np.argmax(confirmed[place + 1 :])) + place + 1 if place + 1 < len(starts) else place
+            position = later if confirmed[later] else len(starts)
             resumed = int(starts[position]) if position < len(starts) else len(data)
-            was_cut = resumed < ends[place]
+            was_cut = resumed < end
             keep[place] = not was_cut
-            gaps.append((int(starts[place] if was_cut else ends[place]), resumed))
+            gaps.append((int(starts[place]) if was_cut else end, resumed))
         keep[place + 1 : position] = False
     return starts[keep], gaps
 
@@ -358,10 +398,9 @@ def _inner_strides(dtype: np.dtype[Any]) -> tuple[int, ...]:
     return (dtype.base.itemsize,) if dtype.shape else ()
 
 
-def _clock(data: Bytes, offsets: Offsets, form: Format) -> NDArray[np.float64]:
-    """Timestamps in seconds since boot, NaN for a message without any."""
-    if form.time_field is None:
-        return np.full(len(offsets), np.nan)
+def _stamps(data: Bytes, offsets: Offsets, form: Format) -> NDArray[np.float64]:
+    """Timestamps in seconds of records that have one."""
+    assert form.time_field is not None
     name, ticks = form.time_field
     return np.asarray(_decode(data, offsets, form.fields[name]) / ticks, dtype=np.float64)
 
@@ -373,8 +412,3 @@ def _text(raw: bytes) -> str:
         return raw.decode("utf-8")
     except UnicodeDecodeError:
         return raw.decode("latin-1")
-
-
-def _shortest(value: float) -> float:
-    """A single-precision number as it was typed: 0.135, not 0.13500000536441803."""
-    return float(str(np.float32(value)))

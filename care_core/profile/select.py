@@ -10,6 +10,7 @@ from care_core.diagnose.records import ProfileChoice
 from care_core.errors import LogError, ProfileError
 from care_core.extract.read import reading_plan
 from care_core.extract.settings import readable
+from care_core.extract.telemetry import as_dataflash
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 
@@ -85,7 +86,7 @@ def measure_fit(log: Log, schema: Schema) -> Fit:
     if log.format.value not in schema.logs:
         return Fit(schema, 0, 0, 0, 0)
     settings = log.settings()
-    channels = {channel.name for channel in log.channels()}
+    channels = {channel.name for channel in as_dataflash(log).channels()}
     plan = reading_plan(schema)
     return Fit(
         schema,

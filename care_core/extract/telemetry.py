@@ -1,0 +1,283 @@
+"""Telemetry seen as a DataFlash log, so that every ArduPilot extractor reads both.
+
+A ground station hears less, later and more coarsely than the vehicle writes down: what it never heard stays absent
+and its extractors answer `Unavailable`. Arming is known to half the time between two heartbeats (0.5 s).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted
+from care_core.run import Unavailable, Value
+
+Floats = NDArray[np.float64]
+Row = tuple[float, tuple[Any, ...]]
+
+_ARMED_FLAG = 128
+_ARM_DISARM, _FORCE = 400, 21196
+_FORCED_WITHIN_S = 3.0
+_SAME_EVENT_S = 3.0
+_UNKNOWN_U16 = 65535
+_COPTERS = frozenset((2, 3, 4, 13, 14, 15, 29, 35))
+_ADVICE = "telemetry does not carry it: use the .BIN of the vehicle's memory card"
+
+_Scaled = Mapping[str, tuple[str, float]]
+_AS_SENT: Mapping[str, tuple[str, _Scaled]] = {
+    "POS": ("GLOBAL_POSITION_INT", {"Lat": ("lat", 1e-7), "Lng": ("lon", 1e-7), "Alt": ("alt", 1e-3),
+                                    "RelHomeAlt": ("relative_alt", 1e-3)}),
+    "PSCN": ("GLOBAL_POSITION_INT", {"VN": ("vx", 0.01)}),
+    "PSCE": ("GLOBAL_POSITION_INT", {"VE": ("vy", 0.01)}),
+    "PSCD": ("GLOBAL_POSITION_INT", {"VD": ("vz", 0.01)}),
+    "GPS": ("GPS_RAW_INT", {"Status": ("fix_type", 1), "NSats": ("satellites_visible", 1), "HDop": ("eph", 0.01)}),
+    "CTUN": ("VFR_HUD", {"ThO": ("throttle", 0.01), "Alt": ("alt", 1)}),
+    "RCOU": ("SERVO_OUTPUT_RAW", {f"C{n}": (f"servo{n}_raw", 1) for n in range(1, 17)}),
+    "VIBE": ("VIBRATION", {f"Vibe{axis}": (f"vibration_{axis.lower()}", 1) for axis in "XYZ"}),
+    "XKF4": ("EKF_STATUS_REPORT", {"SV": ("velocity_variance", 1), "SP": ("pos_horiz_variance", 1),
+                                   "SH": ("pos_vert_variance", 1), "SM": ("compass_variance", 1)}),
+    "RATE": ("ATTITUDE", {"R": ("rollspeed", 180 / np.pi), "P": ("pitchspeed", 180 / np.pi),
+                          "Y": ("yawspeed", 180 / np.pi)}),
+}  # fmt: skip
+"""DataFlash message -> the MAVLink message that carries it, and per field the sent one and its scale."""
+
+_UNKNOWN: Mapping[str, float] = {"eph": _UNKNOWN_U16, "voltage_battery": _UNKNOWN_U16, "current_battery": -1,
+                                 "energy_consumed": -1}  # fmt: skip
+"""Values by which a sender says that it does not know."""
+
+
+def as_dataflash(log: Log) -> Log:
+    """The log itself, or for telemetry the DataFlash log that it can stand for."""
+    return _Telemetry(log) if log.format is LogFormat.MAVLINK_TLOG else log
+
+
+def explained(value: Value, log_format: str) -> Value:
+    """The value; where telemetry lacks what an extractor needs, the advice names the log that has it."""
+    is_telemetry = log_format == LogFormat.MAVLINK_TLOG.value
+    if isinstance(value, Unavailable) and is_telemetry and value.reason.startswith("no "):
+        return Unavailable(value.reason, _ADVICE)
+    return value
+
+
+@dataclass(frozen=True, eq=False)
+class _Telemetry:
+    """A telemetry log with the messages of a DataFlash log beside its own. Everything else is the log's."""
+
+    log: Log
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.log, name)
+
+    def channels(self) -> tuple[Channel, ...]:
+        own = self.log.channels()
+        heard = {channel.name.partition("@")[0]: channel for channel in reversed(own)}
+        shown = []
+        for name, sources in _SOURCES.items():
+            source = next((heard[source] for source in sources if source in heard), None)
+            if source is not None:
+                shown.append(Channel(name, source.name, source.count, source.rate_hz))
+        return (*own, *shown)
+
+    def read(self, wanted: Wanted) -> Mapping[str, Table]:
+        own = {name: fields for name, fields in wanted.items() if name not in _SOURCES}
+        tables = dict(self.log.read(own))
+        for name, fields in wanted.items():
+            table = self._table(name) if name in _SOURCES else None
+            if table is not None and len(table):
+                present = {field: table[field] for field in fields if field in table.columns}
+                tables[name] = Table(table.t, present)
+        return tables
+
+    def _table(self, name: str) -> Table | None:
+        return _MADE[name](self) if name in _MADE else self._as_sent(name)
+
+    def heard(self, message: str, *fields: str) -> Table | None:
+        """A message of the vehicle, None when it was never heard. Values that mean "unknown" are NaN."""
+        table = self.log.read({message: fields}).get(message)
+        if table is None or not set(fields) <= table.columns.keys():
+            return None
+        for field in fields:
+            if field in _UNKNOWN:
+                table[field][table[field] == _UNKNOWN[field]] = np.nan
+        return table
+
+    def exchanged(self, message: str, *fields: str) -> list[Table]:
+        """A message that the vehicle sent, or that was sent to it; one table a sender."""
+        names = [channel.name for channel in self.log.channels() if channel.name.partition("@")[0] == message]
+        tables = self.log.read(dict.fromkeys(names, (*fields, "target_system")))
+        return [
+            table if name == message else table.where(table["target_system"] == self.system)
+            for name, table in tables.items()
+        ]
+
+    @cached_property
+    def system(self) -> int:
+        """The vehicle's number."""
+        return int(self.log.facts["system"].partition(".")[0])
+
+    @cached_property
+    def heartbeats(self) -> Table | None:
+        return self.heard("HEARTBEAT", "base_mode", "custom_mode", "type")
+
+    def _as_sent(self, name: str) -> Table | None:
+        message, fields = _AS_SENT[name]
+        table = self.heard(message, *(sent for sent, _ in fields.values()))
+        if table is None:
+            return None
+        if name == "POS":
+            table = table.where((table["lat"] != 0) | (table["lon"] != 0))
+        return Table(table.t, {field: table[sent] * scale for field, (sent, scale) in fields.items()})
+
+
+def _attitude(log: _Telemetry) -> Table | None:
+    """ATT. A copter's NAV_CONTROLLER_OUTPUT says which attitude it wants; it comes at times of its own."""
+    table = log.heard("ATTITUDE", "roll", "pitch", "yaw")
+    if table is None:
+        return None
+    columns = {name: np.degrees(table[name.lower()]) for name in ("Roll", "Pitch", "Yaw")}
+    columns["Yaw"] = columns["Yaw"] % 360
+    wanted = log.heard("NAV_CONTROLLER_OUTPUT", "nav_roll", "nav_pitch", "nav_bearing")
+    beats = log.heartbeats
+    if wanted is not None and beats is not None and int(beats["type"][0]) in _COPTERS:
+        columns["DesRoll"] = np.interp(table.t, wanted.t, wanted["nav_roll"])
+        columns["DesPitch"] = np.interp(table.t, wanted.t, wanted["nav_pitch"])
+        turned = np.degrees(np.unwrap(np.radians(wanted["nav_bearing"])))
+        columns["DesYaw"] = np.interp(table.t, wanted.t, turned) % 360
+    return Table(table.t, columns)
+
+
+def _batteries(log: _Telemetry) -> Table | None:
+    """BAT, from BATTERY_STATUS where it is sent, else from SYS_STATUS."""
+    table = log.heard("BATTERY_STATUS", "id", "voltages", "current_battery", "energy_consumed")
+    if table is not None:
+        cells = np.array(table["voltages"].tolist(), dtype=np.float64)
+        volts = np.where(cells == _UNKNOWN_U16, 0.0, cells).sum(axis=1) / 1000
+        return Table(table.t, {
+            "Inst": table["id"],
+            "Volt": np.where(volts > 0, volts, np.nan),
+            "Curr": table["current_battery"] / 100,
+            "EnrgTot": table["energy_consumed"] / 36,
+        })  # fmt: skip
+    table = log.heard("SYS_STATUS", "voltage_battery", "current_battery")
+    if table is None:
+        return None
+    return Table(table.t, {"Volt": table["voltage_battery"] / 1000, "Curr": table["current_battery"] / 100})
+
+
+def _home(log: _Telemetry) -> Table | None:
+    table = log.heard("HOME_POSITION", "latitude", "longitude")
+    if table is None:
+        return None
+    here = {"Type": np.ones(len(table)), "Lat": table["latitude"] * 1e-7, "Lng": table["longitude"] * 1e-7}
+    return Table(table.t, here)
+
+
+def _armings(log: _Telemetry) -> Table | None:
+    """ARM: every change of the armed flag, halfway between the two heartbeats. One already set at the first is no
+    arming, since when that was is not in the log."""
+    beats = log.heartbeats
+    if beats is None:
+        return None
+    armed = (beats["base_mode"].astype(np.int64) & _ARMED_FLAG) > 0
+    changed = np.flatnonzero(armed[1:] != armed[:-1]) + 1
+    t = (beats.t[changed] + beats.t[changed - 1]) / 2
+    commands = log.exchanged("COMMAND_LONG", "command", "param1", "param2")
+    orders = [c.t[(c["command"] == _ARM_DISARM) & (c["param1"] == 0) & (c["param2"] == _FORCE)] for c in commands]
+    forced = np.concatenate([np.empty(0), *orders])
+    columns = {"ArmState": armed[changed].astype(np.float64)}
+    if commands:  # a recording without any order would not show one by force either
+        by_force = [float(np.any((forced >= at - _FORCED_WITHIN_S) & (forced <= at + 1))) for at in t.tolist()]
+        columns["Forced"] = np.array(by_force)
+    return Table(t, columns)
+
+
+def _modes(log: _Telemetry) -> Table | None:
+    beats = log.heartbeats
+    if beats is None:
+        return None
+    is_new = np.append(True, np.diff(beats["custom_mode"]) != 0)
+    return Table(beats.t[is_new], {"ModeNum": beats["custom_mode"][is_new]})
+
+
+def _messages(log: _Telemetry) -> Table | None:
+    """MSG: the vehicle's texts, and in its words what it said of its mission by number only."""
+    rows = list(_texts(log))
+    for message, words in (("MISSION_ITEM_REACHED", "Reached command #{}"), ("MISSION_CURRENT", "Mission: {} ")):
+        table = log.heard(message, "seq")
+        if table is None:
+            continue
+        said = [(t, text) for t, (text,) in rows]
+        is_new = np.append(message == "MISSION_ITEM_REACHED", np.diff(table["seq"]) != 0)
+        for t, number in zip(table.t[is_new].tolist(), table["seq"][is_new].tolist(), strict=True):
+            text = words.format(int(number))
+            if not any(abs(t - at) <= _SAME_EVENT_S and known.startswith(text) for at, known in said):
+                rows.append((t, (text,)))
+    return _to_table(rows, ("Message",))
+
+
+def _texts(log: _Telemetry) -> Iterator[Row]:
+    """The texts of STATUSTEXT; a long one comes in pieces of the same number."""
+    table = log.heard("STATUSTEXT", "text", "id", "chunk_seq")
+    if table is None:
+        return
+    began: tuple[float, int, str] | None = None
+    for t, text, number, piece in zip(table.t, table["text"], table["id"], table["chunk_seq"], strict=True):
+        if began is not None and (number == 0 or piece == 0 or number != began[1]):
+            yield began[0], (began[2],)
+            began = None
+        if number == 0:
+            yield float(t), (str(text),)
+        elif began is None:
+            began = (float(t), int(number), str(text))
+        else:
+            began = (*began[:2], began[2] + str(text))
+    if began is not None:
+        yield began[0], (began[2],)
+
+
+def _items(log: _Telemetry) -> Table | None:
+    """CMD: the mission as the vehicle or, to the vehicle, a ground station sent it. Item 0 is home, no item."""
+    rows: list[Row] = []
+    for message, scale in (("MISSION_ITEM_INT", 1e-7), ("MISSION_ITEM", 1.0)):
+        for table in log.exchanged(message, "seq", "command", "x", "y", "z", "mission_type"):
+            own = table.where((table["mission_type"] == 0) & (table["seq"] > 0))
+            columns = (own["seq"], own["command"], own["x"] * scale, own["y"] * scale, own["z"])
+            rows += zip(own.t.tolist(), zip(*(column.tolist() for column in columns), strict=True), strict=True)
+    top = max((int(row[0]) for _, row in rows), default=0)
+    for table in log.exchanged("MISSION_COUNT", "count", "mission_type"):
+        own = table.where(table["mission_type"] == 0)
+        for t, count in zip(own.t.tolist(), own["count"].tolist(), strict=True):
+            # A shorter mission has no items where the longer one before it had.
+            rows += [(t, (number, 0, 0.0, 0.0, 0.0)) for number in range(max(int(count), 1), top + 1)]
+    return _to_table(rows, ("CNum", "CId", "Lat", "Lng", "Alt"))
+
+
+def _to_table(rows: Iterable[Row], fields: tuple[str, ...]) -> Table | None:
+    ordered = sorted(rows, key=lambda row: row[0])
+    if not ordered:
+        return None
+    kind = object if isinstance(ordered[0][1][0], str) else np.float64
+    columns = {field: np.array([row[at] for _, row in ordered], dtype=kind) for at, field in enumerate(fields)}
+    return Table(np.array([t for t, _ in ordered]), columns)
+
+
+_MADE: Mapping[str, Callable[[_Telemetry], Table | None]] = {
+    "ATT": _attitude, "BAT": _batteries, "ORGN": _home, "ARM": _armings, "MODE": _modes, "MSG": _messages,
+    "CMD": _items,
+}  # fmt: skip
+_SOURCES: Mapping[str, tuple[str, ...]] = {
+    **{name: (message,) for name, (message, _) in _AS_SENT.items()},
+    "ATT": ("ATTITUDE",),
+    "BAT": ("BATTERY_STATUS", "SYS_STATUS"),
+    "ORGN": ("HOME_POSITION",),
+    "ARM": ("HEARTBEAT",),
+    "MODE": ("HEARTBEAT",),
+    "MSG": ("STATUSTEXT", "MISSION_ITEM_REACHED", "MISSION_CURRENT"),
+    "CMD": ("MISSION_ITEM_INT", "MISSION_ITEM"),
+}
+"""DataFlash message -> the MAVLink messages that it is made of."""

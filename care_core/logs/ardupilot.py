@@ -1,0 +1,66 @@
+"""What ArduPilot's three kinds of log have in common: how parameters, firmware, frame and wall clock are told."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from datetime import datetime, timedelta, timezone
+
+import numpy as np
+
+from care_core.logs.base import Table
+from care_core.run import Setting
+
+# GPS time runs ahead of UTC by the leap seconds since 1980: 18 since 2017, and none is announced.
+_GPS_EPOCH = datetime(1980, 1, 6, tzinfo=timezone.utc) - timedelta(seconds=18)
+# A week that no receiver has reached yet is a flipped bit.
+_LAST_WEEK, _WEEK_MS = 5200, 7 * 24 * 3600 * 1000
+_GPS_FIELDS = (("GWk", "GMS"), ("Week", "TimeMS"))
+_FIRMWARE = re.compile(r"(?:Ardu(\w+)|APM:(\w+)|AntennaTracker|Blimp|Rover) V\d")
+_VEHICLES = {"copter": "multicopter", "plane": "fixed wing", "sub": "submarine", "rover": "rover"}
+
+GPS_TIME = tuple(name for pair in _GPS_FIELDS for name in pair)
+"""Fields of a GPS message that tell the wall clock, week and milliseconds of it: names of firmware 3.2, older ones."""
+
+
+def history(rows: Iterable[tuple[float, str, float, float | None]], source: str) -> dict[str, tuple[Setting, ...]]:
+    """Per parameter its values in time order, out of (time, name, value, default); a value said again is no change."""
+    known: dict[str, list[Setting]] = {}
+    for t, name, value, default in rows:
+        values = known.setdefault(name, [])
+        if not values or values[-1].value != value:
+            values.append(Setting(name, value, source, default=default, changed_at_s=t if values else None))
+    return {name: tuple(values) for name, values in known.items()}
+
+
+def shortest(value: float) -> float:
+    """A single-precision number as it was typed: 0.135, not 0.13500000536441803."""
+    return float(str(np.float32(value)))
+
+
+def facts_of(texts: Iterable[str]) -> dict[str, str]:
+    """`firmware` ("ArduCopter V4.5.4 (fd1bcc61)"), `vehicle` ("multicopter") and `frame` ("QUAD/PLUS") by the texts."""
+    facts: dict[str, str] = {}
+    for text in texts:
+        match = _FIRMWARE.match(text)
+        if match and "firmware" not in facts:
+            facts["firmware"] = text
+            kind = (match[1] or match[2] or match[0].split()[0]).casefold()
+            facts["vehicle"] = _VEHICLES.get(kind, kind)
+        if text.startswith("Frame: "):
+            facts.setdefault("frame", text.removeprefix("Frame: "))
+    return facts
+
+
+def wall_clock(tables: Mapping[str, Table]) -> str | None:
+    """ISO 8601 UTC time of second 0 of the log, from the first GPS message that knows its week."""
+    gps = tables.get("GPS")
+    names = next((pair for pair in _GPS_FIELDS if gps is not None and set(pair) <= gps.columns.keys()), None)
+    if gps is None or names is None:
+        return None
+    week, milliseconds = (gps[name] for name in names)
+    known = gps.where((week > 0) & (week <= _LAST_WEEK) & (milliseconds < _WEEK_MS) & np.isfinite(gps.t))
+    if not len(known):
+        return None
+    fix = _GPS_EPOCH + timedelta(weeks=float(known[names[0]][0]), milliseconds=float(known[names[1]][0]))
+    return (fix - timedelta(seconds=float(known.t[0]))).isoformat(timespec="seconds")

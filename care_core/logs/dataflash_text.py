@@ -1,0 +1,236 @@
+"""DataFlash logs as text (.log): the same messages as the .BIN, one a line, with values already scaled.
+
+Lines before the first FMT are a greeting. A line that is not what its FMT says is damage.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.errors import LogError
+from care_core.logs.ardupilot import GPS_TIME, facts_of, history, wall_clock
+from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs.clock import find_clock
+from care_core.logs.damage import summarised
+from care_core.logs.dataflash import time_field
+from care_core.run import Damage, Setting
+
+Floats = NDArray[np.float64]
+Offsets = NDArray[np.int64]
+
+_TEXT_CODES = frozenset("nNZ")
+_NAME_BYTES = 5  # four of a message's name and the comma
+
+
+class Columns(NamedTuple):
+    """The columns of a message and the format characters of their values."""
+
+    names: tuple[str, ...]
+    codes: str
+
+
+class DataFlashTextLog:
+    """A DataFlash log as text. Channels and fields are those of the .BIN; old firmwares name and stamp fewer.
+
+    Raises:
+        LogError: the file cannot be read, or holds no message at all.
+    """
+
+    format = LogFormat.DATAFLASH_TEXT
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._data = self._bytes()
+        self._formats: dict[str, Columns] = {}
+        self._lines = self._index()
+        self._read_formats()
+        broken = self._drop_broken()
+        if not any(len(places) for name, places in self._lines.items() if name != "FMT"):
+            raise LogError("The log holds no message.", hint="It may have been cut off.", where=str(path))
+        late = self._keep_time()
+        where = np.searchsorted(self._places, [byte for byte, _ in broken]) - 1
+        times = [float(self._seconds[at]) if at >= 0 else None for at in where.tolist()]
+        found = [Damage(text, byte, t) for (byte, text), t in zip(broken, times, strict=True)]
+        self.damage = (*late, *summarised(found, "damaged lines"))
+
+    def channels(self) -> tuple[Channel, ...]:
+        found = []
+        for name in sorted(name for name, places in self._lines.items() if len(places)):
+            t = self._times(name)
+            span = float(t[-1] - t[0]) if len(t) > 1 else 0.0
+            found.append(Channel(name, self._formats[name].codes, len(t), (len(t) - 1) / span if span > 0 else None))
+        return tuple(found)
+
+    def read(self, wanted: Wanted) -> Mapping[str, Table]:
+        tables = {}
+        for name, fields in wanted.items():
+            if name in self._formats and len(self._lines.get(name, ())):
+                tables[name] = Table(self._times(name), self._columns(name, fields))
+        return tables
+
+    def settings(self) -> Mapping[str, tuple[Setting, ...]]:
+        return self._settings
+
+    @cached_property
+    def _settings(self) -> Mapping[str, tuple[Setting, ...]]:
+        table = self.read({"PARM": ("Name", "Value", "Default")}).get("PARM")
+        if table is None or not {"Name", "Value"} <= table.columns.keys():
+            return {}
+        values, defaults = table["Value"], table.columns.get("Default", np.full(len(table), np.nan))
+        references = [default if np.isfinite(default) else None for default in defaults.tolist()]
+        rows = zip(table.t.tolist(), table["Name"].tolist(), values.tolist(), references, strict=True)
+        return history((row for row in rows if np.isfinite(row[2])), "PARM")
+
+    @cached_property
+    def facts(self) -> Mapping[str, str]:
+        """`firmware`, `vehicle` and `frame`, where a message or the greeting names them."""
+        tables = self.read({"VER": ("FWS",), "MSG": ("Message",)})
+        texts = [str(text) for table in tables.values() for column in table.columns.values() for text in column]
+        first = int(min(places[0] for places in self._lines.values() if len(places)))
+        return facts_of([*texts, *(line.strip() for line in _text(self._data[:first]).splitlines())])
+
+    @cached_property
+    def start(self) -> str | None:
+        """Wall clock of the first timestamp (UTC), from the first GPS line that knows its week."""
+        return wall_clock(self.read({"GPS": GPS_TIME}))
+
+    def _bytes(self) -> NDArray[np.uint8]:
+        try:
+            return np.asarray(np.memmap(self.path, dtype=np.uint8, mode="r"))
+        except (OSError, ValueError) as err:
+            raise LogError(f"Cannot read the file: {err}.", where=str(self.path)) from err
+
+    def _index(self) -> dict[str, Offsets]:
+        """Message name -> the first bytes of its lines. What does not begin like a message is under ''."""
+        ends = np.flatnonzero(self._data == ord("\n"))
+        starts = np.append(0, ends + 1)
+        starts = starts[starts < len(self._data)]
+        within = np.minimum(starts[:, None] + np.arange(_NAME_BYTES), len(self._data) - 1)
+        heads = self._data[within]
+        heads[np.cumsum(heads == ord(","), axis=1) > 0] = 0
+        names, which = np.unique(heads.view(f"S{_NAME_BYTES}")[:, 0], return_inverse=True)
+        lines: dict[str, Offsets] = {}
+        for at, raw in enumerate(names.tolist()):
+            name = raw.decode("latin-1")
+            is_name = len(name) < _NAME_BYTES and name.isidentifier()
+            key = name if is_name else ""
+            lines[key] = np.sort(np.append(lines.get(key, np.empty(0, dtype=np.int64)), starts[which == at]))
+        return lines
+
+    def _line(self, place: int) -> str:
+        """The line that begins at a byte, without its end."""
+        size = 256
+        while True:
+            piece = self._data[place : place + size].tobytes()
+            end = piece.find(b"\n")
+            if end >= 0 or place + size >= len(self._data):
+                return _text(piece[: end if end >= 0 else None]).rstrip("\r")
+            size *= 4
+
+    def _read_formats(self) -> None:
+        for place in self._lines.get("FMT", np.empty(0, dtype=np.int64)).tolist():
+            parts = [part.strip() for part in self._line(place).split(",")]
+            if len(parts) > 5 and parts[3].isidentifier():
+                # The first logs forgot the column of the columns in the declaration of FMT itself.
+                names = tuple(parts[5:]) if parts[3] != "FMT" else ("Type", "Length", "Name", "Format", "Columns")
+                self._formats[parts[3]] = Columns(names, parts[4])
+
+    def _drop_broken(self) -> list[tuple[int, str]]:
+        """Leave only the lines that their FMT describes; answers where the others were and what they are."""
+        first = min((int(places[0]) for name, places in self._lines.items() if name == "FMT"), default=0)
+        broken = []
+        for name in list(self._lines):
+            places = self._lines[name]
+            if name not in self._formats:
+                del self._lines[name]
+                for place in places[places >= first].tolist():
+                    if self._line(place).strip():
+                        broken.append((place, "a line is no message that the log declares"))
+                continue
+            if name == "FMT":
+                continue
+            sound = np.array([self._values(name, place) is not None for place in places.tolist()], dtype=bool)
+            broken += [(place, f"a line is no whole {name}") for place in places[~sound].tolist()]
+            self._lines[name] = places[sound]
+        return sorted(broken)
+
+    def _values(self, name: str, place: int) -> list[str] | None:
+        """The values of a line, None when they are not as many as declared or a number is none."""
+        columns, line = self._formats[name], self._line(place)
+        values = line.split(",")[1:]
+        count = len(columns.codes)
+        if count and len(values) > count and columns.codes[-1] in _TEXT_CODES:
+            values[count - 1 :] = [",".join(values[count - 1 :])]
+        if len(values) < count:
+            return None
+        values = [value.strip() for value in values[:count]]
+        return values if all(map(_is_value, values, columns.codes)) else None
+
+    def _columns(self, name: str, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
+        columns = self._formats[name]
+        if name == "FMT":
+            return {}
+        rows = [self._values(name, place) or [] for place in self._lines[name].tolist()]
+        known = {field: at for at, field in enumerate(columns.names[: len(columns.codes)])}
+        return {field: _column([row[known[field]] for row in rows], columns.codes[known[field]])
+                for field in fields if field in known}  # fmt: skip
+
+    def _keep_time(self) -> tuple[Damage, ...]:
+        """Set `_places` and `_seconds`, the stamped lines and their time; drop lines with an impossible stamp."""
+        places, stamps = [np.empty(0, dtype=np.int64)], [np.empty(0)]
+        for name, own in self._lines.items():
+            stamp = time_field(name, self._formats[name].names)
+            if stamp is not None and len(own):
+                places.append(own)
+                stamps.append(self._columns(name, (stamp[0],))[stamp[0]] / stamp[1])
+        order = np.argsort(np.concatenate(places), kind="stable")
+        place, second = np.concatenate(places)[order], np.concatenate(stamps)[order]
+        clock, impossible, jumps = find_clock(second, place)
+        lost = [Damage("a line's time is impossible", byte) for byte in place[impossible].tolist()]
+        self._places, self._seconds = place[~impossible], clock.seconds(second, place)[~impossible]
+        if lost:
+            self._lines = {name: own[~np.isin(own, place[impossible])] for name, own in self._lines.items()}
+        self.duration_s = clock.duration_s
+        return (*summarised(jumps, "clock jumps"), *summarised(lost, "lines with an impossible time"))
+
+    def _times(self, name: str) -> Floats:
+        """Seconds of the lines of a message; one without a stamp has that of the last one before it."""
+        own = self._lines[name]
+        if name == "FMT" or not len(self._places):
+            return np.full(len(own), np.nan)
+        at = np.searchsorted(self._places, own, side="right") - 1
+        return np.where(at >= 0, self._seconds[at], 0.0)
+
+
+def _is_value(value: str, code: str) -> bool:
+    if code in _TEXT_CODES or code == "M":
+        return True
+    try:
+        float(value)
+    except ValueError:
+        return code == "a"
+    return True
+
+
+def _column(values: list[str], code: str) -> NDArray[Any]:
+    """The values as numbers, or as text where they are (a mode is either, by firmware)."""
+    if code in _TEXT_CODES or code == "a":
+        return np.array(values, dtype=object)
+    try:
+        return np.array([float(value) for value in values])
+    except ValueError:
+        return np.array(values, dtype=object)
+
+
+def _text(raw: bytes | NDArray[np.uint8]) -> str:
+    raw = bytes(raw)
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")

@@ -1,0 +1,223 @@
+"""MAVLink packets in a file of bytes: found by marker and checksum, decoded by pymavlink's message definitions.
+
+A telemetry log puts eight bytes of time (microseconds since 1970, big-endian) before each packet. A packet is believed
+when its checksum, which covers its message's definition too, is right, so packets are found however broken the file is
+between them. Everything works on whole arrays: nothing here loops over packets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Bytes = NDArray[np.uint8]
+Offsets = NDArray[np.int64]
+
+STAMP_BYTES = 8
+V1, V2 = 0xFE, 0xFD
+_SIGNED = 0x01
+_SIGNATURE_BYTES = 13
+_CHUNK = 1 << 22
+_BATCH = 1 << 17
+_KINDS = {
+    "char": "S1", "int8_t": "i1", "uint8_t": "u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4",
+    "uint32_t": "<u4", "int64_t": "<i8", "uint64_t": "<u8", "float": "<f4", "double": "<f8",
+}  # fmt: skip
+
+
+class Field(NamedTuple):
+    """Where a field lies in a payload and how it is stored: a number, text (`S`), or an array of numbers."""
+
+    offset: int
+    dtype: np.dtype[Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message of the MAVLink definitions. `extra` is what its checksum adds."""
+
+    id: int
+    name: str
+    extra: int
+    fields: Mapping[str, Field]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Packets:
+    """Packets of a file, arrays of shape (n,): first byte of the stamp, one past the last byte, message, sender."""
+
+    start: Offsets
+    end: Offsets
+    id: NDArray[np.int32]
+    system: Bytes
+    component: Bytes
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    def where(self, chosen: NDArray[Any]) -> Packets:
+        return Packets(
+            self.start[chosen], self.end[chosen], self.id[chosen], self.system[chosen], self.component[chosen]
+        )
+
+
+@cache
+def definitions() -> Mapping[int, Message]:
+    """Every message of the ArduPilot dialect, which holds the common ones, by number."""
+    from pymavlink.dialects.v20 import ardupilotmega
+
+    return {number: _to_message(number, peer) for number, peer in ardupilotmega.mavlink_map.items()}
+
+
+def _to_message(number: int, peer: Any) -> Message:
+    # pymavlink names fields in the order of the definition, the payload has them by size.
+    kinds = dict(zip(peer.fieldnames, peer.fieldtypes, strict=True))
+    fields, offset = {}, 0
+    for name, count in zip(peer.ordered_fieldnames, peer.array_lengths, strict=True):
+        one = np.dtype(_KINDS[kinds[name]])
+        whole = np.dtype(f"S{max(count, 1)}") if one.kind == "S" else np.dtype((one, (count,))) if count else one
+        fields[name] = Field(offset, whole)
+        offset += whole.itemsize
+    return Message(number, peer.msgname, peer.crc_extra, fields)
+
+
+def find_packets(data: Bytes) -> Packets:
+    """Every stamped packet with the right checksum, in the order of the file; none overlaps another."""
+    pieces = [_checked(data, places) for places in _candidates(data)]
+    found = Packets(*(np.concatenate(parts) for parts in zip(*map(_columns, pieces), strict=True)))
+    while len(found):
+        # A packet can carry another inside it, and noise can look like one: the earlier stays.
+        overlaps = np.append(False, found.start[1:] < found.end[:-1])
+        if not overlaps.any():
+            break
+        found = found.where(~(overlaps & ~np.append(False, overlaps[:-1])))
+    return found
+
+
+def _columns(packets: Packets) -> tuple[NDArray[Any], ...]:
+    return packets.start, packets.end, packets.id, packets.system, packets.component
+
+
+def _candidates(data: Bytes) -> list[Offsets]:
+    """Places where a packet may begin: a marker with a stamp before it whose highest byte is zero."""
+    found: list[Offsets] = [np.empty(0, dtype=np.int64)]
+    for low in range(STAMP_BYTES, len(data), _CHUNK):
+        piece = data[low : low + _CHUNK]
+        leads = data[low - STAMP_BYTES : low - STAMP_BYTES + len(piece)]
+        places = np.flatnonzero(((piece == V2) | (piece == V1)) & (leads == 0)) + low
+        found += [places[at : at + _BATCH] for at in range(0, len(places), _BATCH)]
+    return found
+
+
+def frames(data: Bytes, places: Offsets) -> Packets:
+    """Packets as their headers describe them, unchecked; those that do not fit into the file are left out."""
+    places = places[places + 12 <= len(data)] if len(places) else places
+    is_v2 = data[places] == V2
+    head = np.where(is_v2, 10, 6)
+    flags = np.where(is_v2, data[places + 2], 0)
+    end = places + head + data[places + 1] + 2 + _SIGNATURE_BYTES * (flags & _SIGNED)
+    wide = data[places + 7] | data[places + 8].astype(np.int32) << 8 | data[places + 9].astype(np.int32) << 16
+    number = np.where(is_v2, wide, data[places + 5]).astype(np.int32)
+    sender = places + np.where(is_v2, 5, 3)
+    whole = (end <= len(data)) & (flags | _SIGNED == _SIGNED)
+    found = Packets(places - STAMP_BYTES, end, number, data[sender], data[sender + 1])
+    return found.where(whole)
+
+
+def _checked(data: Bytes, places: Offsets) -> Packets:
+    extras = np.full(max(definitions()) + 2, -1, dtype=np.int16)
+    extras[list(definitions())] = [message.extra for message in definitions().values()]
+    found = frames(data, places)
+    found = found.where(extras[np.minimum(found.id, len(extras) - 1)] >= 0)
+    summed, stated = _sums(data, found)
+    return found.where(_step(summed, extras[found.id].astype(np.uint8)) == stated)
+
+
+def wanted_extras(data: Bytes, packets: Packets) -> NDArray[np.int64]:
+    """What a message's definition would have to add for each packet's checksum to be right; -1 where nothing does."""
+    summed, stated = _sums(data, packets)
+    entry = np.full(1 << 16, -1, dtype=np.int64)
+    entry[_crc_table()] = np.arange(256)
+    found = entry[stated ^ (summed >> 8)]
+    return np.where(found < 0, -1, found ^ (summed & 0xFF))
+
+
+def payloads(data: Bytes, start: Offsets) -> tuple[Offsets, NDArray[np.int64]]:
+    """First byte and size of the payloads of packets whose stamps begin at `start`."""
+    marker = start + STAMP_BYTES
+    return marker + np.where(data[marker] == V2, 10, 6), data[marker + 1].astype(np.int64)
+
+
+def _sums(data: Bytes, packets: Packets) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
+    """CRC-16/MCRF4XX of packets without the byte that their message adds, and the checksums that they state."""
+    marker = packets.start + STAMP_BYTES
+    first, size = payloads(data, packets.start)
+    tail = first + size
+    covered = tail - marker - 1
+    order = np.argsort(-covered, kind="stable")
+    place, falling = marker[order] + 1, -covered[order]
+    sums = np.full(len(order), 0xFFFF, dtype=np.uint16)
+    for step in range(-int(falling[0]) if len(falling) else 0):
+        running = int(np.searchsorted(falling, -step))  # those longer than `step` come first
+        sums[:running] = _step(sums[:running], data[place[:running] + step])
+    answer = np.empty_like(sums)
+    answer[order] = sums
+    return answer, data[tail] | data[tail + 1].astype(np.uint16) << 8
+
+
+def _step(sums: NDArray[np.uint16], byte: Bytes) -> NDArray[np.uint16]:
+    return np.asarray(_crc_table()[(sums ^ byte) & 0xFF] ^ (sums >> 8))
+
+
+@cache
+def _crc_table() -> NDArray[np.uint16]:
+    table = np.arange(256, dtype=np.uint16)
+    for _ in range(8):
+        table = np.where(table & 1, (table >> 1) ^ 0x8408, table >> 1).astype(np.uint16)
+    return table
+
+
+def stamps(data: Bytes, start: Offsets) -> NDArray[np.float64]:
+    """The times before packets, in seconds."""
+    seconds = np.empty(len(start))
+    for low in range(0, len(start), _BATCH):
+        raw = data[start[low : low + _BATCH, None] + np.arange(STAMP_BYTES)]
+        seconds[low : low + _BATCH] = raw.view(">u8")[:, 0] / 1e6
+    return seconds
+
+
+def decode(data: Bytes, start: Offsets, field: Field) -> NDArray[Any]:
+    """One field of packets of one message: float64, or object for text (str) and arrays (tuple).
+
+    A sender leaves out the zeros at the end of a payload, so what lies past it is zero.
+    """
+    first, size = payloads(data, start)
+    within = field.offset + np.arange(field.dtype.itemsize)
+    is_sent = within < size[:, None]
+    raw = data[np.where(is_sent, first[:, None] + within, 0)]
+    raw[~is_sent] = 0
+    if field.dtype.kind == "S":
+        return _objects([_text(row.tobytes()) for row in raw])
+    if field.dtype.shape:
+        return _objects([tuple(row) for row in raw.view(field.dtype.base).tolist()])
+    with np.errstate(invalid="ignore"):
+        return np.asarray(raw.view(field.dtype)[:, 0].astype(np.float64))
+
+
+def _objects(values: Sequence[Any]) -> NDArray[Any]:
+    column = np.empty(len(values), dtype=object)
+    column[:] = values
+    return column
+
+
+def _text(raw: bytes) -> str:
+    raw = raw.split(b"\0", 1)[0]
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")

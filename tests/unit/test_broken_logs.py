@@ -1,0 +1,140 @@
+"""Logs cut anywhere and with flipped bits: read, or refused by a LogError; never anything else, and never a lie."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from care_core.errors import CareError, LogError
+from care_core.extract.read import read_run
+from care_core.logs import open_log
+from care_core.logs.base import Log, LogFormat
+from care_core.profile.schema import read_schema
+from care_core.run import is_known
+from tests.rewritten import write_text, write_ulog
+from tests.unit.test_mavlink import Station, flight, parameter
+
+ROOT = Path(__file__).parents[2]
+SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
+TIMES = 200
+LONGEST_S = 10.0
+
+
+def short_bin(path: Path) -> Path:
+    path.write_bytes(SAMPLE.read_bytes()[:60_000])
+    return path
+
+
+def short_text(path: Path) -> Path:
+    return write_text(path, SAMPLE, only=("MSG", "GPS", "CMD", "ARM"))
+
+
+def short_tlog(path: Path) -> Path:
+    station: Station = flight(120)
+    for number in range(60):
+        station.hear(parameter(f"P{number}", number)).hear(
+            mavlink.MAVLink_statustext_message(6, b"Mission: 1 WP", 0, 0)
+        )
+    return station.write(path)
+
+
+MAKERS: dict[LogFormat, Callable[[Path], Path]] = {
+    LogFormat.DATAFLASH_BIN: short_bin,
+    LogFormat.DATAFLASH_TEXT: short_text,
+    LogFormat.MAVLINK_TLOG: short_tlog,
+    LogFormat.PX4_ULG: write_ulog,
+}
+FIELDS = ("roll", "text", "Roll", "TimeUS", "Message", "Value", "voltage_v", "message", "Lat")
+
+
+def read_all(path: Path) -> Log | None:
+    """Everything a log can be asked for; None when it is refused."""
+    started = time.monotonic()
+    try:
+        log = open_log(path)
+    except LogError:
+        return None
+    tables = log.read({channel.name: FIELDS for channel in log.channels()})
+    assert all(len(column) == len(table) for table in tables.values() for column in table.columns.values())
+    assert 0 <= log.duration_s < 1e6
+    log.settings()
+    assert dict(log.facts) is not None
+    assert log.start is None or log.start[:2] == "20"
+    assert time.monotonic() - started < LONGEST_S
+    return log
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+def test_a_log_cut_anywhere(kind: LogFormat, tmp_path: Path) -> None:
+    whole = MAKERS[kind](tmp_path / "whole").read_bytes()
+    path = tmp_path / "cut"
+    counts = []
+    for at in np.linspace(1, len(whole) - 1, TIMES).astype(int).tolist():
+        path.write_bytes(whole[:at])
+        log = read_all(path)
+        counts.append(sum(channel.count for channel in log.channels()) if log else 0)
+    assert counts == sorted(counts), "more of a log holds no fewer messages"
+    assert counts[-1] > 0
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+def test_a_log_with_a_flipped_bit(kind: LogFormat, tmp_path: Path) -> None:
+    whole = MAKERS[kind](tmp_path / "whole").read_bytes()
+    path = tmp_path / "flipped"
+    rng = np.random.default_rng(1)
+    log = read_all(tmp_path / "whole")
+    assert log is not None
+    longest_s = log.duration_s + 6.0  # a last record may be moved by as much as a pause
+    read, later = 0, 0
+    for _ in range(TIMES):
+        broken = bytearray(whole)
+        broken[int(rng.integers(len(whole)))] ^= 1 << int(rng.integers(8))
+        path.write_bytes(broken)
+        log = read_all(path)
+        read += log is not None
+        later += log is not None and log.duration_s > longest_s
+    assert read > 0.95 * TIMES
+    assert later <= 0.02 * TIMES
+
+
+def test_a_flipped_bit_makes_no_mission_succeed_and_no_absurd_value(tmp_path: Path) -> None:
+    schema = read_schema(ROOT / "profiles" / "arducopter" / "profile.yaml")
+    whole, path, rng = SAMPLE.read_bytes(), tmp_path / "a.BIN", np.random.default_rng(2)
+    sound = read_run(open_log(SAMPLE), schema, judge_anyway=("mission_time", "energy", "path_error_max"))
+    for _ in range(25):
+        broken = bytearray(whole)
+        for at in rng.integers(100_000, len(whole), 8).tolist():
+            broken[at] ^= 1 << int(rng.integers(8))
+        path.write_bytes(broken)
+        try:
+            run = read_run(open_log(path), schema, judge_anyway=("mission_time", "energy", "path_error_max"))
+        except CareError:
+            continue
+        assert run.objectives["mission_success"] != 1.0 or sound.objectives["mission_success"] == 1.0
+        bounds = {"mission_time": 400.0, "energy": 100.0, "path_error_max": 2000.0}
+        for name, bound in bounds.items():
+            value = run.objectives[name]
+            assert not is_known(value) or 0 <= value < bound, name
+        for name in ("min_voltage", "distance", "return_height"):
+            value = run.metrics[name]
+            assert not is_known(value) or 0 <= value < 5000.0, name
+
+
+SHARED = os.environ.get("CARE_SHARED")
+WILD = ("dataflash_bin", "dataflash_text", "mavlink_tlog", "px4_ulg")
+
+
+@pytest.mark.skipif(SHARED is None, reason="CARE_SHARED names no folder of recorded logs")
+@pytest.mark.parametrize("folder", WILD)
+def test_every_wild_log_is_read_or_refused_with_a_sentence(folder: str) -> None:
+    refused = []
+    for path in sorted(Path(SHARED or "", "logs", folder).iterdir()):
+        if read_all(path) is None:
+            refused.append(path.name)
+    assert refused == (["raw_no_timestamps.tlog.raw"] if folder == "mavlink_tlog" else [])

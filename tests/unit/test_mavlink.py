@@ -1,0 +1,213 @@
+"""Telemetry logs: against pymavlink message by message, on packets made here, and on broken files."""
+
+from __future__ import annotations
+
+import math
+import os
+import struct
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from care_core.errors import LogError
+from care_core.logs import open_log
+from care_core.logs.mavlink import MavlinkLog
+
+START_US = 1_700_000_000_000_000
+COPTER = (1, 1)
+
+
+class Station:
+    """Writes packets as they come in, a tenth of a second apart."""
+
+    def __init__(self) -> None:
+        self.senders: dict[tuple[int, int], Any] = {}
+        self.parts: list[bytes] = []
+
+    def hear(self, message: Any, sender: tuple[int, int] = COPTER, *, v1: bool = False) -> Station:
+        mav = self.senders.setdefault(sender, mavlink.MAVLink(None, *sender))
+        stamp = START_US + 100_000 * len(self.parts)
+        self.parts.append(struct.pack(">Q", stamp) + message.pack(mav, force_mavlink1=v1))
+        return self
+
+    def write(self, path: Path) -> Path:
+        path.write_bytes(b"".join(self.parts))
+        return path
+
+
+def heartbeat(kind: int = 2, autopilot: int = 3, armed: int = 0) -> Any:
+    return mavlink.MAVLink_heartbeat_message(kind, autopilot, 0x51 | armed, 5, 4, 3)
+
+
+def attitude(roll: float) -> Any:
+    return mavlink.MAVLink_attitude_message(1000, roll, 0.5, 0.0, 0.0, 0.0, 0.0)
+
+
+def parameter(name: str, value: float, kind: int = 9) -> Any:
+    return mavlink.MAVLink_param_value_message(name.encode(), value, kind, 2, 0)
+
+
+def flight(count: int = 40) -> Station:
+    station = Station().hear(heartbeat())
+    for number in range(count):
+        station.hear(attitude(number / 8), v1=number % 2 == 0)
+    return station
+
+
+def test_both_versions_and_cut_zeros_are_read(tmp_path: Path) -> None:
+    log = MavlinkLog(flight(8).write(tmp_path / "a.tlog"))
+    table = log.read({"ATTITUDE": ("roll", "pitch", "yawspeed", "none"), "NONE": ("x",)})["ATTITUDE"]
+    np.testing.assert_array_equal(table["roll"], np.arange(8) / 8)
+    np.testing.assert_array_equal(table["pitch"], np.full(8, 0.5))
+    np.testing.assert_array_equal(table["yawspeed"], np.zeros(8))
+    np.testing.assert_allclose(table.t, 0.1 + 0.1 * np.arange(8), atol=1e-6)
+    assert set(table.columns) == {"roll", "pitch", "yawspeed"}
+    assert (log.damage, log.start) == ((), "2023-11-14T22:13:20+00:00")
+    assert log.duration_s == pytest.approx(0.8)
+
+
+def test_signed_packets_are_read(tmp_path: Path) -> None:
+    mav = mavlink.MAVLink(None, 1, 1)
+    mav.signing.secret_key, mav.signing.sign_outgoing = b"k" * 32, True
+    packets = [heartbeat().pack(mav), attitude(0.25).pack(mav)]
+    stamped = b"".join(struct.pack(">Q", START_US + at) + packet for at, packet in enumerate(packets))
+    assert packets[0][2] == 1
+    (tmp_path / "a.tlog").write_bytes(stamped)
+    log = MavlinkLog(tmp_path / "a.tlog")
+    assert log.damage == ()
+    assert log.read({"ATTITUDE": ("roll",)})["ATTITUDE"]["roll"].tolist() == [0.25]
+
+
+def test_the_vehicle_is_told_from_the_others(tmp_path: Path) -> None:
+    station = flight(30)
+    for _ in range(60):
+        station.hear(heartbeat(6, 8), (255, 190)).hear(attitude(9.0), (1, 154))
+    station.hear(heartbeat(), (7, 1)).hear(attitude(7.0), (7, 1))
+    log = MavlinkLog(station.write(tmp_path / "a.tlog"))
+    assert (log.facts["system"], log.facts["vehicle"], log.facts["firmware"]) == ("1.1", "multicopter", "ArduCopter")
+    assert log.facts["others"] == "7.1 (multicopter), 255.190 (ground station)"
+    assert {channel.name: channel.count for channel in log.channels()} == {
+        "HEARTBEAT": 1, "ATTITUDE": 30, "ATTITUDE@1.154": 60, "HEARTBEAT@255.190": 60, "HEARTBEAT@7.1": 1,
+        "ATTITUDE@7.1": 1,
+    }  # fmt: skip
+    assert max(log.read({"ATTITUDE": ("roll",)})["ATTITUDE"]["roll"]) < 5
+
+
+def test_parameters_with_the_time_of_their_changes(tmp_path: Path) -> None:
+    station = flight(4).hear(parameter("RTL_ALT", 1500)).hear(parameter("PSC_VELXY_P", 0.135))
+    station.hear(mavlink.MAVLink_param_set_message(1, 1, b"PSC_VELXY_P", 9.0, 9), (255, 190))
+    station.hear(parameter("RTL_ALT", 1500)).hear(parameter("RTL_ALT", 300)).hear(parameter("RTL_ALT", 1.0), (1, 154))
+    found = MavlinkLog(station.write(tmp_path / "a.tlog")).settings()
+    assert [(one.value, one.changed_at_s) for one in found["RTL_ALT"]] == [(1500.0, None), (300.0, pytest.approx(0.9))]
+    assert [(one.value, one.source) for one in found["PSC_VELXY_P"]] == [(0.135, "PARAM_VALUE")]
+
+
+def test_px4_sends_whole_numbers_as_their_bytes(tmp_path: Path) -> None:
+    (as_float,) = struct.unpack("<f", struct.pack("<i", 42))
+    station = Station().hear(heartbeat(autopilot=12)).hear(parameter("COM_RC_LOSS_T", as_float, 6))
+    log = MavlinkLog(station.write(tmp_path / "a.tlog"))
+    assert log.settings()["COM_RC_LOSS_T"][0].value == 42.0
+    assert log.facts["stack"] == "PX4"
+
+
+def test_noise_between_packets_is_reported_and_skipped(tmp_path: Path) -> None:
+    station = flight()
+    station.parts.insert(5, b"\xfd\x09noise\xfe" * 7)
+    log = MavlinkLog(station.write(tmp_path / "a.tlog"))
+    assert len(log.read({"ATTITUDE": ("roll",)})["ATTITUDE"]) == 40
+    (found,) = log.damage
+    assert (found.what, found.byte) == ("56 bytes are no packets", sum(map(len, station.parts[:5])))
+    assert found.time_s == pytest.approx(0.4)
+
+
+def test_much_damage_is_told_in_two_lines(tmp_path: Path) -> None:
+    station = flight(100)
+    for at in range(10, 90):
+        station.parts[at] = station.parts[at][:20] + bytes([station.parts[at][20] ^ at]) + station.parts[at][21:]
+    log = MavlinkLog(station.write(tmp_path / "a.tlog"))
+    assert len(log.read({"ATTITUDE": ("roll",)})["ATTITUDE"]) == 20
+    assert [one.what.partition(",")[0] for one in log.damage] == [
+        "80 damaged places", f"a packet of {len(station.parts[89])} bytes has a wrong checksum"
+    ]  # fmt: skip
+
+
+def test_a_message_of_another_definition_is_no_damage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    station = flight(4)
+    with monkeypatch.context() as patch:
+        patch.setattr(mavlink.MAVLink_vfr_hud_message, "crc_extra", 77)
+        for speed in range(5):
+            station.hear(mavlink.MAVLink_vfr_hud_message(speed, 1.0, 2, 3, 4.0, 5.0))
+    log = MavlinkLog(station.write(tmp_path / "a.tlog"))
+    assert log.damage == ()
+    assert ("UNKNOWN VFR_HUD", 5) in [(channel.name, channel.count) for channel in log.channels()]
+    assert "VFR_HUD" not in log.read({"VFR_HUD": ("alt",)})
+
+
+def test_a_packet_of_another_century_is_damage(tmp_path: Path) -> None:
+    station = flight()
+    station.parts[20] = struct.pack(">Q", START_US + (1 << 52)) + station.parts[20][8:]
+    log = MavlinkLog(station.write(tmp_path / "a.tlog"))
+    assert log.duration_s == pytest.approx(4.0)
+    assert [one.what for one in log.damage] == ["a packet's time is impossible"]
+    assert len(log.read({"ATTITUDE": ("roll",)})["ATTITUDE"]) == 39
+
+
+def test_packets_without_stamps_are_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.tlog.raw"
+    path.write_bytes(b"".join(part[8:] for part in flight().parts))
+    with pytest.raises(LogError, match="without time stamps") as caught:
+        open_log(path)
+    assert "tlog" in caught.value.hint
+
+
+SHARED = os.environ.get("CARE_SHARED")
+needs_logs = pytest.mark.skipif(SHARED is None, reason="CARE_SHARED names no folder of recorded logs")
+WILD = ("ardusub_small", "copter35_mixed_v1_v2", "copter47_sitl", "copter_real_radio_23min", "quadplane_vtol",
+        "crawler_generic_autopilot", "one_packet_70bytes", "ardusub_pymavlink_bug")  # fmt: skip
+
+
+@needs_logs
+@pytest.mark.parametrize("name", WILD)
+def test_agrees_with_pymavlink_message_by_message(name: str) -> None:
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    path = Path(SHARED or "", "logs", "mavlink_tlog", f"{name}.tlog")
+    log = open_log(path)
+    assert isinstance(log, MavlinkLog)
+    theirs: dict[str, list[Any]] = defaultdict(list)
+    peer = mavutil.mavlink_connection(str(path))
+    while (message := peer.recv_msg()) is not None:
+        sender = (message.get_srcSystem(), message.get_srcComponent())
+        if message.get_type() != "BAD_DATA":
+            by = "" if sender == tuple(log.vehicle) else "@{}.{}".format(*sender)
+            theirs[message.get_type() + by].append(message)
+    tables = log.read({channel: tuple(rows[0].get_fieldnames()) for channel, rows in theirs.items()})
+    assert set(tables) == set(theirs)
+    first_s = next(iter(theirs.values()))[0]._timestamp - next(iter(tables.values())).t[0]
+    for channel, rows in theirs.items():
+        table = tables[channel]
+        np.testing.assert_allclose(table.t, [row._timestamp - first_s for row in rows], atol=1e-5)
+        for field in rows[0].get_fieldnames():
+            assert all(map(same, table[field], (getattr(row, field) for row in rows))), (channel, field)
+
+
+def same(ours: Any, their: Any) -> bool:
+    if isinstance(their, str):
+        return their == "".join(c if c.isascii() else "\ufffd" for c in ours)
+    if isinstance(their, list):
+        return all(map(same, ours, their))
+    return bool(ours == their or (math.isnan(ours) and math.isnan(their)))
+
+
+@needs_logs
+def test_fetched_parameters_of_a_wild_log_are_those_of_its_file() -> None:
+    folder = Path(SHARED or "", "logs")
+    settings = open_log(folder / "mavlink_tlog" / "copter47_sitl.tlog").settings()
+    lines = (folder / "configs" / "ardupilot_param" / "adgfuzz_mav.parm").read_text().split("\n")
+    written = {parts[0]: float(parts[1]) for line in lines if len(parts := line.split()) == 2}
+    assert len(settings) == len(written) == 1374
+    agree = [name for name, value in written.items() if settings[name][0].value == pytest.approx(value, abs=1e-5)]
+    assert len(agree) > 1360

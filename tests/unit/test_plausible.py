@@ -1,0 +1,41 @@
+"""Values that cannot be are left out; values that are merely bad stay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from care_core.extract.plausible import plausible
+from care_core.logs.base import Table
+
+
+def battery(volts: list[float], **more: list[float]) -> dict[str, Table]:
+    columns = {"Volt": np.array(volts), **{name: np.array(values) for name, values in more.items()}}
+    return {"BAT": Table(np.arange(len(volts), dtype=float), columns)}
+
+
+def test_a_voltage_beyond_all_limits_is_left_out() -> None:
+    np.testing.assert_array_equal(
+        plausible(battery([12.0, 1e38, 11.9, -5.0, np.nan]))["BAT"]["Volt"], [12.0, 11.9, np.nan]
+    )
+
+
+def test_a_leap_of_one_sample_is_left_out_and_a_drop_stays() -> None:
+    np.testing.assert_array_equal(plausible(battery([24.0, 24.0, 2.0, 23.9]))["BAT"]["Volt"], [24.0, 24.0, 23.9])
+    dropped = [24.0, 24.0, 14.0, 13.0, 12.0]
+    np.testing.assert_array_equal(plausible(battery(dropped))["BAT"]["Volt"], dropped)
+
+
+def test_two_batteries_do_not_leap() -> None:
+    volts = [12.0, 50.0] * 4
+    assert len(plausible(battery(volts, Inst=[0.0, 1.0] * 4))["BAT"]) == 8
+
+
+def test_a_position_off_the_planet_is_left_out() -> None:
+    lat = np.array([-35.36, 200.0, -35.36, -35.3, -35.36])
+    position = {"POS": Table(np.arange(5.0), {"Lat": lat, "Lng": np.full(5, 149.0), "RelHomeAlt": np.full(5, 10.0)})}
+    np.testing.assert_array_equal(plausible(position)["POS"].t, [0.0, 2.0, 4.0])
+
+
+def test_other_messages_pass() -> None:
+    tables = {"XYZ": Table(np.arange(2.0), {"Volt": np.array([1e38, 0.0])})}
+    assert len(plausible(tables)["XYZ"]) == 2
