@@ -99,6 +99,8 @@ class Run:
     log: LogInfo
     mission: MissionInfo
     evidence: tuple[Evidence, ...] = ()
+    changes: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
+    """Per parameter that changed during the mission: the value it began with, and each later one until its end."""
 
     def value(self, name: str) -> Value | None:
         """The run's value of a variable of any role, None when the run does not hold it."""

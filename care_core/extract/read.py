@@ -14,7 +14,7 @@ import care_core.extract.ardupilot
 import care_core.extract.navigation  # noqa: F401
 from care_core.errors import ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
-from care_core.extract.settings import configuration, in_force
+from care_core.extract.settings import changes_between, configuration, in_force
 from care_core.logs import log_digest
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
@@ -32,7 +32,8 @@ def read_run(
 ) -> Run:
     """Read one mission of a log: the last one, or number `mission` (from 1).
 
-    `overrides` are settings of configuration files, used only for options that the log does not hold.
+    `overrides` are settings of configuration files by the name of the parameter in the log, used only for options
+    that the log does not hold.
     `judge_anyway` names objectives that the operator gave thresholds for: they are judged even where the mission
     is not the one that the profile's thresholds belong to.
 
@@ -145,10 +146,20 @@ class _Source:
                 mismatch=mismatch,
             ),
             evidence=tuple(_pointed(evidence, self.schema) for evidence in self.kind.evidence(mission)),
+            changes=_changes(self.settings, mission),
         )
 
     def _values(self, role: Role, mission: Mission) -> dict[str, Value]:
         return {variable.name: _extract(variable, mission) for variable in self.schema.of(role)}
+
+
+def _changes(settings: Mapping[str, tuple[Setting, ...]], mission: Mission) -> dict[str, tuple[Setting, ...]]:
+    changes = {
+        name: changes_between(history, mission.start_s, mission.end_s)
+        for name, history in settings.items()
+        if len(history) > 1
+    }
+    return {name: history for name, history in changes.items() if history}
 
 
 def _extract(variable: Variable, mission: Mission) -> Value:

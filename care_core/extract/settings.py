@@ -22,6 +22,17 @@ def in_force(history: Sequence[Setting], at_s: float) -> Setting:
     return before[-1] if before else history[0]
 
 
+def changes_between(history: Sequence[Setting], start_s: float, end_s: float) -> tuple[Setting, ...]:
+    """The value in force at `start_s` and those that followed it until `end_s`; empty when none did."""
+    later = [one for one in history[1:] if one.changed_at_s is not None and start_s < one.changed_at_s <= end_s]
+    return (in_force(history, start_s), *later) if later else ()
+
+
+def clock(time_s: float | None) -> str:
+    """A time of the log as minutes and seconds, `02:13`."""
+    return "an unknown time" if time_s is None else f"{int(time_s // 60):02d}:{int(time_s % 60):02d}"
+
+
 def option_value(option: Variable, setting: Setting) -> float | None:
     """The setting as the number that the option uses (bool: 0 or 1, enum: its code), None when it is no such value."""
     value = setting.value
@@ -45,27 +56,10 @@ def _number(option: Variable, text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def find_setting(settings: Mapping[str, Setting], parameter: str) -> Setting | None:
-    """The setting of a parameter: the same name, else the longest trailing part of it.
-
-    A ROS configuration file is loaded into a namespace that it does not name: `DWAPlannerROS/sim_time` in a file
-    is `/move_base/DWAPlannerROS/sim_time` in the log.
-    """
-    if parameter in settings:
-        return settings[parameter]
-    parts = parameter.strip("/").split("/")
-    for skipped in range(len(parts)):
-        name = "/".join(parts[skipped:])
-        for candidate in (name, f"/{name}"):
-            if candidate in settings:
-                return settings[candidate]
-    return None
-
-
-def option_setting(option: Variable, settings: Mapping[str, Setting], *, exact: bool = True) -> Setting | None:
+def option_setting(option: Variable, settings: Mapping[str, Setting]) -> Setting | None:
     """The first of the option's parameters that the settings hold with a usable value."""
     for parameter in readable(option):
-        setting = settings.get(parameter) if exact else find_setting(settings, parameter)
+        setting = settings.get(parameter)
         if setting is not None and option_value(option, setting) is not None:
             return setting
     return None
@@ -84,31 +78,30 @@ def configuration(
     The log is what was driven, so it wins; `disagreements` lists where a file says otherwise.
     """
     config: dict[str, float] = {}
-    settings = dict(driven)
+    settings = {**overrides, **driven}
     for option in options:
-        setting = option_setting(option, driven)
-        if setting is None:
-            setting = option_setting(option, overrides, exact=False)
-            if setting is not None:
-                settings[readable(option)[0]] = setting
+        setting = option_setting(option, driven) or option_setting(option, overrides)
         value = None if setting is None else option_value(option, setting)
         if value is not None:
             config[option.name] = value
     return config, settings
 
 
-def disagreements(schema: Schema, config: Mapping[str, float], overrides: Mapping[str, Setting]) -> tuple[str, ...]:
-    """One sentence for each option whose configuration file says another value than the log drove."""
+def disagreements(schema: Schema, driven: Mapping[str, Setting], overrides: Mapping[str, Setting]) -> tuple[str, ...]:
+    """One sentence for each parameter of an option whose configuration file says another value than the log drove."""
     sentences = []
     for option in schema.options:
-        setting = option_setting(option, overrides, exact=False)
-        wanted = None if setting is None else option_value(option, setting)
-        driven = config.get(option.name)
-        if setting is None or wanted is None or driven is None:
-            continue
-        if not math.isclose(wanted, driven, rel_tol=1e-4, abs_tol=1e-9):
+        several = sum(parameter in driven for parameter in option.parameters) > 1
+        for parameter in readable(option):
+            ours, theirs = driven.get(parameter), overrides.get(parameter)
+            if ours is None or theirs is None or ours is theirs:
+                continue
+            value, wanted = option_value(option, ours), option_value(option, theirs)
+            if value is None or wanted is None or math.isclose(wanted, value, rel_tol=1e-4, abs_tol=1e-9):
+                continue
+            named = f"{option.name} ({parameter})" if several else option.name
             sentences.append(
-                f"{option.name} was {option.show(driven)} when driven, {setting.source} says {option.show(wanted)};"
-                " the driven value is used."
+                f"{named} was {option.show(value)} when driven, {theirs.source} says {option.show(wanted)};"
+                " the driven value is used"
             )
     return tuple(sentences)
