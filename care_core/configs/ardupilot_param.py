@@ -59,7 +59,7 @@ def write(settings: Mapping[str, Setting], remarks: Mapping[str, str] | None = N
     """One `NAME,value` a line, in alphabetical order, with the remark of the name as a comment."""
     lines = []
     for name in sorted(settings):
-        remark = f"  # {remarks[name]}" if remarks and name in remarks else ""
+        remark = f"  # {remarks[name]}" if remarks and remarks.get(name) else ""
         lines.append(f"{name},{plain(settings[name].value)}{remark}\n")
     return "".join(lines)
 

@@ -59,7 +59,7 @@ def write(settings: Mapping[str, Setting], remarks: Mapping[str, str] | None = N
     lines = [HEADER]
     for name in sorted(settings):
         value = settings[name].value
-        if remarks and name in remarks:
+        if remarks and remarks.get(name):
             lines.append(f"# {name}: {remarks[name]}")
         kind = _INT32 if isinstance(value, int) else _REAL32
         lines.append(f"1\t1\t{name}\t{plain(value)}\t{kind}")

@@ -68,7 +68,7 @@ def write(settings: Mapping[str, Setting], remarks: Mapping[str, str] | None = N
             at.append(space if isinstance(branch.get(space, {}), dict) else f"{space}/")
             branch = branch.setdefault(at[-1], {})
         branch[key] = yaml_tree.plain(settings[name].value)
-        if remarks and name in remarks:
+        if remarks and remarks.get(name):
             at.append(key)
             comments[tuple(at)] = remarks[name]
     return yaml_tree.dump(tree, comments)

@@ -86,7 +86,7 @@ def write(settings: Mapping[str, Setting], remarks: Mapping[str, str] | None = N
         # A parameter may have the name of a group (`FollowPath` beside `FollowPath.x`): the rest keeps its dots.
         key = ".".join((*spaces, key))
         branch[key] = yaml_tree.plain(settings[name].value)
-        if remarks and name in remarks:
+        if remarks and remarks.get(name):
             at.append(key)
             comments[tuple(at)] = remarks[name]
     return yaml_tree.dump(tree, comments)

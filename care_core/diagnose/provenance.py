@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from care_core.configs import ConfigFile, guesses, resolve
-from care_core.extract.settings import clock, disagreements, option_setting, option_value, readable
+from care_core.extract.settings import clock, disagreements, readable
 from care_core.profile.schema import Schema
-from care_core.run import Run, Setting
+from care_core.run import Run, Setting, shown
 
 _SHOWN = 5
 
@@ -33,22 +33,21 @@ def _changed_on_the_way(schema: Schema, run: Run) -> Iterator[str]:
         for parameter in readable(option):
             first, *later = run.changes.get(parameter, (None,))
             if first is not None:
-                steps = ", ".join(f"to {one.value} at {clock(one.changed_at_s)}" for one in later)
-                yield f"{option.name} was changed on the mission from {first.value} {steps}; the last value is judged"
+                steps = ", ".join(f"to {shown(one.value)} at {clock(one.changed_at_s)}" for one in later)
+                changes = f"from {shown(first.value)} {steps}"
+                yield f"{option.name} was changed during the mission {changes}; the last value is judged"
 
 
 def _from_files(schema: Schema, run: Run, files: Sequence[ConfigFile]) -> Iterator[str]:
     """Per file, the options whose value only it held, with their lines."""
-    for file in files:
-        own = {id(setting) for setting in file.settings.values()}
-        taken = []
-        for option in schema.options:
-            setting = option_setting(option, run.settings)
-            if setting is not None and id(setting) in own:
-                line = setting.source.rpartition(":")[2]
-                taken.append(f"{option.name} = {option.show(option_value(option, setting))} (line {line})")
-        if taken:
-            yield f"not in the log, taken from {file.path}: {', '.join(taken)}"
+    from_file = {setting.source for file in files for setting in file.settings.values()}
+    taken: dict[str, list[str]] = {}
+    for name, source in run.sources.items():
+        if source in from_file:
+            path, _, line = source.rpartition(":")
+            taken.setdefault(path, []).append(f"{name} = {schema.variables[name].show(run.config[name])} (line {line})")
+    for path, values in taken.items():
+        yield f"not in the log, taken from {path}: {', '.join(values)}"
 
 
 def _useless(schema: Schema, files: Sequence[ConfigFile]) -> Iterator[str]:

@@ -28,6 +28,7 @@ from care_core.diagnose.ranking import (
     suspects,
 )
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
+from care_core.diagnose.since import compare, with_evidence
 from care_core.extract.read import read_run
 from care_core.extract.settings import readable
 from care_core.logs.base import Log
@@ -70,6 +71,7 @@ def triage(
     keep: Collection[str] = (),
     thresholds: Mapping[str, float] | None = None,
     mission: int | None = None,
+    since: Log | None = None,
     top: int = 5,
     progress: Progress | None = None,
 ) -> Diagnosis:
@@ -80,6 +82,7 @@ def triage(
         keep: options that must stay as they are.
         thresholds: the operator's own bounds, per objective.
         mission: which mission of the log, from 1; the last when None.
+        since: the log of a good run; what changed since then is told as evidence.
         top: most causes to report per fault.
 
     Raises:
@@ -93,7 +96,12 @@ def triage(
     run = read_run(log, profile.schema, overrides=given, mission=mission, judge_anyway=tuple(overrides))
     report("judging the objectives", 0.6)
     diagnosis = diagnose(run, profile, choice, keep=keep, thresholds=overrides, top=top, progress=progress)
-    return replace(diagnosis, notes=(*diagnosis.notes, *provenance.notes(profile.schema, run, configs, given)))
+    diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *provenance.notes(profile.schema, run, configs, given)))
+    if since is None:
+        return diagnosis
+    report("comparing with the good log", 0.95)
+    bounds = thresholds_in_force(profile.schema, overrides)
+    return with_evidence(diagnosis, compare(run, since, profile, bounds))
 
 
 def diagnose(

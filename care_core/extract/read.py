@@ -125,12 +125,13 @@ class _Source:
         found = self.missions[index]
         found = replace(found, ended=found.ended and not _cut_short(found, self.log))
         driven = {name: in_force(history, found.end_s) for name, history in self.settings.items()}
-        config, settings = configuration(self.schema.options, driven, overrides)
+        config, sources, settings = configuration(self.schema.options, driven, overrides)
         mission = replace(found, settings={name: setting.value for name, setting in driven.items()})
         mismatch = self.kind.mismatch(mission)
         objectives = self._values(Role.OBJECTIVE, mission)
         return Run(
             config=config,
+            sources=sources,
             context=self._values(Role.CONTEXT, mission),
             metrics=self._values(Role.METRIC, mission),
             objectives=_gated(self.schema, objectives, mission.ended, mismatch, judge_anyway),

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from care_core.extract.self_written import is_self_written
 from care_core.profile.schema import Schema
-from care_core.run import Setting
+from care_core.run import Setting, shown
+from care_core.text import clean
 from care_core.variables import Variable
 
 SIMULATOR_PREFIX = "SIM_"
@@ -26,6 +28,32 @@ def changes_between(history: Sequence[Setting], start_s: float, end_s: float) ->
     """The value in force at `start_s` and those that followed it until `end_s`; empty when none did."""
     later = [one for one in history[1:] if one.changed_at_s is not None and start_s < one.changed_at_s <= end_s]
     return (in_force(history, start_s), *later) if later else ()
+
+
+def differing(
+    histories: Mapping[str, tuple[Setting, ...]], *, everything: bool = False
+) -> dict[str, tuple[Setting, ...]]:
+    """Parameters that changed in the log or are off their default; `everything`: those of the vehicle's own too."""
+    return {
+        name: history
+        for name, history in histories.items()
+        if (everything or not is_self_written(name))
+        and (len(history) > 1 or (history[-1].default is not None and history[-1].value != history[-1].default))
+    }
+
+
+def remark(history: Sequence[Setting], *, source: bool = False) -> str:
+    """What a value was before, when it changed, its default, and its source if asked for; for a comment in a file."""
+    first, *later = history
+    parts = []
+    if later:
+        steps = "".join(f" -> {shown(one.value)} at {clock(one.changed_at_s)}" for one in later)
+        parts.append(f"{shown(first.value)}{steps}")
+    if history[-1].default is not None and history[-1].value != history[-1].default:
+        parts.append(f"default {shown(history[-1].default)}")
+    if source:
+        parts.append(f"from {history[-1].source}")
+    return clean(", ".join(parts))
 
 
 def clock(time_s: float | None) -> str:
@@ -72,19 +100,20 @@ def readable(option: Variable) -> tuple[str, ...]:
 
 def configuration(
     options: Iterable[Variable], driven: Mapping[str, Setting], overrides: Mapping[str, Setting]
-) -> tuple[dict[str, float], dict[str, Setting]]:
-    """Option values of a run, and its settings with those of `overrides` that the log lacks.
+) -> tuple[dict[str, float], dict[str, str], dict[str, Setting]]:
+    """Option values of a run, where each came from, and the settings with those of `overrides` that the log lacks.
 
     The log is what was driven, so it wins; `disagreements` lists where a file says otherwise.
     """
     config: dict[str, float] = {}
-    settings = {**overrides, **driven}
+    sources: dict[str, str] = {}
     for option in options:
         setting = option_setting(option, driven) or option_setting(option, overrides)
         value = None if setting is None else option_value(option, setting)
-        if value is not None:
+        if setting is not None and value is not None:
             config[option.name] = value
-    return config, settings
+            sources[option.name] = setting.source
+    return config, sources, {**overrides, **driven}
 
 
 def disagreements(schema: Schema, driven: Mapping[str, Setting], overrides: Mapping[str, Setting]) -> tuple[str, ...]:

@@ -130,16 +130,17 @@ def test_triage_prints_data_on_stdout_alone(care: Care, made: dict[str, Any]) ->
 def test_triage_passes_its_options_on(care: Care, made: dict[str, Any]) -> None:
     care(
         "triage", "a.BIN", "-p", "arducopter", "--config", "b.param", "--config", "c.param", "--keep", "A",
-        "--threshold", "energy=12", "--mission", "2", "--top", "3",
+        "--threshold", "energy=12", "--mission", "2", "--top", "3", "--since", "good.BIN",
     )  # fmt: skip
     assert made["request"] == Request(
         Path("a.BIN"),
         "arducopter",
-        (Path("b.param"), Path("c.param")),
+        ("b.param", "c.param"),
         ("A",),
         {"energy": 12.0},
         top=3,
         mission=2,
+        since=Path("good.BIN"),
     )
 
 
