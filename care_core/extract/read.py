@@ -10,7 +10,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 # Importing them registers their extractors and mission kinds.
+import care_core.extract.actionlib
 import care_core.extract.ardupilot
+import care_core.extract.battery
+import care_core.extract.nav2
 import care_core.extract.navigation  # noqa: F401
 from care_core.errors import ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs

@@ -97,7 +97,7 @@ class Ros1Bag:
         return tables
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
-        """Every value of every dynamic_reconfigure parameter, by `<namespace>/<parameter>`; booleans as words."""
+        """Every value of every dynamic_reconfigure parameter, by `<namespace>/<parameter>`; booleans as 0 or 1."""
         of_type = {c.topic: c.type for c in self._contents.connections.values()}
         updates = [topic for topic, kind in of_type.items() if kind == _CONFIG]
         descriptions = [topic for topic, kind in of_type.items() if kind == _CONFIG_DESCRIPTION]
@@ -228,15 +228,8 @@ def _values(table: Table | None, prefix: str, row: int) -> dict[str, float | str
     for kind in _KINDS:
         names, given = table[f"{prefix}{kind}.name"][row], table[f"{prefix}{kind}.value"][row]
         pairs = zip(names, given, strict=True)
-        values.update({name: _typed(kind, value) for name, value in pairs})
+        values.update({name: value if isinstance(value, str) else float(value) for name, value in pairs})
     return values
-
-
-def _typed(kind: str, value: Any) -> float | str:
-    """A value as a file of ROS parameters has it: integers without a point, booleans as words."""
-    if kind == "bools":
-        return "true" if value else "false"
-    return str(value) if kind == "strs" else int(value) if kind == "ints" else float(value)
 
 
 def _bound(value: float | str | None) -> float | None:
