@@ -75,9 +75,15 @@ class ConfigFile:
     settings: Mapping[str, Setting]
 
 
-def format_for(log_format: str) -> ConfigFormat:
-    """The configuration format of the ecosystem that records such logs."""
-    return _OF_LOG.get(log_format.partition("-")[0], ConfigFormat.ARDUPILOT_PARAM)
+def format_for(log_format: str, parameters: Iterable[str] = ()) -> ConfigFormat:
+    """The configuration format of the ecosystem that records such logs.
+
+    An MCAP may be of either ROS: `parameters` are names of it, which only in ROS 2 have a dot after the node.
+    """
+    family = log_format.partition("-")[0]
+    if family == "mcap" and (names := list(parameters)) and not any("." in name for name in names):
+        return ConfigFormat.ROS1_YAML
+    return _OF_LOG.get(family, ConfigFormat.ARDUPILOT_PARAM)
 
 
 def format_of(text: str, path: Path) -> ConfigFormat:
@@ -184,7 +190,7 @@ def write_params(
 
 def unified_diff(run: Run, fix: Fix) -> str:
     """The configuration as driven against the fix, in the ecosystem's own format; only keys that change."""
-    line_of = _MODULES[format_for(run.log.format)].line_of
+    line_of = _MODULES[format_for(run.log.format, run.settings)].line_of
     driven, fixed = {}, {}
     for option, parameter, suggested in _assignments(fix.changes):
         change = next(change for change in fix.changes if change.option is option)

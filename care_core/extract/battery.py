@@ -31,7 +31,7 @@ def battery_energy(mission: Mission, args: Args) -> Value:
         start, end = np.interp([mission.start_s, mission.end_s], battery.t, battery.charge)
         inside = (battery.t >= mission.start_s) & (battery.t <= mission.end_s)
         return float(start - end) * float(battery.voltage[inside].mean())
-    return Unavailable("the battery reports neither current nor charge")
+    return Unavailable("the battery reports neither current nor charge", "have its driver fill in one of them")
 
 
 @extractor("battery_power", needs={}, parts=("battery",), unit="W")

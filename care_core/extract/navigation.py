@@ -75,7 +75,7 @@ def goals_ended(mission: Mission, args: Args) -> Value:
     """Number of goals that the goal server answered with a status: aborted means that it gave up by itself."""
     status = str(args.get("status", "aborted")).upper()
     if status not in Status.__members__:
-        return Unavailable(f"'{status.lower()}' is no goal status")
+        return Unavailable(f"'{status.lower()}' is no goal status", "use one of those that its arguments name")
     return float(sum(leg.status == Status[status] for leg in mission.shared(analyse).legs))
 
 
@@ -101,7 +101,7 @@ def goal_time(mission: Mission, args: Args) -> Value:
     if "index" in args:
         number = int(args["index"])
         if not 1 <= number <= len(legs):
-            return Unavailable(f"goal {number} was not sent")
+            return Unavailable(f"goal {number} was not sent", f"{len(legs)} goals were")
         return legs[number - 1].time_s
     times = [leg.time_s for leg in legs]
     return max(times) if args.get("of") == "longest" else sum(times) / len(times)
@@ -116,7 +116,7 @@ def time_per_metre(mission: Mission, args: Args) -> Value:
         return odometry
     made_m = sum(_progress(odometry, drive.legs))
     if made_m < 0.1:
-        return Unavailable("the robot made no way towards its goals")
+        return Unavailable("the robot made no way towards its goals", "see what it was commanded")
     return drive.active_s / made_m
 
 
@@ -529,4 +529,4 @@ def _at_end(mission: Mission, *, only_reached: bool) -> list[tuple[float, float]
             last = rows[-1]
             offset = leg.offset(float(odometry.x[last]), float(odometry.y[last]))
             ends.append((offset, angle_between(leg.yaw, float(odometry.yaw[last]))))
-    return ends or Unavailable("no goal was reached")
+    return ends or Unavailable("no goal was reached", "see why its goals failed")

@@ -204,7 +204,9 @@ def build_document(diagnosis: Diagnosis) -> Report:
         sources={name: clean(source) for name, source in run.sources.items()},
         since=None if diagnosis.since is None else _since(diagnosis.since),
         diff=unified_diff(run, diagnosis.fix) if diagnosis.fix is not None else "",
-        apply=apply_commands(diagnosis.fix.changes, format_for(log.format)) if diagnosis.fix is not None else [],
+        apply=apply_commands(diagnosis.fix.changes, format_for(log.format, run.settings))
+        if diagnosis.fix is not None
+        else [],
     )
 
 

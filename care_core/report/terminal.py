@@ -158,7 +158,10 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     yield ""
     yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix).splitlines())
     yield ""
-    yield from (f"  {line}" for line in apply_commands(fix.changes, format_for(diagnosis.run.log.format)))
+    yield from (
+        f"  {line}"
+        for line in apply_commands(fix.changes, format_for(diagnosis.run.log.format, diagnosis.run.settings))
+    )
 
 
 def _prediction(objective: Variable, predicted: Prediction) -> str:

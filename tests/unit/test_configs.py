@@ -360,6 +360,15 @@ def test_commands_of_ros_2() -> None:
     ]
 
 
+def test_the_format_of_a_log() -> None:
+    assert format_for("px4-ulg") is ConfigFormat.QGC_PARAMS
+    assert format_for("mavlink-tlog") is ConfigFormat.ARDUPILOT_PARAM
+    assert format_for("ros2-db3") is ConfigFormat.ROS2_YAML
+    assert format_for("mcap") is ConfigFormat.ROS2_YAML
+    assert format_for("mcap", [MAX_VEL]) is ConfigFormat.ROS2_YAML
+    assert format_for("mcap", ["/move_base/DWAPlannerROS/sim_time"]) is ConfigFormat.ROS1_YAML
+
+
 def test_every_recorded_configuration_is_read_and_written_back(
     recorded: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
