@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_core.configs import (
@@ -296,6 +296,7 @@ def test_written_rows_read_back_with_their_types(
     assert [type(read[name]) for name in given] == [type(value) for value in given.values()]
 
 
+@settings(max_examples=30)
 @given(given=st.dictionaries(st.lists(WORD, min_size=1, max_size=4).map(tuple), ROS_VALUE, max_size=12))
 def test_written_ros_parameters_read_back_with_their_types(
     tmp_path_factory: pytest.TempPathFactory, given: dict[tuple[str, ...], float | str]
