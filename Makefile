@@ -10,7 +10,7 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check profiles clean
+.PHONY: demo test check docs profiles clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
@@ -23,6 +23,9 @@ check: $(DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: $(BASE)
+	$(BIN)/python -m care_core.extract.document docs/extractors.md
 
 profiles: $(DEV)
 	$(BIN)/python -m benchmarks.train_profiles

@@ -68,6 +68,7 @@ class LearningError(CareError):
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """A sentence that names the known word closest to `word`, or an empty string."""
-    close = get_close_matches(word, list(known), n=1, cutoff=0.6)
-    return f"Did you mean '{close[0]}'?" if close else ""
+    """A sentence that names the known word closest to `word`, whatever the case, or an empty string."""
+    spellings = {one.casefold(): one for one in known}
+    close = get_close_matches(word.casefold(), list(spellings), n=1, cutoff=0.6)
+    return f"Did you mean '{spellings[close[0]]}'?" if close else ""

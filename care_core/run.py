@@ -23,6 +23,13 @@ def is_known(value: Value | None) -> TypeGuard[float]:
     return value is not None and not isinstance(value, Unavailable)
 
 
+def shown(value: float | str | None) -> str:
+    """A parameter's value as an operator writes it."""
+    if value is None:
+        return "not there"
+    return value if isinstance(value, str) else f"{value:.7g}"
+
+
 @dataclass(frozen=True, slots=True)
 class Setting:
     """A parameter as driven: its last value before the mission ended, and what the source says about it."""
@@ -99,6 +106,10 @@ class Run:
     log: LogInfo
     mission: MissionInfo
     evidence: tuple[Evidence, ...] = ()
+    changes: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
+    """Per parameter that changed during the mission: the value it began with, and each later one until its end."""
+    sources: Mapping[str, str] = field(default_factory=dict)
+    """Per option of `config` where its value came from: a record or topic of the log, or file:line."""
 
     def value(self, name: str) -> Value | None:
         """The run's value of a variable of any role, None when the run does not hold it."""

@@ -31,11 +31,13 @@ class Request:
 
     log: Path
     profile: str | None = None
-    configs: tuple[Path, ...] = ()
+    configs: tuple[str | Path, ...] = ()
+    """Files as the operator names them: FILE or NAMESPACE=FILE."""
     keep: tuple[str, ...] = ()
     thresholds: Mapping[str, float] = field(default_factory=dict)
     top: int = 5
     mission: int | None = None
+    since: Path | None = None
 
 
 def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
@@ -59,6 +61,7 @@ def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
         keep=request.keep,
         thresholds=request.thresholds,
         mission=request.mission,
+        since=None if request.since is None else open_log(request.since),
         top=request.top,
         progress=progress,
     )

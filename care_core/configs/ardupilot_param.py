@@ -1,10 +1,12 @@
-"""ArduPilot parameter files (.param, .parm) in the three ways they are written, and MAVProxy's commands."""
+"""ArduPilot parameter files (.param, .parm, .params): `NAME value` or `NAME,value`, and the commands that set them."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+
+import numpy as np
 
 from care_core.errors import ConfigError
 from care_core.run import Setting
@@ -13,48 +15,67 @@ from care_core.variables import Variable
 FLAGS = frozenset({"@READONLY"})
 """What may follow a value in a file of defaults."""
 
-_QGC_FIELDS = 5
+_DIGITS_HOLD = 1e16
+"""Below this a whole number is written without an exponent."""
+
+_LINE = re.compile(r"([^\s,]+)(?:\s*,\s*|\s+)(\S+)")
 
 
 def read(text: str, path: Path) -> dict[str, Setting]:
-    """Parameters by name, from `NAME value`, `NAME,value`, or QGroundControl's five columns; # begins a comment."""
+    """Parameters by name; # begins a comment.
+
+    Raises:
+        ConfigError: a line that is no parameter.
+    """
     settings: dict[str, Setting] = {}
     for number, line in enumerate(text.splitlines(), start=1):
-        words = [word for word in re.split(r"[\s,]+", line.partition("#")[0].strip()) if word not in FLAGS]
-        if not any(words):
+        words = [word for word in line.partition("#")[0].split() if word not in FLAGS]
+        if not words:
             continue
         where = f"{path}:{number}"
-        name, value = _name_and_value(words, where)
-        settings[name] = Setting(name, value, where)
+        match = _LINE.fullmatch(" ".join(words))
+        if match is None:
+            raise ConfigError("Not a parameter: a line is NAME,VALUE.", hint="Correct the line.", where=where)
+        name = match[1]
+        settings[name] = Setting(name, _number(name, match[2], where), where)
     return settings
 
 
-def _name_and_value(words: list[str], where: str) -> tuple[str, float]:
-    if len(words) == _QGC_FIELDS:
-        words = words[2:4]
-    if len(words) != 2:
-        raise ConfigError("Not a parameter: a line is NAME,VALUE.", hint="Correct the line.", where=where)
-    name, text = words
+def _number(name: str, text: str, where: str) -> float:
     try:
-        return name, float(int(text, 16)) if text.lower().startswith("0x") else float(text)
+        return float(int(text, 16)) if text.lower().startswith("0x") else float(text)
     except ValueError:
         raise ConfigError(
             f"The value of {name} is not a number: '{text}'.", hint="Correct the line.", where=where
         ) from None
 
 
-def write(settings: Mapping[str, Setting]) -> str:
-    """One `NAME,value` a line, in alphabetical order."""
-    return "".join(f"{name},{_plain(settings[name].value)}\n" for name in sorted(settings))
+def find(files: Sequence[Mapping[str, Setting]], parameter: str) -> Setting | None:
+    """The value that files loaded one after the other give a parameter."""
+    return next((settings[parameter] for settings in reversed(files) if parameter in settings), None)
+
+
+def write(settings: Mapping[str, Setting], remarks: Mapping[str, str] | None = None) -> str:
+    """One `NAME,value` a line, in alphabetical order, with the remark of the name as a comment."""
+    lines = []
+    for name in sorted(settings):
+        remark = f"  # {remarks[name]}" if remarks and remarks.get(name) else ""
+        lines.append(f"{name},{plain(settings[name].value)}{remark}\n")
+    return "".join(lines)
 
 
 def text_of(option: Variable, value: float) -> str:
     """An option's value as the file has it."""
-    return _plain(float(round(value)) if option.type in ("int", "bool") else value)
+    return plain(float(round(value)) if option.type in ("int", "bool") else value)
+
+
+def line_of(option: Variable, parameter: str, value: float) -> str:
+    """One setting as a line of a diff."""
+    return f"{parameter},{text_of(option, value)}"
 
 
 def commands(changes: Iterable[tuple[Variable, str, float]]) -> list[str]:
-    """MAVProxy's commands for (option, parameter, value)."""
+    """MAVProxy's commands for (option, parameter, value), which PX4's shell knows as well."""
     changes = tuple(changes)
     lines = [f"param set {parameter} {text_of(option, value)}" for option, parameter, value in changes]
     if any(option.reboot_required for option, _, _ in changes):
@@ -62,6 +83,11 @@ def commands(changes: Iterable[tuple[Variable, str, float]]) -> list[str]:
     return lines
 
 
-def _plain(value: float | str) -> str:
-    # Parameters are 32-bit floats, which seven digits hold.
-    return value if isinstance(value, str) else f"{value:.7g}" if value % 1 or abs(value) >= 1e16 else f"{value:.0f}"
+def plain(value: float | str) -> str:
+    """A number in as few digits as hold it: parameters are 32-bit floats."""
+    if isinstance(value, str):
+        return value
+    if float(value).is_integer() and abs(value) < _DIGITS_HOLD:
+        return f"{value:.0f}"
+    short = f"{value:.7g}"
+    return short if np.float32(short) == np.float32(value) else f"{value:.9g}"

@@ -1,115 +1,77 @@
-"""ROS 1 parameter files (YAML): nested mappings are namespaces. Values are read from the node tree, so a file can
-never have an object built, whatever its tags say."""
+"""ROS 1 parameter files (YAML): nested mappings are namespaces, `DWAPlannerROS: {sim_time: 1.7}`."""
 
 from __future__ import annotations
 
-import math
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
-from io import StringIO
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-from ruamel.yaml.nodes import MappingNode, Node, ScalarNode
-
-from care_core.errors import ConfigError
+from care_core.configs import yaml_tree
 from care_core.run import Setting
 from care_core.variables import Variable
 
 DYNAMIC_RECONFIGURE = "dynamic_reconfigure.encoding.Config"
-"""Class in the tag of a file that `dynparam dump` wrote; its values are under `dictitems`."""
-
-_DEEPEST = 32
-_MOST_VALUES = 50_000
-"""Bounds on aliases, which can make a small file endless."""
-
-_NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
+"""Class in the tag of a file that `dynparam dump` wrote."""
 
 
-def read(text: str, path: Path) -> dict[str, Setting]:
-    """Parameters by path (`DWAPlannerROS/sim_time`, without a leading slash); lists and nulls are passed over."""
-    root = _compose(text, path)
-    settings: dict[str, Setting] = {}
+def read(text: str, path: Path, namespace: str = "") -> dict[str, Setting]:
+    """Parameters by path (`DWAPlannerROS/sim_time`, without a leading slash), under the namespace given."""
+    root = yaml_tree.compose(text, path)
     if root is None:
-        return settings
-    if not isinstance(root, MappingNode):
-        raise ConfigError("Not a parameter file: it is no mapping of names.", where=str(path))
-    for count, (name, node) in enumerate(_walk(root, "", 0, path)):
-        if count > _MOST_VALUES:
-            raise ConfigError("The file holds more values than a configuration can.", where=str(path))
-        settings[name] = Setting(name, _value(node), f"{path}:{node.start_mark.line + 1}")
+        return {}
+    outer = (namespace.strip("/"),) if namespace.strip("/") else ()
+    settings = {}
+    for leaf in yaml_tree.leaves(root, path, unwrap=DYNAMIC_RECONFIGURE):
+        name = "/".join((*outer, *leaf.keys))
+        settings[name] = Setting(name, leaf.value, f"{path}:{leaf.line}")
     return settings
 
 
-def _compose(text: str, path: Path) -> Node | None:
-    try:
-        node: Node | None = YAML(typ="safe", pure=True).compose(StringIO(text))
-    except YAMLError as err:
-        mark = getattr(err, "problem_mark", None)
-        where = f"{path}:{mark.line + 1}" if mark is not None else str(path)
-        problem = getattr(err, "problem", None) or "the text cannot be read"
-        raise ConfigError(f"Not valid YAML: {problem}.", hint="Correct the line.", where=where) from err
-    except RecursionError as err:
-        raise ConfigError("The file is nested too deeply.", where=str(path)) from err
-    return node
+def find(files: Sequence[Mapping[str, Setting]], parameter: str) -> Setting | None:
+    """The value that files loaded one after the other give a parameter of the log.
 
-
-def _walk(node: MappingNode, prefix: str, depth: int, path: Path) -> Iterator[tuple[str, ScalarNode]]:
-    if depth > _DEEPEST:
-        raise ConfigError("The file is nested too deeply.", where=str(path))
-    dumped = DYNAMIC_RECONFIGURE in str(node.tag)
-    for key, value in node.value:
-        name = str(key.value).strip("/")
-        if dumped and name == "dictitems" and isinstance(value, MappingNode):
-            yield from _walk(value, prefix, depth + 1, path)
-        elif dumped:
+    A file does not name the namespace it is loaded into: `DWAPlannerROS/sim_time` in it is
+    `/move_base/DWAPlannerROS/sim_time` in the log. In one file the longest trailing part counts. A bare last name
+    could belong to any node, so it is taken only where no file says more.
+    """
+    parts = parameter.strip("/").split("/")
+    guess: Setting | None = None
+    found: Setting | None = None
+    for settings in files:
+        names = ("/".join(parts[skipped:]) for skipped in range(len(parts)))
+        name = next((name for name in names if name in settings), None)
+        if name is None:
             continue
-        elif isinstance(value, MappingNode):
-            yield from _walk(value, f"{prefix}{name}/", depth + 1, path)
-        elif isinstance(value, ScalarNode) and value.tag != "tag:yaml.org,2002:null":
-            yield f"{prefix}{name}", value
+        if is_guess(name, parameter):
+            guess = settings[name]
+        else:
+            found = settings[name]
+    return found or guess
 
 
-def _value(node: ScalarNode) -> float | str:
-    text = str(node.value)
-    if node.tag in _NUMBER_TAGS:
-        try:
-            return float(text.replace("_", ""))
-        except ValueError:
-            return float(int(text.replace("_", ""), 0))
-    return text
+def is_guess(name: str, parameter: str) -> bool:
+    """Whether a name in a file says nothing of where the parameter belongs."""
+    return "/" not in name and "/" in parameter.strip("/")
 
 
-def write(settings: Mapping[str, Setting]) -> str:
+def write(settings: Mapping[str, Setting], remarks: Mapping[str, str] | None = None) -> str:
     """A nested file in alphabetical order, to be loaded into the root namespace."""
     tree: dict[str, Any] = {}
+    comments: dict[tuple[str, ...], str] = {}
     for name in sorted(settings):
         *spaces, key = name.strip("/").split("/")
         branch = tree
+        at: list[str] = []
         for space in spaces:
-            inner = branch.setdefault(space, {})
             # A parameter may have the name of a namespace (`/move_base/x` beside `/move_base/x/y`).
-            branch = inner if isinstance(inner, dict) else branch.setdefault(f"{space}/", {})
-        branch[key] = _scalar(settings[name].value)
-    return _dump(tree)
-
-
-def _scalar(value: float | str) -> bool | int | float | str:
-    if isinstance(value, str):
-        return value == "true" if value in ("true", "false") else value
-    return int(value) if math.isfinite(value) and value.is_integer() else float(f"{value:.9g}")
-
-
-def _dump(tree: dict[str, Any]) -> str:
-    if not tree:
-        return ""
-    stream = StringIO()
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = False
-    yaml.dump(tree, stream)
-    return stream.getvalue()
+            at.append(space if isinstance(branch.get(space, {}), dict) else f"{space}/")
+            branch = branch.setdefault(at[-1], {})
+        branch[key] = yaml_tree.plain(settings[name].value)
+        if remarks and remarks.get(name):
+            at.append(key)
+            comments[tuple(at)] = remarks[name]
+    return yaml_tree.dump(tree, comments)
 
 
 def text_of(option: Variable, value: float) -> str:
@@ -120,6 +82,11 @@ def text_of(option: Variable, value: float) -> str:
         return str(round(value))
     text = f"{value:.6g}"
     return text if set(text) & set(".en") else f"{text}.0"
+
+
+def line_of(option: Variable, parameter: str, value: float) -> str:
+    """One setting as a line of a diff."""
+    return f"{parameter}: {text_of(option, value)}"
 
 
 def commands(changes: Iterable[tuple[Variable, str, float]]) -> list[str]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from care_core.run import Run
+from care_core.run import Run, shown
 from care_core.variables import Threshold, Variable
 
 Status = Literal["ok", "fault", "not_evaluated"]
@@ -121,6 +121,30 @@ class ProfileChoice:
 
 
 @dataclass(frozen=True, slots=True)
+class ParameterChange:
+    """A parameter with another value than in the good run; None where that log does not hold it."""
+
+    parameter: str
+    option: Variable | None
+    """The profile's option that it sets, None for any other parameter."""
+    before: float | str | None
+    after: float | str | None
+
+    @property
+    def text(self) -> str:
+        return f"{shown(self.before)} -> {shown(self.after)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Since:
+    """What changed since the last good run, options of the profile first. `warnings` say what is odd about that log."""
+
+    log: str
+    changes: tuple[ParameterChange, ...]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnosis:
     """The whole answer for one run. `fix` is None when nothing is broken or the engine abstains (`abstained`)."""
 
@@ -132,3 +156,5 @@ class Diagnosis:
     alternatives: tuple[Fix, ...] = ()
     abstained: str | None = None
     notes: tuple[str, ...] = field(default=())
+    since: Since | None = None
+    """The comparison with a good log, where one was named."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import Config, World
+from care_core.configs import ConfigFile, resolve
+from care_core.diagnose import provenance
 from care_core.diagnose.faults import check_wishes, judge, thresholds_in_force
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
@@ -26,11 +28,12 @@ from care_core.diagnose.ranking import (
     suspects,
 )
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
+from care_core.diagnose.since import compare, with_evidence
 from care_core.extract.read import read_run
-from care_core.extract.settings import disagreements
+from care_core.extract.settings import readable
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
-from care_core.run import Run, Setting, is_known
+from care_core.run import Run, is_known
 
 MIN_CONTRIBUTION = 0.02
 """Odds an option must cost before it is called a cause of this run."""
@@ -64,20 +67,22 @@ def triage(
     profile: Profile,
     choice: ProfileChoice,
     *,
-    configs: Mapping[str, Setting] | None = None,
+    configs: Sequence[ConfigFile] = (),
     keep: Collection[str] = (),
     thresholds: Mapping[str, float] | None = None,
     mission: int | None = None,
+    since: Log | None = None,
     top: int = 5,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnose one mission of a log.
 
     Args:
-        configs: settings from configuration files, used where the log holds none.
+        configs: configuration files in the order they are loaded, used where the log holds no value.
         keep: options that must stay as they are.
         thresholds: the operator's own bounds, per objective.
         mission: which mission of the log, from 1; the last when None.
+        since: the log of a good run; what changed since then is told as evidence.
         top: most causes to report per fault.
 
     Raises:
@@ -87,10 +92,16 @@ def triage(
     report("reading the log", 0.0)
     overrides = dict(thresholds or {})
     check_wishes(profile.schema, keep, overrides)
-    run = read_run(log, profile.schema, overrides=configs or {}, mission=mission, judge_anyway=tuple(overrides))
+    given = resolve(configs, (parameter for option in profile.schema.options for parameter in readable(option)))
+    run = read_run(log, profile.schema, overrides=given, mission=mission, judge_anyway=tuple(overrides))
     report("judging the objectives", 0.6)
     diagnosis = diagnose(run, profile, choice, keep=keep, thresholds=overrides, top=top, progress=progress)
-    return replace(diagnosis, notes=(*diagnosis.notes, *disagreements(profile.schema, run.config, configs or {})))
+    diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *provenance.notes(profile.schema, run, configs, given)))
+    if since is None:
+        return diagnosis
+    report("comparing with the good log", 0.95)
+    bounds = thresholds_in_force(profile.schema, overrides)
+    return with_evidence(diagnosis, compare(run, since, profile, bounds))
 
 
 def diagnose(

@@ -1,4 +1,4 @@
-"""A drive along goals, analysed once for all extractors: legs, odometry, commands, battery.
+"""A drive along goals, analysed once for all extractors: legs, odometry, commands.
 
 Pure functions of a mission's tables. The mission section of the profile names the topics, see `topics`.
 """
@@ -6,7 +6,7 @@ Pure functions of a mission's tables. The mission section of the profile names t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.extract.registry import Args, Mission
-from care_core.logs.base import Table
+from care_core.logs.base import Table, Wanted
+from care_core.run import Unavailable
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -29,16 +30,6 @@ TURNING_RADPS = 0.05
 _MAX_GAP_S = 1.0
 """A sample speaks for at most this long after it, so a gap in a topic counts as nothing."""
 
-_POSITION = "goal.target_pose.pose.position"
-_ORIENTATION = "goal.target_pose.pose.orientation"
-GOAL_FIELDS = (
-    "goal_id.id",
-    "goal.target_pose.header.frame_id",
-    f"{_POSITION}.x",
-    f"{_POSITION}.y",
-    *(f"{_ORIENTATION}.{axis}" for axis in "xyzw"),
-)
-RESULT_FIELDS = ("status.goal_id.id", "status.status", "status.text")
 ODOMETRY_FIELDS = (
     "header.frame_id",
     "pose.pose.position.x",
@@ -48,13 +39,14 @@ ODOMETRY_FIELDS = (
     "twist.twist.angular.z",
 )
 COMMAND_FIELDS = ("linear.x", "angular.z")
+STAMPED_COMMAND_FIELDS = tuple(f"twist.{name}" for name in COMMAND_FIELDS)
+"""Of geometry_msgs/TwistStamped, which newer ROS 2 stacks publish."""
 BATTERY_FIELDS = ("voltage", "current", "charge")
-RECOVERY_FIELDS = ("recovery_behavior_name",)
 ROSOUT_FIELDS = ("level", "name", "msg")
 
 
 class Status(IntEnum):
-    """How a goal ended (actionlib_msgs/GoalStatus)."""
+    """How a goal ended, in the codes of actionlib_msgs/GoalStatus."""
 
     PREEMPTED = 2
     SUCCEEDED = 3
@@ -66,23 +58,16 @@ class Status(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """Where a platform's log holds what."""
+    """Where a platform's log holds what is not the goal server's own."""
 
-    goal: str
-    result: str
-    recovery: str
     odometry: str
     commands: str
     battery: str
 
 
 def topics(spec: Args) -> Topics:
-    """Topics of a mission section; ROS 1 names where it does not say otherwise."""
-    action = str(spec.get("action", "/move_base"))
+    """Topics of a mission section; the usual names where it does not say otherwise."""
     return Topics(
-        goal=f"{action}/goal",
-        result=f"{action}/result",
-        recovery=f"{action}/recovery_status",
         odometry=str(spec.get("odometry", "/odom")),
         commands=str(spec.get("commands", "/cmd_vel")),
         battery=str(spec.get("battery", "/battery_state")),
@@ -91,7 +76,10 @@ def topics(spec: Args) -> Topics:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """One goal: where it lies (m, rad), when it was sent, when and how it ended (status None: no answer in the log)."""
+    """One goal: where it lies (m, rad; nan where the log does not say), when it was sent, when and how it ended.
+
+    `status` is None where the log holds no answer.
+    """
 
     x: float
     y: float
@@ -125,45 +113,27 @@ def listed_goals(spec: Args) -> tuple[tuple[float, float], ...]:
     return tuple((float(goal[0]), float(goal[1])) for goal in spec.get("goals", ()))
 
 
-def find_legs(tables: Mapping[str, Table], spec: Args, duration_s: float) -> tuple[Leg, ...]:
-    """Every goal of a log, in the order they were sent. A goal sent twice under one id counts once."""
-    names = topics(spec)
-    goals, results = tables.get(names.goal), tables.get(names.result)
-    if goals is None or not has(goals, GOAL_FIELDS):
-        return ()
-    ids = goals["goal_id.id"].tolist()
-    first_rows = [row for row, one in enumerate(ids) if not one or one not in ids[:row]]
-    yaws = _yaw(goals, _ORIENTATION)
-    legs = []
-    for place, row in enumerate(first_rows):
-        sent_s = float(goals.t[row])
-        next_sent_s = float(goals.t[first_rows[place + 1]]) if place + 1 < len(first_rows) else duration_s
-        answer = _answer(results, ids[row], sent_s, next_sent_s)
-        legs.append(
-            Leg(
-                x=float(goals[f"{_POSITION}.x"][row]),
-                y=float(goals[f"{_POSITION}.y"][row]),
-                yaw=float(yaws[row]),
-                frame=str(goals["goal.target_pose.header.frame_id"][row]),
-                sent_s=sent_s,
-                # A goal that another one replaces is over when that one is sent, whenever its answer comes.
-                end_s=next_sent_s if answer is None else min(float(answer[0]), max(next_sent_s, sent_s)),
-                status=None if answer is None else answer[1],
-                text="" if answer is None else answer[2],
-            )
-        )
-    return tuple(legs)
+Recoveries = Sequence[tuple[float, str]]
+"""Time and name of each recovery behavior that ran."""
 
 
-def _answer(results: Table | None, goal_id: str, sent_s: float, next_sent_s: float) -> tuple[float, int, str] | None:
-    """Time, status and text of a goal's result: the one of its id, or without an id the next in time."""
-    if results is None or not has(results, RESULT_FIELDS):
-        return None
-    for row in np.flatnonzero(results.t >= sent_s):
-        same = results["status.goal_id.id"][row] == goal_id if goal_id else results.t[row] <= next_sent_s
-        if same:
-            return float(results.t[row]), int(results["status.status"][row]), str(results["status.text"][row])
-    return None
+@dataclass(frozen=True, slots=True)
+class GoalServer:
+    """How the log of a kind of goal server tells its goals: one a mission kind, see `actionlib` and `nav2`."""
+
+    needs: Callable[[Args], Wanted]
+    legs: Callable[[Mapping[str, Table], Args, float], tuple[Leg, ...]]
+    """Every goal of a log of that duration (s), in the order they were sent."""
+    recoveries: Callable[[Mission], Recoveries | Unavailable]
+
+
+GOAL_SERVERS: dict[str, GoalServer] = {}
+"""By the `kind` of the mission section."""
+
+
+def goal_server(spec: Args) -> GoalServer:
+    """The goal server of a mission section."""
+    return GOAL_SERVERS[str(spec.get("kind", "actionlib_goals"))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -231,7 +201,7 @@ class Drive:
 def analyse(mission: Mission) -> Drive:
     """The drive of a mission; use through `mission.shared`."""
     # The end as the end of the log: legs of later missions are cut off by the window.
-    every = find_legs(mission.tables, mission.spec, mission.end_s)
+    every = goal_server(mission.spec).legs(mission.tables, mission.spec, mission.end_s)
     legs = tuple(leg for leg in every if mission.start_s <= leg.sent_s <= mission.end_s)
     names = topics(mission.spec)
     return Drive(
@@ -256,7 +226,7 @@ def _odometry(table: Table | None, legs: Sequence[Leg]) -> Odometry | None:
         dt=dt[active],
         x=table["pose.pose.position.x"][active],
         y=table["pose.pose.position.y"][active],
-        yaw=_yaw(table, "pose.pose.orientation")[active],
+        yaw=heading(table, "pose.pose.orientation")[active],
         speed=table["twist.twist.linear.x"][active],
         turn=table["twist.twist.angular.z"][active],
         leg=leg[active],
@@ -265,13 +235,15 @@ def _odometry(table: Table | None, legs: Sequence[Leg]) -> Odometry | None:
 
 
 def _commands(table: Table | None, legs: Sequence[Leg]) -> Commands | None:
-    if table is None or not has(table, COMMAND_FIELDS):
+    if table is None:
         return None
+    fields = next((fields for fields in (COMMAND_FIELDS, STAMPED_COMMAND_FIELDS) if has(table, fields)), None)
     leg, dt = _active(table.t, legs)
     active = leg >= 0
-    if np.count_nonzero(active) < 2:
+    if fields is None or np.count_nonzero(active) < 2:
         return None
-    return Commands(table.t[active], dt[active], table["linear.x"][active], table["angular.z"][active])
+    forward, turn = (table[name][active] for name in fields)
+    return Commands(table.t[active], dt[active], forward, turn)
 
 
 def _active(t: Floats, legs: Sequence[Leg]) -> tuple[NDArray[np.intp], Floats]:
@@ -308,7 +280,7 @@ def angle_between(a: float, b: float) -> float:
     return abs((a - b + math.pi) % (2 * math.pi) - math.pi)
 
 
-def _yaw(table: Table, prefix: str) -> Floats:
+def heading(table: Table, prefix: str) -> Floats:
     """Heading of a quaternion, rad."""
     x, y, z, w = (np.asarray(table[f"{prefix}.{axis}"], np.float64) for axis in "xyzw")
     yaw: Floats = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))

@@ -1,28 +1,18 @@
-"""Goal navigation on ROS 1: how missions are found in a bag of an actionlib goal server, and what tells them apart.
+"""Extractors of a drive along goals, whichever goal server was asked: goals and time, path, motion, commands, messages.
 
-A mission is a list of goals sent one after the other. The planner says little about why it fails (a robot boxed in
-by its own cost weights dithers on the spot without one warning), so beside counts of messages and recoveries the
-extractors measure what such a failure looks like: commands to stand or to turn on the spot, reversals of the turn
-command, standstill, distance left to the goal.
+A planner says little about why it fails, so beside counts of messages and recoveries these measure what a failure
+looks like: commands to stand or to turn on the spot, reversals of the turn command, standstill, distance left.
 """
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 from care_core.extract.drive import (
-    BATTERY_FIELDS,
-    COMMAND_FIELDS,
-    GOAL_FIELDS,
     MOVING_MPS,
-    ODOMETRY_FIELDS,
-    RECOVERY_FIELDS,
-    RESULT_FIELDS,
     ROSOUT_FIELDS,
     TOLERANCE_M,
     TURNING_RADPS,
@@ -34,237 +24,36 @@ from care_core.extract.drive import (
     Status,
     analyse,
     angle_between,
-    find_legs,
-    has,
-    listed_goals,
+    goal_server,
     longest,
     share,
-    timeout_s,
-    topics,
 )
-from care_core.extract.registry import MISSION_KINDS, Args, Mission, MissionKind, extractor, missing
-from care_core.logs.base import Table, Wanted
-from care_core.run import Evidence, Unavailable, Value
-
-_IDLE_S = 120.0
-"""A pause this long between goals ends a mission."""
-
-_WARN = 4
-"""Level of a warning in rosgraph_msgs/Log (1 debug, 2 info, 4 warn, 8 error, 16 fatal)."""
-
-_STUCK_S = 15.0
-"""A robot that stands or only swings for this long with a goal ahead is stuck."""
+from care_core.extract.goals import ROSOUT, rosout
+from care_core.extract.registry import Args, Mission, extractor, missing
+from care_core.run import Unavailable, Value
 
 _CRAWL_M = 0.3
 """How much nearer a goal must have come in the last fifth of its time to count as under way."""
-_ROSOUT = ("/rosout", "/rosout_agg")
-
-_MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
-    (re.compile(r"recovery|clearing .* costmap|clearing costmap", re.IGNORECASE), "recovery"),
-    (re.compile(r"abort", re.IGNORECASE), "abort"),
-    (re.compile(r"failed to (produce|find|get|make) .*(path|plan|control)|rotation cmd in collision|error when rotating"
-                r"|unable to|off the map|in collision|oscillat", re.IGNORECASE), "planner"),
-    (re.compile(r"(control|map update) loop missed|sensor origin|transform", re.IGNORECASE), "timing"),
-)  # fmt: skip
-"""What a message of the log speaks about, first match counts."""
 
 _TOO_SHORT = Unavailable("too few messages while a goal was active", "record the whole mission")
-
-
-class ActionlibGoals(MissionKind):
-    """From the first goal of a list to the answer to its last."""
-
-    name = "actionlib_goals"
-    args: Mapping[str, str] = {
-        "action": "namespace of the goal server, /move_base unless given",
-        "goals": "list of [x, y] in m, in the frame of the goals, that the thresholds belong to",
-        "goal_timeout_s": "time within which each goal must be reached, 60 unless given",
-        "tolerance_m": "how far a goal may be from the listed one, 0.3 unless given",
-        "passages": "list of [x, y] of narrow passages, in the frame of the odometry",
-        "odometry": "topic of nav_msgs/Odometry, /odom unless given",
-        "commands": "topic of geometry_msgs/Twist, /cmd_vel unless given",
-        "battery": "topic of sensor_msgs/BatteryState, /battery_state unless given",
-    }
-
-    def needs(self, spec: Args) -> Wanted:
-        names = topics(spec)
-        return {
-            names.goal: GOAL_FIELDS,
-            names.result: RESULT_FIELDS,
-            names.recovery: RECOVERY_FIELDS,
-            names.odometry: ODOMETRY_FIELDS,
-            names.commands: COMMAND_FIELDS,
-            names.battery: BATTERY_FIELDS,
-            **dict.fromkeys(_ROSOUT, ROSOUT_FIELDS),
-        }
-
-    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
-        """One mission each time the list of goals starts again, or goals come after a long pause."""
-        missions = []
-        groups = _split(find_legs(tables, spec, duration_s), spec)
-        for number, legs in enumerate(groups):
-            until_s = groups[number + 1][0].sent_s if number + 1 < len(groups) else duration_s
-            missions.append(Mission(tables, legs[0].sent_s, legs[-1].end_s, _has_ended(legs, spec, until_s), spec))
-        return tuple(missions)
-
-    def mismatch(self, mission: Mission) -> str:
-        goals = listed_goals(mission.spec)
-        if not goals:
-            return ""
-        tolerance_m = float(mission.spec.get("tolerance_m", TOLERANCE_M))
-        legs = mission.shared(analyse).legs
-        for number, leg in enumerate(legs, start=1):
-            if number > len(goals):
-                return f"{len(legs)} goals were sent, the profile's mission has {len(goals)}"
-            off_m = leg.offset(*goals[number - 1])
-            if off_m > tolerance_m:
-                return f"goal {number} lies {off_m:.1f} m from the profile's"
-        return ""
-
-    def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
-        """Failed goals, recoveries, standstill, and warnings of the log: each kind of message once, with its count."""
-        found = (*_failed_goals(mission), *_recoveries(mission), *_stuck(mission), *_warnings(mission))
-        return tuple(sorted(found, key=lambda one: one.time_s))
-
-
-MISSION_KINDS[ActionlibGoals.name] = ActionlibGoals()
-
-
-def _split(legs: Sequence[Leg], spec: Args) -> list[list[Leg]]:
-    goals = listed_goals(spec)
-    tolerance_m = float(spec.get("tolerance_m", TOLERANCE_M))
-    groups: list[list[Leg]] = []
-    for leg in legs:
-        if not groups or _starts_again(leg, groups[-1], goals, tolerance_m):
-            groups.append([])
-        groups[-1].append(leg)
-    return groups
-
-
-def _starts_again(leg: Leg, group: Sequence[Leg], goals: Sequence[tuple[float, float]], tolerance_m: float) -> bool:
-    """Whether a goal begins a new mission after those of `group`."""
-    if leg.sent_s - group[-1].end_s > _IDLE_S:
-        return True
-    # A goal that replaces one still under way belongs to the same mission, wherever it lies.
-    replaces = group[-1].status is None or group[-1].end_s >= leg.sent_s
-    first = goals[0] if goals else (group[0].x, group[0].y)
-    return not replaces and leg.offset(*first) <= tolerance_m
-
-
-def _has_ended(legs: Sequence[Leg], spec: Args, until_s: float) -> bool:
-    """Whether the log shows the mission's end: its last goal answered or out of time, and no goal of the list to come.
-
-    A client may give up after failed goals, so a list that was not finished has ended too once a goal failed; while
-    every goal so far was reached, the log must go on for a goal's time without the next.
-    """
-    limit_s = timeout_s(spec)
-    last = legs[-1]
-    if last.status is None:
-        return until_s - last.sent_s > limit_s
-    if len(legs) < len(listed_goals(spec)) and all(leg.reached(limit_s) for leg in legs):
-        return until_s - last.end_s > limit_s
-    return True
-
-
-# Evidence
-
-
-def _failed_goals(mission: Mission) -> Iterator[Evidence]:
-    drive = mission.shared(analyse)
-    for number, leg in enumerate(drive.legs, start=1):
-        said = f": {leg.text}" if leg.text else ""
-        if leg.status in (Status.ABORTED, Status.REJECTED, Status.LOST):
-            word = Status(leg.status).name.lower()
-            yield Evidence(leg.end_s, f"goal {number} {word} after {leg.time_s:.0f} s{said}", "abort")
-        elif leg.time_s > drive.timeout_s:
-            yield Evidence(leg.end_s, f"goal {number} not reached within {drive.timeout_s:.0f} s{said}", "timeout")
-        elif leg.status in (Status.PREEMPTED, Status.RECALLED):
-            yield Evidence(leg.end_s, f"goal {number} cancelled after {leg.time_s:.0f} s{said}", "cancel")
-
-
-def _recoveries(mission: Mission) -> Iterator[Evidence]:
-    table = mission.table(topics(mission.spec).recovery)
-    if table is not None and has(table, RECOVERY_FIELDS):
-        names = [f"recovery behavior {name}" for name in table["recovery_behavior_name"]]
-        yield from _condensed([(float(t), text, "recovery") for t, text in zip(table.t, names, strict=True)])
-
-
-def _stuck(mission: Mission) -> Iterator[Evidence]:
-    """Goals on which the robot made no way for long, and what it was commanded meanwhile."""
-    drive = mission.shared(analyse)
-    if drive.odometry is None:
-        return
-    for number, leg in enumerate(drive.legs):
-        inside = drive.odometry.leg == number
-        still_s = longest(np.abs(drive.odometry.speed[inside]) < MOVING_MPS, drive.odometry.dt[inside])
-        if still_s < _STUCK_S or leg.reached(drive.timeout_s):
-            continue
-        text = f"made no way for {still_s:.0f} s on goal {number + 1}{_commanded(drive.commands, leg)}"
-        yield Evidence(leg.end_s, text, "stuck")
-
-
-def _commanded(commands: Commands | None, leg: Leg) -> str:
-    if commands is None:
-        return ""
-    inside = (commands.t >= leg.sent_s) & (commands.t <= leg.end_s)
-    shares = {
-        "to stand": share(commands.stands[inside], commands.dt[inside]),
-        "to turn on the spot": share(commands.turns_on_spot[inside], commands.dt[inside]),
-    }
-    order = max(shares, key=lambda one: shares[one])
-    return f", commanded {order} {shares[order]:.0%} of the time" if shares[order] > 0 else ""
-
-
-def _warnings(mission: Mission) -> Iterator[Evidence]:
-    """Warnings and errors of the log, and recoveries that it announces at a lower level."""
-    table = _rosout(mission)
-    if table is None:
-        return
-    rows = []
-    for time_s, level, text in zip(table.t.tolist(), table["level"].tolist(), table["msg"].tolist(), strict=True):
-        kind = next((kind for pattern, kind in _MESSAGE_KINDS if pattern.search(text)), None)
-        if level >= _WARN or kind == "recovery":
-            rows.append((time_s, text, kind or "warning"))
-    yield from _condensed(rows)
-
-
-def _condensed(rows: Sequence[tuple[float, str, str]]) -> Iterator[Evidence]:
-    """The first of each kind of message, with how often it came; messages that differ in numbers only are one kind."""
-    counts: dict[str, int] = {}
-    firsts: dict[str, tuple[float, str, str]] = {}
-    for row in rows:
-        key = re.sub(r"-?\d+(\.\d+)?(e-?\d+)?", "#", row[1])
-        counts[key] = counts.get(key, 0) + 1
-        firsts.setdefault(key, row)
-    for key, (time_s, text, kind) in firsts.items():
-        times = f" ({counts[key]} times)" if counts[key] > 1 else ""
-        yield Evidence(time_s, text + times, kind)
-
-
-def _rosout(mission: Mission) -> Table | None:
-    for channel in _ROSOUT:
-        table = mission.table(channel)
-        if table is not None and all(name in table.columns for name in ROSOUT_FIELDS):
-            return table
-    return None
 
 
 # Goals and time
 
 
-@extractor("goals_sent", needs={}, unit="")
+@extractor("goals_sent", needs={}, parts=("goals",), unit="")
 def goals_sent(mission: Mission, args: Args) -> Value:
     """Number of goals that were sent."""
     return float(len(mission.shared(analyse).legs))
 
 
-@extractor("goals_reached", needs={}, unit="")
+@extractor("goals_reached", needs={}, parts=("goals",), unit="")
 def goals_reached(mission: Mission, args: Args) -> Value:
     """Number of goals that ended in success, late ones included."""
     return float(sum(leg.status == Status.SUCCEEDED for leg in mission.shared(analyse).legs))
 
 
-@extractor("goals_success", needs={}, unit="")
+@extractor("goals_success", needs={}, parts=("goals",), unit="")
 def goals_success(mission: Mission, args: Args) -> Value:
     """1 when every goal of the mission's list was reached within its time, else 0."""
     drive = mission.shared(analyse)
@@ -276,50 +65,68 @@ def goals_success(mission: Mission, args: Args) -> Value:
 
 
 @extractor(
-    "goals_ended", needs={}, unit="", args={"status": "preempted, succeeded, aborted, rejected, recalled or lost"}
+    "goals_ended",
+    needs={},
+    parts=("goals",),
+    unit="",
+    args={"status": "preempted, succeeded, aborted, rejected, recalled or lost"},
 )
 def goals_ended(mission: Mission, args: Args) -> Value:
     """Number of goals that the goal server answered with a status: aborted means that it gave up by itself."""
     status = str(args.get("status", "aborted")).upper()
     if status not in Status.__members__:
-        return Unavailable(f"'{status.lower()}' is no goal status")
+        return Unavailable(f"'{status.lower()}' is no goal status", "use one of those that its arguments name")
     return float(sum(leg.status == Status[status] for leg in mission.shared(analyse).legs))
 
 
-@extractor("goals_time", needs={}, unit="s")
+@extractor("goals_time", needs={}, parts=("goals",), unit="s")
 def goals_time(mission: Mission, args: Args) -> Value:
     """Time from sending the first goal to the answer to the last."""
     return mission.end_s - mission.start_s
 
 
-@extractor("goal_time", needs={}, unit="s", args={"index": "number of the goal, from 1; all unless given",
-                                                  "of": "mean or longest of all goals, mean unless given"})  # fmt: skip
+@extractor(
+    "goal_time",
+    needs={},
+    parts=("goals",),
+    unit="s",
+    args={
+        "index": "number of the goal, from 1; all unless given",
+        "of": "mean or longest of all goals, mean unless given",
+    },
+)
 def goal_time(mission: Mission, args: Args) -> Value:
     """Time that a goal took, reached or not."""
     legs = mission.shared(analyse).legs
     if "index" in args:
         number = int(args["index"])
         if not 1 <= number <= len(legs):
-            return Unavailable(f"goal {number} was not sent")
+            return Unavailable(f"goal {number} was not sent", f"{len(legs)} goals were")
         return legs[number - 1].time_s
     times = [leg.time_s for leg in legs]
     return max(times) if args.get("of") == "longest" else sum(times) / len(times)
 
 
-@extractor("time_per_metre", needs={}, unit="s/m")
+@extractor("time_per_metre", needs={}, parts=("goals", "odometry"), unit="s/m")
 def time_per_metre(mission: Mission, args: Args) -> Value:
     """Time with a goal per metre of way made towards the goals."""
     drive = mission.shared(analyse)
-    odometry = _odometry(drive)
+    odometry = _placed(drive)
     if isinstance(odometry, Unavailable):
         return odometry
     made_m = sum(_progress(odometry, drive.legs))
     if made_m < 0.1:
-        return Unavailable("the robot made no way towards its goals")
+        return Unavailable("the robot made no way towards its goals", "see what it was commanded")
     return drive.active_s / made_m
 
 
-@extractor("goals_approached", needs={}, unit="", args={"within_m": "how near counts, 0.6 m unless given"})
+@extractor(
+    "goals_approached",
+    needs={},
+    parts=("goals", "odometry"),
+    unit="",
+    args={"within_m": "how near counts, 0.6 m unless given"},
+)
 def goals_approached(mission: Mission, args: Args) -> Value:
     """Share of the mission's goals that the robot was near to when they ended, reached or not."""
     left = _at_end(mission, only_reached=False)
@@ -333,6 +140,7 @@ def goals_approached(mission: Mission, args: Args) -> Value:
 @extractor(
     "first_failure",
     needs={},
+    parts=("goals", "odometry"),
     unit="",
     args={"how": "given_up, unsettled, crawling or stuck", "within_m": "how near to the goal, 0.6 m unless given"},
 )
@@ -340,7 +148,7 @@ def first_failure(mission: Mission, args: Args) -> Value:
     """1 when the first goal that was not reached failed in this way, else 0: `given_up` by the stack; out of time
     `unsettled` near the goal, `crawling` (it still came nearer, a share of the way too slow), or `stuck` on the way."""
     drive = mission.shared(analyse)
-    odometry = _odometry(drive)
+    odometry = _placed(drive)
     if isinstance(odometry, Unavailable):
         return odometry
     number = next((i for i, leg in enumerate(drive.legs) if not leg.reached(drive.timeout_s)), None)
@@ -358,10 +166,16 @@ def _way_of_failing(drive: Drive, odometry: Odometry, number: int, args: Args) -
     return "crawling" if recent[0] - recent[-1] >= _CRAWL_M else "stuck"
 
 
-@extractor("passages_passed", needs={}, unit="", args={"within_m": "how near counts as passed, 0.6 m unless given"})
+@extractor(
+    "passages_passed",
+    needs={},
+    parts=("goals", "odometry"),
+    unit="",
+    args={"within_m": "how near counts as passed, 0.6 m unless given"},
+)
 def passages_passed(mission: Mission, args: Args) -> Value:
     """Share of the narrow passages listed in the profile's mission section that the robot came near to."""
-    odometry = _odometry(mission.shared(analyse))
+    odometry = _placed(mission.shared(analyse))
     if isinstance(odometry, Unavailable):
         return odometry
     places = [(float(place[0]), float(place[1])) for place in mission.spec.get("passages", ())]
@@ -375,28 +189,28 @@ def passages_passed(mission: Mission, args: Args) -> Value:
 # Path
 
 
-@extractor("path_length", needs={}, unit="m")
+@extractor("path_length", needs={}, parts=("goals", "odometry"), unit="m")
 def path_length(mission: Mission, args: Args) -> Value:
     """Length of the odometry's path."""
     odometry = _odometry(mission.shared(analyse))
     return odometry if isinstance(odometry, Unavailable) else float(odometry.step_m.sum())
 
 
-@extractor("detour", needs={}, unit="m")
+@extractor("detour", needs={}, parts=("goals", "odometry"), unit="m")
 def detour(mission: Mission, args: Args) -> Value:
     """Path driven beyond the way made towards the goals."""
     drive = mission.shared(analyse)
-    odometry = _odometry(drive)
+    odometry = _placed(drive)
     if isinstance(odometry, Unavailable):
         return odometry
     return float(odometry.step_m.sum()) - sum(_progress(odometry, drive.legs))
 
 
-@extractor("lateral_error", needs={}, unit="m")
+@extractor("lateral_error", needs={}, parts=("goals", "odometry"), unit="m")
 def lateral_error(mission: Mission, args: Args) -> Value:
     """Mean distance from the straight line between where a goal was sent and where it lies."""
     drive = mission.shared(analyse)
-    odometry = _odometry(drive)
+    odometry = _placed(drive)
     if isinstance(odometry, Unavailable):
         return odometry
     offsets = [_lateral(odometry, number, leg) for number, leg in enumerate(drive.legs)]
@@ -404,32 +218,38 @@ def lateral_error(mission: Mission, args: Args) -> Value:
     return float(joined.mean()) if len(joined) else _TOO_SHORT
 
 
-@extractor("distance_left", needs={}, unit="m")
+@extractor("distance_left", needs={}, parts=("goals", "odometry"), unit="m")
 def distance_left(mission: Mission, args: Args) -> Value:
     """Largest distance to a goal when it ended: the goal tolerance where all were reached, else where it got stuck."""
     left = _at_end(mission, only_reached=False)
     return left if isinstance(left, Unavailable) else max(distance for distance, _ in left)
 
 
-@extractor("arrival_error", needs={}, unit="m")
+@extractor("arrival_error", needs={}, parts=("goals", "odometry"), unit="m")
 def arrival_error(mission: Mission, args: Args) -> Value:
     """Mean distance to the reached goals on arrival."""
     left = _at_end(mission, only_reached=True)
     return left if isinstance(left, Unavailable) else float(np.mean([distance for distance, _ in left]))
 
 
-@extractor("heading_error", needs={}, unit="rad")
+@extractor("heading_error", needs={}, parts=("goals", "odometry"), unit="rad")
 def heading_error(mission: Mission, args: Args) -> Value:
     """Mean error of the heading on arrival at the reached goals."""
     left = _at_end(mission, only_reached=True)
     return left if isinstance(left, Unavailable) else float(np.mean([angle for _, angle in left]))
 
 
-@extractor("settling_time", needs={}, unit="s", args={"within_m": "how near to the goal, 0.5 m unless given"})
+@extractor(
+    "settling_time",
+    needs={},
+    parts=("goals", "odometry"),
+    unit="s",
+    args={"within_m": "how near to the goal, 0.5 m unless given"},
+)
 def settling_time(mission: Mission, args: Args) -> Value:
     """Mean time near a goal before it ended: hunting for position and heading."""
     drive = mission.shared(analyse)
-    odometry = _odometry(drive)
+    odometry = _placed(drive)
     if isinstance(odometry, Unavailable):
         return odometry
     near = _goal_distance(odometry, drive.legs) <= float(args.get("within_m", 0.5))
@@ -439,7 +259,7 @@ def settling_time(mission: Mission, args: Args) -> Value:
 # Motion
 
 
-@extractor("drive_speed", needs={}, unit="m/s")
+@extractor("drive_speed", needs={}, parts=("goals", "odometry"), unit="m/s")
 def drive_speed(mission: Mission, args: Args) -> Value:
     """Mean forward speed while driving."""
     odometry = _odometry(mission.shared(analyse))
@@ -449,21 +269,21 @@ def drive_speed(mission: Mission, args: Args) -> Value:
     return float(np.abs(odometry.speed[driving]).mean()) if driving.any() else 0.0
 
 
-@extractor("top_speed", needs={}, unit="m/s")
+@extractor("top_speed", needs={}, parts=("goals", "odometry"), unit="m/s")
 def top_speed(mission: Mission, args: Args) -> Value:
     """95th percentile of the forward speed."""
     odometry = _odometry(mission.shared(analyse))
     return odometry if isinstance(odometry, Unavailable) else float(np.percentile(np.abs(odometry.speed), 95))
 
 
-@extractor("top_turn_rate", needs={}, unit="rad/s")
+@extractor("top_turn_rate", needs={}, parts=("goals", "odometry"), unit="rad/s")
 def top_turn_rate(mission: Mission, args: Args) -> Value:
     """95th percentile of the turn rate."""
     odometry = _odometry(mission.shared(analyse))
     return odometry if isinstance(odometry, Unavailable) else float(np.percentile(np.abs(odometry.turn), 95))
 
 
-@extractor("drive_acceleration", needs={}, unit="m/s^2")
+@extractor("drive_acceleration", needs={}, parts=("goals", "odometry"), unit="m/s^2")
 def drive_acceleration(mission: Mission, args: Args) -> Value:
     """99th percentile of the change of forward speed."""
     odometry = _odometry(mission.shared(analyse))
@@ -476,7 +296,13 @@ def drive_acceleration(mission: Mission, args: Args) -> Value:
     return float(np.percentile(np.abs(np.diff(odometry.speed)[usable] / step_s[usable]), 99))
 
 
-@extractor("standstill", needs={}, unit="", args={"of": "share of the time, or longest in s; share unless given"})
+@extractor(
+    "standstill",
+    needs={},
+    parts=("goals", "odometry"),
+    unit="",
+    args={"of": "share of the time, or longest in s; share unless given"},
+)
 def standstill(mission: Mission, args: Args) -> Value:
     """Not moving while a goal is active: share of that time, or the longest stretch of it."""
     odometry = _odometry(mission.shared(analyse))
@@ -487,7 +313,7 @@ def standstill(mission: Mission, args: Args) -> Value:
     return share(odometry.stands, odometry.dt)
 
 
-@extractor("no_way_time", needs={}, unit="s")
+@extractor("no_way_time", needs={}, parts=("goals", "odometry"), unit="s")
 def no_way_time(mission: Mission, args: Args) -> Value:
     """Longest time without forward motion while a goal is active, turning on the spot included."""
     odometry = _odometry(mission.shared(analyse))
@@ -496,14 +322,14 @@ def no_way_time(mission: Mission, args: Args) -> Value:
     return longest(np.abs(odometry.speed) < MOVING_MPS, odometry.dt)
 
 
-@extractor("total_turn", needs={}, unit="rad")
+@extractor("total_turn", needs={}, parts=("goals", "odometry"), unit="rad")
 def total_turn(mission: Mission, args: Args) -> Value:
     """Sum of all turning, left and right alike."""
     odometry = _odometry(mission.shared(analyse))
     return odometry if isinstance(odometry, Unavailable) else float((np.abs(odometry.turn) * odometry.dt).sum())
 
 
-@extractor("start_delay", needs={}, unit="s")
+@extractor("start_delay", needs={}, parts=("goals", "odometry"), unit="s")
 def start_delay(mission: Mission, args: Args) -> Value:
     """Mean time from sending a goal to the first motion."""
     drive = mission.shared(analyse)
@@ -521,7 +347,7 @@ def start_delay(mission: Mission, args: Args) -> Value:
 # Commands
 
 
-@extractor("commanded_speed", needs={}, unit="m/s")
+@extractor("commanded_speed", needs={}, parts=("goals", "commands"), unit="m/s")
 def commanded_speed(mission: Mission, args: Args) -> Value:
     """Mean commanded forward speed among commands to drive."""
     commands = _commands(mission.shared(analyse))
@@ -531,7 +357,13 @@ def commanded_speed(mission: Mission, args: Args) -> Value:
     return float(commands.speed[driving].mean()) if driving.any() else 0.0
 
 
-@extractor("commanded_share", needs={}, unit="", args={"order": "stand, spot_turn or reverse; stand unless given"})
+@extractor(
+    "commanded_share",
+    needs={},
+    parts=("goals", "commands"),
+    unit="",
+    args={"order": "stand, spot_turn or reverse; stand unless given"},
+)
 def commanded_share(mission: Mission, args: Args) -> Value:
     """Share of the time with a goal that the robot was commanded to stand, to turn on the spot, or to back up."""
     commands = _commands(mission.shared(analyse))
@@ -545,7 +377,7 @@ def commanded_share(mission: Mission, args: Args) -> Value:
     return share(commands.stands, commands.dt)
 
 
-@extractor("blocked_share", needs={}, unit="")
+@extractor("blocked_share", needs={}, parts=("goals", "odometry", "commands"), unit="")
 def blocked_share(mission: Mission, args: Args) -> Value:
     """Share of the time with a goal that forward motion was commanded and none came: contact, slip, a dead drive."""
     drive = mission.shared(analyse)
@@ -559,7 +391,7 @@ def blocked_share(mission: Mission, args: Args) -> Value:
     return share(np.asarray(ordered & (np.abs(odometry.speed) < MOVING_MPS)), odometry.dt)
 
 
-@extractor("turn_reversals", needs={}, unit="1/min")
+@extractor("turn_reversals", needs={}, parts=("goals", "commands"), unit="1/min")
 def turn_reversals(mission: Mission, args: Args) -> Value:
     """How often per minute the commanded turn changes side: a planner that cannot decide."""
     commands = _commands(mission.shared(analyse))
@@ -570,7 +402,13 @@ def turn_reversals(mission: Mission, args: Args) -> Value:
     return float(np.count_nonzero(np.diff(sides))) / total_s * 60 if total_s > 0 else _TOO_SHORT
 
 
-@extractor("command_interval", needs={}, unit="s", args={"percentile": "0 to 100, 50 unless given"})
+@extractor(
+    "command_interval",
+    needs={},
+    parts=("goals", "commands"),
+    unit="s",
+    args={"percentile": "0 to 100, 50 unless given"},
+)
 def command_interval(mission: Mission, args: Args) -> Value:
     """Time between commands while a goal is active: the controller's real period and, at the top, its stalls."""
     drive = mission.shared(analyse)
@@ -585,116 +423,65 @@ def command_interval(mission: Mission, args: Args) -> Value:
 # Recoveries and messages
 
 
-@extractor("recoveries", needs={}, unit="", args={
-    "behavior": "text in the behavior's name; all unless given",
-    "absent": "value where the log lacks the topic, which is only published on a recovery; not known unless given",
-})  # fmt: skip
+@extractor(
+    "recoveries",
+    needs={},
+    parts=("recoveries",),
+    unit="",
+    args={
+        "behavior": "text in the behavior's name; all unless given",
+        "absent": "value where the log lacks the topic, which is only published on a recovery; not known unless given",
+    },
+)
 def recoveries(mission: Mission, args: Args) -> Value:
-    """Number of recovery behaviors that the goal server ran."""
-    channel = topics(mission.spec).recovery
-    table = mission.table(channel)
-    if table is None or "recovery_behavior_name" not in table.columns:
-        return float(args["absent"]) if "absent" in args else missing(channel)
+    """Number of recovery behaviors that ran."""
+    ran = goal_server(mission.spec).recoveries(mission)
+    if isinstance(ran, Unavailable):
+        return float(args["absent"]) if "absent" in args else ran
     wanted = str(args.get("behavior", "")).casefold()
-    return float(sum(wanted in str(name).casefold() for name in table["recovery_behavior_name"]))
+    return float(sum(wanted in name.casefold() for _, name in ran))
 
 
-@extractor("rosout_count", needs=dict.fromkeys(_ROSOUT, ROSOUT_FIELDS), unit="", args={
-    "text": "text in the message, ignoring case",
-    "level": "lowest level that counts: 1 debug, 2 info, 4 warn, 8 error, 16 fatal; any unless given",
-})  # fmt: skip
+@extractor(
+    "rosout_count",
+    needs=dict.fromkeys(ROSOUT, ROSOUT_FIELDS),
+    unit="",
+    args={
+        "text": "text in the message, ignoring case",
+        "node": "text in the name of the node that said it, such as controller_server; any unless given",
+        "level": "lowest level that counts: 1 debug, 2 info, 4 warn, 8 error, 16 fatal; any unless given",
+    },
+)
 def rosout_count(mission: Mission, args: Args) -> Value:
     """Number of messages on /rosout with a text."""
-    table = _rosout(mission)
+    table = rosout(mission)
     if table is None:
         return missing("/rosout")
     text, level = str(args.get("text", "")).casefold(), float(args.get("level", 0))
-    pairs = zip(table["level"].tolist(), table["msg"].tolist(), strict=True)
-    return float(sum(one >= level and text in message.casefold() for one, message in pairs))
-
-
-# Battery
-
-
-@extractor("battery_energy", needs={}, unit="Wh")
-def battery_energy(mission: Mission, args: Args) -> Value:
-    """Energy drawn: voltage times current over time, or where no current is measured charge times mean voltage.
-
-    Drivers differ in the sign of a discharge current, so the magnitude of the sum counts.
-    """
-    battery = _battery(mission)
-    if isinstance(battery, Unavailable):
-        return battery
-    if np.isfinite(battery.current).all():
-        power = battery.voltage * battery.current
-        joule = np.concatenate([[0.0], np.cumsum(np.diff(battery.t) * (power[1:] + power[:-1]) / 2)])
-        start, end = np.interp([mission.start_s, mission.end_s], battery.t, joule)
-        return abs(float(end - start)) / 3600
-    if np.isfinite(battery.charge).all():
-        start, end = np.interp([mission.start_s, mission.end_s], battery.t, battery.charge)
-        inside = (battery.t >= mission.start_s) & (battery.t <= mission.end_s)
-        return float(start - end) * float(battery.voltage[inside].mean())
-    return Unavailable("the battery reports neither current nor charge")
-
-
-@extractor("battery_power", needs={}, unit="W")
-def battery_power(mission: Mission, args: Args) -> Value:
-    """Mean power drawn."""
-    energy_wh = battery_energy(mission, args)
-    time_s = mission.end_s - mission.start_s
-    return energy_wh if isinstance(energy_wh, Unavailable) else energy_wh * 3600 / time_s if time_s > 0 else _TOO_SHORT
-
-
-@extractor("battery_voltage", needs={}, unit="V", args={"of": "start or lowest, lowest unless given"})
-def battery_voltage(mission: Mission, args: Args) -> Value:
-    """The battery's voltage at the start, or its lowest."""
-    battery = _battery(mission)
-    if isinstance(battery, Unavailable):
-        return battery
-    inside = battery.voltage[(battery.t >= mission.start_s) & (battery.t <= mission.end_s)]
-    return float(inside[0] if args.get("of") == "start" else inside.min())
+    node = str(args.get("node", "")).casefold()
+    said = zip(table["level"].tolist(), table["name"].tolist(), table["msg"].tolist(), strict=True)
+    return float(sum(one >= level and node in name.casefold() and text in msg.casefold() for one, name, msg in said))
 
 
 # Parts
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Battery:
-    """Battery of the whole log: s, V, A, Ah, each of shape (n,)."""
-
-    t: Floats
-    voltage: Floats
-    current: Floats
-    charge: Floats
-
-
-def _battery(mission: Mission) -> _Battery | Unavailable:
-    """The battery's record, which must cover the mission but for a few seconds."""
-    channel = topics(mission.spec).battery
-    table = mission.tables.get(channel)
-    if table is None or not has(table, BATTERY_FIELDS):
-        return missing(channel)
-    known = np.isfinite(table["voltage"])
-    inside = known & (table.t >= mission.start_s) & (table.t <= mission.end_s)
-    edge_s = max(5.0, 0.05 * (mission.end_s - mission.start_s))
-    if (
-        inside.sum() < 2
-        or table.t[inside][0] > mission.start_s + edge_s
-        or table.t[inside][-1] < mission.end_s - edge_s
-    ):
-        return Unavailable(f"{channel} does not cover the mission", "record it from the first goal to the last")
-    return _Battery(table.t[known], *(np.asarray(table[name][known], np.float64) for name in BATTERY_FIELDS))
-
-
 def _odometry(drive: Drive) -> Odometry | Unavailable:
-    """Odometry in the frame of the goals."""
+    return missing(drive.topics.odometry) if drive.odometry is None else drive.odometry
+
+
+def _placed(drive: Drive) -> Odometry | Unavailable:
+    """Odometry in the frame of the goals, to measure distances to them."""
     if drive.odometry is None:
         return missing(drive.topics.odometry)
+    if any(math.isnan(leg.x) for leg in drive.legs):
+        return Unavailable("the log does not say where the goals lie", "ros2 bag record /goal_pose /plan")
     frames = {leg.frame.strip("/") for leg in drive.legs} - {""}
     own = drive.odometry.frame.strip("/")
     if own and frames - {own}:
         other = ", ".join(sorted(frames))
-        return Unavailable(f"goals are in frame {other}, odometry is in {own}", "name odometry in the goals' frame")
+        hint = "name in the mission section a topic of nav_msgs/Odometry in the goals' frame"
+        return Unavailable(f"goals are in frame {other}, odometry is in {own}", hint)
     return drive.odometry
 
 
@@ -732,7 +519,7 @@ def _lateral(odometry: Odometry, number: int, leg: Leg) -> Floats:
 def _at_end(mission: Mission, *, only_reached: bool) -> list[tuple[float, float]] | Unavailable:
     """Distance (m) and heading error (rad) at the end of each leg, never an empty list."""
     drive = mission.shared(analyse)
-    odometry = _odometry(drive)
+    odometry = _placed(drive)
     if isinstance(odometry, Unavailable):
         return odometry
     ends = []
@@ -742,4 +529,4 @@ def _at_end(mission: Mission, *, only_reached: bool) -> list[tuple[float, float]
             last = rows[-1]
             offset = leg.offset(float(odometry.x[last]), float(odometry.y[last]))
             ends.append((offset, angle_between(leg.yaw, float(odometry.yaw[last]))))
-    return ends or Unavailable("no goal was reached")
+    return ends or Unavailable("no goal was reached", "see why its goals failed")

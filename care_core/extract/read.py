@@ -10,11 +10,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 # Importing them registers their extractors and mission kinds.
+import care_core.extract.actionlib
 import care_core.extract.ardupilot
+import care_core.extract.battery
+import care_core.extract.nav2
 import care_core.extract.navigation  # noqa: F401
 from care_core.errors import ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
-from care_core.extract.settings import configuration, in_force
+from care_core.extract.settings import changes_between, configuration, in_force
 from care_core.extract.telemetry import as_dataflash, explained
 from care_core.logs import log_digest
 from care_core.logs.base import Log
@@ -33,7 +36,8 @@ def read_run(
 ) -> Run:
     """Read one mission of a log: the last one, or number `mission` (from 1).
 
-    `overrides` are settings of configuration files, used only for options that the log does not hold.
+    `overrides` are settings of configuration files by the name of the parameter in the log, used only for options
+    that the log does not hold.
     `judge_anyway` names objectives that the operator gave thresholds for: they are judged even where the mission
     is not the one that the profile's thresholds belong to.
 
@@ -125,12 +129,13 @@ class _Source:
         found = self.missions[index]
         found = replace(found, ended=found.ended and not _cut_short(found, self.log))
         driven = {name: in_force(history, found.end_s) for name, history in self.settings.items()}
-        config, settings = configuration(self.schema.options, driven, overrides)
+        config, sources, settings = configuration(self.schema.options, driven, overrides)
         mission = replace(found, settings={name: setting.value for name, setting in driven.items()})
         mismatch = self.kind.mismatch(mission)
         objectives = self._values(Role.OBJECTIVE, mission)
         return Run(
             config=config,
+            sources=sources,
             context=self._values(Role.CONTEXT, mission),
             metrics=self._values(Role.METRIC, mission),
             objectives=_gated(self.schema, objectives, mission.ended, mismatch, judge_anyway),
@@ -146,11 +151,21 @@ class _Source:
                 mismatch=mismatch,
             ),
             evidence=tuple(_pointed(evidence, self.schema) for evidence in self.kind.evidence(mission)),
+            changes=_changes(self.settings, mission),
         )
 
     def _values(self, role: Role, mission: Mission) -> dict[str, Value]:
         values = {variable.name: _extract(variable, mission) for variable in self.schema.of(role)}
         return {name: explained(value, self.log.format) for name, value in values.items()}
+
+
+def _changes(settings: Mapping[str, tuple[Setting, ...]], mission: Mission) -> dict[str, tuple[Setting, ...]]:
+    changes = {
+        name: changes_between(history, mission.start_s, mission.end_s)
+        for name, history in settings.items()
+        if len(history) > 1
+    }
+    return {name: history for name, history in changes.items() if history}
 
 
 def _extract(variable: Variable, mission: Mission) -> Value:

@@ -6,11 +6,12 @@ never raises on poor data. New platforms are YAML files that combine these, not 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from care_core.errors import ProfileError, nearest
+from care_core.extract.recording import how_to_record
 from care_core.logs.base import Table, Wanted
 from care_core.run import Evidence, Unavailable, Value
 
@@ -62,6 +63,8 @@ class Extractor:
     unit: str
     doc: str
     args: Mapping[str, str] = field(default_factory=dict)
+    parts: tuple[str, ...] = ()
+    """What it reads of the channels that the mission section names, beside `needs`: `odometry`, `battery`, ..."""
 
 
 class MissionKind:
@@ -92,14 +95,19 @@ MISSION_KINDS: dict[str, MissionKind] = {}
 
 
 def extractor(
-    name: str, *, needs: Wanted | Callable[[Args], Wanted], unit: str, args: Mapping[str, str] | None = None
+    name: str,
+    *,
+    needs: Wanted | Callable[[Args], Wanted],
+    unit: str,
+    args: Mapping[str, str] | None = None,
+    parts: Sequence[str] = (),
 ) -> Callable[[Compute], Compute]:
     """Register a function as the extractor `name`; its docstring becomes the documentation."""
 
     def register(compute: Compute) -> Compute:
         find_needs = needs if callable(needs) else lambda _args: needs
         doc = " ".join((compute.__doc__ or "").split())
-        EXTRACTORS[name] = Extractor(name, compute, find_needs, unit, doc, args or {})
+        EXTRACTORS[name] = Extractor(name, compute, find_needs, unit, doc, args or {}, tuple(parts))
         return compute
 
     return register
@@ -123,4 +131,4 @@ def merge_needs(parts: Iterable[Wanted]) -> dict[str, tuple[str, ...]]:
 
 def missing(channel: str, hint: str = "") -> Unavailable:
     """The answer of an extractor whose channel is not in the log."""
-    return Unavailable(f"no {channel} in the log", hint or f"record {channel}")
+    return Unavailable(f"no {channel} in the log", hint or how_to_record(channel))

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from care_core.extract.self_written import is_self_written
 from care_core.profile.schema import Schema
-from care_core.run import Setting
+from care_core.run import Setting, shown
+from care_core.text import clean
 from care_core.variables import Variable
 
 SIMULATOR_PREFIX = "SIM_"
@@ -20,6 +22,43 @@ def in_force(history: Sequence[Setting], at_s: float) -> Setting:
     """The value in force at a time of the log; the first known value before that."""
     before = [setting for setting in history[1:] if setting.changed_at_s is not None and setting.changed_at_s <= at_s]
     return before[-1] if before else history[0]
+
+
+def changes_between(history: Sequence[Setting], start_s: float, end_s: float) -> tuple[Setting, ...]:
+    """The value in force at `start_s` and those that followed it until `end_s`; empty when none did."""
+    later = [one for one in history[1:] if one.changed_at_s is not None and start_s < one.changed_at_s <= end_s]
+    return (in_force(history, start_s), *later) if later else ()
+
+
+def differing(
+    histories: Mapping[str, tuple[Setting, ...]], *, everything: bool = False
+) -> dict[str, tuple[Setting, ...]]:
+    """Parameters that changed in the log or are off their default; `everything`: those of the vehicle's own too."""
+    return {
+        name: history
+        for name, history in histories.items()
+        if (everything or not is_self_written(name))
+        and (len(history) > 1 or (history[-1].default is not None and history[-1].value != history[-1].default))
+    }
+
+
+def remark(history: Sequence[Setting], *, source: bool = False) -> str:
+    """What a value was before, when it changed, its default, and its source if asked for; for a comment in a file."""
+    first, *later = history
+    parts = []
+    if later:
+        steps = "".join(f" -> {shown(one.value)} at {clock(one.changed_at_s)}" for one in later)
+        parts.append(f"{shown(first.value)}{steps}")
+    if history[-1].default is not None and history[-1].value != history[-1].default:
+        parts.append(f"default {shown(history[-1].default)}")
+    if source:
+        parts.append(f"from {history[-1].source}")
+    return clean(", ".join(parts))
+
+
+def clock(time_s: float | None) -> str:
+    """A time of the log as minutes and seconds, `02:13`."""
+    return "an unknown time" if time_s is None else f"{int(time_s // 60):02d}:{int(time_s % 60):02d}"
 
 
 def option_value(option: Variable, setting: Setting) -> float | None:
@@ -45,27 +84,10 @@ def _number(option: Variable, text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def find_setting(settings: Mapping[str, Setting], parameter: str) -> Setting | None:
-    """The setting of a parameter: the same name, else the longest trailing part of it.
-
-    A ROS configuration file is loaded into a namespace that it does not name: `DWAPlannerROS/sim_time` in a file
-    is `/move_base/DWAPlannerROS/sim_time` in the log.
-    """
-    if parameter in settings:
-        return settings[parameter]
-    parts = parameter.strip("/").split("/")
-    for skipped in range(len(parts)):
-        name = "/".join(parts[skipped:])
-        for candidate in (name, f"/{name}"):
-            if candidate in settings:
-                return settings[candidate]
-    return None
-
-
-def option_setting(option: Variable, settings: Mapping[str, Setting], *, exact: bool = True) -> Setting | None:
+def option_setting(option: Variable, settings: Mapping[str, Setting]) -> Setting | None:
     """The first of the option's parameters that the settings hold with a usable value."""
     for parameter in readable(option):
-        setting = settings.get(parameter) if exact else find_setting(settings, parameter)
+        setting = settings.get(parameter)
         if setting is not None and option_value(option, setting) is not None:
             return setting
     return None
@@ -78,37 +100,37 @@ def readable(option: Variable) -> tuple[str, ...]:
 
 def configuration(
     options: Iterable[Variable], driven: Mapping[str, Setting], overrides: Mapping[str, Setting]
-) -> tuple[dict[str, float], dict[str, Setting]]:
-    """Option values of a run, and its settings with those of `overrides` that the log lacks.
+) -> tuple[dict[str, float], dict[str, str], dict[str, Setting]]:
+    """Option values of a run, where each came from, and the settings with those of `overrides` that the log lacks.
 
     The log is what was driven, so it wins; `disagreements` lists where a file says otherwise.
     """
     config: dict[str, float] = {}
-    settings = dict(driven)
+    sources: dict[str, str] = {}
     for option in options:
-        setting = option_setting(option, driven)
-        if setting is None:
-            setting = option_setting(option, overrides, exact=False)
-            if setting is not None:
-                settings[readable(option)[0]] = setting
+        setting = option_setting(option, driven) or option_setting(option, overrides)
         value = None if setting is None else option_value(option, setting)
-        if value is not None:
+        if setting is not None and value is not None:
             config[option.name] = value
-    return config, settings
+            sources[option.name] = setting.source
+    return config, sources, {**overrides, **driven}
 
 
-def disagreements(schema: Schema, config: Mapping[str, float], overrides: Mapping[str, Setting]) -> tuple[str, ...]:
-    """One sentence for each option whose configuration file says another value than the log drove."""
+def disagreements(schema: Schema, driven: Mapping[str, Setting], overrides: Mapping[str, Setting]) -> tuple[str, ...]:
+    """One sentence for each parameter of an option whose configuration file says another value than the log drove."""
     sentences = []
     for option in schema.options:
-        setting = option_setting(option, overrides, exact=False)
-        wanted = None if setting is None else option_value(option, setting)
-        driven = config.get(option.name)
-        if setting is None or wanted is None or driven is None:
-            continue
-        if not math.isclose(wanted, driven, rel_tol=1e-4, abs_tol=1e-9):
+        several = sum(parameter in driven for parameter in option.parameters) > 1
+        for parameter in readable(option):
+            ours, theirs = driven.get(parameter), overrides.get(parameter)
+            if ours is None or theirs is None or ours is theirs:
+                continue
+            value, wanted = option_value(option, ours), option_value(option, theirs)
+            if value is None or wanted is None or math.isclose(wanted, value, rel_tol=1e-4, abs_tol=1e-9):
+                continue
+            named = f"{option.name} ({parameter})" if several else option.name
             sentences.append(
-                f"{option.name} was {option.show(driven)} when driven, {setting.source} says {option.show(wanted)};"
-                " the driven value is used."
+                f"{named} was {option.show(value)} when driven, {theirs.source} says {option.show(wanted)};"
+                " the driven value is used"
             )
     return tuple(sentences)

@@ -1,6 +1,6 @@
 """The published triage document, `care.triage/1`: what other programs read. Its keys and types are an interface.
 
-`Report` is the document with what people want beside it: the diff, the commands, the notes.
+`Report` is the document with what people want beside it: the diff and the commands.
 """
 
 from __future__ import annotations
@@ -12,7 +12,17 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from care_core.configs import apply_commands, format_for, unified_diff
-from care_core.diagnose.records import Cause, Change, Confidence, Diagnosis, Fix, ObjectiveResult, Prediction, Status
+from care_core.diagnose.records import (
+    Cause,
+    Change,
+    Confidence,
+    Diagnosis,
+    Fix,
+    ObjectiveResult,
+    Prediction,
+    Since,
+    Status,
+)
 from care_core.run import Value, is_known
 from care_core.text import clean
 from care_core.variables import Kind, Op
@@ -109,6 +119,21 @@ class FixEntry(FixSet):
     alternatives: list[FixSet]
 
 
+class ParameterChangeEntry(_Model):
+    parameter: str
+    option: str | None
+    from_: float | str | None = Field(serialization_alias="from")
+    to: float | str | None
+
+
+class SinceEntry(_Model):
+    """What changed since a good run; `warnings` say what is odd about that log."""
+
+    log: str
+    warnings: list[str]
+    changes: list[ParameterChangeEntry]
+
+
 class TriageDocument(_Model):
     """The answer for one run, as `care triage --json` prints it."""
 
@@ -124,14 +149,19 @@ class TriageDocument(_Model):
     faults: list[FaultEntry]
     fix: FixEntry | None
     abstained: str | None
+    notes: list[str] = []
+    """What the operator should know of the log, the configuration and the profile."""
+    sources: dict[str, str] = {}
+    """Where the value of each option came from: a record or topic of the log, or file:line."""
+    since: SinceEntry | None = None
+    """Only with `--since`."""
 
 
 class Report(TriageDocument):
-    """The document with the diff and the commands (in the YAML report) and the notes (in the Markdown one)."""
+    """The document with the diff and the commands that apply it."""
 
     diff: str
     apply: list[str]
-    notes: list[str]
 
 
 def json_schema() -> dict[str, Any]:
@@ -170,10 +200,34 @@ def build_document(diagnosis: Diagnosis) -> Report:
         ],
         fix=None if diagnosis.fix is None else _fix(diagnosis.fix, diagnosis.alternatives),
         abstained=None if diagnosis.abstained is None else clean(diagnosis.abstained),
+        notes=list(dict.fromkeys((*warnings, *(clean(note) for note in diagnosis.notes)))),
+        sources={name: clean(source) for name, source in run.sources.items()},
+        since=None if diagnosis.since is None else _since(diagnosis.since),
         diff=unified_diff(run, diagnosis.fix) if diagnosis.fix is not None else "",
-        apply=apply_commands(diagnosis.fix.changes, format_for(log.format)) if diagnosis.fix is not None else [],
-        notes=[*warnings, *(clean(note) for note in diagnosis.notes)],
+        apply=apply_commands(diagnosis.fix.changes, format_for(log.format, run.settings))
+        if diagnosis.fix is not None
+        else [],
     )
+
+
+def _since(since: Since) -> SinceEntry:
+    return SinceEntry(
+        log=clean(since.log),
+        warnings=[clean(warning) for warning in since.warnings],
+        changes=[
+            ParameterChangeEntry(
+                parameter=clean(change.parameter),
+                option=None if change.option is None else change.option.name,
+                from_=_setting_value(change.before),
+                to=_setting_value(change.after),
+            )
+            for change in since.changes
+        ],
+    )
+
+
+def _setting_value(value: float | str | None) -> float | str | None:
+    return clean(value) if isinstance(value, str) else _finite(value)
 
 
 def _finite(value: float | None) -> float | None:

@@ -14,6 +14,9 @@ from care_core.variables import Variable
 
 WIDTH = 80
 EVIDENCE_SHOWN = 5
+DAMAGE_SHOWN = 5
+CHANGES_SHOWN = 20
+"""Of parameters that are no options of the profile; the options are all shown."""
 
 
 def to_text(diagnosis: Diagnosis) -> str:
@@ -25,6 +28,7 @@ def to_text(diagnosis: Diagnosis) -> str:
         *(_causes(fault) for fault in diagnosis.faults),
         _fix(diagnosis),
         _evidence(diagnosis),
+        _since(diagnosis),
         _notes(diagnosis),
     ]
     return "\n\n".join(text for text in ("\n".join(section) for section in sections) if text) + "\n"
@@ -79,9 +83,11 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     yield from _wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
     for warning in profile.warnings:
         yield from _wrapped(warning, "Warning  ")
-    for damage in run.log.damage:
+    for damage in run.log.damage[:DAMAGE_SHOWN]:
         at = "" if damage.time_s is None else f" at {damage.time_s:.1f} s"
         yield from _wrapped(f"{damage.what}{at}", "Damage   ")
+    if len(run.log.damage) > DAMAGE_SHOWN:
+        yield f"Damage   and {len(run.log.damage) - DAMAGE_SHOWN} more places, 'care inspect' lists them"
 
 
 def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
@@ -152,7 +158,10 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     yield ""
     yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix).splitlines())
     yield ""
-    yield from (f"  {line}" for line in apply_commands(fix.changes, format_for(diagnosis.run.log.format)))
+    yield from (
+        f"  {line}"
+        for line in apply_commands(fix.changes, format_for(diagnosis.run.log.format, diagnosis.run.settings))
+    )
 
 
 def _prediction(objective: Variable, predicted: Prediction) -> str:
@@ -173,6 +182,24 @@ def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
     for item in evidence[-EVIDENCE_SHOWN:]:
         points = f" (points at {', '.join(item.options)})" if item.options else ""
         yield from _wrapped(f"{item.text}{points}", f"  {item.time_s:8.1f} s  ")
+
+
+def _since(diagnosis: Diagnosis) -> Iterator[str]:
+    since = diagnosis.since
+    if since is None:
+        return
+    yield from _wrapped(f"Changed since {Path(since.log).name}")
+    for warning in since.warnings:
+        yield from _wrapped(warning, "  ! ")
+    options = [change for change in since.changes if change.option is not None]
+    others = [change for change in since.changes if change.option is None]
+    for change in (*options, *others[:CHANGES_SHOWN]):
+        named = "" if change.option is None or change.option.name == change.parameter else f" ({change.option.name})"
+        yield from _wrapped(f"{change.parameter}{named}  {change.text}", "  ", "    ")
+    if len(others) > CHANGES_SHOWN:
+        yield f"  and {len(others) - CHANGES_SHOWN} more, which are no options of the profile; --json lists them"
+    if not since.changes:
+        yield "  no parameter that anybody sets"
 
 
 def _notes(diagnosis: Diagnosis) -> Iterator[str]:

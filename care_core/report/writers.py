@@ -13,11 +13,21 @@ from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
 from care_core.errors import UsageError
-from care_core.report.document import CauseEntry, FixSet, ObjectiveEntry, PredictedValue, Report, TriageDocument
+from care_core.report.document import (
+    CauseEntry,
+    FixSet,
+    ObjectiveEntry,
+    PredictedValue,
+    Report,
+    SinceEntry,
+    TriageDocument,
+)
+from care_core.run import shown
 
 STATUS_WORDS = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
 
 _YAML_WIDTH = 100
+_DAMAGE_SHOWN = 5
 _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~])")
 
 
@@ -28,7 +38,7 @@ def to_json(report: Report) -> str:
 
 def to_yaml(report: Report) -> str:
     """The document with the unified diff and the commands that apply it."""
-    data = report.model_dump(by_alias=True, exclude={"notes"})
+    data = report.model_dump(by_alias=True)
     if report.diff:
         data["diff"] = LiteralScalarString(report.diff)
     yaml = YAML()
@@ -62,6 +72,9 @@ def _markdown(report: Report) -> Iterator[str]:
     if report.fix is not None:
         yield ""
         yield from _fix_section(report, report.fix)
+    if report.since is not None:
+        yield ""
+        yield from _since_section(report.since)
     if report.notes:
         yield ""
         yield "## Notes"
@@ -121,6 +134,22 @@ def _fix_section(report: Report, fix: FixSet) -> Iterator[str]:
     yield "```"
 
 
+def _since_section(since: SinceEntry) -> Iterator[str]:
+    yield f"## Changed since {_code(Path(since.log).name)}"
+    yield ""
+    if since.warnings:
+        yield from (f"- {_escape(warning)}" for warning in since.warnings)
+        yield ""
+    if not since.changes:
+        yield "No parameter that anybody sets."
+        return
+    rows = (
+        (_code(change.parameter), change.option or "", _escape(shown(change.from_)), _escape(shown(change.to)))
+        for change in since.changes
+    )
+    yield from _table(("Parameter", "Option", "Then", "Now"), rows)
+
+
 def _prediction(objective: ObjectiveEntry, predicted: PredictedValue) -> str:
     """A yes-or-no objective has odds, not a value."""
     if objective.kind == "functional":
@@ -132,8 +161,10 @@ def _origin(report: Report) -> Iterator[str]:
     log, profile = report.log, report.profile
     yield f"Log {_code(log.path)}, {log.format}, {log.duration_s:.0f} s, SHA-256 `{log.sha256}`."
     yield f"Profile {profile.name} {profile.version} ({profile.platform})."
-    for damage in log.damage:
+    for damage in log.damage[:_DAMAGE_SHOWN]:
         yield f"Damage: {_escape(damage.what)}."
+    if len(log.damage) > _DAMAGE_SHOWN:
+        yield f"Damage: {len(log.damage) - _DAMAGE_SHOWN} more places."
 
 
 def _table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:

@@ -12,7 +12,12 @@ ProfileName = Annotated[
     str | None, typer.Option("--profile", "-p", help="Name or folder; chosen by the log if absent.")
 ]
 ConfigPaths = Annotated[
-    list[Path] | None, typer.Option("--config", help="The robot's configuration file, for what the log lacks.")
+    list[str] | None,
+    typer.Option(
+        "--config",
+        metavar="[NAMESPACE=]FILE",
+        help="The robot's configuration file, for what the log lacks; may be repeated, a later one wins.",
+    ),
 ]
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Write to this file instead of stdout.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]

@@ -39,13 +39,23 @@ def triage(
         list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")
     ] = None,
     mission: Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last.")] = None,
+    since: Annotated[
+        Path | None, typer.Option("--since", metavar="GOOD_LOG", help="List what changed since this good run.")
+    ] = None,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
     formats = [name for name, wanted in (("json", json), ("yaml", yaml), ("markdown", markdown)) if wanted]
     if len(formats) > 1:
         raise UsageError("Only one of --json, --yaml and --markdown can be printed.", hint="Leave the others out.")
     request = Request(
-        log, profile, tuple(config or ()), tuple(keep or ()), bounds(threshold or ()), top=top, mission=mission
+        log,
+        profile,
+        configs=tuple(config or ()),
+        keep=tuple(keep or ()),
+        thresholds=bounds(threshold or ()),
+        top=top,
+        mission=mission,
+        since=since,
     )
     with Progress() as progress:
         diagnosis = diagnose_log(request, progress)

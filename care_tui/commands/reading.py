@@ -33,27 +33,34 @@ def inspect(log: LogPath, json: AsJson = False) -> None:
 @app.command()
 def params(
     log: LogPath,
-    changed: Annotated[bool, typer.Option("--changed", help="Only what differs from its default or changed.")] = False,
+    changed: Annotated[
+        bool, typer.Option("--changed", help="Only what differs from its default or changed, with what it was before.")
+    ] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="With --changed: calibration, statistics and device identities too.")
+    ] = False,
+    sources: Annotated[bool, typer.Option("--sources", help="Say of each value where it came from.")] = False,
     out: Out = None,
 ) -> None:
     """Print the configuration as driven, as a file that the robot's software reads."""
     from care_core.configs import format_for, write_params
+    from care_core.extract.settings import differing, remark
     from care_core.logs import open_log
 
     opened = open_log(log)
     histories = opened.settings()
-    settings = {name: history[-1] for name, history in histories.items()}
-    if changed:
-        settings = {
-            name: setting
-            for name, setting in settings.items()
-            if len(histories[name]) > 1 or (setting.default is not None and setting.value != setting.default)
-        }
-        if not any(setting.default is not None for history in histories.values() for setting in history):
-            say("The log holds no defaults, so only what changed during it is shown.")
     if not histories:
-        say("The log holds no parameters.")
-    emit(write_params(settings, format_for(opened.format.value)), out)
+        say("The log holds no parameters. The files that the robot was started with hold them.")
+    if changed:
+        chosen = differing(histories, everything=everything)
+        if histories and not any(setting.default is not None for history in histories.values() for setting in history):
+            say("The log holds no defaults, so only what changed during it is shown.")
+        if not everything and (hidden := len(differing(histories, everything=True)) - len(chosen)):
+            say(f"{hidden} that the vehicle writes itself are left out (calibration, statistics): --all shows them.")
+        histories = chosen
+    remarks = {name: remark(history, source=sources) for name, history in histories.items() if changed or sources}
+    settings = {name: history[-1] for name, history in histories.items()}
+    emit(write_params(settings, format_for(opened.format.value, settings), remarks), out)
 
 
 @app.command()

@@ -27,6 +27,7 @@ from tests.made import made_diagnosis
 
 COMMANDS = ("triage", "inspect", "params", "ingest", "train", "demo", "profiles", "schema")
 ROOT = Path(__file__).parents[2]
+SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
 
 
 def run_process(*args: str, **variables: str) -> subprocess.CompletedProcess[str]:
@@ -130,16 +131,17 @@ def test_triage_prints_data_on_stdout_alone(care: Care, made: dict[str, Any]) ->
 def test_triage_passes_its_options_on(care: Care, made: dict[str, Any]) -> None:
     care(
         "triage", "a.BIN", "-p", "arducopter", "--config", "b.param", "--config", "c.param", "--keep", "A",
-        "--threshold", "energy=12", "--mission", "2", "--top", "3",
+        "--threshold", "energy=12", "--mission", "2", "--top", "3", "--since", "good.BIN",
     )  # fmt: skip
     assert made["request"] == Request(
         Path("a.BIN"),
         "arducopter",
-        (Path("b.param"), Path("c.param")),
+        ("b.param", "c.param"),
         ("A",),
         {"energy": 12.0},
         top=3,
         mission=2,
+        since=Path("good.BIN"),
     )
 
 
@@ -230,6 +232,30 @@ def test_params_are_a_file_that_can_be_loaded(care: Care, flights: tuple[Path, .
     changed = care("params", flights[0], "--changed").stdout.splitlines()
     assert 0 < len(changed) < len(driven)
     assert all(line.split(",")[0] in driven for line in changed)
+
+
+def test_params_tell_what_was_changed_and_from_where(care: Care) -> None:
+    changed = care("params", SAMPLE, "--changed")
+    assert "LAND_SPEED,16  # default 50" in changed.stdout
+    assert "INS_GYROFFS_X" not in changed.stdout
+    assert "--all shows them" in changed.stderr
+    assert "INS_GYROFFS_X" in care("params", SAMPLE, "--changed", "--all").stdout
+    assert "LAND_SPEED,16  # default 50, from PARM" in care("params", SAMPLE, "--sources").stdout
+
+
+def test_what_a_file_says_and_what_changed_is_told(care: Care, tmp_path: Path) -> None:
+    wrong, other = tmp_path / "wrong.param", tmp_path / "other.yaml"
+    wrong.write_text("LAND_SPEED 40\n")
+    other.write_text("DWAPlannerROS: {sim_time: 2.0}\n")
+    outcome = care("triage", SAMPLE, "--config", wrong, "--config", f"move_base={other}", "--since", SAMPLE, "--json")
+    document = json.loads(outcome.stdout)
+    assert f"LAND_SPEED was 16 when driven, {wrong}:1 says 40; the driven value is used" in document["notes"]
+    assert f"move_base={other} holds nothing that profile arducopter knows" in document["notes"]
+    assert document["sources"]["LAND_SPEED"] == "PARM"
+    assert document["since"]["changes"] == []
+    assert "it is the same log" in document["since"]["warnings"]
+    missing = care("triage", SAMPLE, "--since", tmp_path / "none.BIN")
+    assert (missing.code, "No such file" in missing.stderr) == (4, True)
 
 
 def test_ingest_goes_on_after_a_log_that_fails(care: Care, flights: tuple[Path, ...], tmp_path: Path) -> None:

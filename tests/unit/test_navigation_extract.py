@@ -14,29 +14,29 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from care_core.extract import battery as battery_extractors
 from care_core.extract import navigation
+from care_core.extract.actionlib import GOAL_FIELDS, RECOVERY_FIELDS, RESULT_FIELDS
 from care_core.extract.drive import (
     BATTERY_FIELDS,
     COMMAND_FIELDS,
-    GOAL_FIELDS,
     ODOMETRY_FIELDS,
-    RECOVERY_FIELDS,
-    RESULT_FIELDS,
     ROSOUT_FIELDS,
     angle_between,
 )
 from care_core.extract.read import read_run
-from care_core.extract.registry import EXTRACTORS, Mission, find_extractor
+from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Mission, find_extractor
 from care_core.logs import open_log
 from care_core.logs.base import Table
 from care_core.profile.schema import read_schema
 from care_core.run import Unavailable, Value, is_known
 
-KIND = navigation.ActionlibGoals()
+KIND = MISSION_KINDS["actionlib_goals"]
 PROFILE = Path(__file__).resolve().parents[2] / "profiles" / "move_base" / "profile.yaml"
 GOALS = ((2.0, 0.0), (4.0, 0.0))
 SPEC: dict[str, Any] = {"goals": [list(goal) for goal in GOALS], "goal_timeout_s": 60, "tolerance_m": 0.3}
-OWN = [name for name, one in EXTRACTORS.items() if one.compute.__module__ == navigation.__name__]
+MODULES = (navigation.__name__, battery_extractors.__name__)
+OWN = [name for name, one in EXTRACTORS.items() if one.compute.__module__ in MODULES]
 DURATION_S = 100.0
 
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from care_core.errors import ProfileError, UsageError
 from care_core.extract.read import read_run, read_runs, reading_plan
 from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Args, Mission, MissionKind, extractor
-from care_core.extract.settings import disagreements, find_setting, in_force, option_value
+from care_core.extract.settings import disagreements, in_force, option_value
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.profile.schema import Schema
 from care_core.run import Damage, Evidence, Setting, Unavailable, Value
@@ -181,12 +181,15 @@ def test_words_become_the_numbers_that_options_use() -> None:
 
 def test_a_file_fills_what_the_log_lacks_and_is_contradicted_by_what_it_holds(log: MadeLog) -> None:
     log.known = as_driven(Setting("SPEED", 3.0, "PARM"))
-    overrides = {"SPEED": Setting("SPEED", 9.0, "a.param:4"), "local/brake": Setting("local/brake", "true", "b.yaml:2")}
+    overrides = {
+        "SPEED": Setting("SPEED", 9.0, "a.param:4"),
+        "/nav/local/brake": Setting("local/brake", "true", "b.yaml:2"),
+    }
     schema = made_schema()
     run = read_run(log, schema, overrides=overrides)
     assert run.config == {"speed": 3.0, "brake": 1.0}
     assert run.settings["/nav/local/brake"].source == "b.yaml:2"
-    (sentence,) = disagreements(schema, run.config, overrides)
+    (sentence,) = disagreements(schema, run.settings, overrides)
     assert "speed was 3" in sentence
     assert "a.param:4" in sentence
 
@@ -249,12 +252,19 @@ def test_rules_of_the_profile_add_options_to_evidence(log: MadeLog) -> None:
     assert evidence.options == ("speed", "brake")
 
 
-def test_a_file_may_leave_out_leading_namespaces() -> None:
-    settings = {"local/brake": Setting("local/brake", 1.0, "f:1"), "brake": Setting("brake", 0.0, "f:2")}
-    found = find_setting(settings, "/nav/local/brake")
-    assert found is not None
-    assert found.source == "f:1"
-    assert find_setting(settings, "/nav/local/other") is None
+def test_what_changed_during_the_mission_is_kept(log: MadeLog) -> None:
+    log.known = as_driven(
+        Setting("SPEED", 3.0, "PARM"),
+        Setting("SPEED", 4.0, "PARM", changed_at_s=0.5),
+        Setting("SPEED", 5.0, "PARM", changed_at_s=4.0),
+        Setting("SPEED", 6.0, "PARM", changed_at_s=15.0),
+    )
+    log.spans = ((1.0, 10.0, True),)
+    run = read_run(log, made_schema())
+    assert run.config["speed"] == 5.0
+    assert [setting.value for setting in run.changes["SPEED"]] == [4.0, 5.0]
+    log.spans = ((5.0, 10.0, True),)
+    assert read_run(log, made_schema()).changes == {}
 
 
 @given(st.lists(st.floats(0, 100), max_size=6), st.floats(0, 100))

@@ -13,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from care_core.diagnose.records import Prediction
+from care_core.diagnose.records import ParameterChange, Prediction, Since
+from care_core.diagnose.since import with_evidence
 from care_core.errors import UsageError
 from care_core.report import (
     build_document,
@@ -24,15 +25,17 @@ from care_core.report import (
     to_yaml,
     write_atomically,
 )
+from care_core.run import Damage
 from care_core.text import clean
-from tests.made import HOSTILE, made_diagnosis
+from tests.made import DRIVEN, HOSTILE, LAND_SPEED, made_diagnosis
 
 KEYS = ["schema", "profile", "log", "config", "context", "metrics", "objectives", "faults", "fix", "abstained"]
+ADDED = ["notes", "sources", "since"]
 
 
 def test_the_document_has_exactly_the_published_keys() -> None:
     document = json.loads(to_json(build_document(made_diagnosis())))
-    assert list(document) == KEYS
+    assert list(document) == [*KEYS, *ADDED]
     assert document["schema"] == "care.triage/1"
     assert list(document["profile"]) == ["name", "version", "platform"]
     assert list(document["log"]) == ["path", "format", "start", "duration_s", "damage", "sha256"]
@@ -74,8 +77,8 @@ def test_the_document_keeps_its_published_schema() -> None:
 def test_yaml_adds_the_diff_and_its_commands() -> None:
     report = build_document(made_diagnosis())
     data = YAML(typ="safe").load(to_yaml(report))
-    assert list(data) == [*KEYS, "diff", "apply"]
-    assert {key: data[key] for key in KEYS} == json.loads(to_json(report))
+    assert list(data) == [*KEYS, *ADDED, "diff", "apply"]
+    assert {key: data[key] for key in (*KEYS, *ADDED)} == json.loads(to_json(report))
     assert "+LAND_SPEED,50" in data["diff"]
     assert data["apply"] == ["param set LAND_SPEED 50"]
 
@@ -174,3 +177,34 @@ def test_a_file_is_whole_or_not_there(tmp_path: Path) -> None:
         write_atomically(tmp_path / "none" / "report.json", "x")
     with pytest.raises(UsageError):
         write_atomically(tmp_path / "home", "a folder is in its place")
+
+
+def test_what_changed_since_the_good_run_is_in_every_format() -> None:
+    many = tuple(ParameterChange(f"A{n:02d}", None, 1.0, 2.0) for n in range(30))
+    since = Since("/flights/good.BIN", (ParameterChange("LAND_SPEED", LAND_SPEED, 50.0, DRIVEN), *many), (HOSTILE,))
+    diagnosis = with_evidence(made_diagnosis(), since)
+    report = build_document(diagnosis)
+    document = json.loads(to_json(report))
+    jsonschema.validate(document, json_schema())
+    assert document["since"]["changes"][0] == {
+        "parameter": "LAND_SPEED", "option": "land_speed", "from": 50.0, "to": 16.0
+    }  # fmt: skip
+    assert len(document["since"]["changes"]) == 31
+    assert "changed since good.BIN: 50 -> 16" in document["faults"][0]["causes"][0]["notes"]
+    assert "| `LAND_SPEED` | land_speed | 50 | 16 |" in to_markdown(report)
+    text = to_text(diagnosis)
+    assert "Changed since good.BIN" in text
+    assert "LAND_SPEED (land_speed)  50 -> 16" in text
+    assert "A19  1 -> 2" in text
+    assert "and 10 more" in text
+    assert "\x1b" not in text + to_markdown(report)
+
+
+def test_a_long_list_of_damage_is_folded() -> None:
+    diagnosis = made_diagnosis()
+    log = replace(diagnosis.run.log, damage=tuple(Damage(f"lost {n}", n) for n in range(9)))
+    diagnosis = replace(diagnosis, run=replace(diagnosis.run, log=log))
+    assert "lost 4" in to_text(diagnosis)
+    assert "lost 5" not in to_text(diagnosis)
+    assert "and 4 more places" in to_text(diagnosis)
+    assert len(build_document(diagnosis).log.damage) == 9

@@ -1,0 +1,106 @@
+"""What changed since a good run: the parameters of two logs side by side, as evidence beside the ranking."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from care_core.diagnose.faults import judge
+from care_core.diagnose.records import Cause, Diagnosis, ParameterChange, Since
+from care_core.errors import CareError
+from care_core.extract.read import log_info, read_run
+from care_core.extract.self_written import is_self_written
+from care_core.extract.settings import readable
+from care_core.logs import log_digest
+from care_core.logs.base import Log
+from care_core.profile.store import Profile
+from care_core.run import LogInfo, Run, Setting
+from care_core.variables import Threshold, Variable
+
+
+def compare(run: Run, good: Log, profile: Profile, bounds: Mapping[str, Threshold]) -> Since:
+    """The parameters that differ between a run and the last mission of a good log.
+
+    Parameters that the vehicle writes itself are left out, unless they are options of the profile; those of options
+    come first. A good log without a mission is compared by its last values.
+
+    Args:
+        bounds: thresholds in force, by which the good run is judged too.
+    """
+    other = log_info(good, log_digest(good.path))
+    try:
+        good_run = read_run(good, profile.schema)
+    except CareError as err:
+        before = {name: history[-1] for name, history in good.settings().items()}
+        return Since(str(good.path), _changes(run, before, profile), (*_strange(run, other, before), err.message))
+    return Since(
+        log=str(good.path),
+        changes=_changes(run, good_run.settings, profile),
+        warnings=(*_strange(run, other, good_run.settings), *_not_good(good_run, profile, bounds)),
+    )
+
+
+def with_evidence(diagnosis: Diagnosis, since: Since) -> Diagnosis:
+    """The diagnosis with the comparison, and a note on each cause whose option was changed."""
+    faults = tuple(
+        replace(fault, causes=tuple(_noted(cause, since) for cause in fault.causes)) for fault in diagnosis.faults
+    )
+    return replace(diagnosis, faults=faults, since=since)
+
+
+def _noted(cause: Cause, since: Since) -> Cause:
+    name = Path(since.log).name
+    notes = [f"changed since {name}: {change.text}" for change in since.changes if change.option is cause.option]
+    return replace(cause, notes=(*cause.notes, *dict.fromkeys(notes)))
+
+
+def _changes(run: Run, before: Mapping[str, Setting], profile: Profile) -> tuple[ParameterChange, ...]:
+    options = {parameter: option for option in profile.schema.options for parameter in readable(option)}
+    names = sorted({*run.settings, *before})
+    first = [name for name in options if name in names]
+    rest = [name for name in names if name not in options and not is_self_written(name)]
+    return tuple(_differences([*first, *rest], before, run.settings, options))
+
+
+def _differences(
+    names: list[str], before: Mapping[str, Setting], after: Mapping[str, Setting], options: Mapping[str, Variable]
+) -> Iterator[ParameterChange]:
+    for name in names:
+        old = before[name].value if name in before else None
+        new = after[name].value if name in after else None
+        if not _same(old, new):
+            yield ParameterChange(name, options.get(name), old, new)
+
+
+def _same(a: float | str | None, b: float | str | None) -> bool:
+    if isinstance(a, (int, float)) and isinstance(b, (int, float)):
+        return math.isclose(a, b, rel_tol=1e-6) or (math.isnan(a) and math.isnan(b))
+    return a == b
+
+
+def _strange(run: Run, other: LogInfo, before: Mapping[str, Setting]) -> Iterator[str]:
+    """Why the good log may not be comparable at all."""
+    if other.sha256 == run.log.sha256:
+        yield "it is the same log"
+    if other.format != run.log.format:
+        yield f"its format is {other.format}, this log's is {run.log.format}"
+    for fact, text in run.log.facts.items():
+        if fact in other.facts and other.facts[fact] != text:
+            yield f"its {fact} is {other.facts[fact]}, this log's is {text}"
+    if not before:
+        yield "it holds no parameters"
+    elif not before.keys() & run.settings.keys():
+        yield "it has no parameter in common with this log"
+
+
+def _not_good(good: Run, profile: Profile, bounds: Mapping[str, Threshold]) -> Iterator[str]:
+    """Which objectives the good run misses itself, or else which nobody can judge."""
+    results = judge(good, profile.schema, bounds, profile.model.summaries)
+    broken = [result for result in results if result.status == "fault"]
+    for result in broken:
+        yield f"it has a fault itself: {result.variable.name} = {result.value:.4g}, wanted {result.threshold}"
+    for result in results:
+        if not broken and result.status == "not_evaluated":
+            yield f"its {result.variable.name} could not be evaluated: {result.reason}"

@@ -1,0 +1,36 @@
+"""Parameters that a vehicle writes itself: statistics, calibration, identity. They are outcomes, never choices.
+
+The list is data, and the only one: whoever compares configurations leaves these out.
+"""
+
+from __future__ import annotations
+
+import re
+from fnmatch import translate
+
+SELF_WRITTEN: dict[str, tuple[str, ...]] = {
+    "statistics and counters": (
+        "STAT_*", "MIS_TOTAL", "FENCE_TOTAL", "RALLY_TOTAL", "LOG_LASTFILE", "SYS_NUM_RESETS", "FORMAT_VERSION",
+        "LND_FLIGHT_T_*", "COM_FLIGHT_UUID",
+    ),
+    "learned in flight": (
+        "MOT_THST_HOVER", "H_COL_HOVER", "TUNE_*_LAST", "COMPASS_OFS*", "COMPASS_DEC", "AHRS_TRIM_[XYZ]",
+        "Q_M_THST_HOVER", "Q_TRIM_PITCH_LAST",
+    ),
+    "calibration": (
+        "COMPASS_DIA*", "COMPASS_ODI*", "COMPASS_MOT*", "COMPASS_SCALE*", "INS_*OFF*_[XYZ]", "INS_*OFFS_*",
+        "INS_*SCAL_*", "INS_*CALTEMP", "INS_TCAL*", "BARO*_GND_PRESS", "GND_ABS_PRESS*", "GND_TEMP", "BARO_GND_TEMP",
+        "ARSPD*_OFFSET", "RC*_MIN", "RC*_MAX", "RC*_TRIM", "CAL_*", "TC_*", "SENS_DPRES_OFF",
+    ),
+    "identity of devices": (
+        "*_DEVID", "*_DEV_ID*", "COMPASS_PRIO*_ID", "INS_*_ID", "BRD_SERIAL_NUM",
+    ),
+}  # fmt: skip
+"""Shell patterns by what they are, ArduPilot's and PX4's alike."""
+
+_PATTERN = re.compile("|".join(translate(pattern) for group in SELF_WRITTEN.values() for pattern in group))
+
+
+def is_self_written(parameter: str) -> bool:
+    """Whether nobody chose the value of a parameter."""
+    return _PATTERN.match(parameter) is not None

@@ -1,0 +1,213 @@
+"""Nav2 missions on tables made up here: goals by their states, where they lie, recoveries, what nodes said."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_core.extract.drive import ODOMETRY_FIELDS, ROSOUT_FIELDS, STAMPED_COMMAND_FIELDS, Status
+from care_core.extract.nav2 import PLAN_FIELDS, POSE_FIELDS, STATUS_FIELDS, TREE_FIELDS, find_legs
+from care_core.extract.registry import MISSION_KINDS, Mission, find_extractor
+from care_core.logs.base import Table
+from care_core.run import Unavailable, Value
+
+KIND = MISSION_KINDS["nav2_goals"]
+DURATION_S = 100.0
+SPEC: dict[str, Any] = {"kind": "nav2_goals", "goals": [[2.0, 0.0], [4.0, 0.0]], "goal_timeout_s": 60}
+STATUS = "/navigate_to_pose/_action/status"
+ACCEPTED, EXECUTING, SUCCEEDED, CANCELED, ABORTED = 1, 2, 4, 5, 6
+
+
+def table(t: Sequence[float], fields: Sequence[str], rows: Sequence[Sequence[Any]]) -> Table:
+    columns = {}
+    for place, name in enumerate(fields):
+        values = [row[place] for row in rows]
+        column = np.empty(len(rows), np.float64 if values and isinstance(values[0], float) else object)
+        for number, value in enumerate(values):
+            column[number] = value
+        columns[name] = column
+    return Table(np.array(t, np.float64), columns)
+
+
+def uuid(number: int) -> Any:
+    return np.full(16, number, np.uint8)
+
+
+def states(*told: tuple[float, Sequence[tuple[int, int]]]) -> Table:
+    """What the server told: (time, [(goal, code)]), all goals that it remembers each time."""
+    rows = [([uuid(goal) for goal, _ in goals], [code for _, code in goals]) for _, goals in told]
+    return table([t for t, _ in told], STATUS_FIELDS, rows)
+
+
+def plan(t: float, *points: tuple[float, float], frame: str = "odom") -> tuple[float, Sequence[Any]]:
+    x, y = [p[0] for p in points], [p[1] for p in points]
+    return t, (frame, x, y, [0.0] * len(x), [1.0] * len(x))
+
+
+def plans(*made: tuple[float, Sequence[Any]]) -> Table:
+    return table([t for t, _ in made], PLAN_FIELDS, [row for _, row in made])
+
+
+def drive(**changed: Table | None) -> dict[str, Table]:
+    """Goal 1 accepted at 10 s, there at 20 s; goal 2 accepted at 21 s, there at 31 s; an older goal is remembered."""
+    t = np.arange(0.0, DURATION_S, 0.1)
+    x = np.interp(t, [0, 10, 20, 21, 31], [0, 0, 2, 2, 4])
+    rows = [("odom", one, 0.0, 0.0, 0.0, 0.0, 1.0, v, 0.0) for one, v in zip(x, np.gradient(x, t), strict=True)]
+    tables: dict[str, Table | None] = {
+        STATUS: states(
+            (0.5, [(9, SUCCEEDED)]),
+            (10, [(9, SUCCEEDED), (1, ACCEPTED)]),
+            (10.1, [(1, EXECUTING)]),
+            (20, [(1, SUCCEEDED)]),
+            (21, [(1, SUCCEEDED), (2, EXECUTING)]),
+            (31, [(1, SUCCEEDED), (2, SUCCEEDED)]),
+        ),
+        "/plan": plans(plan(10.5, (0.0, 0.0), (2.0, 0.0)), plan(15.0, (1.0, 0.0), (2.0, 0.0)),
+                       plan(21.5, (2.0, 0.0), (4.0, 0.0))),
+        "/odom": table(t.tolist(), ODOMETRY_FIELDS, rows),
+        "/cmd_vel": table(t.tolist(), STAMPED_COMMAND_FIELDS, [(0.2, 0.0)] * len(t)),
+    }  # fmt: skip
+    tables |= {"/" + name.replace("__", "/"): one for name, one in changed.items()}
+    return {name: one for name, one in tables.items() if one is not None}
+
+
+def mission(tables: dict[str, Table], spec: dict[str, Any] = SPEC) -> Mission:
+    (one,) = KIND.missions(tables, DURATION_S, spec)
+    return one
+
+
+def value(name: str, one: Mission, **args: Any) -> Value:
+    return find_extractor(name).compute(one, args)
+
+
+def test_a_good_drive() -> None:
+    one = mission(drive())
+    assert (one.start_s, one.end_s, one.ended) == (10.0, 31.0, True)
+    assert KIND.mismatch(one) == ""
+    assert KIND.evidence(one) == ()
+    expected = {
+        "goals_sent": 2, "goals_reached": 2, "goals_success": 1, "goals_time": 21, "path_length": 4, "distance_left": 0,
+        "commanded_speed": 0.2, "plans": 3, "plan_length": 4, "detour": 0, "drive_speed": 0.2,
+    }  # fmt: skip
+    assert {name: value(name, one) for name in expected} == pytest.approx(expected, rel=0.02, abs=0.02)
+
+
+def test_how_goals_end() -> None:
+    told = states(
+        (5, [(1, EXECUTING)]),
+        (9, [(1, ABORTED)]),
+        (10, [(2, EXECUTING)]),
+        (14, [(2, CANCELED)]),
+        (20, [(3, EXECUTING)]),
+        (25, [(3, EXECUTING), (4, ACCEPTED)]),
+        (25.1, [(3, ABORTED), (4, EXECUTING)]),
+    )
+    legs = find_legs({STATUS: told}, SPEC, DURATION_S)
+    ends = [(Status.ABORTED, 9.0), (Status.PREEMPTED, 14.0), (Status.PREEMPTED, 25.0), (None, 100.0)]
+    assert [(leg.status, leg.end_s) for leg in legs] == ends
+    one = mission({STATUS: told}, {"kind": "nav2_goals"})
+    assert [e.kind for e in KIND.evidence(one)] == ["abort", "cancel", "cancel", "timeout"]
+    assert value("goals_ended", one, status="aborted") == 1.0
+    assert value("goals_success", one) == 0.0
+
+
+def test_a_goal_of_rviz_lies_where_it_was_clicked() -> None:
+    pose = table([20.7], POSE_FIELDS, [("map", 7.0, 1.0, 0.0, 0.0, math.sin(0.5), math.cos(0.5))])
+    legs = find_legs(drive(goal_pose=pose), SPEC, DURATION_S)
+    assert [(leg.x, leg.frame) for leg in legs] == [(2.0, "odom"), (7.0, "map")]
+    assert legs[1].yaw == pytest.approx(1.0)
+    left = value("distance_left", mission(drive(goal_pose=pose)))
+    assert isinstance(left, Unavailable)
+    assert "frame map, odom" in left.reason
+    assert value("path_length", mission(drive(goal_pose=pose))) == pytest.approx(4.0, abs=0.01)
+
+
+def test_without_a_plan_nobody_knows_where_the_goal_lies() -> None:
+    one = mission(drive(plan=None))
+    assert KIND.mismatch(one) == "the log does not say where goal 1 lies"
+    left, made = value("distance_left", one), value("plan_length", one)
+    assert isinstance(left, Unavailable)
+    assert "ros2 bag record" in left.hint
+    assert isinstance(made, Unavailable)
+    assert value("goals_success", one) == 1.0
+
+
+def test_recoveries_and_failures_of_the_behavior_tree() -> None:
+    tree = table(
+        [12.0, 13.0, 14.0],
+        TREE_FIELDS,
+        [
+            (["ComputePathToPose", "FollowPath"], ["RUNNING", "RUNNING"], ["SUCCESS", "FAILURE"]),
+            (
+                ["RecoveryFallback", "ClearLocalCostmap-Context", "Spin"],
+                ["IDLE"] * 3,
+                ["RUNNING", "SUCCESS", "RUNNING"],
+            ),
+            (["Spin", "BackUp"], ["RUNNING", "IDLE"], ["SUCCESS", "RUNNING"]),
+        ],
+    )
+    one = mission(drive(behavior_tree_log=tree))
+    assert value("recoveries", one) == 3.0
+    assert value("recoveries", one, behavior="spin") == 1.0
+    assert value("tree_count", one, node="FollowPath") == 1.0
+    assert value("tree_count", one, node="ComputePathToPose") == 0.0
+    assert [e.text for e in KIND.evidence(one)] == [
+        "recovery behavior ClearLocalCostmap-Context", "recovery behavior Spin", "recovery behavior BackUp",
+    ]  # fmt: skip
+    unknown = value("recoveries", mission(drive()))
+    assert isinstance(unknown, Unavailable)
+    assert unknown.hint.endswith("ros2 bag record /behavior_tree_log")
+    assert value("recoveries", mission(drive()), absent=0) == 0.0
+
+
+def test_what_nodes_of_ros_2_said() -> None:
+    said = table(
+        [12.0, 13.0, 14.0],
+        ROSOUT_FIELDS,
+        [
+            (20.0, "controller_server", "Passing new path to controller."),
+            (40.0, "controller_server", "Failed to make progress"),
+            (30.0, "planner_server", "GridBased: failed to create plan with tolerance 0.50."),
+        ],
+    )
+    one = mission(drive(rosout=said))
+    assert value("rosout_count", one, node="controller_server") == 2.0
+    assert value("rosout_count", one, node="controller_server", level=8) == 1.0
+    assert value("rosout_count", one, level=4) == 2.0
+    assert [(e.kind, e.text) for e in KIND.evidence(one)] == [
+        ("planner", "controller_server: Failed to make progress"),
+        ("planner", "planner_server: GridBased: failed to create plan with tolerance 0.50."),
+    ]
+
+
+def test_a_log_without_goals_holds_no_mission() -> None:
+    assert KIND.missions({}, DURATION_S, SPEC) == ()
+    assert KIND.missions({STATUS: states()}, DURATION_S, SPEC) == ()
+    assert KIND.missions({STATUS: states((0.0, [(1, SUCCEEDED)]), (5.0, [(1, SUCCEEDED)]))}, DURATION_S, SPEC) == ()
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(0, 99), st.lists(st.tuples(st.integers(0, 5), st.integers(0, 7)), max_size=4)), max_size=12
+    )
+)
+def test_any_states_make_goals_in_order(told: list[tuple[float, list[tuple[int, int]]]]) -> None:
+    tables = {STATUS: states(*sorted(told, key=lambda one: one[0]))}
+    legs = find_legs(tables, SPEC, DURATION_S)
+    assert [leg.sent_s for leg in legs] == sorted(leg.sent_s for leg in legs)
+    assert all(leg.sent_s <= leg.end_s <= DURATION_S for leg in legs)
+    for one in KIND.missions(tables, DURATION_S, SPEC):
+        assert one.start_s <= one.end_s
+        KIND.evidence(one)
+        KIND.mismatch(one)
+
+
+def test_the_kind_reads_the_hidden_topic() -> None:
+    assert STATUS in KIND.needs(SPEC)
+    assert "/move_base/goal" not in KIND.needs(SPEC)
