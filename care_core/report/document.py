@@ -15,6 +15,7 @@ from care_core.configs import apply_commands, format_for, unified_diff
 from care_core.diagnose.records import (
     Cause,
     Change,
+    Circumstance,
     Confidence,
     Diagnosis,
     Fix,
@@ -23,7 +24,7 @@ from care_core.diagnose.records import (
     Since,
     Status,
 )
-from care_core.run import Value, is_known
+from care_core.run import Evidence, Value, is_known
 from care_core.text import clean
 from care_core.variables import Kind, Op
 
@@ -134,6 +135,28 @@ class SinceEntry(_Model):
     changes: list[ParameterChangeEntry]
 
 
+class EvidenceEntry(_Model):
+    """A message of the log that speaks about the failure."""
+
+    time_s: float | None
+    kind: str
+    text: str
+    options: list[str]
+    says: str
+
+
+class CircumstanceEntry(_Model):
+    """What the run met and no option set; `low` to `high` is where 95 % of the training runs lie."""
+
+    circumstance: str
+    variable: str | None
+    value: float | None
+    unit: str
+    low: float | None
+    high: float | None
+    text: str
+
+
 class TriageDocument(_Model):
     """The answer for one run, as `care triage --json` prints it."""
 
@@ -155,6 +178,9 @@ class TriageDocument(_Model):
     """Where the value of each option came from: a record or topic of the log, or file:line."""
     since: SinceEntry | None = None
     """Only with `--since`."""
+    evidence: list[EvidenceEntry] = Field(default_factory=list)
+    rivals: list[CircumstanceEntry] = Field(default_factory=list)
+    tell_more: list[str] = Field(default_factory=list)
 
 
 class Report(TriageDocument):
@@ -203,6 +229,9 @@ def build_document(diagnosis: Diagnosis) -> Report:
         notes=list(dict.fromkeys((*warnings, *(clean(note) for note in diagnosis.notes)))),
         sources={name: clean(source) for name, source in run.sources.items()},
         since=None if diagnosis.since is None else _since(diagnosis.since),
+        evidence=[_evidence(evidence) for evidence in run.evidence],
+        rivals=[_circumstance(rival) for rival in diagnosis.rivals],
+        tell_more=[clean(advice) for advice in diagnosis.tell_more],
         diff=unified_diff(run, diagnosis.fix) if diagnosis.fix is not None else "",
         apply=apply_commands(diagnosis.fix.changes, format_for(log.format, run.settings))
         if diagnosis.fix is not None
@@ -254,6 +283,28 @@ def _objective(result: ObjectiveResult) -> ObjectiveEntry:
         threshold=None if threshold is None else ThresholdEntry(op=threshold.op, value=threshold.value),
         status=result.status,
         reason=clean(result.reason) or None,
+    )
+
+
+def _evidence(evidence: Evidence) -> EvidenceEntry:
+    return EvidenceEntry(
+        time_s=_finite(evidence.time_s),
+        kind=evidence.kind,
+        text=clean(evidence.text),
+        options=list(evidence.options),
+        says=clean(evidence.says),
+    )
+
+
+def _circumstance(one: Circumstance) -> CircumstanceEntry:
+    return CircumstanceEntry(
+        circumstance=one.name,
+        variable=one.variable or None,
+        value=_finite(one.value),
+        unit=one.unit,
+        low=_finite(one.low),
+        high=_finite(one.high),
+        text=clean(one.text),
     )
 
 

@@ -29,6 +29,8 @@ def to_text(diagnosis: Diagnosis) -> str:
         _fix(diagnosis),
         _evidence(diagnosis),
         _since(diagnosis),
+        _rivals(diagnosis),
+        _tell_more(diagnosis),
         _notes(diagnosis),
     ]
     return "\n\n".join(text for text in ("\n".join(section) for section in sections) if text) + "\n"
@@ -180,8 +182,23 @@ def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
         return
     yield "Messages of this run"
     for item in evidence[-EVIDENCE_SHOWN:]:
+        says = f": {item.says}" if item.says else ""
         points = f" (points at {', '.join(item.options)})" if item.options else ""
-        yield from _wrapped(f"{item.text}{points}", f"  {item.time_s:8.1f} s  ")
+        yield from _wrapped(f"{item.text}{says}{points}", f"  {item.time_s:8.1f} s  ")
+
+
+def _rivals(diagnosis: Diagnosis) -> Iterator[str]:
+    if diagnosis.rivals:
+        yield "It may be no parameter"
+    for rival in diagnosis.rivals:
+        yield from _wrapped(f"{rival.name}: {rival.text}", "  - ")
+
+
+def _tell_more(diagnosis: Diagnosis) -> Iterator[str]:
+    if diagnosis.tell_more:
+        yield "What would tell more"
+    for advice in diagnosis.tell_more:
+        yield from _wrapped(advice, "  - ")
 
 
 def _since(diagnosis: Diagnosis) -> Iterator[str]:

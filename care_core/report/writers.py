@@ -75,13 +75,17 @@ def _markdown(report: Report) -> Iterator[str]:
     if report.since is not None:
         yield ""
         yield from _since_section(report.since)
-    if report.notes:
-        yield ""
-        yield "## Notes"
-        yield ""
-        yield from (f"- {_escape(note)}" for note in report.notes)
+    yield from _listed("It may be no parameter", (f"{one.circumstance}: {one.text}" for one in report.rivals))
+    yield from _listed("What would tell more", report.tell_more)
+    yield from _listed("Notes", report.notes)
     yield ""
     yield from _origin(report)
+
+
+def _listed(title: str, sentences: Iterable[str]) -> Iterator[str]:
+    lines = [f"- {_escape(sentence)}" for sentence in sentences]
+    if lines:
+        yield from ("", f"## {title}", "", *lines)
 
 
 def _verdict(report: Report) -> str:
