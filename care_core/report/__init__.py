@@ -2,16 +2,22 @@
 
 from care_core.report.document import Report, TriageDocument, build_document, json_schema
 from care_core.report.terminal import to_text
+from care_core.report.whatif import WhatIfDocument, whatif_document, whatif_json, whatif_schema, whatif_text
 from care_core.report.writers import to_json, to_markdown, to_yaml, write_atomically
 
 __all__ = [
     "Report",
     "TriageDocument",
+    "WhatIfDocument",
     "build_document",
     "json_schema",
     "to_json",
     "to_markdown",
     "to_text",
     "to_yaml",
+    "whatif_document",
+    "whatif_json",
+    "whatif_schema",
+    "whatif_text",
     "write_atomically",
 ]

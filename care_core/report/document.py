@@ -21,6 +21,7 @@ from care_core.diagnose.records import (
     Fix,
     ObjectiveResult,
     Prediction,
+    ProfileChoice,
     Since,
     Status,
 )
@@ -31,23 +32,25 @@ from care_core.variables import Kind, Op
 SCHEMA_ID: Final = "care.triage/1"
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+class Strict(BaseModel):
+    """The frame of every published document: nothing unknown, no number that JSON does not have."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
 
 
-class ProfileEntry(_Model):
+class ProfileEntry(Strict):
     name: str
     version: str
     platform: str
 
 
-class DamageEntry(_Model):
+class DamageEntry(Strict):
     what: str
     byte: int | None
     time_s: float | None
 
 
-class LogEntry(_Model):
+class LogEntry(Strict):
     path: str
     format: str
     start: str | None
@@ -56,12 +59,12 @@ class LogEntry(_Model):
     sha256: str
 
 
-class ThresholdEntry(_Model):
+class ThresholdEntry(Strict):
     op: Op
     value: float
 
 
-class ObjectiveEntry(_Model):
+class ObjectiveEntry(Strict):
     name: str
     value: float | None
     unit: str
@@ -71,7 +74,7 @@ class ObjectiveEntry(_Model):
     reason: str | None
 
 
-class PredictedValue(_Model):
+class PredictedValue(Strict):
     value: float
     low: float
     high: float
@@ -81,7 +84,7 @@ class PredictedObjective(PredictedValue):
     status: Status
 
 
-class CauseEntry(_Model):
+class CauseEntry(Strict):
     rank: int
     option: str
     path: list[str]
@@ -97,20 +100,20 @@ class CauseEntry(_Model):
     notes: list[str]
 
 
-class FaultEntry(_Model):
+class FaultEntry(Strict):
     objective: str
     causes: list[CauseEntry]
 
 
-class ChangeEntry(_Model):
+class ChangeEntry(Strict):
     option: str
     parameter: str | list[str]
-    from_: int | float = Field(serialization_alias="from")
+    from_: int | float = Field(validation_alias="from", serialization_alias="from")
     to: int | float
     reboot_required: bool
 
 
-class FixSet(_Model):
+class FixSet(Strict):
     changes: list[ChangeEntry]
     p_fixed: float
     predicted: dict[str, PredictedObjective]
@@ -120,14 +123,14 @@ class FixEntry(FixSet):
     alternatives: list[FixSet]
 
 
-class ParameterChangeEntry(_Model):
+class ParameterChangeEntry(Strict):
     parameter: str
     option: str | None
-    from_: float | str | None = Field(serialization_alias="from")
+    from_: float | str | None = Field(validation_alias="from", serialization_alias="from")
     to: float | str | None
 
 
-class SinceEntry(_Model):
+class SinceEntry(Strict):
     """What changed since a good run; `warnings` say what is odd about that log."""
 
     log: str
@@ -135,7 +138,7 @@ class SinceEntry(_Model):
     changes: list[ParameterChangeEntry]
 
 
-class EvidenceEntry(_Model):
+class EvidenceEntry(Strict):
     """A message of the log that speaks about the failure."""
 
     time_s: float | None
@@ -145,7 +148,7 @@ class EvidenceEntry(_Model):
     says: str
 
 
-class CircumstanceEntry(_Model):
+class CircumstanceEntry(Strict):
     """What the run met and no option set; `low` to `high` is where 95 % of the training runs lie."""
 
     circumstance: str
@@ -157,12 +160,14 @@ class CircumstanceEntry(_Model):
     text: str
 
 
-class TriageDocument(_Model):
+class TriageDocument(Strict):
     """The answer for one run, as `care triage --json` prints it."""
 
     model_config = ConfigDict(title=SCHEMA_ID)
 
-    schema_: Literal["care.triage/1"] = Field(default=SCHEMA_ID, serialization_alias="schema")
+    schema_: Literal["care.triage/1"] = Field(
+        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
+    )
     profile: ProfileEntry
     log: LogEntry
     config: dict[str, int | float]
@@ -200,9 +205,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
     run, log = diagnosis.run, diagnosis.run.log
     warnings = tuple(clean(warning) for warning in diagnosis.profile.warnings)
     return Report(
-        profile=ProfileEntry(
-            name=diagnosis.profile.name, version=diagnosis.profile.version, platform=diagnosis.profile.platform
-        ),
+        profile=profile_entry(diagnosis.profile),
         log=LogEntry(
             path=clean(log.path),
             format=log.format,
@@ -214,10 +217,10 @@ def build_document(diagnosis: Diagnosis) -> Report:
             ],
             sha256=log.sha256,
         ),
-        config={name: _plain(value) for name, value in run.config.items() if math.isfinite(value)},
+        config={name: plain_number(value) for name, value in run.config.items() if math.isfinite(value)},
         context=_values(run.context),
         metrics=_values(run.metrics),
-        objectives=[_objective(objective) for objective in diagnosis.objectives],
+        objectives=[objective_entry(objective) for objective in diagnosis.objectives],
         faults=[
             FaultEntry(
                 objective=fault.objective.variable.name, causes=[_cause(cause, warnings) for cause in fault.causes]
@@ -263,7 +266,7 @@ def _finite(value: float | None) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
 
 
-def _plain(value: float) -> int | float:
+def plain_number(value: float) -> int | float:
     """A whole number without its point, as configuration files have it."""
     return int(value) if float(value).is_integer() else float(value)
 
@@ -272,7 +275,13 @@ def _values(values: Mapping[str, Value]) -> dict[str, float | None]:
     return {name: _finite(value) if is_known(value) else None for name, value in values.items()}
 
 
-def _objective(result: ObjectiveResult) -> ObjectiveEntry:
+def profile_entry(choice: ProfileChoice) -> ProfileEntry:
+    """The profile that was used."""
+    return ProfileEntry(name=choice.name, version=choice.version, platform=choice.platform)
+
+
+def objective_entry(result: ObjectiveResult) -> ObjectiveEntry:
+    """An objective of a run against its threshold."""
     variable = result.variable
     threshold = result.threshold
     return ObjectiveEntry(
@@ -316,8 +325,8 @@ def _cause(cause: Cause, warnings: tuple[str, ...]) -> CauseEntry:
         path=[node.name for node in cause.path],
         path_ace=_finite(cause.path_ace),
         contribution=_finite(cause.contribution),
-        current=_plain(cause.current),
-        suggested=None if cause.suggested is None else _plain(cause.suggested),
+        current=plain_number(cause.current),
+        suggested=None if cause.suggested is None else plain_number(cause.suggested),
         predicted=None if cause.predicted is None else _predicted(cause.predicted),
         p_fixed=_finite(cause.p_fixed),
         confidence=cause.confidence,
@@ -334,6 +343,12 @@ def _predicted(prediction: Prediction) -> PredictedValue | None:
     return PredictedValue(value=value, low=low, high=high)
 
 
+def predicted_objective(prediction: Prediction) -> PredictedObjective | None:
+    """A prediction with what it means for the threshold, None where it has no finite value."""
+    value = _predicted(prediction)
+    return None if value is None else PredictedObjective(**value.model_dump(), status=prediction.status())
+
+
 def _fix(fix: Fix, alternatives: tuple[Fix, ...]) -> FixEntry:
     chosen = _fix_set(fix)
     return FixEntry(
@@ -345,12 +360,12 @@ def _fix(fix: Fix, alternatives: tuple[Fix, ...]) -> FixEntry:
 
 
 def _fix_set(fix: Fix) -> FixSet:
-    predicted = {}
-    for name, prediction in fix.predicted.items():
-        value = _predicted(prediction)
-        if value is not None:
-            predicted[name] = PredictedObjective(**value.model_dump(), status=prediction.status())
-    return FixSet(changes=[_change(change) for change in fix.changes], p_fixed=fix.p_fixed, predicted=predicted)
+    entries = {name: predicted_objective(prediction) for name, prediction in fix.predicted.items()}
+    return FixSet(
+        changes=[_change(change) for change in fix.changes],
+        p_fixed=fix.p_fixed,
+        predicted={name: entry for name, entry in entries.items() if entry is not None},
+    )
 
 
 def _change(change: Change) -> ChangeEntry:
@@ -358,7 +373,7 @@ def _change(change: Change) -> ChangeEntry:
     return ChangeEntry(
         option=change.option.name,
         parameter=parameters[0] if len(parameters) == 1 else list(parameters),
-        from_=_plain(change.current),
-        to=_plain(change.suggested),
+        from_=plain_number(change.current),
+        to=plain_number(change.suggested),
         reboot_required=change.option.reboot_required,
     )

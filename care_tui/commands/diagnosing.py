@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from care_core.errors import LogError, UsageError
-from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Out, ProfileName
+from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds
 from care_tui.console import Progress, emit, painted
 from care_tui.jobs import Request, diagnose_log, exit_code
 
@@ -35,10 +35,8 @@ def triage(
     keep: Annotated[
         list[str] | None, typer.Option("--keep", metavar="OPTION", help="Never change this option.")
     ] = None,
-    threshold: Annotated[
-        list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")
-    ] = None,
-    mission: Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last.")] = None,
+    threshold: Thresholds = None,
+    mission: Mission = None,
     since: Annotated[
         Path | None, typer.Option("--since", metavar="GOOD_LOG", help="List what changed since this good run.")
     ] = None,

@@ -22,3 +22,13 @@ def triage() -> None:
     from care_core.report import json_schema
 
     emit(dumps(json_schema(), indent=2) + "\n")
+
+
+@app.command("whatif")
+def whatif() -> None:
+    """Print the JSON Schema of 'care whatif --json'."""
+    from json import dumps
+
+    from care_core.report import whatif_schema
+
+    emit(dumps(whatif_schema(), indent=2) + "\n")
