@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,7 +11,7 @@ from care_core.errors import UsageError
 from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds
 from care_tui.commands.diagnosing import bounds
 from care_tui.console import Progress, emit
-from care_tui.jobs import Request, question_of
+from care_tui.jobs import Request, open_and_choose, question_of
 
 app = typer.Typer()
 
@@ -39,3 +40,25 @@ def whatif(
         question = question_of(request, progress)
     answer = question.ask(dict(parse_change(text, question.schema) for text in set_))
     emit((whatif_json if json else whatif_text)(question, answer), out)
+
+
+@app.command()
+def verify(
+    report: Annotated[Path, typer.Argument(metavar="REPORT", help="The report, YAML or JSON.", show_default=False)],
+    log: LogPath,
+    profile: ProfileName = None,
+    mission: Mission = None,
+    json: AsJson = False,
+    out: Out = None,
+) -> None:
+    """Did the fix of a report do what it promised? Ends with 0 recovered, 1 still a fault, 3 cannot tell."""
+    from care_core.report import read_report, verify_json, verify_log, verify_text
+    from care_core.report.verification import EXIT_CODES
+
+    promised = read_report(report)
+    with Progress() as progress:
+        progress("reading the log", 0.0)
+        opened, chosen, _ = open_and_choose(log, profile or promised.profile.name)
+        document = verify_log(promised, opened, chosen, mission)
+    emit((verify_json if json else verify_text)(document), out)
+    raise typer.Exit(EXIT_CODES[document.verdict])
