@@ -23,7 +23,7 @@ from tests.made import made_diagnosis
 from tests.planted import DEFAULTS, ENERGY, SCHEMA, SUCCESS, TIME, planted_run
 
 SLOW = {**DEFAULTS, "speed": 2.0}
-PROMISED = PromisedSet({"speed": (2.0, 5.0)}, 0.9, {"time": (150.0, 175.0), "energy": (12.0, 20.0)})
+PROMISED = PromisedSet({"speed": (2.0, 5.0)}, 0.9, {"time": (130.0, 150.0), "energy": (12.0, 20.0)})
 
 
 def promise(*others: PromisedSet) -> Promise:
