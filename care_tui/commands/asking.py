@@ -10,6 +10,7 @@ import typer
 from care_core.errors import UsageError
 from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds
 from care_tui.commands.diagnosing import bounds
+from care_tui.commands.past import NoHistory, remember
 from care_tui.console import Progress, emit
 from care_tui.jobs import Request, open_and_choose, question_of
 
@@ -50,6 +51,7 @@ def verify(
     mission: Mission = None,
     json: AsJson = False,
     out: Out = None,
+    no_history: NoHistory = False,
 ) -> None:
     """Did the fix of a report do what it promised? Ends with 0 recovered, 1 still a fault, 3 cannot tell."""
     from care_core.report import read_report, verify_json, verify_log, verify_text
@@ -60,5 +62,7 @@ def verify(
         progress("reading the log", 0.0)
         opened, chosen, _ = open_and_choose(log, profile or promised.profile.name)
         document = verify_log(promised, opened, chosen, mission)
+    if not no_history:
+        remember(lambda history: history.add_verification(document.model_dump(by_alias=True, mode="json")))
     emit((verify_json if json else verify_text)(document), out)
     raise typer.Exit(EXIT_CODES[document.verdict])

@@ -17,6 +17,14 @@ def _formats() -> None:
     pass
 
 
+@app.command("history")
+def history() -> None:
+    """Print the JSON Schema of 'care history --json'."""
+    from care_core.history.listing import history_schema
+
+    _print(history_schema())
+
+
 @app.command("triage")
 def triage() -> None:
     """Print the JSON Schema of 'care triage --json'."""
