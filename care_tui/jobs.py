@@ -47,6 +47,7 @@ def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
     """The whole line from a log file to its diagnosis. Raises CareError."""
     from care_core.configs import read_configs
     from care_core.diagnose.triage import triage
+    from care_core.logs import open_log
 
     configs = read_configs(request.configs)
     progress("opening the log", 0.0)
@@ -79,17 +80,14 @@ def open_and_choose(path: Path, profile: str | None) -> tuple[Log, Profile, Prof
 def question_of(request: Request, progress: Progress) -> Question:
     """A run ready to be asked what other options would have done. Raises CareError."""
     from care_core.configs import read_configs
-    from care_core.diagnose.faults import check_wishes
-    from care_core.diagnose.whatif import question
-    from care_core.extract.read import read_run
+    from care_core.diagnose.whatif import question_of_log
 
     configs = read_configs(request.configs)
     progress("reading the log", 0.0)
     log, profile, choice = open_and_choose(request.log, request.profile)
-    bounds = dict(request.thresholds)
-    check_wishes(profile.schema, (), bounds)
-    run = read_run(log, profile.schema, overrides=configs, mission=request.mission, judge_anyway=tuple(bounds))
-    return question(run, profile, choice, bounds)
+    return question_of_log(
+        log, profile, choice, configs=configs, thresholds=request.thresholds, mission=request.mission
+    )
 
 
 def diff_of(run: Run, fix: Fix) -> str:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from care_core.causal.counterfactual import Config, World
-from care_core.diagnose.faults import judge, thresholds_in_force
+from care_core.configs import ConfigFile, resolve
+from care_core.diagnose.faults import check_wishes, judge, thresholds_in_force
 from care_core.diagnose.fixes import change_notes, prediction
 from care_core.diagnose.records import Change, ObjectiveResult, Prediction, ProfileChoice
 from care_core.diagnose.worlds import reference_of, world_of
 from care_core.errors import UsageError, nearest
-from care_core.extract.settings import option_value
+from care_core.extract.read import read_run
+from care_core.extract.settings import option_value, readable
+from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.run import Run, Setting
@@ -108,6 +111,23 @@ def question(
     )
     asked.ask({})  # The mechanisms invert their covariance when first asked, which nobody should wait for at a key.
     return asked
+
+
+def question_of_log(
+    log: Log,
+    profile: Profile,
+    choice: ProfileChoice,
+    *,
+    configs: Sequence[ConfigFile] = (),
+    thresholds: Mapping[str, float] | None = None,
+    mission: int | None = None,
+) -> Question:
+    """Read one mission of a log and get it ready to be asked; the arguments are those of `triage`."""
+    bounds = dict(thresholds or {})
+    check_wishes(profile.schema, (), bounds)
+    given = resolve(configs, (parameter for option in profile.schema.options for parameter in readable(option)))
+    run = read_run(log, profile.schema, overrides=given, mission=mission, judge_anyway=tuple(bounds))
+    return question(run, profile, choice, bounds)
 
 
 def parse_change(text: str, schema: Schema) -> tuple[str, float]:
