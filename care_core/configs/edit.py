@@ -17,7 +17,9 @@ from care_core.errors import ConfigError
 from care_core.run import Setting, shown
 from care_core.variables import Variable
 
-_YAML_VALUE = r"""((?:[^#\n]*?[\s{{,]|\s*)["']?[\w/.~]*{key}["']?\s*:\s+)("[^"]*"|'[^']*'|[^\s#&*!|>\[{{,}}][^\s#,}}]*)(.*)"""
+_YAML_VALUE = (
+    r"""((?:[^#\n]*?[\s{{,]|\s*)["']?[\w/.~]*{key}["']?\s*:\s+)("[^"]*"|'[^']*'|[^\s#&*!|>\[{{,}}][^\s#,}}]*)(.*)"""
+)
 _LINES = {
     ConfigFormat.ARDUPILOT_PARAM: r"(\s*{key}(?:\s*,\s*|\s+))([^\s,#]+)(.*)",
     ConfigFormat.QGC_PARAMS: r"(\s*\d+\t\d+\t{key}\t)([^\t]+)(\t.*)",
