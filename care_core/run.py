@@ -62,6 +62,10 @@ class Evidence:
     kind: str
     """`refusal`, `failsafe`, `crash`, `planner`, ..., as named by the extractor that found it."""
     options: tuple[str, ...] = ()
+    says: str = ""
+    """What the message means, where the profile knows it."""
+    circumstance: str | None = None
+    """What the run met, where the message speaks of no parameter."""
 
 
 @dataclass(frozen=True, slots=True)

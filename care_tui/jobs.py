@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Literal
 from care_core.errors import CareError, ExitCode
 
 if TYPE_CHECKING:
-    from care_core.diagnose.records import Diagnosis, Fix
+    from care_core.diagnose.records import Diagnosis, Fix, ProfileChoice
+    from care_core.diagnose.whatif import Question
+    from care_core.logs.base import Log
+    from care_core.profile.store import Profile
     from care_core.run import Run
 
 Progress = Callable[[str, float], None]
@@ -45,14 +48,10 @@ def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
     from care_core.configs import read_configs
     from care_core.diagnose.triage import triage
     from care_core.logs import open_log
-    from care_core.profile.select import choose_profile
-    from care_core.profile.store import available_profiles, load_profile
 
     configs = read_configs(request.configs)
     progress("opening the log", 0.0)
-    log = open_log(request.log)
-    names: list[Path] | list[str] = available_profiles() if request.profile is None else [request.profile]
-    chosen, choice = choose_profile(log, [load_profile(name) for name in names])
+    log, chosen, choice = open_and_choose(request.log, request.profile)
     return triage(
         log,
         chosen,
@@ -64,6 +63,30 @@ def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
         since=None if request.since is None else open_log(request.since),
         top=request.top,
         progress=progress,
+    )
+
+
+def open_and_choose(path: Path, profile: str | None) -> tuple[Log, Profile, ProfileChoice]:
+    """A log with the profile that fits it, or the one that was named. Raises CareError."""
+    from care_core.logs import open_log
+    from care_core.profile.select import choose_profile
+    from care_core.profile.store import available_profiles, load_profile
+
+    log = open_log(path)
+    names: list[Path] | list[str] = available_profiles() if profile is None else [profile]
+    return (log, *choose_profile(log, [load_profile(name) for name in names]))
+
+
+def question_of(request: Request, progress: Progress) -> Question:
+    """A run ready to be asked what other options would have done. Raises CareError."""
+    from care_core.configs import read_configs
+    from care_core.diagnose.whatif import question_of_log
+
+    configs = read_configs(request.configs)
+    progress("reading the log", 0.0)
+    log, profile, choice = open_and_choose(request.log, request.profile)
+    return question_of_log(
+        log, profile, choice, configs=configs, thresholds=request.thresholds, mission=request.mission
     )
 
 

@@ -174,6 +174,16 @@ class Mechanism:
         """Continuous targets: that quantile of the standardised error."""
         return float(np.quantile(self.calibration, share))
 
+    def residual_share(self, x: FloatArray, value: float) -> tuple[float, float]:
+        """Continuous targets: the share of training runs whose error lies below that of `value` at one place, and what
+        was expected there. x: (1, p). An error that no training run had is 0 or 1."""
+        if value <= LEAST[self.transform]:
+            return 0.0, float(self.expected(x)[0])
+        spread = np.sqrt(self.latent_spread(x) ** 2 + self.noise_spread**2)
+        z = (transformed(np.array([value]), self.transform) - self.latent(x)) / spread
+        share = np.searchsorted(self.calibration, z)[0] / len(self.calibration)
+        return float(share), float(self.expected(x)[0])
+
     def expected(self, x: FloatArray) -> FloatArray:
         """Expected value in the target's own unit; the odds of 1 for binary targets."""
         return self.odds(x) if self.binary else restored(self.latent(x), self.transform)

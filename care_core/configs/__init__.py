@@ -30,7 +30,10 @@ __all__ = [
     "guesses",
     "read_config",
     "read_configs",
+    "read_text",
     "resolve",
+    "split_name",
+    "text_for",
     "unified_diff",
     "write_params",
 ]
@@ -112,7 +115,11 @@ def read_config(path: str | Path, namespace: str = "") -> Mapping[str, Setting]:
 
 
 def _read(path: Path, namespace: str) -> ConfigFile:
-    text = _text(path)
+    return read_text(_text(path), path, namespace)
+
+
+def read_text(text: str, path: Path, namespace: str = "") -> ConfigFile:
+    """A configuration file's text as `read_configs` reads the file. Raises ConfigError."""
     format = format_of(text, path)
     if not namespace:
         return ConfigFile(str(path), format, _MODULES[format].read(text, path))
@@ -121,6 +128,12 @@ def _read(path: Path, namespace: str) -> ConfigFile:
             "Only ROS parameters have namespaces.", hint=f"Leave '{namespace}=' out.", where=f"{namespace}={path}"
         )
     return ConfigFile(f"{namespace}={path}", format, _MODULES[format].read(text, path, namespace))
+
+
+def text_for(format: ConfigFormat, option: Variable, value: float) -> str:
+    """An option's value as a file of that format has it."""
+    text: str = _MODULES[format].text_of(option, value)
+    return text
 
 
 def _text(path: Path) -> str:
@@ -140,10 +153,11 @@ def read_configs(named: Iterable[str | Path]) -> tuple[ConfigFile, ...]:
     Raises:
         ConfigError: as `read_config`.
     """
-    return tuple(_read(*_split(str(name))) for name in named)
+    return tuple(_read(*split_name(str(name))) for name in named)
 
 
-def _split(named: str) -> tuple[Path, str]:
+def split_name(named: str) -> tuple[Path, str]:
+    """The file and the namespace of `FILE` or `NAMESPACE=FILE`. Raises ConfigError."""
     namespace, equals, path = named.partition("=")
     if not equals or Path(named).exists():
         return Path(named), ""

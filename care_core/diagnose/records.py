@@ -109,6 +109,40 @@ class Fix:
 
 
 @dataclass(frozen=True, slots=True)
+class Circumstance:
+    """What this run met and no option set: a rival to the causes named."""
+
+    name: str
+    """`wind`, `battery`, ... as the profile calls it."""
+    variable: str
+    """The context or metric that shows it; empty where a message says so."""
+    value: float | None
+    unit: str
+    low: float | None
+    high: float | None
+    """Where 95 % of the training runs lie."""
+    share: float
+    """Share of the training runs that lie farther out (a metric: than its configuration explains)."""
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """What would tell two causes apart: one option changed alone, and the odds of success under each hypothesis."""
+
+    objective: str
+    option: Variable
+    value: float
+    if_cause: tuple[tuple[str, float], ...]
+    """(the cause, odds that the objective then keeps its threshold), the leading cause first."""
+
+    def __str__(self) -> str:
+        change = f"change only {self.option.name} to {self.option.show(self.value)} and run again"
+        odds = ", ".join(f"{p:.0%} if the cause is {name}" for name, p in self.if_cause)
+        return f"{change}: odds of a good {self.objective} are {odds}"
+
+
+@dataclass(frozen=True, slots=True)
 class ProfileChoice:
     """The profile that was used, and how it was chosen."""
 
@@ -158,3 +192,7 @@ class Diagnosis:
     notes: tuple[str, ...] = field(default=())
     since: Since | None = None
     """The comparison with a good log, where one was named."""
+    rivals: tuple[Circumstance, ...] = ()
+    """What the run met that may explain the fault instead; only where no cause is sure."""
+    tell_more: tuple[str, ...] = ()
+    """What would tell more: a metric to record, an experiment; only where no cause is sure."""

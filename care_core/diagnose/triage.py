@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from care_core.causal.counterfactual import Config, World
 from care_core.configs import ConfigFile, resolve
 from care_core.diagnose import provenance
+from care_core.diagnose.circumstances import circumstances
+from care_core.diagnose.evidence import refused_by, said
 from care_core.diagnose.faults import check_wishes, judge, thresholds_in_force
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
@@ -24,16 +26,17 @@ from care_core.diagnose.ranking import (
     describe_path,
     deviating,
     not_ruled_out,
-    reference_config,
     suspects,
 )
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
 from care_core.diagnose.since import compare, with_evidence
+from care_core.diagnose.tell_more import tell_more
+from care_core.diagnose.worlds import reference_of, world_of
 from care_core.extract.read import read_run
 from care_core.extract.settings import readable
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
-from care_core.run import Run, is_known
+from care_core.run import Run
 
 MIN_CONTRIBUTION = 0.02
 """Odds an option must cost before it is called a cause of this run."""
@@ -123,11 +126,8 @@ def diagnose(
     if not broken:
         return Diagnosis(choice, run, objectives, (), None)
     report("ranking the causes", 0.7)
-    # A context is met, not set: the reference configuration is judged under this run's.
-    met = {name: value for name, value in run.context.items() if is_known(value)}
-    reference = {**reference_config(schema, model), **met}
-    config = {**reference, **run.config}
-    world = World(model, config, {**run.metrics, **run.objectives}, bounds)
+    reference = reference_of(run, profile)
+    world = world_of(run, profile, bounds)
     case = _Case(
         profile, choice, run, world, reference, keep, frozenset(v.name for v in schema.options) - frozenset(run.config)
     )
@@ -136,6 +136,7 @@ def diagnose(
     report("searching for a fix", 0.85)
     fixes = _fixes(case, {s.option for group in found.values() for s in group})
     abstained = _abstains(case, faults, fixes)
+    unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     report("done", 1.0)
     return Diagnosis(
         profile=choice,
@@ -146,16 +147,21 @@ def diagnose(
         alternatives=() if abstained else tuple(fixes[1:]),
         abstained=abstained,
         notes=_notes(case),
+        rivals=circumstances(run, world, schema) if unsure else (),
+        tell_more=tell_more(world, faults, run, schema.variables, reference, keep) if unsure else (),
     )
 
 
 def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
-    """Options that cost this run; where none of them convinces, a few leads that are not ruled out behind them."""
-    named = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION]
-    if not named or named[0].contribution < CONVINCING:
+    """Options that cost this run, those that a failed check names first; where none of them convinces, a few leads
+    that are not ruled out behind them."""
+    others = not_ruled_out(case.world, result.variable.name, case.reference, case.profile.schema, found)
+    refused = refused_by(case.run) if result.variable.kind == "functional" else frozenset()
+    first = [suspect for suspect in (*found, *others) if suspect.option in refused]
+    named = first + [s for s in found if s.contribution >= MIN_CONTRIBUTION and s not in first]
+    if not named or (not first and named[0].contribution < CONVINCING):
         weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION]
-        weak += not_ruled_out(case.world, result.variable.name, case.reference, case.profile.schema, found)
-        named += weak[: max(0, LEADS - len(named))]
+        named += [*weak, *others][: max(0, LEADS - len(named))]
     return tuple(_cause(case, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
 
 
@@ -178,18 +184,22 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         suggested=None if best is None else best[0],
         predicted=None if best is None else prediction(world, result.variable.name, changed),
         p_fixed=None if best is None else best[1],
-        confidence=_confidence(case, suspect.contribution, in_support, support),
+        confidence=_confidence(case, suspect, in_support, support),
         in_support=in_support,
         notes=_cause_notes(case, suspect, in_support, support),
-        is_lead=suspect.contribution < MIN_CONTRIBUTION,
+        is_lead=suspect.contribution < MIN_CONTRIBUTION and name not in refused_by(case.run),
     )
 
 
-def _confidence(case: _Case, contribution: float, in_support: bool, support: float) -> Confidence:
-    """High where the option explains most of the fault and nearly every resample gives it a path there."""
+def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float) -> Confidence:
+    """High where the option explains most of the fault and nearly every resample gives it a path there.
+
+    A check that refused this run and reads the option's value is worth more than a doubt about the model.
+    """
+    contribution = suspect.contribution
     doubtful = not in_support or bool(case.choice.warnings) or not case.run.mission.fits
     if doubtful or support < LOW_SUPPORT or contribution < UNSURE:
-        return "low"
+        return "medium" if suspect.option in refused_by(case.run) else "low"
     if support >= HIGH_SUPPORT and contribution >= SURE:
         return "high"
     return "medium"
@@ -209,7 +219,7 @@ def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float
     if suspect.option in case.keep:
         notes.append("pinned by --keep: not changed")
     notes += change_notes(case.profile.schema.variables[suspect.option])
-    notes += [f"this run says: {e.text}" for e in case.run.evidence if suspect.option in e.options]
+    notes += [said(evidence) for evidence in case.run.evidence if suspect.option in evidence.options]
     return tuple(notes)
 
 

@@ -150,7 +150,7 @@ class _Source:
                 fits=not mismatch,
                 mismatch=mismatch,
             ),
-            evidence=tuple(_pointed(evidence, self.schema) for evidence in self.kind.evidence(mission)),
+            evidence=tuple(_pointed(evidence, self.schema, config) for evidence in self.kind.evidence(mission)),
             changes=_changes(self.settings, mission),
         )
 
@@ -174,11 +174,16 @@ def _extract(variable: Variable, mission: Mission) -> Value:
     return find_extractor(variable.extract.kind).compute(mission, variable.extract.args)
 
 
-def _pointed(evidence: Evidence, schema: Schema) -> Evidence:
-    """The evidence with the options that the profile's rules add to those the extractor named."""
-    text = evidence.text.casefold()
-    named = [option for rule, options in schema.evidence if rule.casefold() in text for option in options]
-    return replace(evidence, options=tuple(dict.fromkeys((*evidence.options, *named))))
+def _pointed(evidence: Evidence, schema: Schema, config: Mapping[str, float]) -> Evidence:
+    """The evidence with what the profile's rules read out of its text."""
+    rules = [rule for rule in schema.evidence if rule.pattern.search(evidence.text)]
+    named = [option for rule in rules for option in rule.points_at(schema.variables, config)]
+    return replace(
+        evidence,
+        options=tuple(dict.fromkeys((*evidence.options, *named))),
+        says=next((rule.says for rule in rules if rule.says), evidence.says),
+        circumstance=next((rule.circumstance for rule in rules if rule.circumstance), evidence.circumstance),
+    )
 
 
 def _cut_short(mission: Mission, log: LogInfo) -> bool:

@@ -89,6 +89,10 @@ class Summary(_Record):
         """Share (0 to 1) of the training runs with a smaller value."""
         return float(np.interp(value, self.quantiles, np.linspace(0, 1, len(self.quantiles))))
 
+    def quantile(self, share: float) -> float:
+        """The value that this share of the training runs stays below."""
+        return float(np.interp(share, np.linspace(0, 1, len(self.quantiles)), self.quantiles))
+
 
 class StageRecord(_Record):
     """One condition on the way to a functional objective: the mission passes when `variable` equals `passes`."""

@@ -6,12 +6,13 @@ pydantic stays inside this module; the rest of the core sees `Schema` and `Varia
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -19,6 +20,9 @@ from care_core.errors import ProfileError, nearest
 from care_core.variables import Extract, Kind, Op, Role, Threshold, ValueType, Variable
 
 SCHEMA_VERSION = 1
+
+Side = Literal["low", "high"]
+"""On which side of what training saw a value is bad."""
 
 
 class _Strict(BaseModel):
@@ -73,7 +77,18 @@ class _Match(_Strict):
 
 class _EvidenceRule(_Strict):
     text: str
-    options: list[str]
+    options: list[str] | dict[str, _Threshold] = Field(default_factory=list)
+    says: str = ""
+    circumstance: str | None = None
+
+    @field_validator("text")
+    @classmethod
+    def _is_pattern(cls, text: str) -> str:
+        try:
+            re.compile(text)
+        except re.error as err:
+            raise ValueError(f"not a regular expression: {err}") from None
+        return text
 
 
 class _Profile(_Strict):
@@ -87,7 +102,50 @@ class _Profile(_Strict):
     observational: bool = False
     mission: dict[str, Any] = Field(default_factory=dict)
     evidence: list[_EvidenceRule] = Field(default_factory=list)
+    circumstances: dict[str, dict[str, Side]] = Field(default_factory=dict)
     variables: dict[str, _Variable]
+
+    @model_validator(mode="after")
+    def _names_are_declared(self) -> _Profile:
+        options = [name for name, variable in self.variables.items() if variable.role is Role.OPTION]
+        met = [name for name, variable in self.variables.items() if variable.role in (Role.CONTEXT, Role.METRIC)]
+        for rule in self.evidence:
+            _declared(rule.options, options, f"evidence '{rule.text}' names the option")
+            if rule.circumstance is not None:
+                _declared([rule.circumstance], self.circumstances, f"evidence '{rule.text}' names the circumstance")
+        for name, sides in self.circumstances.items():
+            _declared(sides, met, f"circumstance '{name}' names the context or metric")
+        return self
+
+
+def _declared(names: Iterable[str], known: Iterable[str], what: str) -> None:
+    known = tuple(known)
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{what} '{name}', which the profile does not declare. {nearest(name, known)}".strip())
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceRule:
+    """What a message of the log says about a mission: the options that its check reads, or what the run met."""
+
+    pattern: re.Pattern[str]
+    """Searched in the message, ignoring case."""
+    options: Mapping[str, Threshold | None]
+    """The value that sets the check off; None: any value but the default."""
+    says: str = ""
+    """The check in an operator's words."""
+    circumstance: str | None = None
+    """What the run met, where the message speaks of no parameter."""
+
+    def points_at(self, variables: Mapping[str, Variable], config: Mapping[str, float]) -> tuple[str, ...]:
+        """The rule's options whose value in this run sets the check off; an option of unknown value may."""
+        return tuple(
+            name
+            for name, bound in self.options.items()
+            if name not in config
+            or (bound.met(config[name]) if bound is not None else config[name] != variables[name].default)
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +163,11 @@ class Schema:
     observational: bool
     """True when operators chose options by what they met, so context may cause options (DESIGN section 6)."""
     mission: Mapping[str, Any]
-    evidence: tuple[tuple[str, tuple[str, ...]], ...]
-    """Text found in a message of the log -> the options it points at."""
+    evidence: tuple[EvidenceRule, ...]
+    """What messages of the log point at."""
     variables: Mapping[str, Variable]
+    circumstances: Mapping[str, Mapping[str, Side]] = field(default_factory=dict)
+    """What no parameter sets (wind, battery) -> the contexts and metrics that show it, and their bad side."""
     digest: str = field(default="", compare=False)
     """SHA-256 of the variables' names, roles, types, ranges and extraction: what a model was learned for."""
 
@@ -183,9 +243,20 @@ def _to_schema(data: _Profile) -> Schema:
         logs=tuple(data.logs),
         observational=data.observational,
         mission=data.mission,
-        evidence=tuple((rule.text, tuple(rule.options)) for rule in data.evidence),
+        evidence=tuple(map(_to_rule, data.evidence)),
         variables=variables,
+        circumstances=data.circumstances,
         digest=_digest(variables),
+    )
+
+
+def _to_rule(rule: _EvidenceRule) -> EvidenceRule:
+    bounds = rule.options if isinstance(rule.options, dict) else dict.fromkeys(rule.options)
+    return EvidenceRule(
+        pattern=re.compile(rule.text, re.IGNORECASE),
+        options={name: None if b is None else Threshold(b.op, b.value) for name, b in bounds.items()},
+        says=rule.says,
+        circumstance=rule.circumstance,
     )
 
 

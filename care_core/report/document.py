@@ -15,38 +15,42 @@ from care_core.configs import apply_commands, format_for, unified_diff
 from care_core.diagnose.records import (
     Cause,
     Change,
+    Circumstance,
     Confidence,
     Diagnosis,
     Fix,
     ObjectiveResult,
     Prediction,
+    ProfileChoice,
     Since,
     Status,
 )
-from care_core.run import Value, is_known
+from care_core.run import Evidence, Value, is_known
 from care_core.text import clean
 from care_core.variables import Kind, Op
 
 SCHEMA_ID: Final = "care.triage/1"
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+class Strict(BaseModel):
+    """The frame of every published document: nothing unknown, no number that JSON does not have."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
 
 
-class ProfileEntry(_Model):
+class ProfileEntry(Strict):
     name: str
     version: str
     platform: str
 
 
-class DamageEntry(_Model):
+class DamageEntry(Strict):
     what: str
     byte: int | None
     time_s: float | None
 
 
-class LogEntry(_Model):
+class LogEntry(Strict):
     path: str
     format: str
     start: str | None
@@ -55,12 +59,12 @@ class LogEntry(_Model):
     sha256: str
 
 
-class ThresholdEntry(_Model):
+class ThresholdEntry(Strict):
     op: Op
     value: float
 
 
-class ObjectiveEntry(_Model):
+class ObjectiveEntry(Strict):
     name: str
     value: float | None
     unit: str
@@ -70,7 +74,7 @@ class ObjectiveEntry(_Model):
     reason: str | None
 
 
-class PredictedValue(_Model):
+class PredictedValue(Strict):
     value: float
     low: float
     high: float
@@ -80,7 +84,7 @@ class PredictedObjective(PredictedValue):
     status: Status
 
 
-class CauseEntry(_Model):
+class CauseEntry(Strict):
     rank: int
     option: str
     path: list[str]
@@ -96,20 +100,20 @@ class CauseEntry(_Model):
     notes: list[str]
 
 
-class FaultEntry(_Model):
+class FaultEntry(Strict):
     objective: str
     causes: list[CauseEntry]
 
 
-class ChangeEntry(_Model):
+class ChangeEntry(Strict):
     option: str
     parameter: str | list[str]
-    from_: int | float = Field(serialization_alias="from")
+    from_: int | float = Field(validation_alias="from", serialization_alias="from")
     to: int | float
     reboot_required: bool
 
 
-class FixSet(_Model):
+class FixSet(Strict):
     changes: list[ChangeEntry]
     p_fixed: float
     predicted: dict[str, PredictedObjective]
@@ -119,14 +123,14 @@ class FixEntry(FixSet):
     alternatives: list[FixSet]
 
 
-class ParameterChangeEntry(_Model):
+class ParameterChangeEntry(Strict):
     parameter: str
     option: str | None
-    from_: float | str | None = Field(serialization_alias="from")
+    from_: float | str | None = Field(validation_alias="from", serialization_alias="from")
     to: float | str | None
 
 
-class SinceEntry(_Model):
+class SinceEntry(Strict):
     """What changed since a good run; `warnings` say what is odd about that log."""
 
     log: str
@@ -134,12 +138,36 @@ class SinceEntry(_Model):
     changes: list[ParameterChangeEntry]
 
 
-class TriageDocument(_Model):
+class EvidenceEntry(Strict):
+    """A message of the log that speaks about the failure."""
+
+    time_s: float | None
+    kind: str
+    text: str
+    options: list[str]
+    says: str
+
+
+class CircumstanceEntry(Strict):
+    """What the run met and no option set; `low` to `high` is where 95 % of the training runs lie."""
+
+    circumstance: str
+    variable: str | None
+    value: float | None
+    unit: str
+    low: float | None
+    high: float | None
+    text: str
+
+
+class TriageDocument(Strict):
     """The answer for one run, as `care triage --json` prints it."""
 
     model_config = ConfigDict(title=SCHEMA_ID)
 
-    schema_: Literal["care.triage/1"] = Field(default=SCHEMA_ID, serialization_alias="schema")
+    schema_: Literal["care.triage/1"] = Field(
+        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
+    )
     profile: ProfileEntry
     log: LogEntry
     config: dict[str, int | float]
@@ -155,6 +183,9 @@ class TriageDocument(_Model):
     """Where the value of each option came from: a record or topic of the log, or file:line."""
     since: SinceEntry | None = None
     """Only with `--since`."""
+    evidence: list[EvidenceEntry] = Field(default_factory=list)
+    rivals: list[CircumstanceEntry] = Field(default_factory=list)
+    tell_more: list[str] = Field(default_factory=list)
 
 
 class Report(TriageDocument):
@@ -174,9 +205,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
     run, log = diagnosis.run, diagnosis.run.log
     warnings = tuple(clean(warning) for warning in diagnosis.profile.warnings)
     return Report(
-        profile=ProfileEntry(
-            name=diagnosis.profile.name, version=diagnosis.profile.version, platform=diagnosis.profile.platform
-        ),
+        profile=profile_entry(diagnosis.profile),
         log=LogEntry(
             path=clean(log.path),
             format=log.format,
@@ -188,10 +217,10 @@ def build_document(diagnosis: Diagnosis) -> Report:
             ],
             sha256=log.sha256,
         ),
-        config={name: _plain(value) for name, value in run.config.items() if math.isfinite(value)},
+        config={name: plain_number(value) for name, value in run.config.items() if math.isfinite(value)},
         context=_values(run.context),
         metrics=_values(run.metrics),
-        objectives=[_objective(objective) for objective in diagnosis.objectives],
+        objectives=[objective_entry(objective) for objective in diagnosis.objectives],
         faults=[
             FaultEntry(
                 objective=fault.objective.variable.name, causes=[_cause(cause, warnings) for cause in fault.causes]
@@ -203,6 +232,9 @@ def build_document(diagnosis: Diagnosis) -> Report:
         notes=list(dict.fromkeys((*warnings, *(clean(note) for note in diagnosis.notes)))),
         sources={name: clean(source) for name, source in run.sources.items()},
         since=None if diagnosis.since is None else _since(diagnosis.since),
+        evidence=[_evidence(evidence) for evidence in run.evidence],
+        rivals=[_circumstance(rival) for rival in diagnosis.rivals],
+        tell_more=[clean(advice) for advice in diagnosis.tell_more],
         diff=unified_diff(run, diagnosis.fix) if diagnosis.fix is not None else "",
         apply=apply_commands(diagnosis.fix.changes, format_for(log.format, run.settings))
         if diagnosis.fix is not None
@@ -234,7 +266,7 @@ def _finite(value: float | None) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
 
 
-def _plain(value: float) -> int | float:
+def plain_number(value: float) -> int | float:
     """A whole number without its point, as configuration files have it."""
     return int(value) if float(value).is_integer() else float(value)
 
@@ -243,7 +275,13 @@ def _values(values: Mapping[str, Value]) -> dict[str, float | None]:
     return {name: _finite(value) if is_known(value) else None for name, value in values.items()}
 
 
-def _objective(result: ObjectiveResult) -> ObjectiveEntry:
+def profile_entry(choice: ProfileChoice) -> ProfileEntry:
+    """The profile that was used."""
+    return ProfileEntry(name=choice.name, version=choice.version, platform=choice.platform)
+
+
+def objective_entry(result: ObjectiveResult) -> ObjectiveEntry:
+    """An objective of a run against its threshold."""
     variable = result.variable
     threshold = result.threshold
     return ObjectiveEntry(
@@ -257,6 +295,28 @@ def _objective(result: ObjectiveResult) -> ObjectiveEntry:
     )
 
 
+def _evidence(evidence: Evidence) -> EvidenceEntry:
+    return EvidenceEntry(
+        time_s=_finite(evidence.time_s),
+        kind=evidence.kind,
+        text=clean(evidence.text),
+        options=list(evidence.options),
+        says=clean(evidence.says),
+    )
+
+
+def _circumstance(one: Circumstance) -> CircumstanceEntry:
+    return CircumstanceEntry(
+        circumstance=one.name,
+        variable=one.variable or None,
+        value=_finite(one.value),
+        unit=one.unit,
+        low=_finite(one.low),
+        high=_finite(one.high),
+        text=clean(one.text),
+    )
+
+
 def _cause(cause: Cause, warnings: tuple[str, ...]) -> CauseEntry:
     notes = [clean(note) for note in cause.notes]
     return CauseEntry(
@@ -265,8 +325,8 @@ def _cause(cause: Cause, warnings: tuple[str, ...]) -> CauseEntry:
         path=[node.name for node in cause.path],
         path_ace=_finite(cause.path_ace),
         contribution=_finite(cause.contribution),
-        current=_plain(cause.current),
-        suggested=None if cause.suggested is None else _plain(cause.suggested),
+        current=plain_number(cause.current),
+        suggested=None if cause.suggested is None else plain_number(cause.suggested),
         predicted=None if cause.predicted is None else _predicted(cause.predicted),
         p_fixed=_finite(cause.p_fixed),
         confidence=cause.confidence,
@@ -283,6 +343,12 @@ def _predicted(prediction: Prediction) -> PredictedValue | None:
     return PredictedValue(value=value, low=low, high=high)
 
 
+def predicted_objective(prediction: Prediction) -> PredictedObjective | None:
+    """A prediction with what it means for the threshold, None where it has no finite value."""
+    value = _predicted(prediction)
+    return None if value is None else PredictedObjective(**value.model_dump(), status=prediction.status())
+
+
 def _fix(fix: Fix, alternatives: tuple[Fix, ...]) -> FixEntry:
     chosen = _fix_set(fix)
     return FixEntry(
@@ -294,12 +360,12 @@ def _fix(fix: Fix, alternatives: tuple[Fix, ...]) -> FixEntry:
 
 
 def _fix_set(fix: Fix) -> FixSet:
-    predicted = {}
-    for name, prediction in fix.predicted.items():
-        value = _predicted(prediction)
-        if value is not None:
-            predicted[name] = PredictedObjective(**value.model_dump(), status=prediction.status())
-    return FixSet(changes=[_change(change) for change in fix.changes], p_fixed=fix.p_fixed, predicted=predicted)
+    entries = {name: predicted_objective(prediction) for name, prediction in fix.predicted.items()}
+    return FixSet(
+        changes=[_change(change) for change in fix.changes],
+        p_fixed=fix.p_fixed,
+        predicted={name: entry for name, entry in entries.items() if entry is not None},
+    )
 
 
 def _change(change: Change) -> ChangeEntry:
@@ -307,7 +373,7 @@ def _change(change: Change) -> ChangeEntry:
     return ChangeEntry(
         option=change.option.name,
         parameter=parameters[0] if len(parameters) == 1 else list(parameters),
-        from_=_plain(change.current),
-        to=_plain(change.suggested),
+        from_=plain_number(change.current),
+        to=plain_number(change.suggested),
         reboot_required=change.option.reboot_required,
     )

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
 from care_core.configs import apply_commands, format_for, unified_diff
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
 from care_core.report.writers import STATUS_WORDS
-from care_core.text import clean
+from care_core.text import clean, wrapped
 from care_core.variables import Variable
 
-WIDTH = 80
 EVIDENCE_SHOWN = 5
 DAMAGE_SHOWN = 5
 CHANGES_SHOWN = 20
@@ -29,29 +27,26 @@ def to_text(diagnosis: Diagnosis) -> str:
         _fix(diagnosis),
         _evidence(diagnosis),
         _since(diagnosis),
+        _rivals(diagnosis),
+        _tell_more(diagnosis),
         _notes(diagnosis),
     ]
     return "\n\n".join(text for text in ("\n".join(section) for section in sections) if text) + "\n"
-
-
-def _wrapped(text: str, first: str = "", rest: str | None = None) -> list[str]:
-    indent = " " * len(first) if rest is None else rest
-    return textwrap.wrap(clean(text), WIDTH, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
 
 
 def _headline(diagnosis: Diagnosis) -> Iterator[str]:
     broken = [_measured(objective) for objective in diagnosis.objectives if objective.status == "fault"]
     unknown = [objective.variable.name for objective in diagnosis.objectives if objective.status == "not_evaluated"]
     if broken:
-        yield from _wrapped("; ".join(broken), "FAULT: ")
+        yield from wrapped("; ".join(broken), "FAULT: ")
     elif unknown:
-        yield from _wrapped(f"no fault found, but {', '.join(unknown)} could not be evaluated", "NOT EVALUATED: ")
+        yield from wrapped(f"no fault found, but {', '.join(unknown)} could not be evaluated", "NOT EVALUATED: ")
     else:
         yield "OK: all objectives are within their thresholds"
     if diagnosis.abstained:
-        yield from _wrapped(diagnosis.abstained, "No answer: ")
+        yield from wrapped(diagnosis.abstained, "No answer: ")
     if diagnosis.fix is not None:
-        yield from _wrapped(_summary(diagnosis, diagnosis.fix))
+        yield from wrapped(_summary(diagnosis, diagnosis.fix))
 
 
 def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
@@ -79,13 +74,13 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     facts = "".join(f", {name} {fact}" for name, fact in run.log.facts.items())
     mission = f"mission {run.mission.index} of {run.mission.count}"
     duration = f"{run.mission.end_s - run.mission.start_s:.0f} s"
-    yield from _wrapped(f"{Path(run.log.path).name}, {mission}, {duration}{facts}", "Log      ")
-    yield from _wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
+    yield from wrapped(f"{Path(run.log.path).name}, {mission}, {duration}{facts}", "Log      ")
+    yield from wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
     for warning in profile.warnings:
-        yield from _wrapped(warning, "Warning  ")
+        yield from wrapped(warning, "Warning  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
         at = "" if damage.time_s is None else f" at {damage.time_s:.1f} s"
-        yield from _wrapped(f"{damage.what}{at}", "Damage   ")
+        yield from wrapped(f"{damage.what}{at}", "Damage   ")
     if len(run.log.damage) > DAMAGE_SHOWN:
         yield f"Damage   and {len(run.log.damage) - DAMAGE_SHOWN} more places, 'care inspect' lists them"
 
@@ -100,7 +95,7 @@ def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
         line = f"  {word:<13}  {objective.variable.name:<{name_width}}  {value:>8}  {wanted} {objective.variable.unit}"
         yield line.rstrip()
         if objective.reason:
-            yield from _wrapped(objective.reason, " " * 17)
+            yield from wrapped(objective.reason, " " * 17)
 
 
 def _causes(fault: Fault) -> Iterator[str]:
@@ -112,7 +107,7 @@ def _causes(fault: Fault) -> Iterator[str]:
         yield from _cause(cause)
     leads = [f"{c.option.name} ({c.option.show(c.current)})" for c in fault.causes if c.is_lead]
     if leads:
-        yield from _wrapped(f"not ruled out: {', '.join(leads)}", "  ", "    ")
+        yield from wrapped(f"not ruled out: {', '.join(leads)}", "  ", "    ")
 
 
 def _cause(cause: Cause) -> Iterator[str]:
@@ -125,13 +120,13 @@ def _cause(cause: Cause) -> Iterator[str]:
         facts.insert(0, f"{cause.p_fixed:.0%} fixed by it alone")
     if not cause.in_support:
         facts.append("outside the training runs")
-    yield from _wrapped(f"{option.name}  {change} {option.unit}  ({', '.join(facts)})", f"  {cause.rank}. ")
-    yield from _wrapped(" -> ".join(node.name for node in cause.path), "     ", "       ")
+    yield from wrapped(f"{option.name}  {change} {option.unit}  ({', '.join(facts)})", f"  {cause.rank}. ")
+    yield from wrapped(" -> ".join(node.name for node in cause.path), "     ", "       ")
     for node in cause.path[1:]:
         if node.value is not None or node.expected is not None:
-            yield from _wrapped(_node(node), "       ", "         ")
+            yield from wrapped(_node(node), "       ", "         ")
     for note in cause.notes:
-        yield from _wrapped(note, "     ! ")
+        yield from wrapped(note, "     ! ")
 
 
 def _node(node: PathNode) -> str:
@@ -149,12 +144,12 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
         option = change.option
         restart = ", needs a restart" if option.reboot_required else ""
         values = f"{option.show(change.current)} -> {option.show(change.suggested)} {option.unit}".rstrip()
-        yield from _wrapped(f"{option.name}  {values}{restart}", "  ", "    ")
+        yield from wrapped(f"{option.name}  {values}{restart}", "  ", "    ")
         for note in change.notes:
-            yield from _wrapped(note, "    ! ")
+            yield from wrapped(note, "    ! ")
     for objective in (result.variable for result in diagnosis.objectives):
         if objective.name in fix.predicted:
-            yield from _wrapped(_prediction(objective, fix.predicted[objective.name]), "  ", "    ")
+            yield from wrapped(_prediction(objective, fix.predicted[objective.name]), "  ", "    ")
     yield ""
     yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix).splitlines())
     yield ""
@@ -180,22 +175,37 @@ def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
         return
     yield "Messages of this run"
     for item in evidence[-EVIDENCE_SHOWN:]:
+        says = f": {item.says}" if item.says else ""
         points = f" (points at {', '.join(item.options)})" if item.options else ""
-        yield from _wrapped(f"{item.text}{points}", f"  {item.time_s:8.1f} s  ")
+        yield from wrapped(f"{item.text}{says}{points}", f"  {item.time_s:8.1f} s  ")
+
+
+def _rivals(diagnosis: Diagnosis) -> Iterator[str]:
+    if diagnosis.rivals:
+        yield "It may be no parameter"
+    for rival in diagnosis.rivals:
+        yield from wrapped(f"{rival.name}: {rival.text}", "  - ")
+
+
+def _tell_more(diagnosis: Diagnosis) -> Iterator[str]:
+    if diagnosis.tell_more:
+        yield "What would tell more"
+    for advice in diagnosis.tell_more:
+        yield from wrapped(advice, "  - ")
 
 
 def _since(diagnosis: Diagnosis) -> Iterator[str]:
     since = diagnosis.since
     if since is None:
         return
-    yield from _wrapped(f"Changed since {Path(since.log).name}")
+    yield from wrapped(f"Changed since {Path(since.log).name}")
     for warning in since.warnings:
-        yield from _wrapped(warning, "  ! ")
+        yield from wrapped(warning, "  ! ")
     options = [change for change in since.changes if change.option is not None]
     others = [change for change in since.changes if change.option is None]
     for change in (*options, *others[:CHANGES_SHOWN]):
         named = "" if change.option is None or change.option.name == change.parameter else f" ({change.option.name})"
-        yield from _wrapped(f"{change.parameter}{named}  {change.text}", "  ", "    ")
+        yield from wrapped(f"{change.parameter}{named}  {change.text}", "  ", "    ")
     if len(others) > CHANGES_SHOWN:
         yield f"  and {len(others) - CHANGES_SHOWN} more, which are no options of the profile; --json lists them"
     if not since.changes:
@@ -206,4 +216,4 @@ def _notes(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.notes:
         yield "Notes"
     for note in diagnosis.notes:
-        yield from _wrapped(note, "  - ")
+        yield from wrapped(note, "  - ")

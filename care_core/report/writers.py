@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
@@ -26,6 +27,7 @@ from care_core.run import shown
 
 STATUS_WORDS = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
 
+_PUBLISHED = set(TriageDocument.model_fields)
 _YAML_WIDTH = 100
 _DAMAGE_SHOWN = 5
 _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~])")
@@ -33,7 +35,12 @@ _MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~])")
 
 def to_json(report: Report) -> str:
     """The document `care.triage/1`, one object."""
-    return report.model_dump_json(by_alias=True, include=set(TriageDocument.model_fields), indent=2) + "\n"
+    return report.model_dump_json(by_alias=True, include=_PUBLISHED, indent=2) + "\n"
+
+
+def published(report: Report) -> dict[str, Any]:
+    """The document `care.triage/1` as plain values."""
+    return report.model_dump(by_alias=True, include=_PUBLISHED, mode="json")
 
 
 def to_yaml(report: Report) -> str:
@@ -75,13 +82,17 @@ def _markdown(report: Report) -> Iterator[str]:
     if report.since is not None:
         yield ""
         yield from _since_section(report.since)
-    if report.notes:
-        yield ""
-        yield "## Notes"
-        yield ""
-        yield from (f"- {_escape(note)}" for note in report.notes)
+    yield from _listed("It may be no parameter", (f"{one.circumstance}: {one.text}" for one in report.rivals))
+    yield from _listed("What would tell more", report.tell_more)
+    yield from _listed("Notes", report.notes)
     yield ""
     yield from _origin(report)
+
+
+def _listed(title: str, sentences: Iterable[str]) -> Iterator[str]:
+    lines = [f"- {_escape(sentence)}" for sentence in sentences]
+    if lines:
+        yield from ("", f"## {title}", "", *lines)
 
 
 def _verdict(report: Report) -> str:

@@ -21,3 +21,7 @@ ConfigPaths = Annotated[
 ]
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Write to this file instead of stdout.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+Thresholds = Annotated[
+    list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")
+]
+Mission = Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last.")]

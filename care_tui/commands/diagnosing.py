@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from care_core.errors import LogError, UsageError
-from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Out, ProfileName
+from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds
+from care_tui.commands.past import NoHistory, remember
 from care_tui.console import Progress, emit, painted
 from care_tui.jobs import Request, diagnose_log, exit_code
 
@@ -35,13 +36,12 @@ def triage(
     keep: Annotated[
         list[str] | None, typer.Option("--keep", metavar="OPTION", help="Never change this option.")
     ] = None,
-    threshold: Annotated[
-        list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")
-    ] = None,
-    mission: Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last.")] = None,
+    threshold: Thresholds = None,
+    mission: Mission = None,
     since: Annotated[
         Path | None, typer.Option("--since", metavar="GOOD_LOG", help="List what changed since this good run.")
     ] = None,
+    no_history: NoHistory = False,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
     formats = [name for name, wanted in (("json", json), ("yaml", yaml), ("markdown", markdown)) if wanted]
@@ -59,6 +59,8 @@ def triage(
     )
     with Progress() as progress:
         diagnosis = diagnose_log(request, progress)
+    if not no_history:
+        remember_triage(diagnosis)
     emit(_written(diagnosis, formats[0] if formats else _format_of(out), to_file=out is not None), out)
     raise typer.Exit(exit_code(diagnosis))
 
@@ -75,6 +77,13 @@ def demo() -> None:
         diagnosis = diagnose_log(Request(path), progress)
     emit(_written(diagnosis, None, to_file=False))
     raise typer.Exit(exit_code(diagnosis))
+
+
+def remember_triage(diagnosis: Diagnosis) -> None:
+    """Put the triage into the history."""
+    from care_core.report import build_document, published
+
+    remember(lambda history: history.add_triage(published(build_document(diagnosis)), diagnosis.run.mission.index))
 
 
 def bounds(texts: Iterable[str]) -> dict[str, float]:

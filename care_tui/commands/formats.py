@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import typer
 
 from care_tui.console import emit
@@ -14,11 +17,39 @@ def _formats() -> None:
     pass
 
 
+@app.command("history")
+def history() -> None:
+    """Print the JSON Schema of 'care history --json'."""
+    from care_core.history.listing import history_schema
+
+    _print(history_schema())
+
+
 @app.command("triage")
 def triage() -> None:
     """Print the JSON Schema of 'care triage --json'."""
-    from json import dumps
-
     from care_core.report import json_schema
 
-    emit(dumps(json_schema(), indent=2) + "\n")
+    _print(json_schema())
+
+
+@app.command("verify")
+def verify() -> None:
+    """Print the JSON Schema of 'care verify --json'."""
+    from care_core.report import verify_schema
+
+    _print(verify_schema())
+
+
+@app.command("whatif")
+def whatif() -> None:
+    """Print the JSON Schema of 'care whatif --json'."""
+    from care_core.report import whatif_schema
+
+    _print(whatif_schema())
+
+
+def _print(schema: Mapping[str, Any]) -> None:
+    from json import dumps
+
+    emit(dumps(schema, indent=2) + "\n")

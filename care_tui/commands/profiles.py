@@ -45,7 +45,26 @@ def show(name: Annotated[str, typer.Argument(metavar="PROFILE")]) -> None:
     lines = [f"{schema.name} {schema.version}: {schema.platform}", schema.doc]
     for role, variables in _by_role(schema).items():
         lines += ["", f"{role} ({len(variables)})", *(f"  {_described(variable)}" for variable in variables)]
+    verified = _verified(schema)
+    lines += ["", verified] if verified else []
     emit("\n".join(lines) + "\n")
+
+
+def _verified(schema: Schema) -> str:
+    """How the fixes of this profile's version held up on this computer; empty where no history is kept."""
+    from care_core.history import History, HistoryError, history_path, track_record
+    from care_core.history.listing import verified_line
+
+    path = history_path()
+    if path is None:
+        return ""
+    try:
+        past = [one for one in History(path).verifications(schema.name) if one.version == schema.version]
+    except HistoryError as err:
+        say(f"care: {err}")
+        return ""
+    record = track_record(past)
+    return verified_line(record.count, record.worked, record.expected)
 
 
 def _by_role(schema: Schema) -> Mapping[str, tuple[Variable, ...]]:

@@ -259,7 +259,7 @@ def test_the_profile_reads_no_simulator_and_names_known_extractors() -> None:
             assert variable.extract is not None
             assert variable.extract.kind in EXTRACTORS
             assert variable.unit == EXTRACTORS[variable.extract.kind].unit
-    assert all(option in schema.variables for _, options in schema.evidence for option in options)
+    assert all(option in schema.variables for rule in schema.evidence for option in rule.options)
     assert schema.variables["BATT_LOW_VOLT"].safety
 
 

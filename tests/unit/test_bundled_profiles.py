@@ -63,6 +63,6 @@ def test_extraction_names_what_exists(schema: Schema) -> None:
 
 def test_evidence_rules_point_at_options(schema: Schema) -> None:
     options = {option.name for option in schema.options}
-    for text, named in schema.evidence:
-        assert text
-        assert set(named) <= options
+    for rule in schema.evidence:
+        assert rule.pattern.pattern
+        assert set(rule.options) <= options

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -18,7 +19,7 @@ from care_core.extract.read import read_run, read_runs, reading_plan
 from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Args, Mission, MissionKind, extractor
 from care_core.extract.settings import disagreements, in_force, option_value
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
-from care_core.profile.schema import Schema
+from care_core.profile.schema import EvidenceRule, Schema
 from care_core.run import Damage, Evidence, Setting, Unavailable, Value
 from care_core.variables import Extract, Role, Threshold, Variable
 
@@ -123,7 +124,7 @@ def made_schema(success: float | None = 1.0, mission: Mapping[str, Any] | None =
         logs=("dataflash-bin",),
         observational=False,
         mission={"kind": "made"} if mission is None else mission,
-        evidence=(("check speed", ("brake", "speed")),),
+        evidence=(EvidenceRule(re.compile("check speed", re.IGNORECASE), {"brake": None, "speed": None}, "too fast"),),
         variables={variable.name: variable for variable in variables},
     )
 
@@ -250,6 +251,7 @@ def test_an_unknown_mission_kind_names_the_nearest() -> None:
 def test_rules_of_the_profile_add_options_to_evidence(log: MadeLog) -> None:
     (evidence,) = read_run(log, made_schema()).evidence
     assert evidence.options == ("speed", "brake")
+    assert evidence.says == "too fast"
 
 
 def test_what_changed_during_the_mission_is_kept(log: MadeLog) -> None:

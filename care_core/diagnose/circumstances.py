@@ -1,0 +1,104 @@
+"""'Not a parameter' is an answer too: what this run met (wind, battery, positioning) that training hardly ever did.
+
+A context is judged by where training saw it. A metric is judged by what the run's own configuration explains: the
+residual of its mechanism against the residuals of the training runs. No threshold is written by hand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from care_core.causal.counterfactual import World
+from care_core.causal.mechanisms import columns
+from care_core.diagnose.records import Circumstance
+from care_core.profile.model import Summary
+from care_core.profile.schema import Schema, Side
+from care_core.run import Run, is_known
+from care_core.variables import Role, Variable
+
+RARE = 0.025
+"""Share of the training runs that lie farther out than what is called unusual."""
+
+
+def circumstances(run: Run, world: World, schema: Schema) -> tuple[Circumstance, ...]:
+    """What this run met and no option set, the rarest first."""
+    found = [*_shown(run, world, schema), *_said(run), *_unsupported(run, world, schema)]
+    named: dict[tuple[str, str], Circumstance] = {}
+    for one in sorted(found, key=lambda one: one.share):
+        named.setdefault((one.name, one.variable), one)
+    return tuple(named.values())
+
+
+def _shown(run: Run, world: World, schema: Schema) -> Iterator[Circumstance]:
+    for name, sides in schema.circumstances.items():
+        for variable, side in ((schema.variables[key], side) for key, side in sides.items()):
+            value = run.value(variable.name)
+            if not is_known(value):
+                continue
+            judge = _context if variable.role is Role.CONTEXT else _metric
+            found = judge(name, variable, side, value, world)
+            if found is not None:
+                yield found
+
+
+def _context(name: str, variable: Variable, side: Side, value: float, world: World) -> Circumstance | None:
+    summary = world.model.summaries.get(variable.name)
+    if summary is None or _same(value, summary.high if side == "high" else summary.low):
+        return None
+    above = 1.0 - summary.percentile(value)
+    share = above if side == "high" else 1.0 - above
+    if share >= RARE:
+        return None
+    low, high = _span(summary)
+    unit = f" {variable.unit}".rstrip()
+    rarity = "no training run" if share == 0 else f"{share:.0%} of the training runs"
+    text = f"{variable.doc or variable.name}: {value:.3g}{unit}; {rarity} had more"
+    if side == "low":
+        text = f"{text.removesuffix('more')}less"
+    return Circumstance(name, variable.name, value, variable.unit, low, high, share, text)
+
+
+def _metric(name: str, variable: Variable, side: Side, value: float, world: World) -> Circumstance | None:
+    mechanism, summary = world.model.mechanisms.get(variable.name), world.model.summaries.get(variable.name)
+    if mechanism is None or mechanism.binary or summary is None:
+        return None
+    below, expected = mechanism.residual_share(columns([world.config], mechanism.inputs), value)
+    share = 1.0 - below if side == "high" else below
+    if share >= RARE:
+        return None
+    low, high = _span(summary)
+    unit = f" {variable.unit}".rstrip()
+    text = f"{variable.doc or variable.name}: {value:.3g}{unit} where this configuration explains {expected:.3g}{unit}"
+    return Circumstance(name, variable.name, value, variable.unit, low, high, share, text)
+
+
+def _said(run: Run) -> Iterator[Circumstance]:
+    """What a message of the log speaks of, unless it points at an option whose value sets it off."""
+    for evidence in run.evidence:
+        if evidence.circumstance is not None and not evidence.options:
+            yield Circumstance(evidence.circumstance, "", None, "", None, None, 0.0, f"the log says: {evidence.text}")
+
+
+def _unsupported(run: Run, world: World, schema: Schema) -> Iterator[Circumstance]:
+    """Contexts outside everything that training saw, on either side."""
+    for variable in schema.contexts:
+        value, summary = run.context.get(variable.name), world.model.summaries.get(variable.name)
+        if summary is None or not is_known(value) or summary.low <= value <= summary.high:
+            continue
+        if _same(value, summary.low) or _same(value, summary.high):
+            continue
+        low, high = _span(summary)
+        text = f"{variable.doc or variable.name}: {value:.3g} {variable.unit}".rstrip()
+        text += f" is outside the training runs ({summary.low:.3g} to {summary.high:.3g})"
+        yield Circumstance("outside support", variable.name, value, variable.unit, low, high, 0.0, text)
+
+
+def _span(summary: Summary) -> tuple[float, float]:
+    """Where 95 % of the training runs lie."""
+    return summary.quantile(RARE), summary.quantile(1 - RARE)
+
+
+def _same(a: float, b: float) -> bool:
+    """Equal as far as a recorder resolves it."""
+    return math.isclose(a, b, rel_tol=1e-3)

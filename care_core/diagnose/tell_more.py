@@ -1,0 +1,104 @@
+"""What would tell more, where no cause is sure: metrics that were not recorded, and the experiment that separates."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from care_core.causal.counterfactual import Config, World
+from care_core.causal.mechanisms import FloatArray
+from care_core.diagnose.fixes import candidate_values
+from care_core.diagnose.records import Experiment, Fault
+from care_core.run import Run, Unavailable
+from care_core.variables import Variable
+
+TELLING = 0.15
+"""Odds by which an experiment's outcome must differ between two causes to be worth a run."""
+HYPOTHESES = 3
+"""Leading causes that are compared in pairs."""
+MOST_METRICS = 3
+MET = "what this run met"
+"""The rival of a cause that stands alone."""
+
+
+def tell_more(
+    world: World, faults: Sequence[Fault], run: Run, options: Mapping[str, Variable], reference: Config,
+    keep: Collection[str],
+) -> tuple[str, ...]:  # fmt: skip
+    """Sentences for an operator, the most useful first; empty where nothing would help."""
+    advice = list(_unrecorded(faults, run))
+    for fault in faults:
+        found = experiment(world, fault, options, reference, keep)
+        if found is not None:
+            advice.append(str(found))
+    if not advice:
+        advice.append(
+            "run the same configuration again: if it fails again, the cause persists (a parameter outside the profile, "
+            "or the vehicle); if not, it is what this run met"
+        )
+    return tuple(dict.fromkeys(advice))
+
+
+def _unrecorded(faults: Sequence[Fault], run: Run) -> Iterator[str]:
+    """Metrics on the path of some leading causes and not of others that this log could not give."""
+    for fault in faults:
+        paths = [{node.name for node in cause.path} for cause in fault.causes[:HYPOTHESES]]
+        if len(paths) < 2:
+            continue
+        separating = [name for name in run.metrics if 0 < sum(name in path for path in paths) < len(paths)]
+        missing = [(name, value) for name in separating if isinstance(value := run.metrics[name], Unavailable)]
+        for name, value in missing[:MOST_METRICS]:
+            hint = f" ({value.hint})" if value.hint else ""
+            yield f"{name} would tell the causes of {fault.objective.variable.name} apart: {value.reason}{hint}"
+
+
+def experiment(
+    world: World, fault: Fault, options: Mapping[str, Variable], reference: Config, keep: Collection[str] = ()
+) -> Experiment | None:
+    """The single change whose outcome differs most between the leading causes, None where none differs enough.
+
+    The first pair of causes that any change separates is taken; a cause that stands alone is set against what the run
+    met.
+    """
+    leading = [cause.option.name for cause in fault.causes if not cause.is_lead][:HYPOTHESES]
+    pairs = list(combinations(leading, 2)) or [(name, MET) for name in leading]
+    found = (_separating(world, fault.objective.variable.name, pair, options, reference, keep) for pair in pairs)
+    return next((one for one in found if one is not None), None)
+
+
+def _separating(
+    world: World, objective: str, pair: tuple[str, str], options: Mapping[str, Variable], reference: Config,
+    keep: Collection[str],
+) -> Experiment | None:  # fmt: skip
+    changes = [
+        (name, value)
+        for name in pair
+        if name in options and name not in keep
+        for value in candidate_values(options[name], world.config[name], reference[name], world.model)
+    ]
+    if not changes or objective not in world.model.outcomes:
+        return None
+    odds = [_odds_if(world, objective, cause, pair, changes, reference) for cause in pair]
+    best = int(np.argmax(np.abs(odds[0] - odds[1])))
+    if abs(odds[0][best] - odds[1][best]) < TELLING:
+        return None
+    name, value = changes[best]
+    return Experiment(objective, options[name], value, ((pair[0], odds[0][best]), (pair[1], odds[1][best])))
+
+
+def _odds_if(
+    world: World, objective: str, cause: str, pair: tuple[str, str], changes: Sequence[tuple[str, float]],
+    reference: Config,
+) -> FloatArray:  # fmt: skip
+    """Odds of a good outcome after each change, shape (m,), if one of the pair is the cause and the other is not.
+
+    The other did nothing, so it is taken to have been at its reference all along, and changing it changes nothing. The
+    run's noise is abducted anew: what the other cost in the model is put down to the cause and to what the run met.
+    """
+    inert = {name: reference[name] for name in pair if name != cause and name in reference}
+    there = replace(world, config={**world.config, **inert})
+    configs = [{**there.config, **({name: value} if name == cause else {})} for name, value in changes]
+    return there.predict(objective, configs).p_ok

@@ -1,0 +1,236 @@
+"""Report and the run after it -> was the change made, and did it do what was promised?
+
+The report is plain data (`Promise`), so this module knows no file format; `care_core.report.verification` fills it in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from care_core.diagnose.records import ObjectiveResult, Status
+from care_core.extract.settings import option_value, readable
+from care_core.profile.schema import Schema
+from care_core.run import Run
+from care_core.variables import Threshold, Variable
+
+Made = Literal["made", "not_made", "other_value", "unknown"]
+Outcome = Literal["recovered", "kept", "unchanged", "better", "worse", "broken", "unknown"]
+Verdict = Literal["fixed_as_promised", "fixed_although", "not_fixed", "change_not_made", "cannot_tell"]
+
+FLOAT32 = 1e-5
+"""Vehicles hold parameters in 32 bits, files in seven digits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """An objective as the report has it."""
+
+    value: float | None
+    status: Status
+    threshold: Threshold | None
+
+
+@dataclass(frozen=True, slots=True)
+class PromisedSet:
+    """One set of changes of the report: option -> (from, to), with the outcome it promised."""
+
+    changes: Mapping[str, tuple[float, float]]
+    p_fixed: float
+    intervals: Mapping[str, tuple[float, float]]
+    """Per objective the 80 % interval."""
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """What a report said and promised: the suggested set first, then its alternatives."""
+
+    config: Mapping[str, float]
+    objectives: Mapping[str, Before]
+    sets: tuple[PromisedSet, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MadeChange:
+    """One suggested change and what the next run was driven with."""
+
+    option: Variable
+    before: float
+    wanted: float
+    driven: float | None
+    made: Made
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class OtherChange:
+    """An option that nobody suggested to change, and that was changed."""
+
+    option: Variable
+    before: float
+    driven: float
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectiveCheck:
+    """One objective before and after. `inside`: whether the outcome lies in the promised 80 % interval."""
+
+    variable: Variable
+    before: Before
+    after: ObjectiveResult
+    outcome: Outcome
+    interval: tuple[float, float] | None
+    inside: bool | None
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """The whole comparison. `chosen` is 0 where the suggested set was made, else the number of the alternative."""
+
+    verdict: Verdict
+    sentence: str
+    chosen: int
+    p_fixed: float
+    changes: tuple[MadeChange, ...]
+    others: tuple[OtherChange, ...]
+    objectives: tuple[ObjectiveCheck, ...]
+
+    @property
+    def worked(self) -> bool | None:
+        """Whether the promised change repaired the run; None where it was not made or nobody can tell."""
+        if self.verdict in ("change_not_made", "cannot_tell") or any(change.made != "made" for change in self.changes):
+            return None
+        return self.verdict != "not_fixed"
+
+
+def verify(
+    promise: Promise, run: Run, schema: Schema, results: Sequence[ObjectiveResult], doubt: str = ""
+) -> Verification:
+    """Compare a run with what was promised for it.
+
+    Args:
+        promise: at least one set.
+        results: the run's objectives, judged by the report's thresholds.
+        doubt: why the run may not be of the same robot or mission, one sentence; empty where it is.
+    """
+    attempts = [_changes(one, run, schema) for one in promise.sets]
+    chosen = max(range(len(attempts)), key=lambda i: (_share_made(attempts[i]), -i))
+    kept, changes = promise.sets[chosen], attempts[chosen]
+    others = tuple(_others(promise, kept, run, schema))
+    checks = tuple(
+        _check(promise.objectives[result.variable.name], result, kept.intervals.get(result.variable.name))
+        for result in results
+        if result.variable.name in promise.objectives
+    )
+    verdict, sentence = _verdict(changes, others, checks, doubt)
+    return Verification(verdict, sentence, chosen, kept.p_fixed, changes, others, checks)
+
+
+def _changes(promised: PromisedSet, run: Run, schema: Schema) -> tuple[MadeChange, ...]:
+    return tuple(
+        _made(schema.variables[name], before, wanted, run)
+        for name, (before, wanted) in promised.changes.items()
+        if name in schema.variables
+    )
+
+
+def _made(option: Variable, before: float, wanted: float, run: Run) -> MadeChange:
+    """An option that sets several keys is made when all that the log holds have the wanted value."""
+    settings = {key: run.settings[key] for key in readable(option) if key in run.settings}
+    values = {key: value for key, setting in settings.items() if (value := option_value(option, setting)) is not None}
+    if not values and option.name in run.config:
+        values = {option.name: run.config[option.name]}
+    off = {key: value for key, value in values.items() if not same(value, wanted)}
+    if not values:
+        return MadeChange(option, before, wanted, None, "unknown", "the log does not hold it")
+    if not off:
+        return MadeChange(option, before, wanted, wanted, "made")
+    note = f"{', '.join(off)} was left" if len(off) < len(values) else ""
+    driven = next(iter(off.values()))
+    return MadeChange(option, before, wanted, driven, "not_made" if same(driven, before) else "other_value", note)
+
+
+def _share_made(changes: Sequence[MadeChange]) -> float:
+    return sum(change.made == "made" for change in changes) / max(1, len(changes))
+
+
+def _others(promise: Promise, chosen: PromisedSet, run: Run, schema: Schema) -> Iterator[OtherChange]:
+    for option in schema.options:
+        before, driven = promise.config.get(option.name), run.config.get(option.name)
+        if option.name not in chosen.changes and before is not None and driven is not None and not same(before, driven):
+            yield OtherChange(option, before, driven)
+
+
+def same(a: float, b: float) -> bool:
+    """Equal as far as a vehicle or a file holds a parameter."""
+    return math.isclose(a, b, rel_tol=FLOAT32, abs_tol=1e-9)
+
+
+def _check(before: Before, after: ObjectiveResult, interval: tuple[float, float] | None) -> ObjectiveCheck:
+    inside = None
+    if interval is not None and after.value is not None:
+        inside = bool(interval[0] <= after.value <= interval[1])
+    return ObjectiveCheck(after.variable, before, after, _outcome(before, after, interval), interval, inside)
+
+
+def _outcome(before: Before, after: ObjectiveResult, interval: tuple[float, float] | None) -> Outcome:
+    if after.status == "not_evaluated":
+        return "unknown"
+    if after.status == "ok":
+        return "kept" if before.status == "ok" else "recovered"
+    if before.status != "fault" or before.value is None or after.value is None:
+        return "broken"
+    # Runs differ without a cause by about half the interval that was predicted for one.
+    noise = (interval[1] - interval[0]) / 2 if interval is not None else 0.0
+    moved = after.value - before.value
+    if abs(moved) <= noise or moved == 0:
+        return "unchanged"
+    wants_less = after.threshold is not None and after.threshold.op in ("<=", "<")
+    return "better" if (moved < 0) == wants_less else "worse"
+
+
+def _verdict(
+    changes: Sequence[MadeChange], others: Sequence[OtherChange], checks: Sequence[ObjectiveCheck], doubt: str
+) -> tuple[Verdict, str]:
+    broken = [check.variable.name for check in checks if check.after.status == "fault"]
+    unknown = [check for check in checks if check.outcome == "unknown"]
+    unmade = [change.option.name for change in changes if change.made in ("not_made", "other_value")]
+    unseen = [change.option.name for change in changes if change.made == "unknown"]
+    if doubt:
+        return "cannot_tell", f"Cannot tell: {doubt}."
+    if broken and unmade:
+        return "change_not_made", f"The change was not made ({', '.join(unmade)}), and {_are(broken)} still at fault."
+    if broken:
+        unsure = f"; whether {', '.join(unseen)} was changed is not in the log" if unseen else ""
+        return "not_fixed", f"Not fixed: {_are(broken)} at fault{unsure}."
+    if unknown:
+        names = ", ".join(check.variable.name for check in unknown)
+        return "cannot_tell", f"Cannot tell: {names} could not be evaluated ({unknown[0].after.reason})."
+    if not checks:
+        return "cannot_tell", "Cannot tell: the report and the run share no objective."
+    although = list(_although(unmade, unseen, others, checks))
+    if although:
+        return "fixed_although", f"Recovered: every objective is within its threshold, although {'; '.join(although)}."
+    return "fixed_as_promised", "Fixed as promised: the change was made, and every objective is where it was predicted."
+
+
+def _although(
+    unmade: Sequence[str], unseen: Sequence[str], others: Sequence[OtherChange], checks: Sequence[ObjectiveCheck]
+) -> Iterator[str]:
+    if unmade:
+        yield f"the change was not made ({', '.join(unmade)})"
+    if unseen:
+        yield f"the log does not show whether {', '.join(unseen)} was changed"
+    if others:
+        names = [other.option.name for other in others]
+        shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+        yield f"{shown} {'was' if len(names) == 1 else 'were'} changed too"
+    missed = [check.variable.name for check in checks if check.inside is False]
+    if missed:
+        yield f"{', '.join(missed)} came out outside the predicted interval"
+
+
+def _are(names: Sequence[str]) -> str:
+    return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"

@@ -1,0 +1,165 @@
+"""What would this run have done with other options? Built once per run, then asked at every key press."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from care_core.causal.counterfactual import Config, World
+from care_core.configs import ConfigFile, resolve
+from care_core.diagnose.faults import check_wishes, judge, thresholds_in_force
+from care_core.diagnose.fixes import change_notes, prediction
+from care_core.diagnose.records import Change, ObjectiveResult, Prediction, ProfileChoice
+from care_core.diagnose.worlds import reference_of, world_of
+from care_core.errors import UsageError, nearest
+from care_core.extract.read import read_run
+from care_core.extract.settings import option_value, readable
+from care_core.logs.base import Log
+from care_core.profile.schema import Schema
+from care_core.profile.store import Profile
+from care_core.run import Run, Setting
+from care_core.variables import Role, Variable
+
+
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """One objective under the changes, beside what this run had."""
+
+    objective: ObjectiveResult
+    predicted: Prediction
+    now: Prediction
+    """Predicted for the run's own configuration: what another run without changes would give."""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What the changes are predicted to do. The odds are those of meeting every threshold."""
+
+    changes: tuple[Change, ...]
+    """With the warnings of each value: out of range, outside the training runs, looser than a safety default."""
+    outlooks: tuple[Outlook, ...]
+    p_ok: float
+    p_ok_now: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Question:
+    """A run ready to be asked "what if"; `ask` is pure and takes milliseconds."""
+
+    profile: ProfileChoice
+    schema: Schema
+    run: Run
+    world: World
+    reference: Config
+    """The configuration that faults are judged against, under what this run met."""
+    objectives: tuple[ObjectiveResult, ...]
+
+    def ask(self, changes: Mapping[str, float]) -> Answer:
+        """The prediction for this run with these options changed; option names must be the profile's."""
+        world = self.world
+        config = {**world.config, **changes}
+        odds = world.odds([config, world.config])
+        return Answer(
+            changes=tuple(
+                Change(self.schema.variables[name], world.config[name], value, self.warnings(name, value))
+                for name, value in changes.items()
+            ),
+            outlooks=tuple(
+                Outlook(result, prediction(world, name, config), prediction(world, name, world.config))
+                for result in self.objectives
+                if (name := result.variable.name) in world.model.outcomes
+            ),
+            p_ok=float(odds[0]),
+            p_ok_now=float(odds[1]),
+        )
+
+    def warnings(self, name: str, value: float) -> tuple[str, ...]:
+        """What speaks against believing or setting this value."""
+        option = self.schema.variables[name]
+        found = []
+        if not option.accepts(value):
+            found.append(f"outside the acceptable values ({acceptable(option)})")
+        if not self.world.model.supports(name, value):
+            summary = self.world.model.summaries[name]
+            found.append(f"outside the training runs ({summary.low:g} to {summary.high:g}): a guess")
+        if not any(name in mechanism.inputs for mechanism in self.world.model.mechanisms.values()):
+            found.append("no effect was seen in training")
+        if name not in self.run.config:
+            found.append("the log does not hold its value; it is taken to be at its reference")
+        return (*found, *change_notes(option))
+
+
+def acceptable(option: Variable) -> str:
+    """The option's acceptable values in words."""
+    if option.labels:
+        return ", ".join(f"{code:g} ({label})" for code, label in option.labels)
+    return "any" if option.range is None else f"{option.range[0]:g} to {option.range[1]:g} {option.unit}".rstrip()
+
+
+def question(
+    run: Run, profile: Profile, choice: ProfileChoice, thresholds: Mapping[str, float] | None = None
+) -> Question:
+    """Get a run ready to be asked. `thresholds` are the operator's own bounds, per objective."""
+    bounds = thresholds_in_force(profile.schema, thresholds or {})
+    asked = Question(
+        profile=choice,
+        schema=profile.schema,
+        run=run,
+        world=world_of(run, profile, bounds),
+        reference=reference_of(run, profile),
+        objectives=judge(run, profile.schema, bounds, profile.model.summaries),
+    )
+    asked.ask({})  # The mechanisms invert their covariance when first asked, which nobody should wait for at a key.
+    return asked
+
+
+def question_of_log(
+    log: Log,
+    profile: Profile,
+    choice: ProfileChoice,
+    *,
+    configs: Sequence[ConfigFile] = (),
+    thresholds: Mapping[str, float] | None = None,
+    mission: int | None = None,
+) -> Question:
+    """Read one mission of a log and get it ready to be asked; the arguments are those of `triage`."""
+    bounds = dict(thresholds or {})
+    check_wishes(profile.schema, (), bounds)
+    given = resolve(configs, (parameter for option in profile.schema.options for parameter in readable(option)))
+    run = read_run(log, profile.schema, overrides=given, mission=mission, judge_anyway=tuple(bounds))
+    return question(run, profile, choice, bounds)
+
+
+def parse_change(text: str, schema: Schema) -> tuple[str, float]:
+    """`OPTION=VALUE` as an operator types it: the option or one of its parameters; true and labels are values too.
+
+    Raises:
+        UsageError: no such option (the nearest is named), or no such value.
+    """
+    name, _, value = (part.strip() for part in text.partition("="))
+    option = _option(name, schema)
+    number = option_value(option, Setting(option.name, value, "--set"))
+    if number is None:
+        raise UsageError(
+            f"'{text}' sets no value.",
+            hint=f"Write {option.name}=VALUE; acceptable are {acceptable(option)}.",
+            where="--set",
+        )
+    return option.name, number
+
+
+def _option(name: str, schema: Schema) -> Variable:
+    variable = schema.variables.get(name)
+    if variable is not None and variable.role is Role.OPTION:
+        return variable
+    by_parameter = {parameter: option for option in schema.options for parameter in option.parameters}
+    if name in by_parameter:
+        return by_parameter[name]
+    if variable is not None:
+        how = "met" if variable.role is Role.CONTEXT else "measured"
+        raise UsageError(f"{name} is {how}, not set.", hint="Only options can be set.", where="--set")
+    names = [option.name for option in schema.options]
+    folded = {known.casefold(): known for known in names}
+    close = folded.get(name.casefold())
+    hint = f"Did you mean '{close}'?" if close else nearest(name, [*names, *by_parameter])
+    raise UsageError(f"The profile has no option '{name}'.", hint=hint or "See 'care profiles show'.", where="--set")

@@ -1,0 +1,66 @@
+"""A report that care wrote, read back: JSON or YAML, checked key by key."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from care_core.errors import ConfigError
+from care_core.report.document import SCHEMA_ID, TriageDocument
+
+_MOST_BYTES = 20_000_000
+
+
+def read_report(path: str | Path) -> TriageDocument:
+    """The document of a report as `care triage --json` or `--yaml` wrote it.
+
+    Raises:
+        ConfigError: no such file, no report of this program, or a damaged one, with the key.
+    """
+    path = Path(path)
+    data = _load(path)
+    if not isinstance(data, Mapping) or data.get("schema") != SCHEMA_ID:
+        raise ConfigError(
+            f"Not a report: it is no '{SCHEMA_ID}' document.",
+            hint="Write one with 'care triage LOG --yaml --out FILE'.",
+            where=str(path),
+        )
+    known = {field.serialization_alias or name for name, field in TriageDocument.model_fields.items()}
+    try:
+        # A later version of this program may add keys; what this one knows must be sound.
+        return TriageDocument.model_validate({key: value for key, value in data.items() if key in known})
+    except ValidationError as err:
+        first = err.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise ConfigError(
+            f"The report is damaged: {key}: {first['msg']}.", hint="Write it again from the log.", where=str(path)
+        ) from err
+
+
+def _load(path: Path) -> Any:
+    try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise ConfigError("Not a report: it is too large.", where=str(path))
+        text = path.read_text(encoding="utf-8-sig")
+    except OSError as err:
+        raise ConfigError(f"Cannot read the report: {err.strerror}.", where=str(path)) from err
+    except UnicodeDecodeError as err:
+        raise ConfigError("Not a report: it is not text.", where=str(path)) from err
+    try:
+        # Every JSON document is YAML too.
+        return YAML(typ="safe", pure=True).load(StringIO(text)) if not text.lstrip().startswith("{") else _json(text)
+    except (YAMLError, ValueError, RecursionError) as err:
+        detail = " ".join(str(err).split())[:120]
+        raise ConfigError(f"The report cannot be read: {detail}.", hint="Write it again.", where=str(path)) from err
+
+
+def _json(text: str) -> Any:
+    from json import loads
+
+    return loads(text)

@@ -1,0 +1,271 @@
+"""`care.verify/1`: what became of a report's promise, for other programs and for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from pydantic import ConfigDict, Field
+
+from care_core.diagnose.faults import judge, thresholds_in_force
+from care_core.diagnose.records import ObjectiveResult
+from care_core.diagnose.verify import (
+    Before,
+    Made,
+    MadeChange,
+    ObjectiveCheck,
+    Outcome,
+    Promise,
+    PromisedSet,
+    Verdict,
+    Verification,
+    verify,
+)
+from care_core.errors import ExitCode, UsageError
+from care_core.extract.read import read_run
+from care_core.logs.base import Log
+from care_core.profile.store import Profile
+from care_core.report.document import (
+    FixSet,
+    ObjectiveEntry,
+    ProfileEntry,
+    Strict,
+    TriageDocument,
+    objective_entry,
+    plain_number,
+)
+from care_core.report.writers import STATUS_WORDS
+from care_core.run import Run
+from care_core.text import clean, wrapped
+from care_core.variables import Threshold
+
+SCHEMA_ID: Final = "care.verify/1"
+
+EXIT_CODES: Mapping[Verdict, ExitCode] = {
+    "fixed_as_promised": ExitCode.OK,
+    "fixed_although": ExitCode.OK,
+    "not_fixed": ExitCode.FAULT,
+    "change_not_made": ExitCode.FAULT,
+    "cannot_tell": ExitCode.NOT_EVALUATED,
+}
+
+_MADE_WORDS: Mapping[Made, str] = {
+    "made": "made",
+    "not_made": "NOT MADE",
+    "other_value": "OTHER VALUE",
+    "unknown": "NOT IN THE LOG",
+}
+
+
+class VerifiedLog(Strict):
+    path: str
+    sha256: str
+    start: str | None
+
+
+class CheckedChange(Strict):
+    """`driven` is the next run's value, null where the log does not hold it."""
+
+    option: str
+    from_: int | float = Field(validation_alias="from", serialization_alias="from")
+    to: int | float
+    driven: int | float | None
+    made: Made
+    note: str
+
+
+class OtherChangeEntry(Strict):
+    option: str
+    from_: int | float = Field(validation_alias="from", serialization_alias="from")
+    to: int | float
+
+
+class Interval(Strict):
+    low: float
+    high: float
+
+
+class CheckedObjective(Strict):
+    """An objective in both runs; `inside` says whether the outcome lies in the promised 80 % interval."""
+
+    before: ObjectiveEntry
+    after: ObjectiveEntry
+    outcome: Outcome
+    promised: Interval | None
+    inside: bool | None
+
+
+class VerifyDocument(Strict):
+    """Whether the fix of a report did what it promised, as `care verify --json` prints it."""
+
+    model_config = ConfigDict(title=SCHEMA_ID)
+
+    schema_: Literal["care.verify/1"] = Field(
+        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
+    )
+    profile: ProfileEntry
+    report_log: VerifiedLog
+    log: VerifiedLog
+    verdict: Verdict
+    sentence: str
+    alternative: int
+    """0: the suggested set of changes; else the number of the alternative that was made instead."""
+    p_fixed: float
+    worked: bool | None
+    """Whether the promised change repaired the run; null where it was not made, or nobody can tell."""
+    changes: list[CheckedChange]
+    other_changes: list[OtherChangeEntry]
+    objectives: list[CheckedObjective]
+    notes: list[str]
+
+
+def verify_schema() -> dict[str, Any]:
+    """The JSON Schema of the verification."""
+    return VerifyDocument.model_json_schema(by_alias=True, mode="serialization")
+
+
+def verify_log(report: TriageDocument, log: Log, profile: Profile, mission: int | None = None) -> VerifyDocument:
+    """Compare the run of a log with what a report promised for it.
+
+    Raises:
+        UsageError: the report suggests no change.
+        CareError: the log holds no mission of the profile.
+    """
+    if report.fix is None:
+        why = report.abstained or "every objective was within its threshold"
+        raise UsageError(f"The report suggests no change, so nothing was promised: {clean(why)}.")
+    schema = profile.schema
+    wanted = {one.name: one.threshold.value for one in report.objectives if one.threshold is not None}
+    usual = thresholds_in_force(schema, {})
+    own = {name: value for name, value in wanted.items() if name not in usual or usual[name].value != value}
+    run = read_run(log, schema, mission=mission, judge_anyway=tuple(own))
+    results = judge(run, schema, thresholds_in_force(schema, own), profile.model.summaries)
+    found = verify(_promise(report, report.fix), run, schema, results, _doubt(report, run))
+    notes = []
+    if report.profile.version != schema.version:
+        notes.append(
+            f"the report was written with version {report.profile.version} of the profile, not {schema.version}"
+        )
+    if report.log.start and run.log.start and run.log.start < report.log.start:
+        notes.append("this log is older than the one of the report")
+    return _document(report, run, results, found, notes)
+
+
+def _doubt(report: TriageDocument, run: Run) -> str:
+    if run.log.sha256 == report.log.sha256:
+        return "this is the log that the report is about, not one of a later run"
+    return run.mission.mismatch
+
+
+def _promise(report: TriageDocument, fix: FixSet) -> Promise:
+    alternatives = report.fix.alternatives if report.fix is not None else []
+    return Promise(
+        config={name: float(value) for name, value in report.config.items()},
+        objectives={
+            one.name: Before(
+                one.value, one.status, Threshold(one.threshold.op, one.threshold.value) if one.threshold else None
+            )
+            for one in report.objectives
+        },
+        sets=tuple(
+            PromisedSet(
+                {change.option: (float(change.from_), float(change.to)) for change in one.changes},
+                one.p_fixed,
+                {name: (predicted.low, predicted.high) for name, predicted in one.predicted.items()},
+            )
+            for one in (fix, *alternatives)
+        ),
+    )
+
+
+def _document(
+    report: TriageDocument, run: Run, results: tuple[ObjectiveResult, ...], found: Verification, notes: list[str]
+) -> VerifyDocument:
+    before = {one.name: one for one in report.objectives}
+    return VerifyDocument(
+        profile=report.profile,
+        report_log=VerifiedLog(path=report.log.path, sha256=report.log.sha256, start=report.log.start),
+        log=VerifiedLog(path=clean(run.log.path), sha256=run.log.sha256, start=run.log.start),
+        verdict=found.verdict,
+        sentence=clean(found.sentence),
+        alternative=found.chosen,
+        p_fixed=found.p_fixed,
+        worked=found.worked,
+        changes=[_change(change) for change in found.changes],
+        other_changes=[
+            OtherChangeEntry(option=o.option.name, from_=plain_number(o.before), to=plain_number(o.driven))
+            for o in found.others
+        ],
+        objectives=[_objective(check, before[check.variable.name]) for check in found.objectives],
+        notes=[clean(note) for note in notes],
+    )
+
+
+def _change(change: MadeChange) -> CheckedChange:
+    return CheckedChange(
+        option=change.option.name,
+        from_=plain_number(change.before),
+        to=plain_number(change.wanted),
+        driven=None if change.driven is None else plain_number(change.driven),
+        made=change.made,
+        note=clean(change.note),
+    )
+
+
+def _objective(check: ObjectiveCheck, before: ObjectiveEntry) -> CheckedObjective:
+    interval = None if check.interval is None else Interval(low=check.interval[0], high=check.interval[1])
+    return CheckedObjective(
+        before=before,
+        after=objective_entry(check.after),
+        outcome=check.outcome,
+        promised=interval,
+        inside=check.inside,
+    )
+
+
+def verify_json(document: VerifyDocument) -> str:
+    """The verification as one JSON object."""
+    return document.model_dump_json(by_alias=True, indent=2) + "\n"
+
+
+def verify_text(document: VerifyDocument) -> str:
+    """The verification in lines: the verdict, the changes, the objectives."""
+    return "\n".join(_lines(document)) + "\n"
+
+
+def _lines(document: VerifyDocument) -> Iterator[str]:
+    yield from wrapped(document.sentence)
+    yield ""
+    yield from wrapped(f"{Path(document.report_log.path).name}, profile {document.profile.name}", "Report  ")
+    yield from wrapped(Path(document.log.path).name, "Log     ")
+    for note in document.notes:
+        yield from wrapped(note, "  ! ")
+    yield ""
+    which = f" of alternative {document.alternative}" if document.alternative else ""
+    yield f"Changes{which} (promised at {document.p_fixed:.0%})"
+    for change in document.changes:
+        driven = "" if change.driven is None or change.made == "made" else f" ({change.driven:g} was driven)"
+        note = f"; {change.note}" if change.note else ""
+        yield clean(
+            f"  {_MADE_WORDS[change.made]:<14}  {change.option}  {change.from_:g} -> {change.to:g}{driven}{note}"
+        )
+    for other in document.other_changes:
+        yield clean(f"  also changed    {other.option}  {other.from_:g} -> {other.to:g}")
+    yield ""
+    yield "Objectives"
+    width = max((len(one.after.name) for one in document.objectives), default=0)
+    for one in document.objectives:
+        yield clean(f"  {STATUS_WORDS[one.after.status]:<13}  {one.after.name:<{width}}  {_outcome(one)}")
+        if one.after.reason:
+            yield from wrapped(one.after.reason, " " * 17)
+
+
+def _outcome(one: CheckedObjective) -> str:
+    unit = one.after.unit
+    values = " -> ".join("-" if value is None else f"{value:.4g}" for value in (one.before.value, one.after.value))
+    parts = [f"{values} {unit}".rstrip(), one.outcome]
+    if one.promised is not None and one.after.kind == "non-functional":
+        where = {True: "inside", False: "outside", None: "promised"}[one.inside]
+        parts.append(f"{where} {one.promised.low:.4g} to {one.promised.high:.4g} {unit}".rstrip())
+    return ", ".join(parts)

@@ -1,0 +1,135 @@
+"""A what-if answer for other programs (`care.whatif/1`) and for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from pydantic import ConfigDict, Field
+
+from care_core.diagnose.whatif import Answer, Outlook, Question
+from care_core.report.document import (
+    ObjectiveEntry,
+    PredictedObjective,
+    ProfileEntry,
+    Strict,
+    objective_entry,
+    plain_number,
+    predicted_objective,
+    profile_entry,
+)
+from care_core.report.writers import STATUS_WORDS
+from care_core.text import clean, wrapped
+
+SCHEMA_ID: Final = "care.whatif/1"
+
+
+class AskedChange(Strict):
+    option: str
+    from_: int | float = Field(validation_alias="from", serialization_alias="from")
+    to: int | float
+    notes: list[str]
+
+
+class OutlookEntry(Strict):
+    objective: ObjectiveEntry
+    predicted: PredictedObjective | None
+    p_ok: float | None
+    p_ok_unchanged: float | None
+
+
+class WhatIfDocument(Strict):
+    """The predicted outcome of this run under changed options, as `care whatif --json` prints it."""
+
+    model_config = ConfigDict(title=SCHEMA_ID)
+
+    schema_: Literal["care.whatif/1"] = Field(
+        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
+    )
+    profile: ProfileEntry
+    log: str
+    changes: list[AskedChange]
+    objectives: list[OutlookEntry]
+    p_ok: float
+    p_ok_unchanged: float
+
+
+def whatif_schema() -> dict[str, Any]:
+    """The JSON Schema of the what-if document."""
+    return WhatIfDocument.model_json_schema(by_alias=True, mode="serialization")
+
+
+def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
+    """The answer as a document."""
+    return WhatIfDocument(
+        profile=profile_entry(question.profile),
+        log=clean(question.run.log.path),
+        changes=[
+            AskedChange(
+                option=change.option.name,
+                from_=plain_number(change.current),
+                to=plain_number(change.suggested),
+                notes=[clean(note) for note in change.notes],
+            )
+            for change in answer.changes
+        ],
+        objectives=[
+            OutlookEntry(
+                objective=objective_entry(outlook.objective),
+                predicted=predicted_objective(outlook.predicted),
+                p_ok=outlook.predicted.p_ok,
+                p_ok_unchanged=outlook.now.p_ok,
+            )
+            for outlook in answer.outlooks
+        ],
+        p_ok=answer.p_ok,
+        p_ok_unchanged=answer.p_ok_now,
+    )
+
+
+def whatif_json(question: Question, answer: Answer) -> str:
+    """The document, one object."""
+    return whatif_document(question, answer).model_dump_json(by_alias=True, indent=2) + "\n"
+
+
+def whatif_text(question: Question, answer: Answer) -> str:
+    """The answer in lines: what is changed, then each objective."""
+    return "\n".join(_lines(question, answer)) + "\n"
+
+
+def _lines(question: Question, answer: Answer) -> Iterator[str]:
+    log = Path(question.run.log.path).name
+    yield from wrapped(f"{log}, profile {question.profile.name} {question.profile.version}", "Log  ")
+    for warning in question.profile.warnings:
+        yield from wrapped(warning, "     ! ")
+    yield ""
+    for change in answer.changes:
+        option = change.option
+        values = f"{option.show(change.current)} -> {option.show(change.suggested)} {option.unit}".rstrip()
+        # Whoever reads the value must not miss what speaks against it.
+        yield clean("; ".join((f"{option.name}  {values}", *change.notes)))
+    yield ""
+    width = max((len(outlook.objective.variable.name) for outlook in answer.outlooks), default=0)
+    for outlook in answer.outlooks:
+        yield from wrapped(_outlook(outlook), f"{outlook.objective.variable.name:<{width}}  ")
+    if any(o.objective.variable.kind == "functional" and o.predicted.status() == "fault" for o in answer.outlooks):
+        yield from wrapped("The mission is likely to fail; the other values are those of a mission that does not.")
+    yield ""
+    yield (
+        f"Odds that all objectives are met: {answer.p_ok:.0%} with the change, "
+        f"{answer.p_ok_now:.0%} if the same configuration runs again"
+    )
+
+
+def _outlook(outlook: Outlook) -> str:
+    result, predicted = outlook.objective, outlook.predicted
+    unit = result.variable.unit
+    odds = "" if predicted.p_ok is None else f"{predicted.p_ok:.0%} odds"
+    unchanged = "" if outlook.now.p_ok is None else f" ({outlook.now.p_ok:.0%} unchanged)"
+    if result.variable.kind == "functional":
+        return f"{STATUS_WORDS[result.status]} in this run -> {odds}{unchanged}"
+    here = "not evaluated" if result.value is None else f"{result.value:.4g}"
+    span = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {unit}".rstrip()
+    bound = "" if result.threshold is None else f", wanted {result.threshold} {unit}, ".replace(" ,", ",")
+    return f"{here} in this run -> {span}{bound}{odds}{unchanged}"

@@ -1,0 +1,68 @@
+"""Commands that ask a run, or compare it with what was promised: whatif, verify."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from care_core.errors import UsageError
+from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds
+from care_tui.commands.diagnosing import bounds
+from care_tui.commands.past import NoHistory, remember
+from care_tui.console import Progress, emit
+from care_tui.jobs import Request, open_and_choose, question_of
+
+app = typer.Typer()
+
+
+@app.command()
+def whatif(
+    log: LogPath,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="OPTION=VALUE", help="Ask with this option changed.")
+    ] = None,
+    profile: ProfileName = None,
+    config: ConfigPaths = None,
+    threshold: Thresholds = None,
+    mission: Mission = None,
+    json: AsJson = False,
+    out: Out = None,
+) -> None:
+    """Predict what a run would have done with other options. Ends with 0, whatever the odds."""
+    from care_core.diagnose.whatif import parse_change
+    from care_core.report import whatif_json, whatif_text
+
+    if not set_:
+        raise UsageError("Nothing is asked.", hint="Change an option with --set OPTION=VALUE.", where="--set")
+    request = Request(log, profile, tuple(config or ()), thresholds=bounds(threshold or ()), mission=mission)
+    with Progress() as progress:
+        question = question_of(request, progress)
+    answer = question.ask(dict(parse_change(text, question.schema) for text in set_))
+    emit((whatif_json if json else whatif_text)(question, answer), out)
+
+
+@app.command()
+def verify(
+    report: Annotated[Path, typer.Argument(metavar="REPORT", help="The report, YAML or JSON.", show_default=False)],
+    log: LogPath,
+    profile: ProfileName = None,
+    mission: Mission = None,
+    json: AsJson = False,
+    out: Out = None,
+    no_history: NoHistory = False,
+) -> None:
+    """Did the fix of a report do what it promised? Ends with 0 recovered, 1 still a fault, 3 cannot tell."""
+    from care_core.report import read_report, verify_json, verify_log, verify_text
+    from care_core.report.verification import EXIT_CODES
+
+    promised = read_report(report)
+    with Progress() as progress:
+        progress("reading the log", 0.0)
+        opened, chosen, _ = open_and_choose(log, profile or promised.profile.name)
+        document = verify_log(promised, opened, chosen, mission)
+    if not no_history:
+        remember(lambda history: history.add_verification(document.model_dump(by_alias=True, mode="json")))
+    emit((verify_json if json else verify_text)(document), out)
+    raise typer.Exit(EXIT_CODES[document.verdict])

@@ -1,0 +1,62 @@
+"""`care history`, and remembering what was triaged and verified."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from care_core.errors import UsageError
+from care_tui.commands.arguments import AsJson, Out
+from care_tui.console import emit, say
+
+if TYPE_CHECKING:
+    from care_core.history import History
+
+app = typer.Typer()
+
+NoHistory = Annotated[bool, typer.Option("--no-history", help="Do not remember this in the history.")]
+
+
+def remember(record: Callable[[History], None]) -> None:
+    """Put something into the history. One that cannot be used costs a sentence, never the work."""
+    from care_core.history import History, HistoryError, history_path
+
+    path = history_path()
+    if path is None:
+        return
+    try:
+        record(History(path))
+    except HistoryError as err:
+        say(f"care: {err}")
+
+
+@app.command()
+def history(
+    profile: Annotated[str | None, typer.Option("--profile", "-p", help="Only runs of this profile.")] = None,
+    limit: Annotated[int, typer.Option("--limit", min=1, help="How many triages are listed.")] = 20,
+    json: AsJson = False,
+    ascii: Annotated[bool, typer.Option("--ascii", help="Draw trends without block characters.")] = False,
+    card: Annotated[
+        Path | None, typer.Option("--card", metavar="FOLDER", help="Write the verified fixes into this profile's card.")
+    ] = None,
+    out: Out = None,
+) -> None:
+    """List past triages with the trend of each objective, and whether fixes worked as often as promised."""
+    from care_core.history import SWITCH, History, history_path, track_record
+    from care_core.history.card import update_card
+    from care_core.history.listing import history_document, history_json, history_text
+    from care_core.profile.store import load_profile
+
+    path = history_path()
+    if path is None:
+        raise UsageError("The history is switched off.", hint=f"Unset {SWITCH}.", where=SWITCH)
+    store = History(path)
+    if card is not None:
+        chosen = load_profile(card)
+        written = update_card(chosen.path, track_record(store.verifications(chosen.schema.name)))
+        say(f"wrote {written}")
+    document = history_document(store.triages(profile, limit), store.verifications(profile))
+    emit(history_json(document) if json else history_text(document, ascii=ascii), out)

@@ -1,0 +1,206 @@
+"""What the log says, and what the run met that is no parameter: rules of the profile, causes, rivals, experiments."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_core.diagnose.circumstances import circumstances
+from care_core.diagnose.evidence import refused_by
+from care_core.diagnose.faults import thresholds_in_force
+from care_core.diagnose.records import ProfileChoice
+from care_core.diagnose.tell_more import experiment
+from care_core.diagnose.triage import diagnose, triage
+from care_core.diagnose.worlds import reference_of, world_of
+from care_core.errors import ProfileError
+from care_core.logs import open_log
+from care_core.profile.model import Summary
+from care_core.profile.schema import EvidenceRule, Schema, Side, read_schema
+from care_core.profile.select import describe_fit
+from care_core.profile.store import Profile, load_profile
+from care_core.report import build_document, to_markdown, to_text
+from care_core.run import Evidence, Run, Unavailable
+from care_core.variables import Role, Threshold, Variable
+from tests.planted import OPTIONS, SCHEMA, planted_run
+
+CHOICE = ProfileChoice("planted", "1", "Simulated robot", "")
+VARIABLES = {option.name: option for option in OPTIONS}
+MINIMAL = """
+schema_version: 1
+name: made
+version: "1"
+platform: one
+{extra}
+variables:
+  speed: {{role: option, range: [0, 1]}}
+  wind: {{role: context}}
+  done: {{role: objective, kind: functional}}
+"""
+
+
+def written(tmp_path: Path, extra: str) -> Schema:
+    path = tmp_path / "profile.yaml"
+    path.write_text(MINIMAL.format(extra=extra), encoding="utf-8")
+    return read_schema(path)
+
+
+@pytest.mark.parametrize(
+    ("extra", "words"),
+    [
+        ("evidence: [{text: a, options: [sped]}]", r"'sped'.*Did you mean 'speed'"),
+        ("evidence: [{text: a, options: {wind: {op: '<', value: 1}}}]", "names the option 'wind'"),
+        ("evidence: [{text: '(', options: [speed]}]", "not a regular expression"),
+        ("evidence: [{text: a, circumstance: wnd}]\ncircumstances: {wind: {wind: high}}", "Did you mean 'wind'"),
+        ("circumstances: {wind: {speed: high}}", "names the context or metric 'speed'"),
+        ("circumstances: {wind: {wind: up}}", "circumstances"),
+        ("evidence: [{text: a, option: [speed]}]", "Unknown key"),
+    ],
+)
+def test_a_rule_that_names_what_is_not_declared_is_refused(tmp_path: Path, extra: str, words: str) -> None:
+    with pytest.raises(ProfileError, match=words):
+        written(tmp_path, extra)
+
+
+def test_rules_do_not_touch_what_a_model_was_learned_for(tmp_path: Path) -> None:
+    plain = written(tmp_path, "")
+    ruled = written(
+        tmp_path,
+        "evidence: [{text: slow, options: {speed: {op: '<', value: 0.5}}, says: too slow}]\n"
+        "circumstances: {wind: {wind: high}}",
+    )
+    assert ruled.digest == plain.digest
+    assert ruled.evidence[0].says == "too slow"
+    assert ruled.circumstances == {"wind": {"wind": "high"}}
+
+
+@given(st.floats(0, 12), st.floats(0, 12))
+def test_a_bounded_rule_points_only_where_the_value_sets_the_check_off(value: float, bound: float) -> None:
+    rule = EvidenceRule(re.compile("x"), {"speed": Threshold("<", bound), "accel": None})
+    pointed = rule.points_at(VARIABLES, {"speed": value, "accel": 1.5})
+    assert pointed == (("speed",) if value < bound else ())
+    assert rule.points_at(VARIABLES, {"accel": 2.0}) == ("speed", "accel")
+
+
+def refused_run(**options: float) -> Run:
+    return replace(
+        planted_run(**options), evidence=(Evidence(3.0, "Arm: too few satellites", "refusal", ("min_sats",)),)
+    )
+
+
+def test_a_refusing_check_puts_its_option_first_and_is_quoted(planted: Profile) -> None:
+    run = refused_run(min_sats=14, speed=8.0)
+    diagnosis = diagnose(run, planted, CHOICE)
+    (fault,) = diagnosis.faults
+    assert refused_by(run) == {"min_sats"}
+    assert fault.causes[0].option.name == "min_sats"
+    assert any("too few satellites" in note for note in fault.causes[0].notes)
+
+
+def test_a_refusing_check_names_an_option_that_the_model_knows_nothing_of(planted: Profile) -> None:
+    run = planted_run(min_sats=14, inert=0.9)
+    run = replace(run, evidence=(Evidence(3.0, "Arm: inert", "refusal", ("inert",)),))
+    cause = diagnose(run, planted, CHOICE).faults[0].causes[0]
+    assert cause.option.name == "inert"
+    assert not cause.is_lead
+
+
+def test_a_message_in_flight_is_a_note_and_no_proof(planted: Profile) -> None:
+    run = replace(refused_run(min_sats=14), evidence=(Evidence(3.0, "tracking", "failsafe", ("speed",)),))
+    assert refused_by(run) == frozenset()
+    assert diagnose(run, planted, CHOICE).faults[0].causes[0].option.name == "min_sats"
+
+
+def circumstances_of(profile: Profile, run: Run, sides: Mapping[str, Side]) -> list[str]:
+    schema = replace(profile.schema, circumstances={"battery": sides})
+    world = world_of(run, profile, thresholds_in_force(schema, {}))
+    return [one.variable for one in circumstances(run, world, schema)]
+
+
+def test_a_metric_beyond_what_the_configuration_explains_is_a_circumstance(planted: Profile) -> None:
+    ordinary = planted_run(accel=3.5)
+    sagging = replace(ordinary, metrics={**ordinary.metrics, "sag": 2.5})
+    assert circumstances_of(planted, ordinary, {"sag": "high"}) == []
+    assert circumstances_of(planted, sagging, {"sag": "high"}) == ["sag"]
+    assert circumstances_of(planted, sagging, {"sag": "low"}) == []
+    gone = replace(ordinary, metrics={**ordinary.metrics, "sag": Unavailable("no battery")})
+    assert circumstances_of(planted, gone, {"sag": "high"}) == []
+
+
+def test_a_context_is_judged_by_where_training_saw_it(planted: Profile) -> None:
+    wind = Variable("wind", Role.CONTEXT, unit="m/s", doc="wind")
+    model = replace(planted.model, summaries={**planted.model.summaries, "wind": _summary(0.0, 10.0)})
+    schema = replace(SCHEMA, variables={**SCHEMA.variables, "wind": wind}, circumstances={"wind": {"wind": "high"}})
+    for value, expected in ((5.0, []), (9.9, ["wind"]), (12.0, ["wind"]), (0.1, [])):
+        run = replace(planted_run(), context={"wind": value})
+        world = replace(world_of(run, planted, {}), model=model)
+        found = circumstances(run, world, schema)
+        assert [one.name for one in found][: len(expected)] == expected
+        assert all(str(one.value)[:2] in one.text for one in found)
+
+
+def _summary(low: float, high: float) -> Summary:
+    return Summary(count=100, mean=5.0, spread=3.0, quantiles=tuple(low + (high - low) * i / 20 for i in range(21)))
+
+
+def test_the_experiment_separates_the_two_leading_causes(planted: Profile) -> None:
+    run = planted_run(speed=3.0, planner=2.0)
+    bounds = thresholds_in_force(SCHEMA, {"time": 183.0})
+    diagnosis = diagnose(run, planted, CHOICE, thresholds={"time": 183.0})
+    (fault,) = diagnosis.faults
+    reference = reference_of(run, planted)
+    world = world_of(run, planted, bounds)
+    found = experiment(world, fault, SCHEMA.variables, reference)
+    assert found is not None
+    (first, p_first), (second, p_second) = found.if_cause
+    assert {first, second} <= {cause.option.name for cause in fault.causes} | {"what this run met"}
+    assert abs(p_first - p_second) >= 0.15
+    assert found.option.name in (first, second)
+    assert experiment(world, fault, SCHEMA.variables, reference, keep=(first, second)) is None
+
+
+def test_where_nothing_is_off_its_reference_a_repeat_is_advised(planted: Profile) -> None:
+    run = planted_run()
+    slow = replace(run, objectives={**run.objectives, "time": 300.0})
+    diagnosis = diagnose(slow, planted, CHOICE)
+    assert diagnosis.abstained is not None
+    assert any("same configuration again" in advice for advice in diagnosis.tell_more)
+    report = build_document(diagnosis)
+    assert report.tell_more
+    assert "What would tell more" in to_text(diagnosis)
+    assert "## What would tell more" in to_markdown(report)
+
+
+def test_a_sure_cause_has_no_rivals(planted: Profile) -> None:
+    diagnosis = diagnose(planted_run(speed=1.5), planted, CHOICE)
+    if all(fault.causes[0].confidence == "high" for fault in diagnosis.faults):
+        assert diagnosis.rivals == ()
+        assert diagnosis.tell_more == ()
+
+
+REFUSED = {
+    "ACRO_BAL": ("ATC_ANG_RLL_P", "ATC_ANG_PIT_P"),
+    "ANGLE_MAX": ("ANGLE_MAX",),
+    "waiting for home": ("EK3_VELNE_M_NSE",),
+}
+
+
+def test_every_recorded_refusal_names_the_option_that_set_its_check_off(recorded: Path) -> None:
+    profile = load_profile("arducopter")
+    seen: list[str] = []
+    for path in sorted((recorded / "data/arducopter/faults").glob("*.BIN")):
+        log = open_log(path)
+        diagnosis = triage(log, profile, describe_fit(log, profile))
+        refusals = [e for e in diagnosis.run.evidence if e.kind == "refusal"]
+        for evidence in refusals:
+            check = next(check for check in REFUSED if check in evidence.text)
+            assert set(evidence.options) <= set(REFUSED[check])
+            assert evidence.options
+            assert diagnosis.faults[0].causes[0].option.name in refused_by(diagnosis.run)
+            seen.append(check)
+    assert seen

@@ -1,0 +1,227 @@
+"""Report and next run -> what became of the promise: core, files, command."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+
+from care_core.diagnose.faults import judge, thresholds_in_force
+from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, same, verify
+from care_core.errors import ConfigError
+from care_core.report import read_report, to_json, to_yaml
+from care_core.report.document import build_document
+from care_core.run import Setting, Unavailable
+from tests.conftest import Care
+from tests.made import made_diagnosis
+from tests.planted import DEFAULTS, ENERGY, SCHEMA, SUCCESS, TIME, planted_run
+
+SLOW = {**DEFAULTS, "speed": 2.0}
+PROMISED = PromisedSet({"speed": (2.0, 5.0)}, 0.9, {"time": (130.0, 150.0), "energy": (12.0, 20.0)})
+
+
+def promise(*others: PromisedSet) -> Promise:
+    return Promise(
+        config=SLOW,
+        objectives={
+            "success": Before(1.0, "ok", SUCCESS.threshold),
+            "time": Before(230.0, "fault", TIME.threshold),
+            "energy": Before(15.0, "ok", ENERGY.threshold),
+        },
+        sets=(PROMISED, *others),
+    )
+
+
+def checked(doubt: str = "", *others: PromisedSet, **options: float) -> Verification:
+    run = planted_run(**options)
+    return verify(promise(*others), run, SCHEMA, judge(run, SCHEMA, thresholds_in_force(SCHEMA, {}), {}), doubt)
+
+
+def test_a_change_that_was_made_and_did_what_it_promised() -> None:
+    found = checked(speed=5.0)
+    assert found.verdict == "fixed_as_promised"
+    assert found.worked is True
+    assert [change.made for change in found.changes] == ["made"]
+    assert {check.variable.name: check.outcome for check in found.objectives} == {
+        "success": "kept", "time": "recovered", "energy": "kept",
+    }  # fmt: skip
+
+
+def test_a_change_that_was_not_made() -> None:
+    found = checked(speed=2.0)
+    assert found.verdict == "change_not_made"
+    assert found.changes[0].made == "not_made"
+    assert found.worked is None
+    assert "speed" in found.sentence
+
+
+def test_another_value_is_neither_made_nor_left() -> None:
+    found = checked(speed=2.5)
+    assert found.changes[0].made == "other_value"
+    assert found.changes[0].driven == 2.5
+    assert found.verdict == "change_not_made"
+
+
+def test_a_change_that_did_not_help() -> None:
+    found = checked(speed=5.0, planner=2.0)
+    assert found.verdict == "not_fixed"
+    assert found.worked is False
+    assert [other.option.name for other in found.others] == ["planner"]
+    time = next(check for check in found.objectives if check.variable is TIME)
+    assert time.outcome == "better"
+    assert time.inside is False
+
+
+def test_a_run_that_became_worse_or_broke_something_else() -> None:
+    found = checked(speed=1.0, accel=4.0)
+    outcomes = {check.variable.name: check.outcome for check in found.objectives}
+    assert outcomes["time"] == "worse"
+    assert outcomes["energy"] == "broken"
+
+
+def test_a_recovery_with_other_changes_says_so() -> None:
+    found = checked(speed=5.0, accel=1.0)
+    assert found.verdict == "fixed_although"
+    assert "accel was changed too" in found.sentence
+
+
+def test_a_mission_that_failed_otherwise_is_not_fixed() -> None:
+    found = checked(speed=5.0, min_sats=14)
+    assert found.verdict == "not_fixed"
+    assert {check.variable.name: check.outcome for check in found.objectives}["time"] == "unknown"
+
+
+def test_what_was_not_evaluated_or_is_another_mission_cannot_be_told() -> None:
+    run = planted_run(speed=5.0)
+    run = replace(run, objectives={**run.objectives, "time": Unavailable("the log ends early")})
+    found = verify(promise(), run, SCHEMA, judge(run, SCHEMA, thresholds_in_force(SCHEMA, {}), {}))
+    assert found.verdict == "cannot_tell"
+    assert "the log ends early" in found.sentence
+    assert checked("the mission has 3 waypoints", speed=5.0).verdict == "cannot_tell"
+
+
+def test_an_alternative_that_was_made_instead_is_what_is_judged() -> None:
+    other = PromisedSet({"planner": (1.0, 0.0), "speed": (2.0, 4.0)}, 0.7, {})
+    found = checked("", other, speed=4.0, planner=0.0)
+    assert found.chosen == 1
+    assert found.p_fixed == 0.7
+    assert [change.made for change in found.changes] == ["made", "made"]
+
+
+def test_an_option_of_two_keys_is_made_when_both_are() -> None:
+    both = PromisedSet({"radius": (0.5, 0.3)}, 0.9, {})
+    run = planted_run(radius=0.3)
+    for values, made in (((0.3, 0.3), "made"), ((0.3, 0.5), "not_made"), ((0.4, 0.4), "other_value")):
+        keys = dict(zip(("/a/radius", "/b/radius"), values, strict=True))
+        driven = replace(run, settings={key: Setting(key, value, "log") for key, value in keys.items()})
+        found = verify(replace(promise(), sets=(both,)), driven, SCHEMA, ())
+        assert found.changes[0].made == made
+    assert verify(replace(promise(), sets=(both,)), replace(run, config={}), SCHEMA, ()).changes[0].made == "unknown"
+
+
+@settings(deadline=None)
+@given(st.floats(-1e6, 1e6, allow_subnormal=False))
+def test_a_value_is_the_same_after_a_trip_through_32_bits(value: float) -> None:
+    import numpy as np
+
+    assert same(value, float(np.float32(value))) or abs(value) < 1e-9
+
+
+# Reports on disk
+
+
+def test_a_report_is_read_back_from_json_and_yaml(tmp_path: Path) -> None:
+    report = build_document(made_diagnosis())
+    (tmp_path / "r.json").write_text(to_json(report), encoding="utf-8")
+    (tmp_path / "r.yaml").write_text(to_yaml(report), encoding="utf-8")
+    from_json, from_yaml = read_report(tmp_path / "r.json"), read_report(tmp_path / "r.yaml")
+    assert from_json == from_yaml
+    assert json.loads(to_json(report)) == from_json.model_dump(by_alias=True, mode="json")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{",
+        "a: [",
+        "[1, 2]",
+        "schema: care.triage/2",
+        "schema: care.triage/1",
+        "schema: care.triage/1\nfix: 3",
+        "!!python/object:os.system x",
+        "\x00",
+        "{" * 5000,
+        "[" * 5000,
+    ],
+)
+def test_what_is_no_report_is_refused_in_a_sentence(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "r.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        read_report(path)
+    assert caught.value.where == str(path)
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError):
+        read_report(path)
+    with pytest.raises(ConfigError):
+        read_report(tmp_path / "missing.yaml")
+
+
+# The command
+
+SAMPLE = Path(__file__).parents[2] / "samples/arducopter_failed.BIN"
+
+
+@pytest.fixture
+def report(care: Care, tmp_path: Path) -> Path:
+    path = tmp_path / "report.yaml"
+    assert care("triage", SAMPLE, "--out", path).code == 1
+    return path
+
+
+def test_the_log_of_the_report_itself_tells_nothing(care: Care, report: Path) -> None:
+    code, out, _ = care("verify", report, SAMPLE)
+    assert code == 3
+    assert "NOT MADE" in out
+
+
+def test_a_run_that_still_fails_ends_with_1(care: Care, report: Path) -> None:
+    data = YAML(typ="safe").load(report)
+    data["log"]["sha256"] = "0" * 64
+    other = report.with_suffix(".json")
+    other.write_text(json.dumps(data), encoding="utf-8")
+    code, out, _ = care("verify", other, SAMPLE, "--json")
+    _, schema, _ = care("schema", "verify")
+    document = json.loads(out)
+    jsonschema.validate(document, json.loads(schema))
+    assert code == 1
+    assert document["verdict"] == "change_not_made"
+    assert document["worked"] is None
+
+
+def test_what_cannot_be_verified_is_refused(care: Care, report: Path, tmp_path: Path) -> None:
+    assert care("verify", tmp_path / "none.yaml", SAMPLE).code == 2
+    assert care("verify", report, tmp_path / "none.BIN").code == 4
+    data = YAML(typ="safe").load(report)
+    data["fix"], data["abstained"] = None, "nothing explains it"
+    report.write_text(json.dumps(data), encoding="utf-8")
+    code, _, err = care("verify", report, SAMPLE)
+    assert code == 2
+    assert "nothing explains it" in err
+
+
+def test_another_fault_of_the_same_vehicle_is_no_recovery(care: Care, recorded: Path, tmp_path: Path) -> None:
+    faults = recorded / "data/arducopter/faults"
+    path = tmp_path / "report.json"
+    care("triage", faults / "f77_005.BIN", "--json", "--out", path)
+    code, out, _ = care("verify", path, faults / "f77_007.BIN")
+    assert code == 1
+    assert "LAND_SPEED" in out
+    assert "also changed" in out

@@ -1,0 +1,118 @@
+"""What another configuration would have given: predictions, warnings, and what an operator types."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from care_core.diagnose.records import ProfileChoice
+from care_core.diagnose.whatif import Question, parse_change, question
+from care_core.errors import UsageError
+from care_core.profile.store import Profile
+from care_core.report import whatif_document, whatif_text
+from tests.conftest import Care
+from tests.planted import CALM, DEFAULTS, SCHEMA, fly, planted_run
+
+CHOICE = ProfileChoice("planted", "1", "Simulated robot", "")
+
+
+@pytest.fixture(scope="module")
+def slow(planted: Profile) -> Question:
+    return question(planted_run(speed=2.0), planted, CHOICE)
+
+
+def test_a_faster_robot_is_predicted_to_meet_its_time(slow: Question) -> None:
+    answer = slow.ask({"speed": 5.0})
+    time = next(outlook for outlook in answer.outlooks if outlook.objective.variable.name == "time")
+    flown = fly({**DEFAULTS, "speed": 5.0}, CALM)
+    assert time.objective.status == "fault"
+    assert time.predicted.low <= flown["time"] <= time.predicted.high
+    assert answer.p_ok > answer.p_ok_now
+
+
+@settings(deadline=None, max_examples=30)
+@given(speed=st.floats(1, 10), accel=st.floats(0.5, 4))
+def test_odds_are_odds_and_an_answer_repeats(slow: Question, speed: float, accel: float) -> None:
+    answer = slow.ask({"speed": speed, "accel": accel})
+    assert 0 <= answer.p_ok <= 1
+    assert answer == slow.ask({"speed": speed, "accel": accel})
+    for outlook in answer.outlooks:
+        assert outlook.predicted.low <= outlook.predicted.high
+
+
+def test_asking_for_no_change_gives_the_run_again(slow: Question) -> None:
+    answer = slow.ask({})
+    assert answer.p_ok == answer.p_ok_now
+    assert answer.changes == ()
+
+
+def test_what_speaks_against_a_value_is_said_beside_it(slow: Question) -> None:
+    answer = slow.ask({"speed": 40.0, "planner": 7.0})
+    notes = {change.option.name: " ".join(change.notes) for change in answer.changes}
+    assert "outside the acceptable values (1 to 10 m/s)" in notes["speed"]
+    assert "outside the training runs" in notes["speed"]
+    assert "0 (straight)" in notes["planner"]
+    line = next(line for line in whatif_text(slow, answer).splitlines() if line.startswith("speed"))
+    assert "outside the acceptable values" in line
+    assert whatif_document(slow, answer).changes[0].notes
+
+
+def test_a_run_without_a_fault_can_be_asked(planted: Profile) -> None:
+    asked = question(planted_run(), planted, CHOICE)
+    assert all(result.status == "ok" for result in asked.objectives)
+    assert asked.ask({"speed": 1.2}).p_ok < asked.ask({}).p_ok
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("sped=3", "Did you mean 'speed'"),
+        ("SPEED=3", "Did you mean 'speed'"),
+        ("speed", "sets no value"),
+        ("speed=fast", "acceptable are 1 to 10 m/s"),
+        ("speed=nan", "sets no value"),
+        ("speed=inf", "sets no value"),
+        ("sag=1", "measured, not set"),
+        ("=3", "no option ''"),
+    ],
+)
+def test_what_cannot_be_set_is_refused(text: str, words: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        parse_change(text, SCHEMA)
+    assert words in str(caught.value)
+
+
+def test_labels_and_parameters_name_values_and_options() -> None:
+    assert parse_change("planner = greedy", SCHEMA) == ("planner", 2.0)
+    assert parse_change("filter=false", SCHEMA) == ("filter", 0.0)
+    assert parse_change("/b/radius=0.3", SCHEMA) == ("radius", 0.3)
+
+
+SAMPLE = Path(__file__).parents[2] / "samples/arducopter_failed.BIN"
+
+
+def test_the_command_asks_the_sample(care: Care) -> None:
+    code, out, _ = care("whatif", SAMPLE, "--set", "LAND_SPEED=40")
+    assert code == 0
+    assert "mission_time" in out
+    assert "unchanged" in out
+
+
+def test_the_command_answers_its_published_json(care: Care) -> None:
+    from json import loads
+
+    import jsonschema
+
+    code, out, _ = care("whatif", SAMPLE, "--set", "LAND_SPEED=40", "--json")
+    _, schema, _ = care("schema", "whatif")
+    assert code == 0
+    jsonschema.validate(loads(out), loads(schema))
+
+
+def test_the_command_refuses_what_it_does_not_know(care: Care) -> None:
+    assert care("whatif", SAMPLE, "--set", "LAND_SPED=40").code == 2
+    assert care("whatif", SAMPLE).code == 2
+    assert care("whatif", "nothing.BIN", "--set", "LAND_SPEED=40").code == 4
