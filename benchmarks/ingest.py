@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import heapq
+import os
 import statistics
 import struct
 import subprocess
@@ -31,6 +32,9 @@ from care_core.resources import bundled
 MB = 1e6
 GOOD_BAG = Path(__file__).parents[1] / "tests" / "data" / "move_base_good.bag"
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
+
+INSTALLED = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+"""The environment: an installed package is compiled, a checkout that may not be is slower to start."""
 
 TRIAGE = [sys.executable, "-c", "from care_tui.cli import main; main()", "triage", "--json"]
 DECODE_BAG = """
@@ -85,7 +89,7 @@ def run_once(command: list[str]) -> Cost:
     """What one run of a command costs. Raises where it ends with another code than 0 or 1 (a fault was found)."""
     started = time.perf_counter()
     peak_kb = 0
-    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=INSTALLED) as process:
         status = Path(f"/proc/{process.pid}/status")
         while process.poll() is None:
             lines = status.read_text().splitlines()
@@ -184,7 +188,9 @@ def sensor_messages(make: Mapping[str, Any]) -> list[tuple[str, Any, int]]:
     imu = make["sensor_msgs/msg/Imu"](header, turn, square, vector, square, vector, square)
     names = ["front_left", "front_right", "rear_left", "rear_right"]
     joints = make["sensor_msgs/msg/JointState"](header, names, np.zeros(4), np.zeros(4), np.zeros(4))
-    moved = make["geometry_msgs/msg/TransformStamped"](header, "odom", make["geometry_msgs/msg/Transform"](vector, turn))
+    moved = make["geometry_msgs/msg/TransformStamped"](
+        header, "odom", make["geometry_msgs/msg/Transform"](vector, turn)
+    )
     transforms = make["tf2_msgs/msg/TFMessage"]([moved, moved])
     picture = make["sensor_msgs/msg/CompressedImage"](header, "jpeg", rng.integers(0, 256, 60_000, dtype=np.uint8))
     return [
@@ -244,7 +250,7 @@ def make_mcap(path: Path) -> None:
                 schema = writer.register_schema(topic.type.replace("/msg/", "/"), "ros1msg", topic.definition.encode())
                 channels[topic.name] = writer.register_channel(topic.name, "ros1", schema)
             writer.add_message(channels[topic.name], time_ns, raw, time_ns)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 CASES = (

@@ -1,4 +1,4 @@
-"""The same work on many items in processes of its own, where one that crashes or hangs is told and never stops the rest.
+"""The same work on many items in other processes: one that crashes or hangs is told and never stops the rest.
 
 A pool of the standard library is broken for everybody when one of its processes dies, and waits for ever for one that
 hangs. Here each process talks to the parent over its own pipe and is replaced when it is lost.

@@ -12,6 +12,7 @@ from care_core.errors import CareError, ExitCode
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix
+    from care_core.logs import Sha256
     from care_core.run import Run
 
 Progress = Callable[[str, float], None]
@@ -40,6 +41,15 @@ class Request:
 
 def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
     """The whole line from a log file to its diagnosis. Raises CareError."""
+    from care_core.logs import hashing, sniff
+
+    sniff(request.log)
+    # Begun before anything else is imported: of a large log it takes as long as all the rest.
+    with hashing(request.log) as sha256:
+        return _diagnose(request, sha256, progress)
+
+
+def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> Diagnosis:
     from care_core.configs import read_configs
     from care_core.diagnose.triage import triage
     from care_core.logs import open_log
@@ -61,6 +71,7 @@ def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
         mission=request.mission,
         top=request.top,
         progress=progress,
+        sha256=sha256,
     )
 
 

@@ -28,6 +28,7 @@ from care_core.diagnose.ranking import (
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
 from care_core.extract.read import read_run
 from care_core.extract.settings import disagreements
+from care_core.logs import Sha256
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
 from care_core.run import Run, Setting, is_known
@@ -70,6 +71,7 @@ def triage(
     mission: int | None = None,
     top: int = 5,
     progress: Progress | None = None,
+    sha256: Sha256 | None = None,
 ) -> Diagnosis:
     """Diagnose one mission of a log.
 
@@ -79,6 +81,7 @@ def triage(
         thresholds: the operator's own bounds, per objective.
         mission: which mission of the log, from 1; the last when None.
         top: most causes to report per fault.
+        sha256: gives the log's digest, where the caller has begun to work it out.
 
     Raises:
         CareError: the log holds no such mission, the profile has no usable model, or no such option or objective.
@@ -87,7 +90,8 @@ def triage(
     report("reading the log", 0.0)
     overrides = dict(thresholds or {})
     check_wishes(profile.schema, keep, overrides)
-    run = read_run(log, profile.schema, overrides=configs or {}, mission=mission, judge_anyway=tuple(overrides))
+    named = tuple(overrides)
+    run = read_run(log, profile.schema, overrides=configs or {}, mission=mission, judge_anyway=named, sha256=sha256)
     report("judging the objectives", 0.6)
     diagnosis = diagnose(run, profile, choice, keep=keep, thresholds=overrides, top=top, progress=progress)
     return replace(diagnosis, notes=(*diagnosis.notes, *disagreements(profile.schema, run.config, configs or {})))

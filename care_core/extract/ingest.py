@@ -62,7 +62,7 @@ def ingest(
     progress: Report,
     read: Callable[[Path, Schema], list[Row]] = rows_of,
 ) -> Ingested:
-    """Read every log, going on with what `journal_of(out)` holds. The caller removes the journal with its table written.
+    """Read every log, going on with what `journal_of(out)` holds. The caller removes the journal when all is written.
 
     Args:
         limit_s: seconds that one log may take.

@@ -22,3 +22,13 @@ def triage() -> None:
     from care_core.report import json_schema
 
     emit(dumps(json_schema(), indent=2) + "\n")
+
+
+@app.command("inspect")
+def inspect() -> None:
+    """Print the JSON Schema of 'care inspect --json'."""
+    from json import dumps
+
+    from care_core.report.inspection import inspection_schema
+
+    emit(dumps(inspection_schema(), indent=2) + "\n")

@@ -23,14 +23,15 @@ MOST_FAILURES = 20
 
 @app.command()
 def inspect(log: LogPath, json: AsJson = False) -> None:
-    """Show what a log holds: format, span, channels, parameters, damage, missions, and which profiles fit."""
+    """Show what a log holds: span, channels, parameters, damage, missions, and what each profile would miss."""
     from care_core.logs import open_log
-    from care_tui.inspection import as_json, as_text, inspect_log
+    from care_core.report.inspection import inspection_json
+    from care_tui.inspection import as_text, inspect_log
 
     with Progress() as progress:
         progress("reading the log", 0.0)
-        inspection = inspect_log(open_log(log))
-    emit(as_json(inspection) if json else as_text(inspection))
+        document = inspect_log(open_log(log))
+    emit(inspection_json(document) if json else as_text(document))
 
 
 @app.command()
