@@ -12,7 +12,7 @@ from care_core.errors import CareError, ExitCode
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix
-    from care_core.logs import Sha256
+    from care_core.logs.digest import Sha256
     from care_core.run import Run
 
 Progress = Callable[[str, float], None]
@@ -41,7 +41,8 @@ class Request:
 
 def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
     """The whole line from a log file to its diagnosis. Raises CareError."""
-    from care_core.logs import hashing, sniff
+    from care_core.logs import sniff
+    from care_core.logs.digest import hashing
 
     sniff(request.log)
     # Begun before anything else is imported: of a large log it takes as long as all the rest.

@@ -28,8 +28,8 @@ from care_core.diagnose.ranking import (
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
 from care_core.extract.read import read_run
 from care_core.extract.settings import disagreements
-from care_core.logs import Sha256
 from care_core.logs.base import Log
+from care_core.logs.digest import Sha256
 from care_core.profile.store import Profile
 from care_core.run import Run, Setting, is_known
 

@@ -14,8 +14,8 @@ import care_core.extract.navigation  # noqa: F401
 from care_core.errors import ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
 from care_core.extract.settings import configuration, in_force
-from care_core.logs import Sha256, hashing
 from care_core.logs.base import Log
+from care_core.logs.digest import Sha256, hashing
 from care_core.profile.schema import Schema
 from care_core.run import Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable

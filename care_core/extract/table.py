@@ -13,7 +13,7 @@ from care_core.logs import open_log, sniff
 from care_core.profile.schema import Schema
 from care_core.run import Run, is_known
 
-LOG_SUFFIXES = (".bin", ".log", ".tlog", ".bag", ".mcap", ".db3", ".ulg")
+LOG_SUFFIXES = (".bin", ".log", ".tlog", ".bag", ".active", ".mcap", ".db3", ".zstd", ".ulg")
 SHARED_SUFFIX = ".log"
 """An ending that many files have: only those that begin like a log are taken out of a folder."""
 ABOUT = ("log", "mission", "log_format", "log_start", "log_sha256")

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 
@@ -32,11 +29,6 @@ UNREADABLE_MAGIC = (
 """Formats that are recognised but not read: how the file begins, what it is, what to do."""
 
 _SNIFF_BYTES = 4096
-_PIECE_BYTES = 1 << 23
-"""Pieces that a file is hashed in: after each the thread waits for its turn among those that compute."""
-
-Sha256 = Callable[[], str]
-"""Waits for the digest of a file and gives it."""
 
 
 def open_log(path: str | Path) -> Log:
@@ -74,18 +66,12 @@ def log_digest(path: str | Path) -> str:
     digest = hashlib.sha256()
     try:
         with Path(path).open("rb") as stream:
-            while piece := stream.read(_PIECE_BYTES):
+            # Large pieces: after each the thread waits for its turn among those that compute.
+            while piece := stream.read(1 << 23):
                 digest.update(piece)
     except OSError as err:
         raise _cannot_open(Path(path), err) from err
     return digest.hexdigest()
-
-
-@contextmanager
-def hashing(path: str | Path) -> Iterator[Sha256]:
-    """The file's digest, worked out in a thread while the log is read: hashing leaves the interpreter lock."""
-    with ThreadPoolExecutor(max_workers=1) as pool:
-        yield pool.submit(log_digest, path).result
 
 
 def _read_head(path: Path) -> bytes:
