@@ -2,7 +2,7 @@
 
     python -m benchmarks.wild_logs [--shared DIR]
 
-Prints a table of file and outcome: read, read with damage, or refused with a sentence; and what a triage of it ends with.
+Prints a table of file and outcome (read, read with damage, or refused with a sentence), and how a triage of it ends.
 """
 
 from __future__ import annotations

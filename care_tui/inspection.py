@@ -82,7 +82,8 @@ def _parameters(found: ParameterEntry) -> Iterator[str]:
     sources = ", ".join(f"{count} from {source}" for source, count in found.sources.items())
     yield f"Parameters  {found.count}{f': {sources}' if sources else ''}"
     for change in found.changed[:MOST_CHANGED]:
-        yield f"  changed   {change.name} from {_value(change.before)} to {_value(change.after)} at {_clock(change.time_s)}"
+        values = f"from {_value(change.before)} to {_value(change.after)}"
+        yield f"  changed   {change.name} {values} at {_clock(change.time_s)}"
     if len(found.changed) > MOST_CHANGED:
         yield f"  changed   and {len(found.changed) - MOST_CHANGED} more (see --json)"
 

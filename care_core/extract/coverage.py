@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import re
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 from care_core.errors import CareError
@@ -13,6 +14,8 @@ from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.run import MissionInfo, Run, Unavailable
 from care_core.variables import Role, Variable
+
+_WORD = re.compile(r"[\w/]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +61,7 @@ def cover(log: Log, schema: Schema) -> Coverage:
             runs = read_runs(log, schema)
         except CareError as err:
             obstacle = _no_mission(schema, channels) or err.message
-    missed = (*lost_options, *_missed_values(schema, channels, runs[-1] if runs else None))
+    missed = (*lost_options, *_missed_values(schema, plan.keys() - channels, runs[-1] if runs else None))
     return Coverage(schema, obstacle, found, sources, len(plan), missed, tuple(run.mission for run in runs))
 
 
@@ -94,18 +97,21 @@ def _how_to_have(option: Variable) -> str:
     return f"{recorded}give the file that sets {names[0]} with --config"
 
 
-def _missed_values(schema: Schema, channels: Collection[str], run: Run | None) -> list[Missed]:
-    """Contexts, metrics and objectives for which a message is not there: those of a run that it leaves without value,
-    without a run all of them."""
-    missed = []
+def _missed_values(schema: Schema, absent: Collection[str], run: Run | None) -> Iterator[Missed]:
+    """Contexts, metrics and objectives without a value for want of a message that the profile reads; where the log
+    holds no run, those whose extractor asks for one."""
     for variable in schema.variables.values():
         if variable.role is Role.OPTION or variable.extract is None:
             continue
         needs = find_extractor(variable.extract.kind).needs(variable.extract.args)
-        absent = [name for name in needs if name not in channels]
+        lacking = [name for name in needs if name in absent]
+        if run is None and lacking:
+            yield Missed(variable, f"no {' or '.join(lacking)} in the log", f"record {', '.join(lacking)}")
         value = None if run is None else run.value(variable.name)
-        if not absent or (run is not None and not isinstance(value, Unavailable)):
-            continue
-        told = value if isinstance(value, Unavailable) else Unavailable(f"no {' or '.join(absent)} in the log")
-        missed.append(Missed(variable, told.reason, told.hint or f"record {', '.join(absent)}"))
-    return missed
+        if isinstance(value, Unavailable) and (lacking or _names(value) & set(absent)):
+            yield Missed(variable, value.reason, value.hint or f"record {', '.join(lacking)}")
+
+
+def _names(value: Unavailable) -> set[str]:
+    """The words of a reason and its hint that may be channels."""
+    return set(_WORD.findall(f"{value.reason} {value.hint}"))

@@ -128,7 +128,7 @@ def inspection_json(document: InspectDocument) -> str:
 
 def inspection_schema() -> dict[str, Any]:
     """The JSON Schema of `care.inspect/1`."""
-    return {"$id": INSPECT_ID, **InspectDocument.model_json_schema(by_alias=True)}
+    return {**InspectDocument.model_json_schema(by_alias=True), "title": INSPECT_ID}
 
 
 def _log(log: Log) -> LogEntry:

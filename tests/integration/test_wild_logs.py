@@ -1,4 +1,4 @@
-"""Every log from the wild: read, read with damage, or refused with a sentence. Never a traceback, never a false 'ok'."""
+"""Every log from the wild is read, read with damage, or refused with a sentence: no traceback, no false 'ok'."""
 
 from __future__ import annotations
 
