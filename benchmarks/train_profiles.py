@@ -15,7 +15,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from care_core.extract.table import find_logs, ingest, write_table
+from care_core.extract.ingest import ingest, journal_of
+from care_core.extract.table import find_logs, write_table
 from care_core.learn.card import model_card
 from care_core.learn.table import read_table
 from care_core.learn.train import Settings, train
@@ -68,11 +69,12 @@ def runs_table(source: Source, schema: Schema, shared: Path, folder: Path) -> Pa
         return path
     with tarfile.open(path) as archive:
         archive.extractall(folder / schema.name, filter="data")
-    rows, failures = ingest(find_logs([folder / schema.name]), schema, progress=lambda _step, _share: None)
-    for failure in failures:
-        print(f"  {failure.path.name}: {failure.reason}")
     table = folder / f"{schema.name}.parquet"
-    write_table(table, rows, schema)
+    found = ingest(find_logs([folder / schema.name]), schema, table, progress=lambda _step, _share: None)
+    for failure in found.failures:
+        print(f"  {failure.path.name}: {failure.reason}")
+    write_table(table, found.rows, schema)
+    journal_of(table).unlink()
     return table
 
 

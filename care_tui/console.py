@@ -44,6 +44,16 @@ def emit(text: str, out: Path | None = None) -> None:
         raise UsageError(f"Cannot write the output: {err.strerror}.", hint="Write it to another place.") from None
 
 
+def check_writable(out: Path) -> None:
+    """Refuse, before any work is done, a file that could not be written. Raises UsageError."""
+    if out.is_dir():
+        raise UsageError("This is a folder.", hint="Name a file in it.", where=str(out))
+    if not out.parent.is_dir():
+        raise UsageError("The folder does not exist.", hint="Make it first.", where=str(out.parent))
+    if not os.access(out.parent, os.W_OK):
+        raise UsageError("No permission to write there.", hint="Choose another place.", where=str(out.parent))
+
+
 def say(text: str) -> None:
     """One line of talk on stderr."""
     print(clean(text), file=sys.stderr)

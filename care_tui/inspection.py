@@ -1,110 +1,131 @@
-"""What `care inspect` says of a log, as text and as JSON."""
+"""What `care inspect` prints: the inspection as lines for a terminal."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from json import dumps
+import re
+from collections.abc import Iterable, Iterator, Sequence
 
-from care_core.errors import CareError
-from care_core.extract.read import read_runs
+from care_core.extract.coverage import cover
 from care_core.logs.base import Log
-from care_core.profile.select import Fit, measure_fit
 from care_core.profile.store import available_profiles, load_profile
-from care_core.run import MissionInfo
-from care_core.text import clean
+from care_core.report.inspection import (
+    DamageEntry,
+    InspectDocument,
+    LogEntry,
+    MissedEntry,
+    MissionEntry,
+    ParameterEntry,
+    ProfileEntry,
+    build_inspection,
+)
+
+MOST_DAMAGE, MOST_CHANGED = 8, 10
+"""Damaged places, and changed parameters, that are listed one by one."""
+
+_NUMBER = re.compile(r"\d+")
 
 
-@dataclass(frozen=True, slots=True)
-class Inspection:
-    """A log, the profiles that fit it (best first), and the missions that the best of them finds."""
-
-    log: Log
-    fits: tuple[Fit, ...]
-    missions: tuple[MissionInfo, ...]
+def inspect_log(log: Log) -> InspectDocument:
+    """Look into a log without judging it, with every installed profile."""
+    return build_inspection(log, [cover(log, load_profile(path).schema) for path in available_profiles()])
 
 
-def inspect_log(log: Log) -> Inspection:
-    """Look into a log without judging it."""
-    fits = [fit for fit in (measure_fit(log, load_profile(path).schema) for path in available_profiles()) if fit.found]
-    fits.sort(key=lambda fit: (-fit.found, -fit.names, fit.schema.name))
-    missions: tuple[MissionInfo, ...] = ()
-    if fits:
-        try:
-            missions = tuple(run.mission for run in read_runs(log, fits[0].schema))
-        except CareError:
-            missions = ()  # a log without missions is still worth looking into
-    return Inspection(log, tuple(fits), missions)
-
-
-def as_json(inspection: Inspection) -> str:
-    """One object."""
-    log = inspection.log
-    data = {
-        "path": str(log.path),
-        "format": log.format.value,
-        "start": log.start,
-        "duration_s": log.duration_s,
-        "facts": {name: clean(text) for name, text in log.facts.items()},
-        "damage": [{"what": clean(damage.what), "byte": damage.byte, "time_s": damage.time_s} for damage in log.damage],
-        "channels": [
-            {
-                "name": clean(channel.name),
-                "type": clean(channel.type),
-                "count": channel.count,
-                "rate_hz": channel.rate_hz,
-            }
-            for channel in log.channels()
-        ],
-        "parameters": len(log.settings()),
-        "missions": [
-            {
-                "index": mission.index,
-                "start_s": mission.start_s,
-                "end_s": mission.end_s,
-                "ended": mission.ended,
-                "fits": mission.fits,
-                "mismatch": mission.mismatch or None,
-            }
-            for mission in inspection.missions
-        ],
-        "profiles": [
-            {"name": fit.schema.name, "options": fit.options, "sources": fit.sources} for fit in inspection.fits
-        ],
-    }
-    return dumps(data, indent=2, allow_nan=False) + "\n"
-
-
-def as_text(inspection: Inspection) -> str:
+def as_text(document: InspectDocument) -> str:
     """Lines for a terminal."""
-    log = inspection.log
+    log = document.log
     lines = [
-        f"Log         {clean(str(log.path))}",
-        f"Format      {log.format.value}",
+        f"Log         {log.path}",
+        f"Format      {log.format}",
         f"Start       {log.start or 'not known (no wall clock)'}",
-        f"Duration    {log.duration_s:.1f} s",
-        *(f"{name.capitalize():<11} {clean(text)}" for name, text in log.facts.items()),
-        f"Parameters  {len(log.settings())}",
-        *(f"Damage      {clean(damage.what)}{_at(damage.time_s)}" for damage in log.damage),
-        *(f"Mission {mission.index:<3} {_mission(mission)}" for mission in inspection.missions),
-        *(f"Profile     {fit.schema.name}: {fit}" for fit in inspection.fits),
+        f"Duration    {_span(log)}",
+        *(f"{name.capitalize():<11} {text}" for name, text in log.facts.items()),
+        *_damage(log.damage),
+        *_parameters(document.parameters),
+        *_profiles(document.profiles),
+        *_channels(document),
     ]
-    if not inspection.fits:
-        lines.append("Profile     none fits")
-    elif not inspection.missions:
-        lines.append("Mission     none found")
-    channels = sorted(log.channels(), key=lambda channel: channel.name)
-    width = max((len(channel.name) for channel in channels), default=0)
-    lines += ["", f"{'Channel':<{width}}  {'Count':>8}  {'Hz':>8}  Type"]
-    for channel in channels:
-        rate = "" if channel.rate_hz is None else f"{channel.rate_hz:.1f}"
-        lines.append(f"{clean(channel.name):<{width}}  {channel.count:>8}  {rate:>8}  {clean(channel.type)}")
     return "\n".join(lines) + "\n"
 
 
-def _at(time_s: float | None) -> str:
-    return "" if time_s is None else f" at {time_s:.1f} s"
+def _span(log: LogEntry) -> str:
+    if not log.damage:
+        return f"{_clock(log.duration_s)} ({log.duration_s:.1f} s)"
+    about = "an unknown time" if log.read.about_s is None else f"about {_clock(log.read.about_s)}"
+    return f"read 00:00 to {_clock(log.read.to_s)} of {about} ({log.duration_s:.1f} s)"
 
 
-def _mission(mission: MissionInfo) -> str:
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes:02}:{rest:02}"
+
+
+def _damage(damage: Sequence[DamageEntry]) -> Iterator[str]:
+    """Every damaged place; where they are many, a line for each kind with the first and the last of it."""
+    if len(damage) <= MOST_DAMAGE:
+        yield from (f"Damage      {entry.what}{_place(entry)}" for entry in damage)
+        return
+    kinds: dict[str, list[DamageEntry]] = {}
+    for entry in damage:
+        kinds.setdefault(_NUMBER.sub("N", entry.what), []).append(entry)
+    for found in kinds.values():
+        more = f", and {len(found) - 1} more like it, the last{_place(found[-1])}" if len(found) > 1 else ""
+        yield f"Damage      {found[0].what}{_place(found[0])}{more}"
+
+
+def _place(entry: DamageEntry) -> str:
+    byte = "" if entry.byte is None else f" at byte {entry.byte}"
+    return byte + ("" if entry.time_s is None else f" (at {_clock(entry.time_s)})")
+
+
+def _parameters(found: ParameterEntry) -> Iterator[str]:
+    sources = ", ".join(f"{count} from {source}" for source, count in found.sources.items())
+    yield f"Parameters  {found.count}{f': {sources}' if sources else ''}"
+    for change in found.changed[:MOST_CHANGED]:
+        values = f"from {_value(change.before)} to {_value(change.after)}"
+        yield f"  changed   {change.name} {values} at {_clock(change.time_s)}"
+    if len(found.changed) > MOST_CHANGED:
+        yield f"  changed   and {len(found.changed) - MOST_CHANGED} more (see --json)"
+
+
+def _value(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:g}"
+
+
+def _profiles(profiles: Iterable[ProfileEntry]) -> Iterator[str]:
+    for profile in profiles:
+        held = ""
+        if profile.sources_wanted:
+            held = (
+                f"{profile.options} of {profile.options_wanted} options and {profile.sources} of"
+                f" {profile.sources_wanted} sources are in the log"
+            )
+        verdict = held if profile.usable else "; ".join(part for part in (f"no: {profile.reason}", held) if part)
+        yield f"Profile     {profile.name}: {verdict}"
+        yield from (f"  mission {mission.index} {_mission(mission)}" for mission in profile.missions)
+        if profile.options or profile.sources:
+            yield from _missed(profile.missed)
+
+
+def _mission(mission: MissionEntry) -> str:
     end = "" if mission.ended else ", the log ends before it does"
-    return f"{mission.start_s:.1f} to {mission.end_s:.1f} s{end}{f', {mission.mismatch}' if mission.mismatch else ''}"
+    mismatch = f", {mission.mismatch}" if mission.mismatch else ""
+    return f"{_clock(mission.start_s)} to {_clock(mission.end_s)}{end}{mismatch}"
+
+
+def _missed(missed: Sequence[MissedEntry]) -> Iterator[str]:
+    """What a profile would miss, variables with the same hint on one line."""
+    together: dict[tuple[str, str], list[str]] = {}
+    for entry in missed:
+        together.setdefault((entry.role, entry.hint), []).append(entry.name)
+    for (role, hint), names in together.items():
+        yield f"  misses    {role}{'' if len(names) == 1 else 's'} {', '.join(names)}: {hint}"
+
+
+def _channels(document: InspectDocument) -> Iterator[str]:
+    width = max((len(channel.name) for channel in document.channels), default=0)
+    yield ""
+    yield f"{'Channel':<{width}}  {'Count':>8}  {'Hz':>8}  Type"
+    for channel in document.channels:
+        rate = "" if channel.rate_hz is None else f"{channel.rate_hz:.1f}"
+        yield f"{channel.name:<{width}}  {channel.count:>8}  {rate:>8}  {channel.type}"

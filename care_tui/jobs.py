@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix, ProfileChoice
     from care_core.diagnose.whatif import Question
     from care_core.logs.base import Log
+    from care_core.logs.digest import Sha256
     from care_core.profile.store import Profile
     from care_core.run import Run
 
@@ -45,6 +46,16 @@ class Request:
 
 def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
     """The whole line from a log file to its diagnosis. Raises CareError."""
+    from care_core.logs import sniff
+    from care_core.logs.digest import hashing
+
+    sniff(request.log)
+    # Begun before anything else is imported: of a large log it takes as long as all the rest.
+    with hashing(request.log) as sha256:
+        return _diagnose(request, sha256, progress)
+
+
+def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> Diagnosis:
     from care_core.configs import read_configs
     from care_core.diagnose.triage import triage
     from care_core.logs import open_log
@@ -63,6 +74,7 @@ def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
         since=None if request.since is None else open_log(request.since),
         top=request.top,
         progress=progress,
+        sha256=sha256,
     )
 
 

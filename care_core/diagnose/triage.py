@@ -35,6 +35,7 @@ from care_core.diagnose.worlds import reference_of, world_of
 from care_core.extract.read import read_run
 from care_core.extract.settings import readable
 from care_core.logs.base import Log
+from care_core.logs.digest import Sha256
 from care_core.profile.store import Profile
 from care_core.run import Run
 
@@ -77,6 +78,7 @@ def triage(
     since: Log | None = None,
     top: int = 5,
     progress: Progress | None = None,
+    sha256: Sha256 | None = None,
 ) -> Diagnosis:
     """Diagnose one mission of a log.
 
@@ -87,6 +89,7 @@ def triage(
         mission: which mission of the log, from 1; the last when None.
         since: the log of a good run; what changed since then is told as evidence.
         top: most causes to report per fault.
+        sha256: gives the log's digest, where the caller has begun to work it out.
 
     Raises:
         CareError: the log holds no such mission, the profile has no usable model, or no such option or objective.
@@ -96,7 +99,8 @@ def triage(
     overrides = dict(thresholds or {})
     check_wishes(profile.schema, keep, overrides)
     given = resolve(configs, (parameter for option in profile.schema.options for parameter in readable(option)))
-    run = read_run(log, profile.schema, overrides=given, mission=mission, judge_anyway=tuple(overrides))
+    named = tuple(overrides)
+    run = read_run(log, profile.schema, overrides=given, mission=mission, judge_anyway=named, sha256=sha256)
     report("judging the objectives", 0.6)
     diagnosis = diagnose(run, profile, choice, keep=keep, thresholds=overrides, top=top, progress=progress)
     diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *provenance.notes(profile.schema, run, configs, given)))

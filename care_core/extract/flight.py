@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -152,12 +153,13 @@ def distance_to_legs(points: Floats, corners: Floats) -> Floats:
     """Distance of each point, shape (n, 2), from the nearest of the legs between `corners`, shape (legs + 1, 2)."""
     if len(corners) < 2 or not len(points):
         return np.empty(0)
-    start, leg = corners[:-1], np.diff(corners, axis=0)
-    along = points[:, None, :] - start[None]
-    length2 = np.maximum((leg**2).sum(axis=1), 1e-9)
-    share = np.clip((along * leg).sum(axis=2) / length2, 0.0, 1.0)
-    off = along - share[..., None] * leg
-    return np.asarray(np.hypot(off[..., 0], off[..., 1]).min(axis=1), dtype=np.float64)
+    nearest = np.full(len(points), np.inf)
+    for start, end in pairwise(corners):  # leg by leg, since a log holds many points
+        leg, along = end - start, points - start
+        share = np.clip((along * leg).sum(axis=1) / max(float((leg**2).sum()), 1e-9), 0.0, 1.0)
+        off = along - share[:, None] * leg
+        nearest = np.minimum(nearest, np.hypot(off[:, 0], off[:, 1]))
+    return nearest
 
 
 def waypoint_offsets(waypoints: Sequence[Waypoint], expected: Sequence[Sequence[float]]) -> list[float]:

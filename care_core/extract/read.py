@@ -6,7 +6,6 @@ Everything a profile asks of a log is merged into one reading plan, so the log i
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 # Importing them registers their extractors and mission kinds.
@@ -19,8 +18,8 @@ from care_core.errors import ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
 from care_core.extract.settings import changes_between, configuration, in_force
 from care_core.extract.telemetry import as_dataflash, explained
-from care_core.logs import log_digest
 from care_core.logs.base import Log
+from care_core.logs.digest import Sha256, hashing
 from care_core.profile.schema import Schema
 from care_core.run import Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable
@@ -33,19 +32,21 @@ def read_run(
     overrides: Mapping[str, Setting] | None = None,
     mission: int | None = None,
     judge_anyway: Collection[str] = (),
+    sha256: Sha256 | None = None,
 ) -> Run:
     """Read one mission of a log: the last one, or number `mission` (from 1).
 
     `overrides` are settings of configuration files by the name of the parameter in the log, used only for options
     that the log does not hold.
     `judge_anyway` names objectives that the operator gave thresholds for: they are judged even where the mission
-    is not the one that the profile's thresholds belong to.
+    is not the one that the profile's thresholds belong to. `sha256` gives the log's digest where the caller has
+    begun to work it out.
 
     Raises:
         ProfileError: the profile reads no logs, or the log holds no mission of its kind.
         UsageError: there is no mission of that number.
     """
-    source = _Source.read(log, schema)
+    source = _Source.read(log, schema, sha256)
     count = len(source.missions)
     if mission is not None and not 1 <= mission <= count:
         held = "holds one mission" if count == 1 else f"holds missions 1 to {count}"
@@ -107,15 +108,14 @@ class _Source:
     missions: tuple[Mission, ...]
 
     @classmethod
-    def read(cls, log: Log, schema: Schema) -> _Source:
+    def read(cls, log: Log, schema: Schema, sha256: Sha256 | None = None) -> _Source:
+        if sha256 is None:
+            with hashing(log.path) as digest:
+                return cls.read(log, schema, digest)
         kind = mission_kind(schema)
         plan = reading_plan(schema)
-        # Hashing leaves the interpreter lock, so it costs nothing beside decoding.
-        with ThreadPoolExecutor(max_workers=1) as pool:
-            digest = pool.submit(log_digest, log.path)
-            tables = as_dataflash(log).read(plan)
-            settings = log.settings()
-            sha256 = digest.result()
+        tables = as_dataflash(log).read(plan)
+        settings = log.settings()
         missions = kind.missions(tables, log.duration_s, schema.mission)
         if not missions:
             raise ProfileError(
@@ -123,7 +123,7 @@ class _Source:
                 hint="Look at what was recorded with 'care inspect'.",
                 where=str(log.path),
             )
-        return cls(schema, kind, log_info(log, sha256), settings, missions)
+        return cls(schema, kind, log_info(log, sha256()), settings, missions)
 
     def run(self, index: int, overrides: Mapping[str, Setting], judge_anyway: Collection[str]) -> Run:
         found = self.missions[index]

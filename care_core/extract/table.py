@@ -1,37 +1,32 @@
-"""Many logs to one table of runs, in parallel. A log that cannot be read is told apart and never stops the rest."""
+"""The table of runs: which logs go into it, its rows, and how it is written."""
 
 from __future__ import annotations
 
 import csv
 import io
-import os
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from care_core.errors import CareError, UsageError
+from care_core.errors import LogError, UsageError
 from care_core.extract.read import read_runs
-from care_core.logs import open_log, whole_recording
+from care_core.logs import open_log, sniff, whole_recording
 from care_core.profile.schema import Schema
 from care_core.run import Run, is_known
 
-LOG_SUFFIXES = (".bin", ".log", ".tlog", ".ulg", ".bag", ".active", ".mcap", ".db3", ".zstd")
+LOG_SUFFIXES = (".bin", ".log", ".tlog", ".bag", ".active", ".mcap", ".db3", ".zstd", ".ulg")
+SHARED_SUFFIX = ".log"
+"""An ending that many files have: only those that begin like a log are taken out of a folder."""
+ABOUT = ("log", "mission", "log_format", "log_start", "log_sha256")
+"""The columns before the variables."""
 INSTALL_LEARN = "Install what it needs with: pip install 'care-tui[learn]'"
 
 Row = dict[str, str | int | float | None]
 
 
-@dataclass(frozen=True, slots=True)
-class Failure:
-    """A log that gave no runs, and why."""
-
-    path: Path
-    reason: str
-
-
 def find_logs(places: Iterable[Path]) -> tuple[Path, ...]:
-    """The files named, and every log below the folders named, each once, in a stable order.
+    """The logs named, and every log below the folders named, each once, in a stable order.
+
+    A folder that a ROS 2 recorder made is one log.
 
     A folder that is one recording of several files counts as one log.
 
@@ -42,33 +37,45 @@ def find_logs(places: Iterable[Path]) -> tuple[Path, ...]:
     for place in places:
         if not place.exists():
             raise UsageError("No such file or folder.", hint="Check the path.", where=str(place))
-        inside = sorted(path for path in place.rglob("*") if path.suffix.lower() in LOG_SUFFIXES and path.is_file())
-        found.update(dict.fromkeys(map(whole_recording, inside) if place.is_dir() else [place]))
+        inside = map(whole_recording, logs_below(place)) if place.is_dir() else [place]
+        found.update(dict.fromkeys(inside))
     if not found:
-        raise UsageError("There is no log there.", hint=f"Logs end in {' or '.join(LOG_SUFFIXES)}.")
+        raise UsageError("There is no log there.", hint=f"Logs end in {', '.join(LOG_SUFFIXES)}.")
     return tuple(found)
 
 
-def ingest(
-    paths: Sequence[Path], schema: Schema, *, workers: int | None = None, progress: Callable[[str, float], None]
-) -> tuple[list[Row], list[Failure]]:
-    """Rows of `log`, `mission` and every variable of the schema (None: not known), one a mission, in order of paths."""
-    rows: dict[Path, list[Row]] = {}
-    failures: dict[Path, Failure] = {}
-    count = min(workers or os.cpu_count() or 1, len(paths))
-    with ProcessPoolExecutor(max_workers=max(count, 1)) as pool:
-        jobs = {pool.submit(rows_of, path, schema): path for path in paths}
-        for done, job in enumerate(as_completed(jobs), start=1):
-            path = jobs[job]
-            try:
-                rows[path] = job.result()
-            except CareError as err:
-                failures[path] = Failure(path, err.message)
-            except Exception as err:  # a defect met in one log must not lose the others
-                failures[path] = Failure(path, f"unexpected {type(err).__name__}: {err}")
-            progress(f"read {done} of {len(paths)} logs", done / len(paths))
-    ordered = [row for path in paths for row in rows.get(path, ())]
-    return ordered, [failures[path] for path in paths if path in failures]
+def logs_below(folder: Path) -> list[Path]:
+    """Every log in a folder and in those below it, by name; the folder itself where it is one recording."""
+    if is_recording(folder):
+        return [folder]
+    found: list[Path] = []
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and not path.is_symlink():
+            found += logs_below(path)
+        elif is_log(path):
+            found.append(path)
+    return found
+
+
+def is_recording(folder: Path) -> bool:
+    """Whether a ROS 2 recorder made this folder."""
+    return (folder / "metadata.yaml").is_file()
+
+
+def is_log(path: Path) -> bool:
+    """Whether a file in a folder is a log, by its ending, and by its beginning where others end like that too."""
+    suffix = path.suffix.lower()
+    if suffix not in LOG_SUFFIXES or not path.is_file():
+        return False
+    return suffix != SHARED_SUFFIX or _begins_like_a_log(path)
+
+
+def _begins_like_a_log(path: Path) -> bool:
+    try:
+        sniff(path)
+    except LogError:
+        return False
+    return True
 
 
 def rows_of(path: Path, schema: Schema) -> list[Row]:
@@ -77,16 +84,22 @@ def rows_of(path: Path, schema: Schema) -> list[Row]:
 
 
 def _row(path: Path, run: Run, schema: Schema) -> Row:
-    row: Row = {"log": str(path), "mission": run.mission.index}
+    about = (_as_text(path), run.mission.index, run.log.format, run.log.start, run.log.sha256)
+    row: Row = dict(zip(ABOUT, about, strict=True))
     for name in schema.variables:
         value = run.value(name)
         row[name] = value if is_known(value) else None
     return row
 
 
+def _as_text(path: Path) -> str:
+    """The path; bytes that are no text are escaped, since a table cannot hold them."""
+    return str(path).encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def write_table(path: Path, rows: Sequence[Row], schema: Schema) -> None:
     """Write the table as CSV or Parquet, by suffix; whole or not at all."""
-    columns = ["log", "mission", *schema.variables]
+    columns = [*ABOUT, *schema.variables]
     if path.suffix.lower() == ".parquet":
         _write_parquet(path, rows, columns)
         return

@@ -104,7 +104,8 @@ def log_digest(path: str | Path) -> str:
         files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
         for file in files:
             with file.open("rb") as stream:
-                while piece := stream.read(1 << 20):
+                # Large pieces: after each the thread waits for its turn among those that compute.
+                while piece := stream.read(1 << 23):
                     digest.update(piece)
     except OSError as err:
         raise _cannot_open(path, err) from err

@@ -87,7 +87,7 @@ class _RecordColumns(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return len(self._fields)
 
-    def where(self, mask: NDArray[np.bool_]) -> _RecordColumns:
+    def where(self, mask: NDArray[np.bool_] | slice) -> _RecordColumns:
         part = _RecordColumns(self._read_bytes, self._fields, self._offsets[mask])
         part._texts = {name: column[mask] for name, column in self._texts.items()}
         return part

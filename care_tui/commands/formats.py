@@ -33,6 +33,14 @@ def triage() -> None:
     _print(json_schema())
 
 
+@app.command("inspect")
+def inspect() -> None:
+    """Print the JSON Schema of 'care inspect --json'."""
+    from care_core.report.inspection import inspection_schema
+
+    _print(inspection_schema())
+
+
 @app.command("verify")
 def verify() -> None:
     """Print the JSON Schema of 'care verify --json'."""

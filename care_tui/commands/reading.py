@@ -8,26 +8,30 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from care_core.errors import CareError, LogError
+from care_core.errors import ExitCode, LogError
 from care_tui.commands.arguments import AsJson, LogPath, Out, ProfileName
-from care_tui.console import Progress, emit, say
+from care_tui.console import Progress, check_writable, emit, say
 
 if TYPE_CHECKING:
-    from care_core.profile.schema import Schema
+    from care_core.extract.ingest import Failure
 
 app = typer.Typer()
+
+MOST_FAILURES = 20
+"""More logs that failed are shown by reason."""
 
 
 @app.command()
 def inspect(log: LogPath, json: AsJson = False) -> None:
-    """Show what a log holds: format, span, channels, parameters, damage, missions, and which profiles fit."""
+    """Show what a log holds: span, channels, parameters, damage, missions, and what each profile would miss."""
     from care_core.logs import open_log
-    from care_tui.inspection import as_json, as_text, inspect_log
+    from care_core.report.inspection import inspection_json
+    from care_tui.inspection import as_text, inspect_log
 
     with Progress() as progress:
         progress("reading the log", 0.0)
-        inspection = inspect_log(open_log(log))
-    emit(as_json(inspection) if json else as_text(inspection))
+        document = inspect_log(open_log(log))
+    emit(inspection_json(document) if json else as_text(document))
 
 
 @app.command()
@@ -69,34 +73,52 @@ def ingest(
     out: Annotated[Path, typer.Option("--out", "-o", help="The table to write: .csv or .parquet.", show_default=False)],
     profile: ProfileName = None,
     workers: Annotated[int | None, typer.Option("--workers", min=1, help="Processes; one a core.")] = None,
+    limit: Annotated[float, typer.Option("--limit", min=0.1, help="Seconds that one log may take.")] = 600.0,
+    failures: Annotated[Path | None, typer.Option("--failures", help="Write logs that failed to this .csv.")] = None,
 ) -> None:
-    """Read many logs into a table of runs, one row a mission, for 'care train'."""
-    from care_core.extract.table import check_table_path, find_logs, ingest, write_table
+    """Read many logs into a table of runs, one row a mission, for 'care train'.
+
+    What is interrupted goes on where it was when the command is given again. Ends with 0 all read, 3 some failed,
+    4 none could be read.
+    """
+    from care_core.extract import ingest as ingesting
+    from care_core.extract.table import check_table_path, find_logs, write_table
     from care_core.profile.store import load_profile
 
     check_table_path(out)
+    if failures is not None:
+        check_writable(failures)
     paths = find_logs(logs)
-    schema = load_profile(profile).schema if profile else _schema_for(paths)
-    with Progress() as progress:
-        rows, failures = ingest(paths, schema, workers=workers, progress=progress)
-    for failure in failures:
-        say(f"  {failure.path}  {failure.reason}")
-    if not rows:
+    journal = ingesting.journal_of(out)
+    try:
+        schema = load_profile(profile).schema if profile else ingesting.schema_that_fits(paths, limit_s=limit)
+        with Progress() as progress:
+            found = ingesting.ingest(paths, schema, out, workers=workers, limit_s=limit, progress=progress)
+    except KeyboardInterrupt:
+        say(f"interrupted: what was read is kept in {journal}; give the same command again to go on")
+        raise typer.Exit(ExitCode.INTERRUPTED) from None
+    if found.resumed:
+        say(f"{found.resumed} of {len(paths)} logs were read before the interruption")
+    _say_failures(found.failures)
+    if failures is not None:
+        emit(ingesting.failures_table(found.failures), failures)
+    if not found.rows:
+        journal.unlink(missing_ok=True)
         raise LogError(f"None of the {len(paths)} logs could be read.", hint="Look at one with 'care inspect'.")
-    write_table(out, rows, schema)
-    say(f"wrote {out}: {len(rows)} runs of {len(paths) - len(failures)} logs, {len(failures)} logs failed")
+    write_table(out, found.rows, schema)
+    journal.unlink(missing_ok=True)
+    read = len(paths) - len(found.failures)
+    say(f"wrote {out}: {len(found.rows)} runs of {read} logs, {len(found.failures)} logs failed")
+    raise typer.Exit(ExitCode.NOT_EVALUATED if found.failures else ExitCode.OK)
 
 
-def _schema_for(paths: Sequence[Path]) -> Schema:
-    """The schema that fits the first log that can be read."""
-    from care_core.logs import open_log
-    from care_core.profile.select import choose_profile
-    from care_core.profile.store import available_profiles, load_profile
+def _say_failures(failures: Sequence[Failure]) -> None:
+    """A line for each log that failed; where they are many, a line for each reason."""
+    from care_core.extract.ingest import by_reason
 
-    profiles = [load_profile(path) for path in available_profiles()]
-    for path in paths:
-        try:
-            return choose_profile(open_log(path), profiles)[0].schema
-        except CareError:  # 'ingest' tells why, of every log
-            continue
-    raise LogError(f"None of the {len(paths)} logs fits a profile.", hint="Look at one with 'care inspect'.")
+    if len(failures) <= MOST_FAILURES:
+        for failure in failures:
+            say(f"  {failure.path}  {failure.reason}")
+        return
+    for reason, count, first in by_reason(failures):
+        say(f"  {count:>6}  {reason} ({'' if count == 1 else 'such as '}{first})")

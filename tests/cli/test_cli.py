@@ -16,6 +16,7 @@ import pytest
 
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import UsageError
+from care_core.extract.table import ABOUT
 from care_core.profile.store import load_profile
 from care_tui import __version__, console
 from care_tui.cli import route
@@ -108,12 +109,16 @@ def test_the_app_asks_for_a_terminal(care: Care, tmp_path: Path) -> None:
     assert "care triage LOG" in outcome.stderr
 
 
-def test_the_newest_log_is_found(tmp_path: Path) -> None:
-    for age, name in enumerate(("old.BIN", "new.bag", "newest.txt")):
+def test_the_newest_log_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "rosbag2_today").mkdir()
+    for age, name in enumerate(("old.BIN", "rosbag2_today/metadata.yaml", "new.bag", "newest.txt", "now.bag.active")):
         path = tmp_path / name
         path.touch()
         os.utime(path, (age, age))
     assert newest_log([tmp_path / "none", tmp_path]).name == "new.bag"
+    assert "now.bag.active is still being written" in capsys.readouterr().err
+    (tmp_path / "new.bag").unlink()
+    assert newest_log([tmp_path]).name == "rosbag2_today"
     with pytest.raises(UsageError, match="no log in the usual places"):
         newest_log([tmp_path / "none"])
 
@@ -178,7 +183,7 @@ def test_ingest_chooses_the_profile_by_a_log_that_can_be_read(
     empty = tmp_path / "empty.BIN"
     empty.touch()
     outcome = care("ingest", empty, flights[0], "-o", tmp_path / "runs.csv")
-    assert outcome.code == 0
+    assert outcome.code == 3
     assert "1 logs failed" in outcome.stderr
 
 
@@ -216,8 +221,8 @@ def test_a_configuration_that_cannot_be_read_is_named(care: Care, flights: tuple
 
 def test_inspect_shows_what_a_log_holds(care: Care, flights: tuple[Path, ...]) -> None:
     data = json.loads(care("inspect", flights[0], "--json").stdout)
-    assert data["format"] == "dataflash-bin"
-    assert data["parameters"] > 100
+    assert data["log"]["format"] == "dataflash-bin"
+    assert data["parameters"]["count"] > 100
     assert data["profiles"][0]["name"] == "arducopter"
     assert any(channel["name"] == "PARM" for channel in data["channels"])
     assert "dataflash-bin" in care("inspect", flights[0]).stdout
@@ -265,12 +270,13 @@ def test_ingest_goes_on_after_a_log_that_fails(care: Care, flights: tuple[Path, 
         (folder / path.name).symlink_to(path)
     (folder / "broken.bin").write_bytes(b"no log")
     out = tmp_path / "runs.csv"
-    outcome = care("ingest", folder, "-o", out, "--profile", "arducopter")
-    assert outcome.code == 0
+    outcome = care("ingest", folder, "-o", out, "--profile", "arducopter", "--failures", tmp_path / "failed.csv")
+    assert outcome.code == 3
+    assert "broken.bin,Not a log of a known format." in (tmp_path / "failed.csv").read_text()
     assert "broken.bin  Not a log of a known format." in outcome.stderr
     with out.open() as stream:
         rows = list(csv.reader(stream))
-    assert rows[0] == ["log", "mission", *load_profile("arducopter").schema.variables]
+    assert rows[0] == [*ABOUT, *load_profile("arducopter").schema.variables]
     assert len(rows) == 1 + len(flights)
 
 
@@ -285,6 +291,7 @@ def test_ingest_refuses_before_it_reads(care: Care, tmp_path: Path) -> None:
 
 def test_the_published_schema_is_printed(care: Care) -> None:
     assert json.loads(care("schema", "triage").stdout)["title"] == "care.triage/1"
+    assert json.loads(care("schema", "inspect").stdout)["title"] == "care.inspect/1"
 
 
 def test_profiles_are_listed_and_shown(care: Care) -> None:

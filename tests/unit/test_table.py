@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from care_core.errors import UsageError
-from care_core.extract.table import check_table_path, find_logs, write_table
+from care_core.extract.table import ABOUT, check_table_path, find_logs, write_table
 from tests.unit.test_read_run import made_schema
 
 
@@ -18,6 +18,11 @@ def test_folders_are_searched_and_each_log_comes_once(tmp_path: Path) -> None:
         (tmp_path / name).touch()
     found = find_logs([tmp_path / "3.bin", tmp_path])
     assert [path.name for path in found] == ["3.bin", "2.BIN", "1.bag"]
+    (tmp_path / "a" / "drive").mkdir()
+    for name in ("metadata.yaml", "drive_0.db3"):
+        (tmp_path / "a" / "drive" / name).touch()
+    (tmp_path / "a" / "program.log").write_text("started")
+    assert [path.name for path in find_logs([tmp_path / "a"])] == ["2.BIN", "1.bag", "drive"]
     with pytest.raises(UsageError, match="No such file"):
         find_logs([tmp_path / "none"])
     with pytest.raises(UsageError, match="no log there"):
@@ -39,7 +44,7 @@ def test_a_parquet_table_holds_the_same(tmp_path: Path) -> None:
     check_table_path(out)
     write_table(out, [{"log": "a.bin", "mission": 1, "speed": 2.0, "energy": None}], made_schema())
     frame = pd.read_parquet(out)
-    assert list(frame.columns) == ["log", "mission", *made_schema().variables]
+    assert list(frame.columns) == [*ABOUT, *made_schema().variables]
     assert frame["speed"][0] == 2.0
     assert [path.name for path in tmp_path.iterdir() if path.name != "home"] == ["runs.parquet"]
 

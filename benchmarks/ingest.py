@@ -1,0 +1,320 @@
+"""How long `care triage` takes on large logs and what memory it needs, beside decoding all of them and beside `cat`.
+
+    python -m benchmarks.ingest [--runs 3] [--only bag,mcap,BIN]
+
+The logs are made in a temporary folder (1.1 GB): a 450 MB ROS 1 bag, the same messages as MCAP, and DataFlash logs of
+6 and 100 MB. The bag holds a real mission of move_base with its configuration, between the camera, lasers, IMU, joints
+and transforms of a robot that stood for five minutes before it drove. The DataFlash logs are the bundled sample with
+every telemetry record repeated at evenly spaced times, as a log that was not thinned would have it.
+
+Every number is of a whole process with the file in the cache: wall seconds, and the peak of its anonymous memory
+(`RssAnon` of /proc, sampled; pages of a mapped file are the kernel's to take back and do not count).
+"""
+
+from __future__ import annotations
+
+import argparse
+import heapq
+import os
+import statistics
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from care_core.resources import bundled
+
+MB = 1e6
+GOOD_BAG = Path(__file__).parents[1] / "tests" / "data" / "move_base_good.bag"
+SAMPLE = bundled("samples", "arducopter_failed.BIN")
+
+INSTALLED = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+"""The environment: an installed package is compiled, a checkout that may not be is slower to start."""
+
+TRIAGE = [sys.executable, "-c", "from care_tui.cli import main; main()", "triage", "--json"]
+DECODE_BAG = """
+import sys
+from pathlib import Path
+from rosbags.highlevel import AnyReader
+with AnyReader([Path(sys.argv[1])]) as bag:
+    for connection, _, raw in bag.messages():
+        bag.deserialize(raw, connection.msgtype)
+"""
+DECODE_MCAP = """
+import sys
+from mcap.reader import make_reader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+store, names = get_typestore(Stores.EMPTY), {}
+with open(sys.argv[1], "rb") as stream:
+    for schema, channel, message in make_reader(stream).iter_messages():
+        if schema.id not in names:
+            names[schema.id] = schema.name.replace("/", "/msg/")
+            store.register({k: v for k, v in get_types_from_msg(schema.data.decode(), names[schema.id]).items()
+                            if k not in store.fielddefs})
+        store.deserialize_ros1(message.data, names[schema.id])
+"""
+DECODE_BIN = """
+import sys
+from pymavlink import DFReader
+log = DFReader.DFReader_binary(sys.argv[1])
+while log.recv_msg() is not None:
+    pass
+"""
+
+
+class Cost(NamedTuple):
+    """Wall seconds of a process, and the peak of its anonymous memory in MB."""
+
+    seconds: float
+    anonymous_mb: float
+
+
+@dataclass(frozen=True)
+class Case:
+    """A log to make, who decodes all of it, and the seconds that triage may take."""
+
+    name: str
+    make: Callable[[Path], None]
+    decode_all: str
+    library: str
+    bar_s: float
+
+
+def run_once(command: list[str]) -> Cost:
+    """What one run of a command costs. Raises where it ends with another code than 0 or 1 (a fault was found)."""
+    started = time.perf_counter()
+    peak_kb = 0
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=INSTALLED) as process:
+        status = Path(f"/proc/{process.pid}/status")
+        while process.poll() is None:
+            lines = status.read_text().splitlines()
+            peak_kb = max([peak_kb, *(int(line.split()[1]) for line in lines if line.startswith("RssAnon"))])
+            time.sleep(0.005)
+        seconds = time.perf_counter() - started
+    if process.returncode not in (0, 1):
+        raise SystemExit(f"ended with {process.returncode}: {' '.join(command)}")
+    return Cost(seconds, peak_kb * 1024 / MB)
+
+
+def median_of(costs: list[Cost]) -> Cost:
+    return Cost(*(statistics.median(values) for values in zip(*costs, strict=True)))
+
+
+# DataFlash
+
+HEADER = b"\xa3\x95"
+FORMAT = 0x80
+TELEMETRY = {
+    b"ATT", b"BAT", b"CTUN", b"GPS", b"MOTB", b"POS", b"PSCD", b"PSCE", b"PSCN", b"RATE", b"RCOU", b"VIBE",
+    b"XKF3", b"XKF4",
+}  # fmt: skip
+THINNED_US = 400_000
+
+
+def records(raw: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """(name, whole record) of every record of a sound DataFlash log, in order."""
+    lengths, names, pos = {FORMAT: 89}, {FORMAT: b"FMT"}, 0
+    while raw[pos : pos + 2] == HEADER and raw[pos + 2] in lengths:
+        kind = raw[pos + 2]
+        record = raw[pos : pos + lengths[kind]]
+        if kind == FORMAT:
+            described, length, name = struct.unpack_from("<BB4s", record, 3)
+            lengths[described], names[described] = length, name.rstrip(b"\0")
+        yield names[kind], record
+        pos += lengths[kind]
+
+
+def full_rate(raw: bytes, size: int) -> bytes:
+    """The log with its telemetry repeated until it has about `size` bytes."""
+    parts = list(records(raw))
+    telemetry = sum(len(record) for name, record in parts if name in TELEMETRY)
+    repeats = max(1, round((size - len(raw)) / telemetry) + 1)
+    made = bytearray()
+    for name, record in parts:
+        for k in range(repeats if name in TELEMETRY else 1):
+            (stamp,) = struct.unpack_from("<Q", record, 3) if name in TELEMETRY else (0,)
+            shifted = struct.pack("<Q", stamp + k * THINNED_US // repeats) if name in TELEMETRY else record[3:11]
+            made += record[:3] + shifted + record[11:]
+    return bytes(made)
+
+
+def make_bin(size: int) -> Callable[[Path], None]:
+    def make(path: Path) -> None:
+        path.write_bytes(full_rate(SAMPLE.read_bytes(), size))
+
+    return make
+
+
+# ROS
+
+SECOND_NS = 1_000_000_000
+STOOD_S = 300
+
+
+class Topic(NamedTuple):
+    """A topic as both containers need it; `definition` is the message's with those that it is made of."""
+
+    name: str
+    type: str
+    definition: str
+    digest: str
+
+
+def ros_types() -> Any:
+    """The message types of noetic with that of `/tf`."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    store.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
+    return store
+
+
+def sensor_messages(make: Mapping[str, Any]) -> list[tuple[str, Any, int]]:
+    """(topic, message, messages a second) of what a robot records beside its navigation; `make` holds the types."""
+    import numpy as np
+
+    rng = np.random.default_rng(0)
+    header = make["std_msgs/msg/Header"](0, make["builtin_interfaces/msg/Time"](0, 0), "base_link")
+    vector = make["geometry_msgs/msg/Vector3"](0.1, 0.2, 9.8)
+    turn = make["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
+    square = np.zeros(9)
+    beams = rng.random(1081).astype(np.float32)
+    scan = make["sensor_msgs/msg/LaserScan"](header, -2.4, 2.4, 0.004, 0.0, 0.025, 0.1, 30.0, beams, beams)
+    imu = make["sensor_msgs/msg/Imu"](header, turn, square, vector, square, vector, square)
+    names = ["front_left", "front_right", "rear_left", "rear_right"]
+    joints = make["sensor_msgs/msg/JointState"](header, names, np.zeros(4), np.zeros(4), np.zeros(4))
+    moved = make["geometry_msgs/msg/TransformStamped"](
+        header, "odom", make["geometry_msgs/msg/Transform"](vector, turn)
+    )
+    transforms = make["tf2_msgs/msg/TFMessage"]([moved, moved])
+    picture = make["sensor_msgs/msg/CompressedImage"](header, "jpeg", rng.integers(0, 256, 60_000, dtype=np.uint8))
+    return [
+        ("/front/scan", scan, 20), ("/rear/scan", scan, 20), ("/imu/data", imu, 200), ("/joint_states", joints, 50),
+        ("/tf", transforms, 100), ("/camera/image_raw/compressed", picture, 15),
+    ]  # fmt: skip
+
+
+def repeated(topic: Topic, raw: bytes, times: range) -> Iterator[tuple[int, Topic, bytes]]:
+    return ((time_ns, topic, raw) for time_ns in times)
+
+
+def robot_messages() -> Iterator[tuple[int, Topic, bytes]]:
+    """(time in ns, topic, serialised message) in time order: the mission of `GOOD_BAG` among the sensors' messages."""
+    from rosbags.rosbag1 import Reader
+
+    store = ros_types()
+    with Reader(GOOD_BAG) as bag:
+        begin, end = bag.start_time, bag.end_time + STOOD_S * SECOND_NS
+        topics = {c.id: Topic(c.topic, c.msgtype, c.msgdef.data, c.digest) for c in bag.connections}
+        mission = [(time_ns + STOOD_S * SECOND_NS, topics[c.id], bytes(raw)) for c, time_ns, raw in bag.messages()]
+    streams = [iter(mission)]
+    for name, message, rate in sensor_messages(store.types):
+        kind = message.__msgtype__
+        topic = Topic(name, kind, *store.generate_msgdef(kind))
+        raw = bytes(store.serialize_ros1(message, kind))
+        streams.append(repeated(topic, raw, range(begin, end, SECOND_NS // rate)))
+    return heapq.merge(*streams, key=lambda part: part[0])
+
+
+def make_bag(path: Path) -> None:
+    """As 'rosbag record' writes it: chunks of 768 kB, not compressed."""
+    from rosbags.rosbag1 import Writer
+
+    connections: dict[str, Any] = {}
+    writer = Writer(path)
+    writer.chunk_threshold = 768 * 1024
+    with writer:
+        for time_ns, topic, raw in robot_messages():
+            if topic.name not in connections:
+                connections[topic.name] = writer.add_connection(
+                    topic.name, topic.type, msgdef=topic.definition, md5sum=topic.digest
+                )
+            writer.write(connections[topic.name], time_ns, raw)
+
+
+def make_mcap(path: Path) -> None:
+    """The same messages in the ros1 profile, in chunks of 768 kB, not compressed."""
+    from mcap.writer import CompressionType, Writer
+
+    channels: dict[str, int] = {}
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=768 * 1024, compression=CompressionType.NONE)
+        writer.start(profile="ros1", library="care benchmark")
+        for time_ns, topic, raw in robot_messages():
+            if topic.name not in channels:
+                schema = writer.register_schema(topic.type.replace("/msg/", "/"), "ros1msg", topic.definition.encode())
+                channels[topic.name] = writer.register_channel(topic.name, "ros1", schema)
+            writer.add_message(channels[topic.name], time_ns, raw, time_ns)
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+CASES = (
+    Case("six.BIN", make_bin(6_000_000), DECODE_BIN, "pymavlink", 1.5),
+    Case("hundred.BIN", make_bin(100_000_000), DECODE_BIN, "pymavlink", 6.0),
+    Case("robot.bag", make_bag, DECODE_BAG, "rosbags", 3.0),
+    Case("robot.mcap", make_mcap, DECODE_MCAP, "mcap and rosbags", 3.0),
+)
+MOST_ANONYMOUS_MB = 300
+MOST_MB_PER_MB = 0.5
+LEAST_RATIO = 5
+
+
+class Measured(NamedTuple):
+    """One log: its size, what triage, decoding everything and reading the bytes cost, and ratios pair by pair."""
+
+    size_mb: float
+    triage: Cost
+    decode: Cost
+    cat: Cost
+    ratio: float
+
+
+def measure(case: Case, path: Path, runs: int) -> Measured:
+    """Medians of `runs` rounds after a warm-up; a round runs the three one after the other."""
+    commands = ([*TRIAGE, str(path)], [sys.executable, "-c", case.decode_all, str(path)], ["cat", str(path)])
+    rounds = [[run_once(command) for command in commands] for _ in range(runs + 1)][1:]
+    triage, decode, cat = (median_of([costs[i] for costs in rounds]) for i in range(3))
+    ratio = statistics.median(costs[1].seconds / costs[0].seconds for costs in rounds)
+    return Measured(path.stat().st_size / MB, triage, decode, cat, ratio)
+
+
+def report(case: Case, found: Measured, start: Cost) -> None:
+    per_mb = (found.triage.anonymous_mb - start.anonymous_mb) / found.size_mb
+    bars = {
+        f"{found.triage.seconds:.2f} s, at most {case.bar_s:g}": found.triage.seconds <= case.bar_s,
+        f"{found.triage.anonymous_mb:.0f} MB, at most {MOST_ANONYMOUS_MB}": found.triage.anonymous_mb
+        <= MOST_ANONYMOUS_MB,
+        f"{per_mb:.2f} MB more a MB of log, at most {MOST_MB_PER_MB}": per_mb <= MOST_MB_PER_MB,
+        f"{found.ratio:.1f} times faster than decoding everything, at least {LEAST_RATIO}": found.ratio >= LEAST_RATIO,
+    }
+    print(f"{case.name}, {found.size_mb:.1f} MB")
+    for name, cost in (("care triage", found.triage), (f"{case.library}, all", found.decode), ("cat", found.cat)):
+        times = found.triage.seconds / cost.seconds
+        print(f"  {name:22s} {cost.seconds:7.2f} s {cost.anonymous_mb:6.0f} MB   triage takes {times:.2f} times it")
+    for bar, is_kept in bars.items():
+        print(f"  {'kept  ' if is_kept else 'MISSED'} {bar}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--only", default="", help="names of logs, or parts of them, with commas")
+    args = parser.parse_args()
+    start = median_of([run_once([*TRIAGE, str(SAMPLE)]) for _ in range(args.runs + 1)][1:])
+    print(f"{SAMPLE.name}, {SAMPLE.stat().st_size / MB:.1f} MB: {start.seconds:.2f} s {start.anonymous_mb:.0f} MB")
+    for case in CASES:
+        if not any(part in case.name for part in args.only.split(",")):
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / case.name
+            case.make(path)
+            report(case, measure(case, path, args.runs), start)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""What a profile has of a log, and what it would miss: for people who decide what to record next time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+
+from care_core.errors import CareError
+from care_core.extract.read import mission_kind, read_runs, reading_plan
+from care_core.extract.registry import find_extractor
+from care_core.extract.settings import readable
+from care_core.logs.base import Log
+from care_core.profile.schema import Schema
+from care_core.run import MissionInfo, Run, Unavailable
+from care_core.variables import Role, Variable
+
+_WORD = re.compile(r"[\w/]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """A variable that the log cannot give, why, and how to have it next time."""
+
+    variable: Variable
+    reason: str
+    hint: str
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """A profile and a log. `obstacle` says why the profile cannot use it, empty when it can."""
+
+    schema: Schema
+    obstacle: str
+    options: int
+    sources: int
+    sources_wanted: int
+    missed: tuple[Missed, ...]
+    missions: tuple[MissionInfo, ...]
+
+    @property
+    def is_usable(self) -> bool:
+        return not self.obstacle
+
+
+def cover(log: Log, schema: Schema) -> Coverage:
+    """Try a profile on a log without judging anything."""
+    obstacle = _wrong_kind(log, schema)
+    if obstacle:
+        return Coverage(schema, obstacle, 0, 0, 0, (), ())
+    channels = {channel.name for channel in log.channels() if channel.count}
+    plan = reading_plan(schema)
+    lost_options = _missed_options(log, schema)
+    found, sources = len(schema.options) - len(lost_options), len(channels & plan.keys())
+    runs: Sequence[Run] = ()
+    if not found and not sources:
+        obstacle = "none of its parameters or sources are in the log"
+    else:
+        try:
+            runs = read_runs(log, schema)
+        except CareError as err:
+            obstacle = _no_mission(schema, channels) or err.message
+    missed = (*lost_options, *_missed_values(schema, plan.keys() - channels, runs[-1] if runs else None))
+    return Coverage(schema, obstacle, found, sources, len(plan), missed, tuple(run.mission for run in runs))
+
+
+def _wrong_kind(log: Log, schema: Schema) -> str:
+    if not schema.logs:
+        return "it comes from a table of runs and reads no log"
+    if log.format.value not in schema.logs:
+        return f"it reads {' or '.join(schema.logs)}, this is {log.format.value}"
+    return ""
+
+
+def _no_mission(schema: Schema, channels: Collection[str]) -> str:
+    """Which of the messages that missions are found by are not in the log; '' when all are."""
+    absent = [name for name in mission_kind(schema).needs(schema.mission) if name not in channels]
+    return f"no mission was found; of what tells of missions {', '.join(absent)} are not in the log" if absent else ""
+
+
+def _missed_options(log: Log, schema: Schema) -> list[Missed]:
+    settings = log.settings()
+    return [
+        Missed(option, "its parameter is not in the log", _how_to_have(option))
+        for option in schema.options
+        if not any(name in settings for name in readable(option))
+    ]
+
+
+def _how_to_have(option: Variable) -> str:
+    names = readable(option)
+    if not names:
+        return "the profile names no parameter for it"
+    namespace = names[0].rpartition("/")[0]
+    recorded = f"record {namespace}/parameter_updates, or " if namespace else ""
+    return f"{recorded}give the file that sets {names[0]} with --config"
+
+
+def _missed_values(schema: Schema, absent: Collection[str], run: Run | None) -> Iterator[Missed]:
+    """Contexts, metrics and objectives without a value for want of a message that the profile reads; where the log
+    holds no run, those whose extractor asks for one."""
+    for variable in schema.variables.values():
+        if variable.role is Role.OPTION or variable.extract is None:
+            continue
+        needs = find_extractor(variable.extract.kind).needs(variable.extract.args)
+        lacking = [name for name in needs if name in absent]
+        if run is None and lacking:
+            yield Missed(variable, f"no {' or '.join(lacking)} in the log", f"record {', '.join(lacking)}")
+        value = None if run is None else run.value(variable.name)
+        if isinstance(value, Unavailable) and (lacking or _names(value) & set(absent)):
+            yield Missed(variable, value.reason, value.hint or f"record {', '.join(lacking)}")
+
+
+def _names(value: Unavailable) -> set[str]:
+    """The words of a reason and its hint that may be channels."""
+    return set(_WORD.findall(f"{value.reason} {value.hint}"))

@@ -1,0 +1,198 @@
+"""Many logs to one table of runs, on all cores, resumable: what is done is kept in a journal beside the table.
+
+A journal is one JSON object a line: first what it was read for, then a line a log. It is appended to as logs are done,
+so whatever ends the program costs at most the logs that were being read. A line that was cut off is not read.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, TextIO
+
+from care_core.errors import LogError, UsageError
+from care_core.extract.table import Row, rows_of
+from care_core.logs import open_log
+from care_core.parallel import Failed, each
+from care_core.profile.schema import Schema
+from care_core.profile.select import choose_profile
+from care_core.profile.store import available_profiles, load_profile
+
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A log that gave no runs, and why."""
+
+    path: Path
+    reason: str
+
+
+@dataclass(slots=True)
+class Ingested:
+    """The rows and failures of logs, in the order in which the logs were named; `resumed` of them were done before."""
+
+    rows: list[Row] = field(default_factory=list)
+    failures: list[Failure] = field(default_factory=list)
+    resumed: int = 0
+
+
+def journal_of(out: Path) -> Path:
+    """Where the journal of a table lies."""
+    return out.with_name(f"{out.name}.part")
+
+
+def ingest(
+    paths: Sequence[Path],
+    schema: Schema,
+    out: Path,
+    *,
+    workers: int | None = None,
+    limit_s: float = 600.0,
+    progress: Report,
+    read: Callable[[Path, Schema], list[Row]] = rows_of,
+) -> Ingested:
+    """Read every log, going on with what `journal_of(out)` holds. The caller removes the journal when all is written.
+
+    Args:
+        limit_s: seconds that one log may take.
+        read: gives the rows of a log, one a mission.
+    """
+    known = _read_journal(journal_of(out), _purpose(schema))
+    keys = {path: _key(path) for path in paths}
+    done: dict[Path, list[Row] | Failed] = {path: known[key] for path, key in keys.items() if key in known}
+    resumed, left = len(done), [path for path in paths if path not in done]
+    started = time.monotonic()
+    answers = each(partial(_read_one, schema=schema, read=read), left, workers=workers, limit_s=limit_s)
+    with _writing(journal_of(out), _purpose(schema), known) as journal, closing(answers):
+        for place, answer in answers:
+            path = left[place]
+            done[path] = answer
+            if not isinstance(answer, Failed) or answer.is_final:
+                journal.write(_line(keys[path], answer))
+                journal.flush()
+            progress(_said(done, len(paths), len(done) - resumed, time.monotonic() - started), len(done) / len(paths))
+    return _collected(paths, done, resumed)
+
+
+def failures_table(failures: Sequence[Failure]) -> str:
+    """The failures as CSV with the columns log and reason."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerows([("log", "reason"), *((str(failure.path), failure.reason) for failure in failures)])
+    return stream.getvalue()
+
+
+def by_reason(failures: Sequence[Failure]) -> list[tuple[str, int, Path]]:
+    """(reason, how many logs, the first of them), the most frequent reason first."""
+    counts = Counter(failure.reason for failure in failures)
+    first = {failure.reason: failure.path for failure in reversed(failures)}
+    return [(reason, count, first[reason]) for reason, count in counts.most_common()]
+
+
+def _read_one(path: Path, *, schema: Schema, read: Callable[[Path, Schema], list[Row]]) -> list[Row]:
+    return read(path, schema)
+
+
+def _collected(paths: Sequence[Path], done: Mapping[Path, list[Row] | Failed], resumed: int) -> Ingested:
+    found = Ingested(resumed=resumed)
+    for path in paths:
+        answer = done[path]
+        if isinstance(answer, Failed):
+            found.failures.append(Failure(path, answer.reason))
+        else:
+            found.rows.extend(answer)
+    return found
+
+
+def _said(done: Mapping[Path, list[Row] | Failed], count: int, now: int, seconds: float) -> str:
+    failed = sum(isinstance(answer, Failed) for answer in done.values())
+    left_s = seconds / now * (count - len(done))
+    left = f"{left_s / 60:.0f} min" if left_s >= 90 else f"{left_s:.0f} s"
+    return f"read {len(done)} of {count} logs, {failed} failed, about {left} left"
+
+
+def _purpose(schema: Schema) -> dict[str, str]:
+    """What rows depend on beside the log."""
+    mission = hashlib.sha256(repr(sorted(schema.mission.items())).encode()).hexdigest()
+    return {"journal": "care.ingest/1", "profile": schema.name, "variables": schema.digest, "mission": mission}
+
+
+def _key(path: Path) -> str:
+    """A log as it is now: a file that grew or was replaced is another one."""
+    files = sorted(inside for inside in path.rglob("*") if inside.is_file()) if path.is_dir() else [path]
+    try:
+        stats = [file.stat() for file in files]
+    except OSError:  # reading it says what is wrong
+        stats = []
+    return json.dumps([str(path), sum(s.st_size for s in stats), max((s.st_mtime_ns for s in stats), default=0)])
+
+
+def _line(key: str, answer: list[Row] | Failed) -> str:
+    found = {"failure": answer.reason} if isinstance(answer, Failed) else {"rows": answer}
+    return json.dumps({"log": key, **found}) + "\n"
+
+
+def _read_journal(path: Path, purpose: Mapping[str, str]) -> dict[str, list[Row] | Failed]:
+    """What an interrupted run had done; nothing where there is no journal, or one of another profile."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return {}
+    entries: list[Any] = []
+    for line in lines:
+        try:
+            entries.append(json.loads(line))
+        except ValueError:  # cut off
+            break
+    if not entries or entries[0] != purpose:
+        return {}
+    return {e["log"]: e["rows"] if "rows" in e else Failed(e["failure"], is_final=True) for e in entries[1:]}
+
+
+@contextmanager
+def _writing(path: Path, purpose: Mapping[str, str], known: Mapping[str, list[Row] | Failed]) -> Iterator[TextIO]:
+    """The journal, opened to append to what is known. Raises UsageError where it cannot be written."""
+    fresh = path.with_name(f".{path.name}.new")
+    try:
+        with fresh.open("w", encoding="utf-8") as stream:
+            stream.write(json.dumps(purpose) + "\n")
+            stream.writelines(_line(key, answer) for key, answer in known.items())
+            stream.flush()
+            fresh.replace(path)
+            yield stream
+    except OSError as err:
+        raise UsageError(
+            f"Cannot write the journal: {err.strerror}.", hint="Choose another place.", where=str(path)
+        ) from err
+
+
+def schema_that_fits(paths: Sequence[Path], *, limit_s: float = 600.0) -> Schema:
+    """The schema of the profile that fits the first log that any fits.
+
+    Raises:
+        LogError: no profile fits any of the logs.
+    """
+    with closing(each(_fitting_profile, paths, workers=1, limit_s=limit_s)) as answers:
+        for _, answer in answers:
+            if not isinstance(answer, Failed):
+                return load_profile(answer).schema
+    raise LogError(
+        f"None of the {len(paths)} logs fits an installed profile.",
+        hint="Look at one with 'care inspect', or name the profile with --profile.",
+    )
+
+
+def _fitting_profile(path: Path) -> Path:
+    profiles = [load_profile(folder) for folder in available_profiles()]
+    return choose_profile(open_log(path), profiles)[0].path

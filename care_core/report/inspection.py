@@ -1,0 +1,214 @@
+"""The published inspection, `care.inspect/1`: what a log holds. Its keys and types are an interface."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, Final, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from care_core.extract.coverage import Coverage, Missed
+from care_core.logs.base import Log
+from care_core.run import Damage, MissionInfo
+from care_core.text import clean
+
+INSPECT_ID: Final = "care.inspect/1"
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class DamageEntry(_Model):
+    what: str
+    byte: int | None
+    time_s: float | None
+
+
+class ReadShare(_Model):
+    """Seconds of the log that could be read, and about how many it had, null where nothing tells."""
+
+    to_s: float
+    about_s: float | None
+
+
+class LogEntry(_Model):
+    path: str
+    format: str
+    start: str | None
+    duration_s: float
+    bytes: int
+    facts: dict[str, str]
+    damage: list[DamageEntry]
+    read: ReadShare
+
+
+class ChannelEntry(_Model):
+    name: str
+    type: str
+    count: int
+    rate_hz: float | None
+
+
+class ChangeEntry(_Model):
+    """A parameter that was changed while the log was recorded."""
+
+    name: str
+    before: float | str
+    after: float | str
+    time_s: float
+
+
+class ParameterEntry(_Model):
+    count: int
+    sources: dict[str, int]
+    changed: list[ChangeEntry]
+
+
+class MissionEntry(_Model):
+    index: int
+    start_s: float
+    end_s: float
+    ended: bool
+    fits: bool
+    mismatch: str | None
+
+
+class MissedEntry(_Model):
+    name: str
+    role: Literal["option", "context", "metric", "objective"]
+    reason: str
+    hint: str
+
+
+class ProfileEntry(_Model):
+    """An installed profile: whether it can use the log, what of it is there, and what it would miss."""
+
+    name: str
+    version: str
+    platform: str
+    usable: bool
+    reason: str | None
+    options: int
+    options_wanted: int
+    sources: int
+    sources_wanted: int
+    missions: list[MissionEntry]
+    missed: list[MissedEntry]
+
+
+class InspectDocument(_Model):
+    id: Literal["care.inspect/1"] = Field(default=INSPECT_ID, alias="schema")
+    log: LogEntry
+    channels: list[ChannelEntry]
+    parameters: ParameterEntry
+    profiles: list[ProfileEntry]
+    """Those that can use the log first, the best of them before the others."""
+
+
+def build_inspection(log: Log, coverages: Sequence[Coverage]) -> InspectDocument:
+    """The document of a log and the installed profiles. Text of the log is made safe to show."""
+    ranked = sorted(coverages, key=lambda c: (not c.is_usable, -(c.options + c.sources), c.schema.name))
+    profiles = [_profile(coverage) for coverage in ranked]
+    channels = [
+        ChannelEntry(name=clean(c.name), type=clean(c.type), count=c.count, rate_hz=c.rate_hz)
+        for c in sorted(log.channels(), key=lambda channel: channel.name)
+    ]
+    parameters = _parameters(log)
+    # Last, since a reader tells what it could not decode only after it was asked to.
+    return InspectDocument(log=_log(log), channels=channels, parameters=parameters, profiles=profiles)
+
+
+def inspection_json(document: InspectDocument) -> str:
+    """One object."""
+    return document.model_dump_json(by_alias=True, indent=2) + "\n"
+
+
+def inspection_schema() -> dict[str, Any]:
+    """The JSON Schema of `care.inspect/1`."""
+    return {**InspectDocument.model_json_schema(by_alias=True), "title": INSPECT_ID}
+
+
+def _log(log: Log) -> LogEntry:
+    files = [path for path in log.path.rglob("*") if path.is_file()] if log.path.is_dir() else [log.path]
+    size = sum(path.stat().st_size for path in files)
+    return LogEntry(
+        path=clean(str(log.path)),
+        format=log.format.value,
+        start=log.start,
+        duration_s=log.duration_s,
+        bytes=size,
+        facts={name: clean(text) for name, text in log.facts.items()},
+        damage=[DamageEntry(what=clean(d.what), byte=d.byte, time_s=d.time_s) for d in log.damage],
+        read=ReadShare(to_s=log.duration_s, about_s=_about_s(log.damage, log.duration_s, size)),
+    )
+
+
+def _about_s(damage: Sequence[Damage], duration_s: float, size: int) -> float | None:
+    """How long the whole log was, taking its bytes to come evenly: known when it breaks off before the file ends."""
+    if not damage:
+        return duration_s
+    last = max(damage, key=lambda d: d.byte or 0)
+    breaks_off = last.time_s is None or last.time_s >= duration_s - 1.0
+    if not breaks_off or not last.byte or last.byte >= size:
+        return None
+    return duration_s * size / last.byte
+
+
+def _parameters(log: Log) -> ParameterEntry:
+    histories = log.settings()
+    sources = Counter(clean(history[0].source) for history in histories.values())
+    changed = [
+        ChangeEntry(name=clean(after.name), before=_shown(before.value), after=_shown(after.value), time_s=at_s)
+        for history in histories.values()
+        for before, after in pairwise(history)
+        if (at_s := after.changed_at_s) is not None
+    ]
+    changed.sort(key=lambda change: change.time_s)
+    return ParameterEntry(count=len(histories), sources=dict(sorted(sources.items())), changed=changed)
+
+
+def _shown(value: float | str) -> float | str:
+    """Numbers that JSON cannot hold as text."""
+    if isinstance(value, str):
+        return clean(value)
+    return value if abs(value) < float("inf") else str(value)
+
+
+def _profile(coverage: Coverage) -> ProfileEntry:
+    schema = coverage.schema
+    return ProfileEntry(
+        name=schema.name,
+        version=schema.version,
+        platform=schema.platform,
+        usable=coverage.is_usable,
+        reason=coverage.obstacle or None,
+        options=coverage.options,
+        options_wanted=len(schema.options),
+        sources=coverage.sources,
+        sources_wanted=coverage.sources_wanted,
+        missions=[_mission(mission) for mission in coverage.missions],
+        missed=[_missed(missed) for missed in coverage.missed],
+    )
+
+
+def _mission(mission: MissionInfo) -> MissionEntry:
+    return MissionEntry(
+        index=mission.index,
+        start_s=mission.start_s,
+        end_s=mission.end_s,
+        ended=mission.ended,
+        fits=mission.fits,
+        mismatch=clean(mission.mismatch) or None,
+    )
+
+
+def _missed(missed: Missed) -> MissedEntry:
+    return MissedEntry(
+        name=missed.variable.name,
+        role=missed.variable.role.value,
+        reason=clean(missed.reason),
+        hint=clean(missed.hint),
+    )
