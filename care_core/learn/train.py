@@ -76,7 +76,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Prog
     resamples = _Resamples.draw(len(frame), rng)
     edges = _edge_effects(frame, schema, graph, settings, resamples)
     report("cross-validating", 0.8)
-    skill = cross_validated_skill(frame, schema, graph, rng, folds=FOLDS)
+    skill = cross_validated_skill(frame, schema, graph, rng, folds=FOLDS, n_jobs=settings.n_jobs)
     return Model(
         schema_digest=schema.digest,
         graph=graph,
