@@ -24,7 +24,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.graph import CausalGraph
-from care_core.learn.completion import complete
+from care_core.learn.completion import RATE, complete
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import FisherZ, IndependenceTest, IntArray, discover
 from care_core.learn.orientation import resolve
@@ -65,7 +65,8 @@ class Way:
 
     test: Callable[[FloatArray], IndependenceTest] = FisherZ
     alpha: float = 0.01
-    completed: bool = True
+    completion_rate: float | None = RATE
+    """False discovery rate of the completion; None: none."""
     entropic: bool = True
 
     def learn(self, frame: pd.DataFrame, schema: Schema) -> CausalGraph:
@@ -79,7 +80,9 @@ class Way:
             resolved = resolve(pag, columns, constraints, np.random.default_rng(0))
         directed = frozenset(edge for edge in resolved.directed if not constraints.forbids(*edge))
         graph = CausalGraph(tuple(schema.variables), directed, resolved.bidirected)
-        return complete(frame, schema, graph, screening.kept).graph if self.completed else graph
+        if self.completion_rate is None:
+            return graph
+        return complete(frame, schema, graph, screening.kept, rate=self.completion_rate).graph
 
 
 WAYS: Mapping[str, Way] = {
@@ -88,9 +91,11 @@ WAYS: Mapping[str, Way] = {
     "scores and magnitudes": Way(WithMagnitudes),
     "alpha 0.001": Way(alpha=0.001),
     "alpha 0.05": Way(alpha=0.05),
-    "without completion": Way(completed=False),
-    "Pearson, no completion": Way(Pearson, completed=False),
-    "magnitudes, no completion": Way(WithMagnitudes, completed=False),
+    "completion at 0.01": Way(completion_rate=0.01),
+    "magnitudes, completion at 0.01": Way(WithMagnitudes, completion_rate=0.01),
+    "without completion": Way(completion_rate=None),
+    "Pearson, no completion": Way(Pearson, completion_rate=None),
+    "magnitudes, no completion": Way(WithMagnitudes, completion_rate=None),
     "without latent search": Way(entropic=False),
 }
 
@@ -139,7 +144,7 @@ def measure(seed: int, runs: int) -> dict[str, tuple[float, float, float]]:
 
 def show(runs: int, answers: list[dict[str, tuple[float, float, float]]]) -> None:
     print(f"\n{len(answers)} robots x {runs} runs")
-    print(f"| {'way':25s} | distance | against default | F1 of causes | against default | s |")
+    print(f"| {'way':30s} | distance | against default | F1 of causes | against default | s |")
     print("|---|---|---|---|---|---|")
     default = np.array([answer["default"] for answer in answers])
     for name in WAYS:
@@ -148,7 +153,7 @@ def show(runs: int, answers: list[dict[str, tuple[float, float, float]]]) -> Non
         error = gain.std(axis=0, ddof=1) / np.sqrt(len(gain))
         against = [f"{gain[:, k].mean():+.2f} +- {error[k]:.2f}" if name != "default" else "" for k in (0, 1)]
         distance, f1, seconds = mine.mean(axis=0)
-        print(f"| {name:25s} | {distance:.1f} | {against[0]} | {f1:.3f} | {against[1]} | {seconds:.2f} |")
+        print(f"| {name:30s} | {distance:.1f} | {against[0]} | {f1:.3f} | {against[1]} | {seconds:.2f} |")
 
 
 def main() -> None:

@@ -1,12 +1,12 @@
 """Operators chose the options by what they met: who is fooled?
 
-    python -m benchmarks.observational [--robots 6] [--runs 800]
+    python -m benchmarks.observational [--robots 4] [--runs 800]
 
 Simulated robots (`tests/robots.py`) whose table was not randomised: three options follow the wind, which also moves a
-metric that the objectives hang on. Once the wind is a context in the table, once no column holds it. Asked of 30 failed
+metric that the objectives hang on. Once the wind is a context in the table, once no column holds it. Asked of 12 failed
 runs a robot: is the first-ranked option one whose reset really helps (odds of meeting everything rise by half of what
 the best single reset gives, at least 0.1), and how far are the predicted odds of every single reset from the true ones
-(2000 simulated missions each, the option set by intervention)? "said no" counts options that were not ranked because
+(1000 simulated missions each, the option set by intervention)? "said no" counts options that were not ranked because
 their effect is not identified.
 """
 
@@ -29,8 +29,8 @@ from care_core.profile.model import Model
 from care_core.profile.schema import Schema
 from tests.robots import Chosen, Robot, declared_random, random_robot
 
-FAULTS = 30
-TRUTH = 2000
+FAULTS = 12
+TRUTH = 1000
 WORTH = 0.1
 METHODS = ("care", "care, declared as randomised", "plain classifier")
 
@@ -52,7 +52,7 @@ class Score:
 class _Care:
     def __init__(self, frame: pd.DataFrame, schema: Schema, seed: int) -> None:
         self.schema = schema
-        self.model: Model = train(frame, schema, Settings(seed=seed, resamples=0, n_jobs=1))
+        self.model: Model = train(frame, schema, Settings(seed=seed, resamples=0, folds=0, n_jobs=1))
         self.bounds = {o.name: o.threshold for o in schema.objectives if o.threshold is not None}
         self.refused = {
             option for (option, objective), effect in self.model.effects.items() if not effect.identified
@@ -134,7 +134,7 @@ def show(title: str, parts: list[dict[str, Score]]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--robots", type=int, default=6)
+    parser.add_argument("--robots", type=int, default=4)
     parser.add_argument("--runs", type=int, default=800)
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()

@@ -24,9 +24,10 @@ from care_core.learn.screening import discoveries
 from care_core.profile.schema import Schema
 from care_core.variables import Variable
 
-RATE = 0.1
+RATE = 0.05
 """False discovery rate of total effects. A mechanism forgets an input that explains nothing, but never learns of one
-that the graph leaves out: on held-out missions 0.05 and 0.1 predicted alike, 0.01 worse on the smaller table."""
+that the graph leaves out. Against 0.1, the graphs of simulated robots have fewer false edges and the same causes
+(benchmarks/discovery.py); on held-out missions the two predict alike, and 0.01 worse on the smaller table."""
 LEVEL = 0.01
 """Level of the tests that choose the metric to carry an effect."""
 

@@ -34,7 +34,6 @@ BACKGROUND = 32
 """Training runs over which an effect is averaged."""
 EFFECT_RESAMPLES = 20
 """Bootstrap resamples behind the intervals of effects (mechanisms are refitted with their kernels kept)."""
-FOLDS = 5
 TOP_PATHS = 20
 QUANTILES = np.linspace(0, 1, 21)
 
@@ -46,6 +45,8 @@ class Settings:
     seed: int = 0
     alpha: float = 0.01
     resamples: int = 50
+    folds: int = 5
+    """Parts of the cross-validation; 0 leaves the skill out."""
     n_jobs: int = 2
     origin: str = "not stated"
 
@@ -76,7 +77,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Prog
     resamples = _Resamples.draw(len(frame), rng)
     edges = _edge_effects(frame, schema, graph, settings, resamples)
     report("cross-validating", 0.8)
-    skill = cross_validated_skill(frame, schema, graph, rng, folds=FOLDS, n_jobs=settings.n_jobs)
+    skill = cross_validated_skill(frame, schema, graph, rng, folds=settings.folds, n_jobs=settings.n_jobs)
     return Model(
         schema_digest=schema.digest,
         graph=graph,
