@@ -112,19 +112,29 @@ def paths(shared: Path, limit: float) -> None:
     edges = [*((o, m) for o in sources for m in metrics), *later, *((m, "y") for m in metrics)]
     graph = CausalGraph((*sources, *metrics, "y"), frozenset(edges))
     weight = {edge: float(w) for edge, w in zip(sorted(edges), rng.uniform(0.05, 1.0, len(edges)), strict=True)}
-    print(f"paths: {len(sources)} options, {len(metrics)} metrics, all {len(edges)} edges, {len(sources) << 40:.1e} paths")
+    print(
+        f"paths: {len(sources)} options, {len(metrics)} metrics, all {len(edges)} edges, {len(sources) << 40:.1e} paths"
+    )
     with _measured("the ten best"):
         rank_paths(graph, "y", sources, weight, top=10)
 
 
 @contextlib.contextmanager
 def _measured(what: str) -> Iterator[Callable[[], float]]:
-    """Prints the wall time and the largest resident memory of this process and those it started."""
+    """Prints wall and processor time and the largest resident memory of this process and those it started.
+
+    On a machine that others use as well, wall time says little; processor time over `JOBS` bounds it from below.
+    """
     peak, over = [0.0], threading.Event()
+    busy: dict[int, float] = {}
 
     def watch() -> None:
-        while not over.wait(0.05):
-            peak[0] = max(peak[0], _resident_mb())
+        before: dict[int, float] | None = None
+        while not over.wait(0.1):
+            now = _family()
+            before = before or {pid: cpu_s for pid, (_, cpu_s) in now.items()}
+            peak[0] = max(peak[0], sum(mb for mb, _ in now.values()))
+            busy.update({pid: cpu_s - before.get(pid, 0.0) for pid, (_, cpu_s) in now.items()})
 
     watcher = threading.Thread(target=watch)
     watcher.start()
@@ -136,23 +146,26 @@ def _measured(what: str) -> Iterator[Callable[[], float]]:
         took = time.monotonic() - started
         over.set()
         watcher.join()
-    print(f"  {what}: {took:.2f} s, peak {peak[0]:.0f} MB (bar {BAR_MB:.0f})", flush=True)
+    print(f"  {what}: {took:.2f} s, processors {sum(busy.values()):.1f} s, peak {peak[0]:.0f} MB (bar {BAR_MB:.0f})",
+          flush=True)  # fmt: skip
 
 
-def _resident_mb() -> float:
-    """Resident memory of this process and its descendants (Linux)."""
+def _family() -> dict[int, tuple[float, float]]:
+    """Resident memory in MB and processor seconds of this process and its descendants (Linux)."""
     parents: dict[int, int] = {}
-    pages: dict[int, int] = {}
+    used: dict[int, tuple[float, float]] = {}
     for folder in Path("/proc").iterdir():
         if folder.name.isdigit():
             with contextlib.suppress(OSError):  # a process may end while it is read
                 pid = int(folder.name)
-                parents[pid] = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
-                pages[pid] = int((folder / "statm").read_text().split()[1])
+                stat = (folder / "stat").read_text().rpartition(")")[2].split()
+                resident = int((folder / "statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
+                parents[pid] = int(stat[1])
+                used[pid] = resident, (int(stat[11]) + int(stat[12])) / os.sysconf("SC_CLK_TCK")
     family = {os.getpid()}
-    while grown := {pid for pid, parent in parents.items() if parent in family} - family:
+    while grown := {pid for pid, parent in parents.items() if parent in family and pid in used} - family:
         family |= grown
-    return sum(pages.get(pid, 0) for pid in family) * os.sysconf("SC_PAGE_SIZE") / 2**20
+    return {pid: used[pid] for pid in family}
 
 
 PARTS = {part.__name__: part for part in (published, options, runs, paths)}

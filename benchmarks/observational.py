@@ -54,14 +54,14 @@ class _Care:
         self.schema = schema
         self.model: Model = train(frame, schema, Settings(seed=seed, resamples=0, folds=0, n_jobs=1))
         self.bounds = {o.name: o.threshold for o in schema.objectives if o.threshold is not None}
-        self.refused = {
-            option for (option, objective), effect in self.model.effects.items() if not effect.identified
-        }
+        self.refused = {option for (option, objective), effect in self.model.effects.items() if not effect.identified}
 
     def answer(self, row: Mapping[str, float], reference: Mapping[str, float]) -> tuple[list[str], dict[str, float]]:
         config = {**reference, **{v.name: row[v.name] for v in (*self.schema.options, *self.schema.contexts)}}
         here = {**reference, **{c.name: row[c.name] for c in self.schema.contexts}}
-        seen = {v.name: row[v.name] for v in (*self.schema.metrics, *self.schema.objectives) if np.isfinite(row[v.name])}
+        seen = {
+            v.name: row[v.name] for v in (*self.schema.metrics, *self.schema.objectives) if np.isfinite(row[v.name])
+        }
         world = World(self.model, config, seen, self.bounds)
         best: dict[str, float] = {}
         for objective in self.bounds:

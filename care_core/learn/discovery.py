@@ -398,8 +398,8 @@ def _p_of(test: IndependenceTest, tests: Sequence[tuple[int, int, Sequence[int]]
     p = np.ones(len(tests))
     sizes = np.array([len(given) for _, _, given in tests], dtype=np.int64)
     for size in np.unique(sizes).tolist():
-        chosen = np.flatnonzero(sizes == size)
-        x, y = (np.array([tests[i][end] for i in chosen]) for end in (0, 1))
+        chosen = np.flatnonzero(sizes == size).tolist()
+        x, y = np.array([tests[i][:2] for i in chosen], dtype=np.int64).T
         given = np.array([tests[i][2] for i in chosen], dtype=np.int64).reshape(len(chosen), size)
         p[chosen] = test.p_values(x, y, given)
     return p

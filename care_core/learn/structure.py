@@ -89,7 +89,9 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
     )
 
 
-def _with_hidden_reasons(graph: CausalGraph, pag: Pag, options: Collection[str], constraints: Constraints) -> CausalGraph:
+def _with_hidden_reasons(
+    graph: CausalGraph, pag: Pag, options: Collection[str], constraints: Constraints
+) -> CausalGraph:
     """A hidden common cause between each of these options and all that it was found beside in the mission."""
     beside = {*graph.directed, *((edge.a, edge.b) for edge in pag.edges), *((edge.b, edge.a) for edge in pag.edges)}
     arcs = {(a, b) for a, b in beside if a in options and constraints.roles[b] in (Role.METRIC, Role.OBJECTIVE)}
