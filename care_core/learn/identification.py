@@ -6,6 +6,7 @@ changes with the hash seed, so the functional is written here, from the same par
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from ananke.graphs import ADMG
@@ -75,10 +76,24 @@ def _adjustment(graph: CausalGraph, option: str, objective: str) -> tuple[str, .
     The last is the canonical adjustment set (Perkovic et al. 2018): if it fails, so does every other.
     """
     mediators = graph.descendants(option) & graph.ancestors(objective) - {option}
-    first_steps = {(option, node) for node in graph.children(option) if node in mediators}
-    backdoor = CausalGraph(graph.nodes, graph.directed - first_steps, graph.bidirected)
     allowed = graph.ancestors(option, objective) - graph.descendants(*mediators) - {option}
     for candidate in (set[str](), allowed.intersection(graph.parents(option)), allowed):
-        if backdoor.m_separated(option, objective, candidate):
+        if _blocks(graph, option, objective, candidate):
             return tuple(sorted(candidate))
     return None
+
+
+def is_answered_by(graph: CausalGraph, option: str, objective: str, inputs: Collection[str]) -> bool:
+    """Whether a regression of the objective on these exogenous variables gives the option's effect.
+
+    An effect that is identified only through metrics (the front door) is not: nothing here computes its functional.
+    """
+    return _blocks(graph, option, objective, {*inputs} - {option})
+
+
+def _blocks(graph: CausalGraph, option: str, objective: str, held: Collection[str]) -> bool:
+    """Whether `held` blocks every path but the causal ones."""
+    mediators = graph.descendants(option) & graph.ancestors(objective) - {option}
+    first_steps = {(option, node) for node in graph.children(option) if node in mediators}
+    backdoor = CausalGraph(graph.nodes, graph.directed - first_steps, graph.bidirected)
+    return backdoor.m_separated(option, objective, held)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import networkx as nx
 import numpy as np
 import pytest
 from causallearn.search.ConstraintBased.FCI import fci
@@ -100,6 +101,54 @@ def test_agrees_with_causal_learn_on_a_graph_without_hidden_causes(seed: int) ->
         theirs |= {(a, b): edge.get_endpoint2().name, (b, a): edge.get_endpoint1().name}
     assert set(ours) == set(theirs)
     assert all("CIRCLE" in (ours[ends].name, theirs[ends]) or ours[ends].name == theirs[ends] for ends in ours)
+
+
+def drawn(pag: Pag) -> set[str]:
+    """Every edge as text, such as `a o-> b`."""
+    left = {Mark.TAIL: "-", Mark.ARROW: "<", Mark.CIRCLE: "o"}
+    return {f"{e.a} {left[e.at_a]}-{e.at_b.value} {e.b}" for e in pag.edges}
+
+
+@pytest.mark.parametrize(
+    ("directed", "hidden", "pag"),
+    [
+        ("ab bc", "", {"a o-o b", "b o-o c"}),
+        ("ac bc", "", {"a o-> c", "b o-> c"}),
+        ("ac bc cd", "", {"a o-> c", "b o-> c", "c --> d"}),
+        ("ab dc", "bc", {"a o-> b", "b <-> c", "c <-o d"}),
+        ("ac bc cd", "cd", {"a o-> c", "b o-> c", "a o-> d", "b o-> d", "c o-o d"}),
+        ("ab cb cd", "", {"a o-> b", "b <-o c", "c o-o d"}),
+        ("ba bc", "ac", {"a o-o b", "b o-o c", "a o-o c"}),
+    ],
+)
+def test_the_partial_graph_of_known_graphs(directed: str, hidden: str, pag: set[str]) -> None:
+    names = tuple("abcd" if "d" in directed else "abc")
+    edges, arcs = (frozenset((pair[0], pair[1]) for pair in text.split()) for text in (directed, hidden))
+    found = drawn(discover(names, Oracle(CausalGraph(names, edges, arcs), names), FREE))
+    assert found == pag
+
+
+@settings(deadline=None, max_examples=25)
+@given(mixed_graphs(nodes=METRICS[:5]))
+def test_with_hidden_causes_agrees_with_causal_learn_on_its_own_oracle(truth: CausalGraph) -> None:
+    """Same adjacencies; a mark is the same, or a circle of ours where causal-learn's R5 to R10 say more."""
+    names = truth.nodes
+    dag = nx.DiGraph([(names.index(a), names.index(b)) for a, b in truth.directed])
+    dag.add_nodes_from(range(len(names)))
+    for k, (a, b) in enumerate(sorted(truth.bidirected), start=len(names)):
+        dag.add_edges_from([(k, names.index(a)), (k, names.index(b))])
+    reference = fci(
+        np.random.default_rng(0).normal(size=(10, len(names))), "d_separation", true_dag=dag,
+        node_names=list(names), show_progress=False,
+    )[0]  # fmt: skip
+    theirs: dict[tuple[str, str], str] = {}
+    for edge in reference.get_graph_edges():
+        a, b = edge.get_node1().get_name(), edge.get_node2().get_name()
+        theirs |= {(a, b): edge.get_endpoint2().name, (b, a): edge.get_endpoint1().name}
+    ours = marks(discover(names, Oracle(truth, names), FREE, max_given=3, max_given_beyond=3))
+    assert set(ours) == set(theirs)
+    for ends, mark in ours.items():
+        assert mark.name == theirs[ends] or mark is Mark.CIRCLE, ends
 
 
 def test_a_confounded_metric_and_objective_stay_open_to_a_latent_cause() -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.causal.effects import acceptable_values, average_causal_effect
+from care_core.causal.effects import Direction, acceptable_values, along, average_causal_effect
 from care_core.variables import Role, Variable
 
 responses = st.lists(st.floats(-1e3, 1e3), min_size=2, max_size=12)
@@ -74,3 +74,17 @@ def test_without_a_range_the_observed_values_count() -> None:
     assert len(values) == 9
     assert values.max() < 2
     assert acceptable_values(metric, [3, 1, 3, np.nan]).tolist() == [1, 3]
+
+
+@pytest.mark.parametrize(
+    ("edges", "path"),
+    [
+        (("increasing", "increasing"), "increasing"),
+        (("increasing", "decreasing"), "decreasing"),
+        (("decreasing", "decreasing"), "increasing"),
+        (("decreasing", "optimum inside"), "optimum inside"),
+        (("optimum inside", "none"), "none"),
+    ],
+)
+def test_signs_multiply_along_a_path(edges: tuple[Direction, ...], path: Direction) -> None:
+    assert along(edges) == path

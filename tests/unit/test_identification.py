@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from care_core.causal.graph import CausalGraph
-from care_core.learn.identification import identify
+from care_core.learn.identification import identify, is_answered_by
 from tests.simulated import simulate
 
 
@@ -80,3 +80,17 @@ def test_the_functional_does_not_depend_on_the_hash_seed() -> None:
     }
     assert len(texts) == 1
     assert texts.pop().startswith("sum_{m,n} ")
+
+
+def test_a_regression_answers_where_it_holds_what_chose_the_option() -> None:
+    chosen = graph("c>x c>m x>m m>y")
+    assert is_answered_by(chosen, "x", "y", ["x", "c"])
+    assert not is_answered_by(chosen, "x", "y", ["x"])
+
+
+def test_the_front_door_and_an_adjusting_metric_are_not_answered_by_options_and_contexts() -> None:
+    front_door, through_metric = graph("x>m m>y", "x-y"), graph("x>m m>y n>y", "x-n")
+    assert identify(front_door, "x", "y").identified
+    assert not is_answered_by(front_door, "x", "y", ["x"])
+    assert identify(through_metric, "x", "y").adjustment == ("n",)
+    assert not is_answered_by(through_metric, "x", "y", ["x"])

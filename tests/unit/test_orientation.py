@@ -9,6 +9,7 @@ from care_core.causal.graph import is_acyclic
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import Mark, Pag, PagEdge
 from care_core.learn.orientation import (
+    THRESHOLD,
     entropy,
     exogenous_entropy,
     has_latent_cause,
@@ -109,6 +110,18 @@ def test_a_latent_state_is_recovered_exactly(rng: np.random.Generator) -> None:
     joint = np.zeros((4, 4))
     joint[:2, :2] = joint[2:, 2:] = within / 2
     assert latent_entropy(joint, rng) == pytest.approx(np.log(2), abs=0.01)
+
+
+@pytest.mark.parametrize(("own", "share"), [([0.5, 0.5], 2 / 3), ([0.92, 0.08], 0.83)])
+def test_a_latent_counts_below_eight_tenths_of_the_smaller_entropy(
+    own: list[float], share: float, rng: np.random.Generator
+) -> None:
+    """X = (Z, U) and Y = (Z, V) with four states of Z: only Z explains the pair, and H(Z) / H(X) is known."""
+    within = np.outer(own, own) / 4
+    joint = np.asarray(np.kron(np.eye(4), within), dtype=np.float64)
+    assert np.log(4) / entropy(joint.sum(axis=1)) == pytest.approx(share, abs=0.01)
+    assert latent_entropy(joint, rng) == pytest.approx(np.log(4), abs=0.02)
+    assert has_latent_cause(joint, rng) == (share < THRESHOLD)
 
 
 @given(st.integers(0, 1000))

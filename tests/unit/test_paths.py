@@ -88,3 +88,27 @@ def test_a_dense_graph_is_searched_without_listing_its_paths() -> None:
     rng = np.random.default_rng(0)
     weight = {edge: float(rng.random()) for edge in sorted(edges)}
     assert len(rank_paths(CausalGraph(nodes, edges), "y", ["o"], weight, 20)) == 20
+
+
+class Counted(CausalGraph):
+    """Counts how many suffixes the search expands: each asks for the parents of its first node once."""
+
+    def parents(self, node: str) -> tuple[str, ...]:
+        EXPANDED.append(node)
+        return super().parents(node)
+
+
+EXPANDED: list[str] = []
+
+
+def test_no_suffix_is_expanded_that_does_not_lead_to_a_best_path() -> None:
+    """2^40 paths; each of the ten best has at most 41 edges, so the bound leaves at most 410 expansions."""
+    metrics = [f"m{i:02d}" for i in range(40)]
+    nodes = ("o", *metrics, "y")
+    edges = frozenset((a, b) for i, a in enumerate(nodes) for b in nodes[i + 1 :])
+    rng = np.random.default_rng(1)
+    weight = {edge: float(rng.random()) for edge in sorted(edges)}
+    EXPANDED.clear()
+    found = rank_paths(Counted(nodes, edges), "y", ["o"], weight, 10)
+    assert len(found) == 10
+    assert len(EXPANDED) <= 10 * (len(nodes) - 1)

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sklearn.metrics import brier_score_loss, log_loss, roc_auc_score
 
-from care_core.learn.skill import calibration_error, reliability, score
+from care_core.learn.skill import calibration_error, cross_validated_skill, reliability, score
 from care_core.profile.store import Profile
+from tests.planted import SCHEMA, fly_many
 
 PAIRS = st.lists(st.tuples(st.floats(0.01, 0.99), st.booleans()), min_size=4, max_size=60)
 
@@ -55,3 +56,14 @@ def test_the_planted_robot_is_predicted_on_runs_it_has_not_seen(planted: Profile
         assert found["log_loss"] < 0.7 * -(base * np.log(base) + (1 - base) * np.log(1 - base)), name
         assert found["auc"] > 0.9, name
         assert found["calibration_error"] < 0.1, name
+
+
+def test_folds_are_the_same_on_any_number_of_processes(planted: Profile) -> None:
+    frame = fly_many(90)
+    answers = [
+        cross_validated_skill(frame, SCHEMA, planted.model.graph, np.random.default_rng(0), folds=2, n_jobs=n_jobs)
+        for n_jobs in (1, 2)
+    ]
+    assert answers[0] == answers[1]
+    assert "all" in answers[0]
+    assert cross_validated_skill(frame, SCHEMA, planted.model.graph, np.random.default_rng(0), folds=0) == {}
