@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -23,16 +23,39 @@ def cross_validated_skill(
     frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, folds: int
 ) -> dict[str, dict[str, float]]:
     """Per objective, and for `all` of them, skill of the odds on held-out runs. The graph is kept."""
+    odds = held_out_odds(frame, schema, lambda _runs: graph, rng, folds=folds)
+    truth: dict[str, FloatArray] = {objective.name: met(objective, frame) for objective in schema.objectives}
+    truth["all"] = all_met(frame, schema)
+    return {name: score(odds[name], truth[name]) for name in odds}
+
+
+def held_out_odds(
+    frame: pd.DataFrame,
+    schema: Schema,
+    learn: Callable[[pd.DataFrame], CausalGraph],
+    rng: np.random.Generator,
+    *,
+    folds: int,
+) -> dict[str, FloatArray]:
+    """Odds of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each.
+
+    Args:
+        learn: the runs of the other folds -> the graph to fit mechanisms on.
+    """
     fold = rng.permutation(len(frame)) % folds
     odds: dict[str, FloatArray] = {}
     for k in range(folds):
         held_out = fold == k
-        predicted = _odds(frame[~held_out], frame[held_out], schema, graph, rng)
-        for name, values in predicted.items():
+        runs = frame[~held_out]
+        for name, values in _odds(runs, frame[held_out], schema, learn(runs), rng).items():
             odds.setdefault(name, np.full(len(frame), np.nan))[held_out] = values
-    truth: dict[str, FloatArray] = {objective.name: met(objective, frame) for objective in schema.objectives}
-    truth["all"] = np.all([np.nan_to_num(kept, nan=0.0) == 1.0 for kept in truth.values()], axis=0).astype(float)
-    return {name: score(odds[name], truth[name]) for name in odds}
+    return odds
+
+
+def all_met(frame: pd.DataFrame, schema: Schema) -> FloatArray:
+    """1 where every objective has a value that keeps its threshold, else 0; shape (n,)."""
+    kept = [np.nan_to_num(met(objective, frame), nan=0.0) == 1.0 for objective in schema.objectives]
+    return np.all(kept, axis=0).astype(float)
 
 
 def _odds(

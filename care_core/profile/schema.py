@@ -76,6 +76,13 @@ class _EvidenceRule(_Strict):
     options: list[str]
 
 
+class _Known(_Strict):
+    """What people know to act on what: every cause may act on every effect."""
+
+    causes: list[str]
+    effects: list[str]
+
+
 class _Profile(_Strict):
     schema_version: Literal[1]
     name: str
@@ -87,7 +94,17 @@ class _Profile(_Strict):
     observational: bool = False
     mission: dict[str, Any] = Field(default_factory=dict)
     evidence: list[_EvidenceRule] = Field(default_factory=list)
+    known: list[_Known] = Field(default_factory=list)
     variables: dict[str, _Variable]
+
+    @model_validator(mode="after")
+    def _known_are_declared(self) -> _Profile:
+        for name in (name for rule in self.known for name in (*rule.causes, *rule.effects)):
+            if name not in self.variables:
+                raise ValueError(
+                    f"'known' names '{name}', which is not declared. {nearest(name, self.variables)}".strip()
+                )
+        return self
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +125,8 @@ class Schema:
     evidence: tuple[tuple[str, tuple[str, ...]], ...]
     """Text found in a message of the log -> the options it points at."""
     variables: Mapping[str, Variable]
+    known: frozenset[tuple[str, str]] = frozenset()
+    """(cause, effect): direct effects that people know to be possible. Data say how large they are."""
     digest: str = field(default="", compare=False)
     """SHA-256 of the variables' names, roles, types, ranges and extraction: what a model was learned for."""
 
@@ -185,6 +204,7 @@ def _to_schema(data: _Profile) -> Schema:
         mission=data.mission,
         evidence=tuple((rule.text, tuple(rule.options)) for rule in data.evidence),
         variables=variables,
+        known=frozenset((a, b) for rule in data.known for a in rule.causes for b in rule.effects),
         digest=_digest(variables),
     )
 
