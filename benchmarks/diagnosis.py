@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from threadpoolctl import threadpool_limits
 
 from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import FloatArray
@@ -67,18 +66,21 @@ def held_out(table: Path, schema: Schema, cache: Path) -> HeldOut:
     if not kept.exists():
         frame = read_table(table, schema)
         truth = all_met(frame, schema)
-        rng = np.random.default_rng(0)
-        with threadpool_limits(1):
-            care = held_out_odds(
-                frame, schema, lambda runs: learn_structure(runs, schema, rng=rng).graph, rng, folds=FOLDS
-            )["all"]
+        odds = held_out_odds(
+            frame,
+            schema,
+            lambda runs, rng: learn_structure(runs, schema, rng=rng).graph,
+            np.random.default_rng(0),
+            folds=FOLDS,
+            n_jobs=2,
+        )
         plain = np.full(len(frame), np.nan)
         fold = np.random.default_rng(0).permutation(len(frame)) % FOLDS
         for k in range(FOLDS):
             peer = PlainClassifier(frame[fold != k], truth[fold != k] == 1.0, [o.name for o in schema.options])
             plain[fold == k] = peer.odds(frame[fold == k].to_dict("records"))
         cache.mkdir(parents=True, exist_ok=True)
-        np.savez(kept, care=care, plain=plain, met=truth)
+        np.savez(kept, care=odds["all"], plain=plain, met=truth)
     with np.load(kept) as arrays:
         return HeldOut(arrays["care"], arrays["plain"], arrays["met"])
 

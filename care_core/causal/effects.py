@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -66,6 +67,14 @@ def _direction(values: FloatArray) -> Direction:
     if bump > BUMP * np.ptp(values):
         return "optimum inside"
     return "increasing" if values[-1] > values[0] else "decreasing"
+
+
+def along(directions: Sequence[Direction]) -> Direction:
+    """Which way the end of a path moves with its start: the signs multiply, unless an edge has none or turns round."""
+    for unclear in ("none", "optimum inside"):
+        if unclear in directions:
+            return unclear
+    return "decreasing" if directions.count("decreasing") % 2 else "increasing"
 
 
 def acceptable_values(variable: Variable, observed: ArrayLike, count: int = 9) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from care_core.profile.model import Model
+from care_core.profile.model import EffectRecord, Model
 from care_core.profile.schema import Schema
 
 TOP = 10
@@ -59,11 +59,18 @@ def _graph(model: Model) -> str:
 
 def _paths(model: Model) -> str:
     rows = [
-        (objective, str(rank), " -> ".join(path.nodes), f"{path.ace:.2f} ({path.low:.2f} to {path.high:.2f})")
+        (
+            objective,
+            str(rank),
+            " -> ".join(path.nodes),
+            f"{path.ace:.2f} ({path.low:.2f} to {path.high:.2f})",
+            path.direction,
+            " ".join(f"{share:.0%}" for share in path.edge_support),
+        )
         for objective, paths in model.paths.items()
         for rank, path in enumerate(paths[:TOP], start=1)
     ]
-    header = ("objective", "rank", "path", "path ACE (90 % interval)")
+    header = ("objective", "rank", "path", "path ACE (90 % interval)", "direction", "edges in resamples")
     return "## Strongest paths\n\nMean edge effect on scaled variables (Eq. 2).\n\n" + _table(header, rows)
 
 
@@ -89,12 +96,18 @@ def _effects(model: Model) -> str:
     rows = []
     for objective in dict.fromkeys(e.objective for e in ranked):
         for e in [e for e in ranked if e.objective == objective][:TOP]:
-            known = "yes" if e.identified else "no: not ranked"
+            known = _identified(e)
             seen = "" if e.support is None else f"{e.support:.0%}"
             size = f"{e.effect:.2f} ({e.low:.2f} to {e.high:.2f})"
             rows.append((objective, e.option, size, e.direction, seen, known))
     header = ("objective", "option", "effect (90 % interval)", "direction", "path in resamples", "identified")
     return "## Total effects\n\nEq. 1 on scaled variables.\n\n" + _table(header, rows)
+
+
+def _identified(effect: EffectRecord) -> str:
+    if not effect.identified:
+        return "only through metrics: not ranked" if effect.functional else "no: not ranked"
+    return f"given {', '.join(effect.adjustment)}" if effect.adjustment else "yes"
 
 
 def _support(schema: Schema, model: Model) -> str:

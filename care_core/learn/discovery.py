@@ -11,12 +11,13 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import partial
+from functools import lru_cache, partial
 from itertools import combinations
-from typing import Protocol
+from math import comb
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from causallearn.graph.Edge import Edge as CausalLearnEdge
@@ -39,6 +40,8 @@ MAX_GIVEN = 3
 """Largest conditioning set among neighbours (anytime FCI, Spirtes 2001: stopping early keeps arrowheads valid)."""
 MAX_GIVEN_BEYOND = 2
 """Largest conditioning set among possibly d-separating nodes that are not neighbours."""
+BATCH = 100_000
+"""Independence tests answered in one call: bounds memory, not accuracy."""
 MAX_PATTERNS = 12
 """Most patterns of missing values told apart; beyond, the most alike are merged."""
 CLEAR = 4.0
@@ -209,16 +212,13 @@ def _neighbour_search(
     for i, j in zip(*np.nonzero(~possible), strict=True):
         sets[int(i), int(j)] = frozenset()
     for size in range(max_given + 1):
-        neighbours = [np.flatnonzero(row).tolist() for row in adjacent]
-        removed = []
+        neighbours = [np.flatnonzero(row) for row in adjacent]
+        questions = []
         for x, y in _pairs(adjacent):
             useful = explains[:, x] | explains[:, y]
-            candidates = [[n for n in neighbours[node] if useful[n] and n not in (x, y)] for node in (x, y)]
-            found = _most_independent(x, y, candidates, size, test, alpha)
-            if found is not None:
-                removed.append((x, y, found))
-        for x, y, found in removed:
-            _separate(adjacent, sets, x, y, found)
+            useful[[x, y]] = False
+            questions.append(_Question(x, y, [neighbours[node][useful[neighbours[node]]] for node in (x, y)]))
+        _separate(adjacent, sets, _independences(questions, size, test, alpha))
         if max(map(len, neighbours), default=0) <= size:
             break
     return adjacent, sets
@@ -237,38 +237,83 @@ def _search_beyond(
     found_any = False
     reach = [_possibly_separating(marks, adjacent, x) for x in range(len(adjacent))]
     neighbours = [set(np.flatnonzero(row).tolist()) for row in adjacent]
-    for x, y in _pairs(adjacent):
-        for node, other in ((x, y), (y, x)):
-            beyond = reach[node] - neighbours[node] - {other}
-            candidates = [n for n in sorted(reach[node] - {other}) if explains[n, x] or explains[n, y]]
-            found = None
-            for size in range(1, max_given + 1) if beyond else ():
-                found = _most_independent(x, y, [candidates], size, test, alpha)
-                if found is not None:
-                    break
-            if found is not None:
-                _separate(adjacent, sets, x, y, found)
-                found_any = True
-                break
+    for size in range(1, max_given + 1):
+        questions = []
+        for x, y in _pairs(adjacent):
+            useful = explains[:, x] | explains[:, y]
+            pools = [
+                np.array([n for n in sorted(reach[node] - {other}) if useful[n]], dtype=np.int64)
+                for node, other in ((x, y), (y, x))
+                if reach[node] - neighbours[node] - {other}
+            ]
+            questions.append(_Question(x, y, pools))
+        found = _independences(questions, size, test, alpha)
+        _separate(adjacent, sets, found)
+        found_any = found_any or bool(found)
     return found_any
 
 
+class _Question(NamedTuple):
+    """Is the pair independent given some nodes of one of the pools?"""
+
+    x: int
+    y: int
+    pools: list[IntArray]
+
+
+def _independences(
+    questions: Iterable[_Question], size: int, test: IndependenceTest, alpha: float
+) -> list[tuple[int, int, frozenset[int]]]:
+    """The pairs that some set of this size separates, each with the set given which it looks most independent."""
+    found = []
+    batch: list[tuple[_Question, IntArray]] = []
+    waiting = 0
+    for question in questions:
+        given = [pool[_choices(len(pool), size)] for pool in (question.pools if size else question.pools[:1])]
+        sets = np.concatenate(given) if given else np.zeros((0, size), dtype=np.int64)
+        # A pair with very many sets is split, so that memory stays bounded.
+        for part in np.array_split(sets, 1 + len(sets) // BATCH) if len(sets) else ():
+            batch.append((question, part))
+            waiting += len(part)
+            if waiting >= BATCH:
+                found += _most_independent(batch, test, alpha)
+                batch, waiting = [], 0
+    return _best_of(found + _most_independent(batch, test, alpha))
+
+
 def _most_independent(
-    x: int, y: int, candidates: Sequence[Sequence[int]], size: int, test: IndependenceTest, alpha: float
-) -> frozenset[int] | None:
-    """Of the sets of this size, the one given which x and y look most independent, None if never independent."""
-    given = [subset for nodes in candidates for subset in combinations(nodes, size)]
-    if not given:
-        return None
-    if size == 0:
-        given = given[:1]
-    array = np.array(given, dtype=np.int64).reshape(len(given), size)
-    p = test.p_values(np.full(len(given), x), np.full(len(given), y), array)
+    batch: Sequence[tuple[_Question, IntArray]], test: IndependenceTest, alpha: float
+) -> list[tuple[float, int, int, frozenset[int]]]:
+    """Per pair and its sets: the largest p-value and its set, where that is above alpha."""
+    if not batch:
+        return []
+    counts = [len(sets) for _, sets in batch]
+    given = np.concatenate([sets for _, sets in batch])
+    x, y = (np.repeat([question[end] for question, _ in batch], counts) for end in (0, 1))
     # A pair never seen to vary together shows no dependence. A set whose runs leave one of the pair constant has
     # selected runs, not explained the dependence seen in the others.
-    p = np.nan_to_num(p, nan=0.0 if size else 1.0)
-    best = int(p.argmax())
-    return frozenset(given[best]) if p[best] > alpha else None
+    p = np.nan_to_num(test.p_values(x, y, given), nan=0.0 if given.shape[1] else 1.0)
+    found = []
+    for (question, sets), own in zip(batch, np.split(p, np.cumsum(counts)[:-1]), strict=True):
+        best = int(own.argmax())
+        if own[best] > alpha:
+            found.append((float(own[best]), question.x, question.y, frozenset(sets[best].tolist())))
+    return found
+
+
+def _best_of(found: Iterable[tuple[float, int, int, frozenset[int]]]) -> list[tuple[int, int, frozenset[int]]]:
+    """One set a pair: the one with the largest p-value, the first of equal ones."""
+    best: dict[tuple[int, int], tuple[float, frozenset[int]]] = {}
+    for p, x, y, given in found:
+        if (x, y) not in best or p > best[x, y][0]:
+            best[x, y] = p, given
+    return [(x, y, given) for (x, y), (_, given) in best.items()]
+
+
+@lru_cache(maxsize=512)
+def _choices(count: int, size: int) -> IntArray:
+    """All ways to take `size` of `count` places, shape (ways, size)."""
+    return np.array(list(combinations(range(count), size)), dtype=np.int64).reshape(comb(count, size), size)
 
 
 def _pairs(adjacent: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
@@ -276,9 +321,12 @@ def _pairs(adjacent: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
         yield int(x), int(y)
 
 
-def _separate(adjacent: NDArray[np.bool_], sets: SeparatingSets, x: int, y: int, found: frozenset[int]) -> None:
-    adjacent[x, y] = adjacent[y, x] = False
-    sets[x, y] = sets[y, x] = found
+def _separate(
+    adjacent: NDArray[np.bool_], sets: SeparatingSets, found: Iterable[tuple[int, int, frozenset[int]]]
+) -> None:
+    for x, y, given in found:
+        adjacent[x, y] = adjacent[y, x] = False
+        sets[x, y] = sets[y, x] = given
 
 
 # Marks as a matrix: marks[i, j] is the mark at j of the edge between i and j, 0 where there is none.
@@ -311,16 +359,18 @@ def _middles(
     of y, m is no collider towards y for any other neighbour either, whatever their own triple looks like: among
     metrics, paths that nearly cancel are common.
     """
-    evidence: dict[tuple[int, int, int], float] = {}
+    triples = [
+        (x, middle, y)
+        for middle in range(len(adjacent))
+        for x, y in combinations(np.flatnonzero(adjacent[middle]).tolist(), 2)
+        if not (adjacent[x, y] or exogenous[middle] or (exogenous[x] and exogenous[y]))
+    ]
+    evidence = dict(zip(triples, _evidence(triples, sets, test), strict=True))
     pooled: dict[tuple[int, int], float] = {}
-    for middle in range(len(adjacent)):
-        for x, y in combinations(np.flatnonzero(adjacent[middle]).tolist(), 2):
-            if adjacent[x, y] or exogenous[middle] or (exogenous[x] and exogenous[y]):
-                continue
-            evidence[x, middle, y] = _evidence(test, x, y, sorted(sets[x, y] - {middle}), middle)
-            if exogenous[x] or exogenous[y]:
-                question = middle, (y if exogenous[x] else x)
-                pooled[question] = pooled.get(question, 0.0) + evidence[x, middle, y]
+    for (x, middle, y), own in evidence.items():
+        if exogenous[x] or exogenous[y]:
+            question = middle, (y if exogenous[x] else x)
+            pooled[question] = pooled.get(question, 0.0) + own
     readings = {}
     for (x, middle, y), own in evidence.items():
         asked = [pooled[middle, end] for end in (x, y) if (middle, end) in pooled]
@@ -335,16 +385,28 @@ def _reading(evidence: float) -> Middle:
     return Middle.COLLIDER if evidence > 0 else Middle.NONCOLLIDER
 
 
-def _evidence(test: IndependenceTest, x: int, y: int, without: Sequence[int], middle: int) -> float:
-    """By how much conditioning on the middle raises the squared z-score of its ends; 0 if that cannot be tested."""
-    p = np.array([_p_value(test, x, y, without), _p_value(test, x, y, [*without, middle])])
-    before, after = ndtri(np.maximum(p, 1e-300) / 2) ** 2
-    return 0.0 if np.isnan(p).any() else float(after - before)
+def _evidence(triples: Sequence[tuple[int, int, int]], sets: SeparatingSets, test: IndependenceTest) -> list[float]:
+    """By how much conditioning on the middle raises the squared z-score of the ends; 0 if that cannot be tested."""
+    without = [(x, y, sorted(sets[x, y] - {middle})) for x, middle, y in triples]
+    beside = [(x, y, [*given, middle]) for (x, y, given), (_, middle, _) in zip(without, triples, strict=True)]
+    before, after = (ndtri(np.maximum(_p_of(test, tests), 1e-300) / 2) ** 2 for tests in (without, beside))
+    return np.nan_to_num(after - before, nan=0.0).tolist()
+
+
+def _p_of(test: IndependenceTest, tests: Sequence[tuple[int, int, Sequence[int]]]) -> FloatArray:
+    """p-values of single tests with conditioning sets of any size, shape (len(tests),)."""
+    p = np.ones(len(tests))
+    sizes = np.array([len(given) for _, _, given in tests], dtype=np.int64)
+    for size in np.unique(sizes).tolist():
+        chosen = np.flatnonzero(sizes == size)
+        x, y = (np.array([tests[i][end] for i in chosen]) for end in (0, 1))
+        given = np.array([tests[i][2] for i in chosen], dtype=np.int64).reshape(len(chosen), size)
+        p[chosen] = test.p_values(x, y, given)
+    return p
 
 
 def _p_value(test: IndependenceTest, x: int, y: int, given: Sequence[int]) -> float:
-    one = np.array([given], dtype=np.int64).reshape(1, -1)
-    return float(test.p_values(np.array([x]), np.array([y]), one)[0])
+    return float(_p_of(test, [(x, y, given)])[0])
 
 
 def _with_colliders(known: IntArray, middles: Middles) -> IntArray:

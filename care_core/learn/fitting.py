@@ -102,7 +102,7 @@ def fit_mechanism(
 
 def left_out_loss(mechanism: Mechanism) -> float:
     """Mean negative log likelihood of each training run given the others: which of two input sets predicts better."""
-    errors, spreads = _leave_one_out(mechanism.kernel, mechanism.points, mechanism.targets)
+    errors, spreads = leave_one_out(mechanism.kernel, mechanism.points, mechanism.targets)
     if not mechanism.binary:
         return float((np.log(spreads) + 0.5 * (errors / spreads) ** 2).mean())
     slope, offset = mechanism.calibration

@@ -6,6 +6,7 @@ changes with the hash seed, so the functional is written here, from the same par
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from ananke.graphs import ADMG
@@ -38,6 +39,9 @@ def identify(graph: CausalGraph, option: str, objective: str) -> Identification:
     ancestral = graph.subgraph(graph.ancestors(objective))
     if option not in ancestral.nodes or option == objective:
         return Identification(True, f"p({objective})", True, ())
+    if not ancestral.parents(option) and not any(option in edge for edge in ancestral.bidirected):
+        # Nothing, seen or hidden, acts on it: seeing its value is setting it. A query would say so, slowly.
+        return Identification(True, f"p({objective}|{option})", True, ())
     query = OneLineID(
         ADMG(
             list(ancestral.nodes),
@@ -75,10 +79,24 @@ def _adjustment(graph: CausalGraph, option: str, objective: str) -> tuple[str, .
     The last is the canonical adjustment set (Perkovic et al. 2018): if it fails, so does every other.
     """
     mediators = graph.descendants(option) & graph.ancestors(objective) - {option}
-    first_steps = {(option, node) for node in graph.children(option) if node in mediators}
-    backdoor = CausalGraph(graph.nodes, graph.directed - first_steps, graph.bidirected)
     allowed = graph.ancestors(option, objective) - graph.descendants(*mediators) - {option}
     for candidate in (set[str](), allowed.intersection(graph.parents(option)), allowed):
-        if backdoor.m_separated(option, objective, candidate):
+        if _blocks(graph, option, objective, candidate):
             return tuple(sorted(candidate))
     return None
+
+
+def is_answered_by(graph: CausalGraph, option: str, objective: str, inputs: Collection[str]) -> bool:
+    """Whether a regression of the objective on these exogenous variables gives the option's effect.
+
+    An effect that is identified only through metrics (the front door) is not: nothing here computes its functional.
+    """
+    return _blocks(graph, option, objective, {*inputs} - {option})
+
+
+def _blocks(graph: CausalGraph, option: str, objective: str, held: Collection[str]) -> bool:
+    """Whether `held` blocks every path but the causal ones."""
+    mediators = graph.descendants(option) & graph.ancestors(objective) - {option}
+    first_steps = {(option, node) for node in graph.children(option) if node in mediators}
+    backdoor = CausalGraph(graph.nodes, graph.directed - first_steps, graph.bidirected)
+    return backdoor.m_separated(option, objective, held)

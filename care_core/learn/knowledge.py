@@ -7,6 +7,8 @@ and without them, and the data choose (`outcomes`).
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+
 import pandas as pd
 
 from care_core.causal.graph import CausalGraph
@@ -17,8 +19,21 @@ from care_core.profile.schema import Schema
 def with_known(graph: CausalGraph, frame: pd.DataFrame, schema: Schema) -> CausalGraph:
     """The graph with every known edge between varying variables that the constraints and its own arrows allow."""
     constraints = Constraints.of(schema)
-    for cause, effect in sorted(schema.known):
-        possible = frame[cause].nunique() > 1 and frame[effect].nunique() > 1 and not constraints.forbids(cause, effect)
-        if possible and cause != effect and cause not in graph.descendants(effect):
-            graph = CausalGraph(graph.nodes, graph.directed | {(cause, effect)}, graph.bidirected)
-    return graph
+    varying = {name for name in schema.variables if frame[name].nunique() > 1}
+    possible = [edge for edge in sorted(schema.known) if varying.issuperset(edge) and not constraints.forbids(*edge)]
+    children: dict[str, set[str]] = {name: set(graph.children(name)) for name in graph.nodes}
+    for cause, effect in possible:
+        if cause not in _reached(children, effect):
+            children[cause].add(effect)
+    edges = frozenset((cause, effect) for cause, effects in children.items() for effect in effects)
+    return CausalGraph(graph.nodes, edges, graph.bidirected)
+
+
+def _reached(children: Mapping[str, Collection[str]], start: str) -> set[str]:
+    """`start` and everything downstream of it."""
+    reached, ahead = {start}, [start]
+    while ahead:
+        new = set(children[ahead.pop()]) - reached
+        reached |= new
+        ahead += new
+    return reached

@@ -6,49 +6,61 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
+from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
 
 from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray
-from care_core.learn.fitting import OUTCOME
+from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
 from care_core.profile.model import Model, Training
 from care_core.profile.schema import Schema
 
 BINS = 10
+FOLD = Effort(points=400, iterations=30)
+"""Folds are fitted with less effort than the model itself, so the skill of large tables is rather understated."""
 
 
 def cross_validated_skill(
-    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, folds: int
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, folds: int, n_jobs: int = 1
 ) -> dict[str, dict[str, float]]:
-    """Per objective, and for `all` of them, skill of the odds on held-out runs. The graph is kept."""
-    odds = held_out_odds(frame, schema, lambda _runs: graph, rng, folds=folds)
+    """Per objective, and for `all` of them, skill of the odds on held-out runs. The graph is kept.
+
+    Args:
+        rng: draws the folds and the runs that mechanisms keep; the answer does not depend on `n_jobs`.
+        n_jobs: processes, one thread each.
+    """
+    if not folds:
+        return {}
+    odds = held_out_odds(frame, schema, lambda _runs, _rng: graph, rng, folds=folds, n_jobs=n_jobs)
     truth: dict[str, FloatArray] = {objective.name: met(objective, frame) for objective in schema.objectives}
     truth["all"] = all_met(frame, schema)
     return {name: score(odds[name], truth[name]) for name in odds}
 
 
-def held_out_odds(
-    frame: pd.DataFrame,
-    schema: Schema,
-    learn: Callable[[pd.DataFrame], CausalGraph],
-    rng: np.random.Generator,
-    *,
-    folds: int,
-) -> dict[str, FloatArray]:
-    """Odds of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each.
+Learn = Callable[[pd.DataFrame, np.random.Generator], CausalGraph]
+"""The runs of the other folds -> the graph to fit mechanisms on."""
 
-    Args:
-        learn: the runs of the other folds -> the graph to fit mechanisms on.
-    """
+
+def held_out_odds(
+    frame: pd.DataFrame, schema: Schema, learn: Learn, rng: np.random.Generator, *, folds: int, n_jobs: int = 1
+) -> dict[str, FloatArray]:
+    """Odds of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each."""
     fold = rng.permutation(len(frame)) % folds
+    seeds = rng.integers(2**32, size=folds)
+
+    def predict(k: int) -> Mapping[str, FloatArray]:
+        own = np.random.default_rng(seeds[k])
+        runs = frame[fold != k]
+        return _odds(runs, frame[fold == k], schema, learn(runs, own), own)
+
+    with parallel_config("loky", n_jobs=min(n_jobs, folds), inner_max_num_threads=1):
+        predicted = Parallel()(delayed(predict)(k) for k in range(folds))
     odds: dict[str, FloatArray] = {}
-    for k in range(folds):
-        held_out = fold == k
-        runs = frame[~held_out]
-        for name, values in _odds(runs, frame[held_out], schema, learn(runs), rng).items():
-            odds.setdefault(name, np.full(len(frame), np.nan))[held_out] = values
+    for k, values in enumerate(predicted):
+        for name, held_out in values.items():
+            odds.setdefault(name, np.full(len(frame), np.nan))[fold == k] = held_out
     return odds
 
 
@@ -65,7 +77,7 @@ def _odds(
     graph: CausalGraph,
     rng: np.random.Generator,
 ) -> Mapping[str, FloatArray]:
-    outcomes, mechanisms = fit_outcomes(train, schema, graph, rng, effort=OUTCOME)
+    outcomes, mechanisms = fit_outcomes(train, schema, graph, rng, effort=FOLD)
     training = Training(
         origin="", runs=len(train), seed=0, alpha=0.0, resamples=0,
         moves_together=groups_that_move_together(schema, train),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ import pandas as pd
 
 from care_core.causal.graph import CausalGraph
 from care_core.errors import LearningError
+from care_core.learn.choices import chosen_together
 from care_core.learn.completion import DirectEdge, complete
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import FisherZ, Pag, discover
@@ -67,8 +68,9 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
         resolved.bidirected,
     )
     completion = complete(frame, schema, graph, screening.kept)
+    together = chosen_together(frame, schema, screening.kept)
     return Structure(
-        graph=completion.graph,
+        graph=_with_hidden_reasons(completion.graph, pag, together, constraints),
         pag=pag,
         kept_options=screening.kept,
         dropped_options=screening.dropped,
@@ -78,8 +80,22 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
             *_repeats(frame, [v.name for v in schema.metrics if v.name in varying]),
             *resolved.notes,
             *completion.notes,
+            *(
+                f"'{option}' was chosen together with '{other}' for a reason that no context holds; what it seems to "
+                "do may be that reason's doing."
+                for option, other in together.items()
+            ),
         ),
     )
+
+
+def _with_hidden_reasons(
+    graph: CausalGraph, pag: Pag, options: Collection[str], constraints: Constraints
+) -> CausalGraph:
+    """A hidden common cause between each of these options and all that it was found beside in the mission."""
+    beside = {*graph.directed, *((edge.a, edge.b) for edge in pag.edges), *((edge.b, edge.a) for edge in pag.edges)}
+    arcs = {(a, b) for a, b in beside if a in options and constraints.roles[b] in (Role.METRIC, Role.OBJECTIVE)}
+    return CausalGraph(graph.nodes, graph.directed, graph.bidirected | arcs)
 
 
 def _repeats(frame: pd.DataFrame, metrics: Sequence[str]) -> list[str]:

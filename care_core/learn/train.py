@@ -13,14 +13,14 @@ from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from care_core.causal.effects import Effect, acceptable_values, average_causal_effect
+from care_core.causal.effects import Effect, acceptable_values, along, average_causal_effect
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Mechanism, solve, transformed
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.bootstrap import support as measure_support
 from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME
-from care_core.learn.identification import identify
+from care_core.learn.identification import identify, is_answered_by
 from care_core.learn.knowledge import with_known
 from care_core.learn.outcomes import badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
 from care_core.learn.skill import cross_validated_skill
@@ -35,7 +35,6 @@ BACKGROUND = 32
 """Training runs over which an effect is averaged."""
 EFFECT_RESAMPLES = 20
 """Bootstrap resamples behind the intervals of effects (mechanisms are refitted with their kernels kept)."""
-FOLDS = 5
 TOP_PATHS = 20
 WITNESS_Z = 1.96
 """How many standard errors a correlation must be off 0 before a metric counts as a witness."""
@@ -49,6 +48,8 @@ class Settings:
     seed: int = 0
     alpha: float = 0.01
     resamples: int = 50
+    folds: int = 5
+    """Parts of the cross-validation; 0 leaves the skill out."""
     n_jobs: int = 2
     origin: str = "not stated"
 
@@ -104,14 +105,14 @@ def assemble(
     resamples = _Resamples.draw(len(frame), rng)
     edges = _edge_effects(frame, schema, graph, settings, resamples)
     report("cross-validating", 0.8)
-    skill = cross_validated_skill(frame, schema, learned.graph, rng, folds=FOLDS)
+    skill = cross_validated_skill(frame, schema, learned.graph, rng, folds=settings.folds, n_jobs=settings.n_jobs)
     return Model(
         schema_digest=schema.digest,
         graph=graph,
         edges={edge: _edge_record(edge, "directed", support, edges) for edge in sorted(graph.directed)},
         bidirected=tuple(_edge_record(edge, "bidirected", support, edges) for edge in sorted(graph.bidirected)),
         effects=_total_effects(frame, schema, graph, learned.outcomes, learned.mechanisms, resamples, support),
-        paths=_paths(schema, graph, edges),
+        paths=_paths(schema, graph, edges, support),
         outcomes=learned.outcomes,
         summaries=_summaries(frame, schema),
         witnesses=_witnesses(frame, schema, learned.mechanisms),
@@ -138,6 +139,16 @@ class _Measured:
 
     effect: Effect
     resampled: FloatArray
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """5 % and 95 % of the resampled magnitudes."""
+        return _interval(self.resampled)
+
+
+def _interval(resampled: FloatArray) -> tuple[float, float]:
+    low, high = np.quantile(resampled, [0.05, 0.95])
+    return float(low), float(high)
 
 
 def _measure(
@@ -219,12 +230,15 @@ def _edge_record(
     edge: Edge, kind: str, support: Mapping[Finding, float], effects: Mapping[Edge, _Measured]
 ) -> EdgeRecord:
     measured = effects.get(edge) if kind == "directed" else None
+    low, high = measured.interval if measured else (0.0, 0.0)
     return EdgeRecord(
         source=edge[0],
         target=edge[1],
         kind="directed" if kind == "directed" else "bidirected",
         support=support.get(edge if kind == "directed" else frozenset(edge), 0.0),
         effect=measured.effect.magnitude if measured else 0.0,
+        low=low,
+        high=high,
         direction=measured.effect.direction if measured else "none",
     )
 
@@ -238,7 +252,10 @@ def _total_effects(
     resamples: _Resamples,
     support: Mapping[Finding, float],
 ) -> dict[Edge, EffectRecord]:
-    """Every option with a directed path to an objective: is the effect identified, and how large is it?"""
+    """Every option with a directed path to an objective: is the effect identified, and how large is it?
+
+    `identified` is said only where the mechanisms, regressions on the exogenous variables, give the effect.
+    """
     records: dict[Edge, EffectRecord] = {}
     for objective, outcome in outcomes.items():
         keys = [stage.mechanism for stage in outcome.stages] or [outcome.mechanism]
@@ -254,31 +271,42 @@ def _total_effects(
             if not measured:
                 continue
             best = max(measured, key=lambda m: m.effect.magnitude)
-            low, high = np.quantile(best.resampled, [0.05, 0.95])
+            inputs = {name for key in keys for name in mechanisms[key].inputs}
+            low, high = best.interval
             records[option, objective] = EffectRecord(
                 option=option,
                 objective=objective,
-                identified=answer.identified,
+                identified=answer.identified and is_answered_by(graph, option, objective, inputs),
                 functional=answer.functional,
                 adjustment=tuple(answer.adjustment),
                 effect=best.effect.magnitude,
-                low=float(low),
-                high=float(high),
+                low=low,
+                high=high,
                 direction=best.effect.direction,
                 support=support.get(Reaches(option, objective), 0.0),
             )
     return records
 
 
-def _paths(schema: Schema, graph: CausalGraph, edges: Mapping[Edge, _Measured]) -> dict[str, tuple[PathRecord, ...]]:
+def _paths(
+    schema: Schema, graph: CausalGraph, edges: Mapping[Edge, _Measured], support: Mapping[Finding, float]
+) -> dict[str, tuple[PathRecord, ...]]:
     """Alg. 2: the top paths of each objective, with the interval of their mean edge effect over resamples."""
     weight = {edge: measured.effect.magnitude for edge, measured in edges.items()}
     options = {option.name for option in schema.options}
 
     def record(path: CausalPath, objective: str) -> PathRecord:
         drawn = np.mean([edges[edge].resampled for edge in path.edges], axis=0)
-        low, high = np.quantile(drawn, [0.05, 0.95])
-        return PathRecord(objective=objective, nodes=path.nodes, ace=path.ace, low=float(low), high=float(high))
+        low, high = _interval(drawn)
+        return PathRecord(
+            objective=objective,
+            nodes=path.nodes,
+            ace=path.ace,
+            low=low,
+            high=high,
+            direction=along([edges[edge].effect.direction for edge in path.edges]),
+            edge_support=tuple(support.get(edge, 0.0) for edge in path.edges),
+        )
 
     return {
         objective.name: tuple(

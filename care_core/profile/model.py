@@ -33,13 +33,15 @@ class _Record(BaseModel):
 
 
 class EdgeRecord(_Record):
-    """An edge with the share of bootstrap resamples that hold it, and its effect (Eq. 1, scaled)."""
+    """An edge with the share of bootstrap resamples that hold it, and its effect (Eq. 1, scaled) with its interval."""
 
     source: str
     target: str
     kind: Literal["directed", "bidirected"]
     support: float
     effect: float = 0.0
+    low: float = 0.0
+    high: float = 0.0
     direction: Direction = "none"
 
 
@@ -60,13 +62,15 @@ class EffectRecord(_Record):
 
 
 class PathRecord(_Record):
-    """A ranked path (Eq. 2) with its bootstrap interval."""
+    """A ranked path (Eq. 2) with its bootstrap interval, which way it moves the objective, and each edge's support."""
 
     objective: str
     nodes: tuple[str, ...]
     ace: float
     low: float
     high: float
+    direction: Direction = "none"
+    edge_support: tuple[float, ...] = ()
 
 
 class Summary(_Record):

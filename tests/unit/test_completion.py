@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from scipy.stats import f as f_distribution
 
 from care_core.causal.graph import CausalGraph
-from care_core.learn.completion import _features, _p_of, _p_of_each, complete
+from care_core.learn.completion import complete
 from care_core.learn.constraints import Constraints
+from care_core.learn.regression import Regressions, features
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import FloatArray, normal_scores
 from care_core.profile.schema import Schema
@@ -35,7 +36,7 @@ def exact_p(frame: pd.DataFrame, name: str, held: list[str], target: str) -> flo
     y = normal_scores(frame[target].to_numpy(dtype=float))
 
     def fit(names: list[str]) -> tuple[float, int]:
-        x = np.column_stack([np.ones(len(y)), *(_features(frame[n].to_numpy(dtype=float)) for n in names)])
+        x = np.column_stack([np.ones(len(y)), *(features(frame[n].to_numpy(dtype=float)) for n in names)])
         coefficients = np.linalg.lstsq(x, y, rcond=None)[0]
         return float(((y - x @ coefficients) ** 2).sum()), int(np.linalg.matrix_rank(x))
 
@@ -143,8 +144,8 @@ def test_one_fit_and_one_by_one_give_the_exact_test(share: float) -> None:
     frame = frame.assign(y=frame.a + 0.3 * frame.flag + rng.normal(size=200) / 2)
     names = ["a", "b", "c", "flag", "code"]
     others = {name: [n for n in names if n != name] for name in names}
-    together = _p_of_each(frame, names, "y")
-    np.testing.assert_allclose(together, [_p_of(frame, name, others[name], "y") for name in names], rtol=1e-6)
+    together = Regressions(frame).p_of_each(names, "y")
+    np.testing.assert_allclose(together, [Regressions(frame).p_of(name, others[name], "y") for name in names], rtol=1e-6)
     np.testing.assert_allclose(together, [exact_p(frame, name, others[name], "y") for name in names], rtol=1e-6)
 
 
@@ -154,16 +155,16 @@ def test_more_options_than_the_runs_can_carry() -> None:
     n, many = 60, 40
     frame = pd.DataFrame({f"x{i}": rng.uniform(size=n) for i in range(many)})
     frame["y"] = frame.x7 + 0.1 * rng.normal(size=n)
-    p = _p_of_each(frame, [f"x{i}" for i in range(many)], "y")
+    p = Regressions(frame).p_of_each([f"x{i}" for i in range(many)], "y")
     assert ((p >= 0) & (p <= 1)).all()
     assert p.argmin() == 7
 
 
 def test_constants_and_targets_without_values_give_one() -> None:
     frame = table(40, 0, constant=np.ones(40), y=np.ones(40), z=np.full(40, np.nan))
-    assert _p_of_each(frame, ["a", "constant"], "y").tolist() == [1.0, 1.0]
-    assert _p_of_each(frame, ["a", "constant"], "z").tolist() == [1.0, 1.0]
-    assert _p_of_each(frame.assign(y=frame.a), ["a", "constant"], "y")[1] == 1.0
+    assert Regressions(frame).p_of_each(["a", "constant"], "y").tolist() == [1.0, 1.0]
+    assert Regressions(frame).p_of_each(["a", "constant"], "z").tolist() == [1.0, 1.0]
+    assert Regressions(frame.assign(y=frame.a)).p_of_each(["a", "constant"], "y")[1] == 1.0
 
 
 def test_columns_that_repeat_each_other_are_counted_once() -> None:
@@ -172,9 +173,9 @@ def test_columns_that_repeat_each_other_are_counted_once() -> None:
     flew = rng.random(200) < 0.6
     flight = {name: np.where(flew, rng.normal(size=200), np.nan) for name in ("m", "second")}
     frame = table(200, 0, permit=flew.astype(float), y=flew + 0.3 * rng.normal(size=200), **flight)
-    assert _p_of(frame, "permit", ["a"], "y") < 1e-9
-    assert _p_of(frame, "permit", ["a", "m"], "y") == 1.0
-    assert _p_of(frame, "second", ["m"], "y") > 0.01
+    assert Regressions(frame).p_of("permit", ["a"], "y") < 1e-9
+    assert Regressions(frame).p_of("permit", ["a", "m"], "y") == 1.0
+    assert Regressions(frame).p_of("second", ["m"], "y") > 0.01
     names = ["m", "second", "a"]
     exact = [exact_p(frame, name, [n for n in names if n != name], "y") for name in names]
-    np.testing.assert_allclose(_p_of_each(frame, names, "y"), exact, rtol=1e-6)
+    np.testing.assert_allclose(Regressions(frame).p_of_each(names, "y"), exact, rtol=1e-6)

@@ -1,0 +1,151 @@
+"""Operators chose the options by what they met: who is fooled?
+
+    python -m benchmarks.observational [--robots 4] [--runs 800]
+
+Simulated robots (`tests/robots.py`) whose table was not randomised: three options follow the wind, which also moves a
+metric that the objectives hang on. Once the wind is a context in the table, once no column holds it. Asked of 12 failed
+runs a robot: is the first-ranked option one whose reset really helps (odds of meeting everything rise by half of what
+the best single reset gives, at least 0.1), and how far are the predicted odds of every single reset from the true ones
+(1000 simulated missions each, the option set by intervention)? "said no" counts options that were not ranked because
+their effect is not identified.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from joblib import Parallel, delayed
+
+from care_core.causal.counterfactual import World
+from care_core.diagnose.ranking import deviating, reference_config, suspects
+from care_core.learn.baselines import PlainClassifier
+from care_core.learn.outcomes import met
+from care_core.learn.train import Settings, train
+from care_core.profile.model import Model
+from care_core.profile.schema import Schema
+from tests.robots import Chosen, Robot, declared_random, random_robot
+
+FAULTS = 12
+TRUTH = 1000
+WORTH = 0.1
+METHODS = ("care", "care, declared as randomised", "plain classifier")
+
+
+@dataclass
+class Score:
+    """`fooled`: first-ranked options that were chosen by the wind and do not help."""
+
+    asked: int = 0
+    hits: int = 0
+    silent: int = 0
+    fooled: int = 0
+    misses: list[float] = field(default_factory=list)
+    swayed_misses: list[float] = field(default_factory=list)
+    """Errors of the odds, over the options that followed the wind."""
+    refused: int = 0
+
+
+class _Care:
+    def __init__(self, frame: pd.DataFrame, schema: Schema, seed: int) -> None:
+        self.schema = schema
+        self.model: Model = train(frame, schema, Settings(seed=seed, resamples=0, folds=0, n_jobs=1))
+        self.bounds = {o.name: o.threshold for o in schema.objectives if o.threshold is not None}
+        self.refused = {option for (option, objective), effect in self.model.effects.items() if not effect.identified}
+
+    def answer(self, row: Mapping[str, float], reference: Mapping[str, float]) -> tuple[list[str], dict[str, float]]:
+        config = {**reference, **{v.name: row[v.name] for v in (*self.schema.options, *self.schema.contexts)}}
+        here = {**reference, **{c.name: row[c.name] for c in self.schema.contexts}}
+        seen = {
+            v.name: row[v.name] for v in (*self.schema.metrics, *self.schema.objectives) if np.isfinite(row[v.name])
+        }
+        world = World(self.model, config, seen, self.bounds)
+        best: dict[str, float] = {}
+        for objective in self.bounds:
+            for suspect in suspects(world, objective, here):
+                if suspect.contribution > 0:
+                    best[suspect.option] = max(best.get(suspect.option, 0.0), suspect.contribution)
+        fresh = World(self.model, config, {}, self.bounds)
+        asked = [name for name in deviating(config, here) if name not in self.refused]
+        odds = fresh.odds([{**config, name: here[name]} for name in asked]) if asked else np.zeros(0)
+        return sorted(best, key=lambda name: -best[name]), dict(zip(asked, odds.tolist(), strict=True))
+
+
+def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
+    robot = random_robot(np.random.default_rng(seed), chosen=chosen, inert=4)
+    schema = robot.schema
+    frame = robot.drive(n, np.random.default_rng(1000 + seed))
+    kept = np.all([np.nan_to_num(met(o, frame)) == 1.0 for o in schema.objectives], axis=0)
+    options = [o.name for o in schema.options]
+    engines = {"care": _Care(frame, schema, seed), METHODS[1]: _Care(frame, declared_random(schema), seed)}
+    plain = PlainClassifier(frame, kept, options, seed)
+    reference = reference_config(schema, engines["care"].model)
+    scores = {name: Score() for name in METHODS}
+    fresh = robot.drive(n, np.random.default_rng(2000 + seed))
+    failed = ~np.all([np.nan_to_num(met(o, fresh)) == 1.0 for o in schema.objectives], axis=0)
+    for _, row in fresh[failed].head(FAULTS).iterrows():
+        run = {str(k): float(v) for k, v in row.items()}
+        config = {name: run[name] for name in options}
+        off = deviating(config, {name: reference[name] for name in options})
+        truth = {name: _true_odds(robot, {**config, name: reference[name]}, run) for name in off}
+        worth = max(truth.values()) - _true_odds(robot, config, run)
+        helps = {name for name in off if truth[name] - _true_odds(robot, config, run) >= max(WORTH, worth / 2)}
+        answers = {name: engine.answer(run, reference) for name, engine in engines.items()}
+        predicted = plain.odds([{**config, name: reference[name]} for name in off])
+        answers[METHODS[2]] = (plain.rank(config, reference, off), dict(zip(off, predicted.tolist(), strict=True)))
+        for name, (ranking, odds) in answers.items():
+            score = scores[name]
+            score.misses += [abs(odds[option] - truth[option]) for option in odds]
+            score.swayed_misses += [abs(odds[o] - truth[o]) for o in odds if o in robot.swayed]
+            if helps:
+                score.asked += 1
+                score.silent += not ranking
+                score.hits += bool(ranking) and ranking[0] in helps
+                score.fooled += bool(ranking) and ranking[0] in robot.swayed and ranking[0] not in helps
+    for name, engine in engines.items():
+        scores[name].refused = len(engine.refused)
+    return scores
+
+
+def _true_odds(robot: Robot, config: Mapping[str, float], run: Mapping[str, float]) -> float:
+    """Share of missions that meet everything, options set, in this run's wind where the table holds it."""
+    frame = robot.drive(TRUTH, np.random.default_rng(7), config, run.get("wind"))
+    return float(np.all([np.nan_to_num(met(o, frame)) == 1.0 for o in robot.schema.objectives], axis=0).mean())
+
+
+def show(title: str, parts: list[dict[str, Score]]) -> None:
+    print(f"\n{title}")
+    print(f"  {'method':30s} {'rank 1 helps':>13s} {'fooled':>7s} {'silent':>7s} {'odds error':>11s} {'swayed':>7s} "
+          f"{'said no':>8s}")  # fmt: skip
+    for name in METHODS:
+        mine = [part[name] for part in parts]
+        asked, hits = sum(s.asked for s in mine), sum(s.hits for s in mine)
+        misses = [m for s in mine for m in s.misses]
+        swayed = [m for s in mine for m in s.swayed_misses]
+        print(
+            f"  {name:30s} {f'{hits}/{asked}':>13s} {sum(s.fooled for s in mine):>7d} {sum(s.silent for s in mine):>7d} "
+            f"{np.mean(misses):>11.3f} {f'{np.mean(swayed):.3f}' if swayed else '-':>7s} "
+            f"{sum(s.refused for s in mine):>8d}"
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--robots", type=int, default=4)
+    parser.add_argument("--runs", type=int, default=800)
+    parser.add_argument("--jobs", type=int, default=2)
+    args = parser.parse_args()
+    cases: dict[str, Chosen] = {
+        "chosen by the wind, which the table holds": "by context",
+        "chosen by the wind, which no column holds": "by something hidden",
+    }
+    for title, chosen in cases.items():
+        tasks = (delayed(compare)(chosen, seed, args.runs) for seed in range(args.robots))
+        show(f"{title} ({args.robots} robots x {args.runs} runs)", Parallel(n_jobs=args.jobs)(tasks))
+
+
+if __name__ == "__main__":
+    main()
