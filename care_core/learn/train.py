@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -168,23 +167,26 @@ def _measure(
     stacked, ends = np.vstack(grids), np.cumsum([len(grid) for grid in grids])[:-1]
     spread = 0.5 * mechanism.scale if mechanism.binary else mechanism.scale
 
-    def effects(m: Mechanism) -> list[Effect]:
-        answers = np.split(m.odds(stacked) if m.binary else m.latent(stacked), ends)
-        responses = [a.reshape(len(background), -1).mean(axis=0) for a in answers]
+    # One kernel serves the fit and all its resamples: only the weights of the training points differ.
+    weights = np.column_stack([mechanism.weights, *(_reweighted(mechanism, rows) for rows in resamples.rows)])
+    cross = mechanism.kernel(mechanism.scaled(stacked), mechanism.points)
+    latent = mechanism.mean + mechanism.scale * (cross @ weights)
+
+    def effects(answer: FloatArray) -> list[Effect]:
+        responses = [part.reshape(len(background), -1).mean(axis=0) for part in np.split(answer, ends)]
         return [average_causal_effect(response, spread) for response in responses]
 
-    drawn = [[e.magnitude for e in effects(_refitted(mechanism, rows))] for rows in resamples.rows]
-    by_name = zip(names, effects(mechanism), np.transpose(drawn), strict=True)
-    return {name: _Measured(effect, resampled) for name, effect, resampled in by_name}
+    whole, *drawn = [effects(answer) for answer in (mechanism.odds_of(latent) if mechanism.binary else latent).T]
+    magnitudes = np.array([[effect.magnitude for effect in resample] for resample in drawn])
+    return {name: _Measured(whole[i], magnitudes[:, i]) for i, name in enumerate(names)}
 
 
-def _refitted(mechanism: Mechanism, rows: NDArray[np.int64]) -> Mechanism:
-    """The mechanism on resampled training points, its kernel kept."""
+def _reweighted(mechanism: Mechanism, rows: NDArray[np.int64]) -> FloatArray:
+    """Weights of all training points, shape (n,), when the mechanism rests on a resample and its kernel is kept."""
     chosen = (rows % len(mechanism.targets))[: len(mechanism.targets)]
-    points, targets = mechanism.points[chosen], mechanism.targets[chosen]
-    return dataclasses.replace(
-        mechanism, points=points, targets=targets, weights=solve(mechanism.kernel, points, targets)
-    )
+    weights = np.zeros(len(mechanism.targets))
+    np.add.at(weights, chosen, solve(mechanism.kernel, mechanism.points[chosen], mechanism.targets[chosen]))
+    return weights
 
 
 def _metric_mechanisms(
