@@ -1,32 +1,38 @@
 """Are the causes and fixes right? Diagnoses failed missions whose true fixes are known, beside three peers.
 
-    python benchmarks/diagnosis.py --shared DIR [--platform arducopter] [--tables DIR] [--verbose]
+    python -m benchmarks.diagnosis --shared DIR [--platform arducopter] [--tables DIR] [--profiles DIR] [--verbose]
 
-`--tables` holds the training runs for the peers (made by `care ingest` on the training logs). Every truth row says
-which resets were really flown and which fixed the mission.
+`--tables` holds the training runs (made by `care ingest` on the training logs): for the peers, and for the odds of
+training missions held out of graph and mechanisms, which join those of the resets in the calibration error. Every truth
+row says which resets were really flown and which fixed the mission.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from care_core.causal.counterfactual import World
+from care_core.causal.mechanisms import FloatArray
 from care_core.diagnose.faults import thresholds_in_force
 from care_core.diagnose.ranking import deviating, reference_config
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.triage import triage
 from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
-from care_core.learn.outcomes import met
-from care_core.learn.skill import calibration_error, reliability
+from care_core.learn.skill import all_met, calibration_error, held_out_odds, reliability
+from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
 from care_core.logs import open_log
+from care_core.profile.schema import Schema
 from care_core.profile.select import describe_fit
 from care_core.profile.store import Profile, load_profile
 
@@ -36,9 +42,47 @@ TRUTH_NAMES = {
                    "path_error_max": "path_error_max_m"},
     "move_base": {"mission_success": "mission_success", "mission_time": "mission_time", "energy": "energy_j"},
 }  # fmt: skip
+CORE = Path(__file__).parent.parent / "care_core"
+FOLDS = 5
 JOULES_PER_WH = 3600.0
 LOWERED = 0.98
 """What the operator makes of a threshold that the log just meets although the mission was measured to miss it."""
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Odds of training missions by models that had not seen them, and whether they met everything; shape (n,) each."""
+
+    care: FloatArray
+    plain: FloatArray
+    met: FloatArray
+
+
+def held_out(table: Path, schema: Schema, cache: Path) -> HeldOut:
+    """Cross-validated odds, graph and mechanisms learned anew in each fold; kept in `cache` for this table and code."""
+    code = [path.read_bytes() for room in ("learn", "causal") for path in sorted((CORE / room).glob("*.py"))]
+    key = hashlib.sha256(b"".join([table.read_bytes(), repr(schema).encode(), *code])).hexdigest()[:16]
+    kept = cache / f"{schema.name}-{key}.npz"
+    if not kept.exists():
+        frame = read_table(table, schema)
+        truth = all_met(frame, schema)
+        odds = held_out_odds(
+            frame,
+            schema,
+            lambda runs, rng: learn_structure(runs, schema, rng=rng).graph,
+            np.random.default_rng(0),
+            folds=FOLDS,
+            n_jobs=2,
+        )
+        plain = np.full(len(frame), np.nan)
+        fold = np.random.default_rng(0).permutation(len(frame)) % FOLDS
+        for k in range(FOLDS):
+            peer = PlainClassifier(frame[fold != k], truth[fold != k] == 1.0, [o.name for o in schema.options])
+            plain[fold == k] = peer.odds(frame[fold == k].to_dict("records"))
+        cache.mkdir(parents=True, exist_ok=True)
+        np.savez(kept, care=odds["all"], plain=plain, met=truth)
+    with np.load(kept) as arrays:
+        return HeldOut(arrays["care"], arrays["plain"], arrays["met"])
 
 
 @dataclass
@@ -65,6 +109,8 @@ class Tally:
     with_single: int = 0
     wrong_objectives: list[str] = field(default_factory=list)
     hits: dict[str, Hits] = field(default_factory=dict)
+    unflown: list[str] = field(default_factory=list)
+    """Suggested sets whose reset nobody flew."""
     fix_flown: int = 0
     fix_confirmed: int = 0
     fix_sizes: list[int] = field(default_factory=list)
@@ -73,12 +119,13 @@ class Tally:
     """Faults that the log shows just inside the threshold."""
     odds: dict[str, list[float]] = field(default_factory=dict)
     outcomes: list[float] = field(default_factory=list)
+    held_out: HeldOut | None = None
 
 
 def ranking_of(diagnosis: Diagnosis) -> list[str]:
-    """The options of every fault, best first: by contribution, an option counted where it weighs most."""
+    """The options of every fault by their rank, between faults by contribution; an option counts where it is first."""
     causes = [cause for fault in diagnosis.faults for cause in fault.causes]
-    causes.sort(key=lambda cause: (cause.is_lead, -cause.contribution if not cause.is_lead else cause.rank))
+    causes.sort(key=lambda cause: (cause.rank, -cause.contribution))
     return list(dict.fromkeys(cause.option.name for cause in causes))
 
 
@@ -105,13 +152,13 @@ def objectives_differ(diagnosis: Diagnosis, truth: Mapping[str, Any], platform: 
     return differ
 
 
-def evaluate(platform: str, shared: Path, table: Path | None, verbose: bool) -> Tally:
-    profile = load_profile(platform)
+def evaluate(profile: Profile, shared: Path, peers: Peers | None, *, verbose: bool = False) -> Tally:
+    """Diagnose every fault of the profile's platform."""
+    platform = profile.schema.name
     folder = shared / "data" / platform / "faults"
     truths = [json.loads(line) for line in (folder / "truth.jsonl").read_text().splitlines()]
     reference = reference_config(profile.schema, profile.model)
     tally = Tally()
-    peers = None if table is None else _Peers(table, profile)
     for truth in truths:
         log = open_log(folder / truth["log"])
         choice = describe_fit(log, profile)
@@ -135,15 +182,13 @@ def _is_near(result: ObjectiveResult, truth: Mapping[str, Any], platform: str) -
     return result.status == "ok" and not result.threshold.met(true * scale)
 
 
-class _Peers:
+class Peers:
     """The three rankings without a graph, trained on the same table."""
 
-    def __init__(self, table: Path, profile: Profile) -> None:
-        self.schema = profile.schema
-        self.frame = read_table(table, profile.schema)
-        kept = [np.nan_to_num(met(o, self.frame), nan=0.0) == 1.0 for o in profile.schema.objectives]
-        self.met_all = np.all(kept, axis=0)
-        self.classifier = PlainClassifier(self.frame, self.met_all, [o.name for o in profile.schema.options])
+    def __init__(self, frame: pd.DataFrame, schema: Schema) -> None:
+        self.schema, self.frame = schema, frame
+        self.met_all = all_met(frame, schema) == 1.0
+        self.classifier = PlainClassifier(frame, self.met_all, [o.name for o in schema.options])
 
     def rankings(self, config: Mapping[str, float], reference: Mapping[str, float]) -> dict[str, list[str]]:
         off = deviating(config, reference)
@@ -161,7 +206,7 @@ def _count(
     platform: str,
     reference: Mapping[str, float],
     profile: Profile,
-    peers: _Peers | None,
+    peers: Peers | None,
     verbose: bool,
 ) -> None:
     tally.faults += 1
@@ -186,6 +231,8 @@ def _count(
         flown = {frozenset(row["reset"]): row["ok"] for row in truth["tried"]}
         tally.fix_flown += suggested in flown
         tally.fix_confirmed += flown.get(suggested, False)
+        if suggested not in flown:
+            tally.unflown.append(f"{truth['tag']} {'+'.join(sorted(suggested))}")
     if verbose:
         fix = (
             [f"{c.option.name} {c.current:g}->{c.suggested:g}" for c in diagnosis.fix.changes]
@@ -202,7 +249,7 @@ def _count_odds(
     truth: Mapping[str, Any],
     reference: Mapping[str, float],
     profile: Profile,
-    peers: _Peers | None,
+    peers: Peers | None,
 ) -> None:
     """Predicted odds of every reset that was flown, against whether it met all objectives."""
     config = {**reference, **diagnosis.run.config}
@@ -227,15 +274,26 @@ def show(platform: str, tally: Tally) -> None:
     median = np.median(tally.fix_sizes) if tally.fix_sizes else float("nan")
     print(f"  suggested sets that were flown as resets: {tally.fix_flown}, confirmed: {tally.fix_confirmed}; "
           f"median changes {median:g}; abstained {tally.abstained}")  # fmt: skip
+    if tally.unflown:
+        print(f"  suggested sets that nobody flew: {', '.join(tally.unflown)}")
+    _show_odds(tally)
+
+
+def _show_odds(tally: Tally) -> None:
     outcomes = np.array(tally.outcomes)
     for name, odds in tally.odds.items():
-        p = np.array(odds)
-        print(f"  odds of {len(p)} flown resets, {name}: calibration error {calibration_error(p, outcomes):.3f}, "
-              f"Brier {((p - outcomes) ** 2).mean():.3f}")  # fmt: skip
-    print(
-        "  reliability (predicted, met, n): "
-        + "; ".join(f"{a:.2f} {b:.2f} {c}" for a, b, c in reliability(np.array(tally.odds["care"]), outcomes))
-    )
+        parts = {"flown resets": (np.array(odds), outcomes)}
+        if tally.held_out is not None:
+            kept = tally.held_out.care if name == "care" else tally.held_out.plain
+            parts["held-out missions"] = (kept, tally.held_out.met)
+            parts["both"] = (np.r_[parts["flown resets"][0], kept], np.r_[outcomes, tally.held_out.met])
+        for what, (p, met) in parts.items():
+            print(f"  odds, {name}, {len(p)} {what}: calibration error {calibration_error(p, met):.3f}, "
+                  f"Brier {((p - met) ** 2).mean():.3f}")  # fmt: skip
+        p, met = list(parts.values())[-1]
+        print("    predicted  met    n")
+        for predicted, seen, count in reliability(p, met):
+            print(f"    {predicted:9.2f} {seen:4.2f} {count:4d}")
 
 
 def main() -> None:
@@ -246,14 +304,25 @@ def main() -> None:
         "--tables", type=Path, help="folder with PLATFORM.parquet or .csv, the training runs of the peers"
     )
     parser.add_argument("--verbose", action="store_true", help="one line a fault")
+    parser.add_argument("--profiles", type=Path, help="folder of profiles to judge; default: the bundled ones")
+    parser.add_argument("--cache", type=Path, default=Path(tempfile.gettempdir()) / "care-benchmarks",
+                        help="where cross-validated odds are kept")  # fmt: skip
     args = parser.parse_args()
     for platform in args.platform or PLATFORMS:
-        table = None
+        profile = load_profile(platform if args.profiles is None else args.profiles / platform)
+        peers, kept = None, None
         if args.tables is not None:
-            table = next(
-                p for p in (args.tables / f"{platform}.parquet", args.tables / f"{platform}.csv") if p.exists()
-            )
-        show(platform, evaluate(platform, args.shared, table, args.verbose))
+            table = table_of(args.tables, platform)
+            peers = Peers(read_table(table, profile.schema), profile.schema)
+            kept = held_out(table, profile.schema, args.cache)
+        tally = evaluate(profile, args.shared, peers, verbose=args.verbose)
+        tally.held_out = kept
+        show(platform, tally)
+
+
+def table_of(folder: Path, platform: str) -> Path:
+    """The training runs of a platform."""
+    return next(path for path in (folder / f"{platform}.parquet", folder / f"{platform}.csv") if path.exists())
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ class _Care:
         world = World(self.model, config, seen, self.bounds)
         best: dict[str, float] = {}
         for objective in self.bounds:
-            for suspect in suspects(world, objective, here):
+            for suspect in suspects(world, self.schema, objective, here):
                 if suspect.contribution > 0:
                     best[suspect.option] = max(best.get(suspect.option, 0.0), suspect.contribution)
         fresh = World(self.model, config, {}, self.bounds)

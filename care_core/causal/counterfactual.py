@@ -67,7 +67,8 @@ class World:
         grouped = {name for group in together for name in group}
         return [group for group in together if group] + [[name] for name in names if name not in grouped]
 
-    def _known(self, name: str) -> float | None:
+    def known(self, name: str) -> float | None:
+        """This run's value of a metric or an objective, None where it has none."""
         value = self.observed.get(name)
         return float(value) if is_known(value) else None  # type: ignore[arg-type]
 
@@ -100,7 +101,7 @@ class World:
 
     def _passed(self, objective: str, stage: StageRecord) -> bool | None:
         """Whether this run passed the stage, None where it never came to it."""
-        seen = self._known(stage.variable)
+        seen = self.known(stage.variable)
         if seen is None:
             return None
         bound = self.thresholds.get(objective) if stage.variable == objective else None
@@ -114,7 +115,7 @@ class World:
     def _continuous(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
         mechanism = self.model.mechanisms[outcome.mechanism]
         x = columns(configs, mechanism.inputs)
-        seen = self._known(outcome.objective)
+        seen = self.known(outcome.objective)
         if seen is not None and seen > LEAST[mechanism.transform]:
             # This run's noise is carried over, y' = y + f(x') - f(x), but for the share that does not persist.
             change, unsure = mechanism.change(x, columns([self.config], mechanism.inputs))

@@ -161,8 +161,12 @@ class Mechanism:
 
     def odds(self, x: FloatArray) -> FloatArray:
         """Binary targets: probability of 1, shape (m,)."""
+        return self.odds_of(self.latent(x))
+
+    def odds_of(self, latent: FloatArray) -> FloatArray:
+        """Binary targets: probability of 1 for values of the regression, of any shape."""
         slope, offset = self.calibration
-        probability: FloatArray = 1.0 / (1.0 + np.exp(-(slope * self.latent(x) + offset)))
+        probability: FloatArray = 1.0 / (1.0 + np.exp(-(slope * latent + offset)))
         return np.clip(probability, TAIL, 1 - TAIL)
 
     def share_below(self, z: FloatArray) -> FloatArray:

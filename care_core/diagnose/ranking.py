@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +11,10 @@ from care_core.causal.counterfactual import Config, World
 from care_core.causal.mechanisms import FloatArray, columns
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.diagnose.records import PathNode
+from care_core.diagnose.symptoms import pointers
 from care_core.profile.model import EffectRecord, Model
 from care_core.profile.schema import Schema
-from care_core.run import Run, is_known
+from care_core.run import Evidence, Run, is_known
 
 PERMUTATIONS = 12
 """Orders of reset per Shapley estimate, each also taken backwards."""
@@ -29,6 +30,11 @@ class Suspect:
     path: CausalPath
     effect: EffectRecord | None
     """None when no effect was found in training."""
+    weight: float = 0.0
+    """What suspects are ranked by: the contribution, and of the odds that no contribution explains the share that this
+    run's own symptoms lay to the option."""
+    symptom: str | None = None
+    """The metric of this run that points at the option most."""
 
     @property
     def total_effect(self) -> float:
@@ -59,25 +65,39 @@ def deviating(config: Config, reference: Config) -> tuple[str, ...]:
     )
 
 
-def suspects(world: World, objective: str, reference: Config) -> tuple[Suspect, ...]:
-    """Options off their reference that have a causal path to the objective, largest contribution first.
+def suspects(
+    world: World, schema: Schema, objective: str, reference: Config, said: Sequence[Evidence] = ()
+) -> tuple[Suspect, ...]:
+    """Options off their reference that have a causal path to the objective, the likeliest cause first.
 
     The contribution is a Shapley value (Shapley 1953) over these options: how much the odds of keeping the threshold
     rise when the option goes back to its reference, averaged over the orders in which the others may go back, so an
-    interaction is shared by those who take part in it and the contributions add up to the whole change.
+    interaction is shared by those who take part in it and the contributions add up to the whole change. What they
+    leave unexplained, much where training runs were few, is laid to the options that this run's symptoms point at.
     """
-    if objective not in world.model.outcomes:
-        return ()
-    paths = best_paths(world.model, objective)
-    effects = world.model.effects
-    names = [
-        name for name in deviating(world.config, reference) if name in paths and effects[name, objective].identified
-    ]
+    off = deviating(world.config, reference)
+    paths = best_paths(world.model, objective, off)
+    effects = {name: world.model.effects.get((name, objective)) for name in paths}
+    names = [name for name, effect in effects.items() if effect is None or effect.identified]
+    learned = [name for name in names if effects[name] is not None and objective in world.model.outcomes]
     shares = _shapley(
-        names, lambda sets: world.predict(objective, [_reset(world.config, reference, s) for s in sets]).p_ok
+        learned, lambda sets: world.predict(objective, [_reset(world.config, reference, s) for s in sets]).p_ok
     )
-    found = [Suspect(n, share, paths[n], effects[n, objective]) for n, share in zip(names, shares, strict=True)]
-    return tuple(sorted(found, key=lambda s: (-s.contribution, -s.total_effect, s.option)))
+    contribution = {**dict.fromkeys(names, 0.0), **dict(zip(learned, map(float, shares), strict=True))}
+    unexplained = max(0.0, 1.0 - sum(max(0.0, share) for share in contribution.values()))
+    pointer = pointers(world, schema, objective, names, reference, said)
+    found = [
+        Suspect(
+            option=name,
+            contribution=contribution[name],
+            path=paths[name],
+            effect=effects[name],
+            weight=contribution[name] + unexplained * pointer[name].share,
+            symptom=pointer[name].metric,
+        )
+        for name in names
+    ]
+    return tuple(sorted(found, key=lambda s: (-s.weight, -s.total_effect, s.option)))
 
 
 def not_ruled_out(
@@ -88,8 +108,6 @@ def not_ruled_out(
     Options whose effect is not identified are left out; the rest have no path in the graph, and get a direct one of no
     effect.
     """
-    if objective not in world.model.outcomes:
-        return ()
     named = {suspect.option for suspect in found}
     others = [
         name
@@ -100,7 +118,7 @@ def not_ruled_out(
     return tuple(Suspect(name, 0.0, CausalPath((name, objective), 0.0), None) for name in others)
 
 
-def best_paths(model: Model, objective: str) -> Mapping[str, CausalPath]:
+def best_paths(model: Model, objective: str, options: Sequence[str]) -> dict[str, CausalPath]:
     """Per option the directed path to the objective with the largest mean of effect times support.
 
     The path ACE that is reported is Eq. 2 of that path; an edge seen in few resamples only counts less in the choice,
@@ -108,13 +126,11 @@ def best_paths(model: Model, objective: str) -> Mapping[str, CausalPath]:
     """
     weight = {edge: record.effect * record.support for edge, record in model.edges.items()}
     found: dict[str, CausalPath] = {}
-    for option, target in model.effects:
-        if target == objective:
-            paths = rank_paths(model.graph, objective, [option], weight, top=1)
-            if paths:
-                nodes = paths[0].nodes
-                effects = [model.edges[edge].effect for edge in paths[0].edges]
-                found[option] = CausalPath(nodes, sum(effects) / len(effects))
+    for option in options:
+        paths = rank_paths(model.graph, objective, [option], weight, top=1)
+        if paths:
+            effects = [model.edges[edge].effect for edge in paths[0].edges]
+            found[option] = CausalPath(paths[0].nodes, sum(effects) / len(effects))
     return found
 
 

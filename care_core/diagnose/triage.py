@@ -135,7 +135,10 @@ def diagnose(
     case = _Case(
         profile, choice, run, world, reference, keep, frozenset(v.name for v in schema.options) - frozenset(run.config)
     )
-    found = {result.variable.name: suspects(world, result.variable.name, reference) for result in broken}
+    found = {
+        result.variable.name: suspects(world, schema, result.variable.name, reference, run.evidence)
+        for result in broken
+    }
     faults = tuple(Fault(result, _causes(case, result, found[result.variable.name], top)) for result in broken)
     report("searching for a fix", 0.85)
     fixes = _fixes(case, {s.option for group in found.values() for s in group})
@@ -162,17 +165,21 @@ def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], to
     others = not_ruled_out(case.world, result.variable.name, case.reference, case.profile.schema, found)
     refused = refused_by(case.run) if result.variable.kind == "functional" else frozenset()
     first = [suspect for suspect in (*found, *others) if suspect.option in refused]
-    named = first + [s for s in found if s.contribution >= MIN_CONTRIBUTION and s not in first]
-    if not named or (not first and named[0].contribution < CONVINCING):
-        weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION]
+    named = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION]
+    if not first and (not named or named[0].contribution < CONVINCING):
+        weak = [suspect for suspect in found if suspect.contribution < MIN_CONTRIBUTION <= suspect.weight]
+        named = [suspect for suspect in found if suspect in named or suspect in weak[: max(0, LEADS - len(named))]]
+        weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION > suspect.weight]
         named += [*weak, *others][: max(0, LEADS - len(named))]
+    named = first + [suspect for suspect in named if suspect not in first]
     return tuple(_cause(case, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
 
 
 def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) -> Cause:
     name, world = suspect.option, case.world
     option = case.profile.schema.variables[name]
-    best = None if name in case.keep else best_alone(world, case.profile.schema.variables, name, case.reference)
+    is_predictable = result.variable.name in world.model.outcomes and name not in case.keep
+    best = best_alone(world, case.profile.schema.variables, name, case.reference) if is_predictable else None
     path = describe_path(suspect.path, world, case.profile.schema, case.run, case.reference)
     in_support = world.model.supports(name, world.config[name])
     support = (suspect.effect.support if suspect.effect is not None else None) or 0.0
@@ -215,6 +222,8 @@ def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float
         notes.append(f"no effect on {suspect.path.nodes[-1]} was seen in training: not ruled out")
     elif suspect.contribution < MIN_CONTRIBUTION:
         notes.append("costs this run little: not ruled out")
+    if suspect.symptom is not None and suspect.contribution < MIN_CONTRIBUTION <= suspect.weight:
+        notes.append(f"this run's {suspect.symptom} points at it")
     if not in_support:
         summary = case.world.model.summaries[suspect.option]
         notes.append(f"outside the training support ({summary.low:g} to {summary.high:g})")
@@ -264,6 +273,10 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str |
             "(wind, battery, positioning, obstacles) or at parameters outside the profile"
         )
     now = float(case.world.odds([case.world.config])[0])
+    names = [fault.objective.variable.name for fault in faults]
+    unknown = [name for name in names if name not in case.world.model.outcomes]
+    if unknown:
+        return f"too few training missions to predict {', '.join(unknown)}: the causes are named, no change is promised"
     if not fixes or fixes[0].p_fixed < max(MIN_ODDS, now + MIN_CONTRIBUTION):
         pinned = f", with {', '.join(sorted(case.keep))} kept as it is" if case.keep else ""
         return f"no change inside the acceptable ranges is likely enough to meet every threshold{pinned}"

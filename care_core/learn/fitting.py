@@ -100,6 +100,17 @@ def fit_mechanism(
     )
 
 
+def left_out_loss(mechanism: Mechanism) -> float:
+    """Mean negative log likelihood of each training run given the others: which of two input sets predicts better."""
+    errors, spreads = leave_one_out(mechanism.kernel, mechanism.points, mechanism.targets)
+    if not mechanism.binary:
+        return float((np.log(spreads) + 0.5 * (errors / spreads) ** 2).mean())
+    slope, offset = mechanism.calibration
+    coded = mechanism.mean + mechanism.scale * mechanism.targets
+    logit = slope * (coded - mechanism.scale * errors) + offset
+    return float(np.logaddexp(0, np.where(coded > 0, -logit, logit)).mean())
+
+
 def best_transform(y: FloatArray) -> Transform:
     """The scale on which the target is least skewed: times and energies act as ratios, counts have heavy tails."""
     choices: list[Transform] = ["identity"]

@@ -39,6 +39,9 @@ def identify(graph: CausalGraph, option: str, objective: str) -> Identification:
     ancestral = graph.subgraph(graph.ancestors(objective))
     if option not in ancestral.nodes or option == objective:
         return Identification(True, f"p({objective})", True, ())
+    if not ancestral.parents(option) and not any(option in edge for edge in ancestral.bidirected):
+        # Nothing, seen or hidden, acts on it: seeing its value is setting it. A query would say so, slowly.
+        return Identification(True, f"p({objective}|{option})", True, ())
     query = OneLineID(
         ADMG(
             list(ancestral.nodes),

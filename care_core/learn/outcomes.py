@@ -16,8 +16,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import FloatArray, Mechanism
-from care_core.learn.fitting import MIN_ROWS, Effort, Inputs, fit_mechanism
+from care_core.causal.mechanisms import FloatArray, Mechanism, transformed
+from care_core.learn.fitting import MIN_ROWS, Effort, Inputs, best_transform, fit_mechanism, left_out_loss
+from care_core.learn.knowledge import with_known
 from care_core.profile.model import OutcomeRecord, StageRecord
 from care_core.profile.schema import Schema
 from care_core.variables import Role, Variable
@@ -45,6 +46,14 @@ def causes_of(name: str, graph: CausalGraph, schema: Schema) -> tuple[str, ...]:
     return tuple(v.name for v in schema.variables.values() if v.role in roles and v.name in ancestors)
 
 
+def candidates(name: str, graph: CausalGraph, frame: pd.DataFrame, schema: Schema) -> list[tuple[str, ...]]:
+    """Input sets to choose from: the causes that the search found, and those together with what people know."""
+    sets = [causes_of(name, graph, schema)]
+    if schema.known:
+        sets.append(causes_of(name, with_known(graph, frame, schema), schema))
+    return list(dict.fromkeys(sets))
+
+
 def inputs_of(names: Sequence[str], schema: Schema) -> Inputs:
     return Inputs(tuple(names), np.array([schema.variables[name].is_log_scaled for name in names], dtype=bool))
 
@@ -54,6 +63,17 @@ def met(objective: Variable, frame: pd.DataFrame) -> FloatArray:
     values = frame[objective.name].to_numpy(dtype=float)
     bound = objective.threshold
     return np.array([np.nan if np.isnan(v) else float(bound.met(v)) if bound else 1.0 for v in values])
+
+
+def badness(objective: Variable, frame: pd.DataFrame) -> FloatArray:
+    """How bad each run was: the value, turned so that more is worse, its logarithm where it has one; shape (n,)."""
+    if objective.kind == "functional":
+        return 1.0 - met(objective, frame)
+    values = frame[objective.name].to_numpy(dtype=float)
+    known = values[np.isfinite(values)]
+    scaled = transformed(values, best_transform(known)) if len(known) else values
+    lower_is_worse = objective.threshold is not None and objective.threshold.op in (">=", ">")
+    return -scaled if lower_is_worse else scaled
 
 
 def find_stages(objective: Variable, schema: Schema, frame: pd.DataFrame) -> tuple[Stage, ...]:
@@ -126,15 +146,14 @@ def _fit_functional(
     records, mechanisms = [], {}
     for stage in find_stages(objective, schema, frame):
         # A stage that no option moves stays in, with its base rate: else its failures would be laid to a later one.
-        names = causes_of(stage.variable, graph, schema)
         key = f"stage:{stage.variable}"
-        known = stage.reached & frame[list(names)].notna().all(axis=1).to_numpy()
-        if int(known.sum()) < MIN_ROWS:
-            continue
-        x = frame.loc[known, list(names)].to_numpy(dtype=float)
         one = stage.passed if stage.passes == 1.0 else ~stage.passed
-        y = one[known].astype(float)
-        mechanisms[key] = fit_mechanism(x, y, inputs_of(names, schema), binary=True, rng=rng, effort=effort)
+        table = frame.assign(**{key: np.where(stage.reached, one.astype(float), np.nan)})
+        sets = candidates(stage.variable, graph, frame, schema)
+        mechanism = fit_on(sets, key, table, schema, rng, effort=effort)
+        if mechanism is None:
+            continue
+        mechanisms[key] = mechanism
         records.append(StageRecord(variable=stage.variable, passes=stage.passes, mechanism=key))
     if not any(mechanism.inputs for mechanism in mechanisms.values()):
         return None
@@ -159,21 +178,29 @@ def fit_total(
     name: str, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, effort: Effort
 ) -> Mechanism | None:
     """The variable as a function of the exogenous variables that cause it; None where it has no cause or no values."""
-    names = causes_of(name, graph, schema)
-    return fit_on(names, name, frame, schema, rng, effort=effort) if names else None
+    sets = [names for names in candidates(name, graph, frame, schema) if names]
+    return fit_on(sets, name, frame, schema, rng, effort=effort)
 
 
 def fit_on(
-    names: Sequence[str], target: str, frame: pd.DataFrame, schema: Schema, rng: np.random.Generator, *, effort: Effort
+    sets: Sequence[Sequence[str]],
+    target: str,
+    frame: pd.DataFrame,
+    schema: Schema,
+    rng: np.random.Generator,
+    *,
+    effort: Effort,
 ) -> Mechanism | None:
-    """The target as a function of `names`, on the runs that hold them all; None where too few runs do."""
-    known = frame[[*names, target]].dropna()
-    if len(known) < MIN_ROWS or known[target].nunique() < 2:
-        return None
-    y = known[target].to_numpy(dtype=float)
-    binary = set(np.unique(y)) <= {0.0, 1.0}
-    x = known[list(names)].to_numpy(dtype=float)
-    return fit_mechanism(x, y, inputs_of(names, schema), binary=binary, rng=rng, effort=effort)
+    """The target as a function of the input set that predicts left-out runs best; None where too few runs hold any."""
+    fitted = []
+    for names in sets:
+        known = frame[[*names, target]].dropna()
+        if len(known) < MIN_ROWS or known[target].nunique() < 2:
+            continue
+        x, y = known[list(names)].to_numpy(dtype=float), known[target].to_numpy(dtype=float)
+        binary = set(np.unique(y)) <= {0.0, 1.0}
+        fitted.append(fit_mechanism(x, y, inputs_of(names, schema), binary=binary, rng=rng, effort=effort))
+    return min(fitted, key=left_out_loss, default=None)
 
 
 def groups_that_move_together(schema: Schema, frame: pd.DataFrame) -> tuple[tuple[str, ...], ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -33,21 +33,41 @@ def cross_validated_skill(
     """
     if not folds:
         return {}
+    odds = held_out_odds(frame, schema, lambda _runs, _rng: graph, rng, folds=folds, n_jobs=n_jobs)
+    truth: dict[str, FloatArray] = {objective.name: met(objective, frame) for objective in schema.objectives}
+    truth["all"] = all_met(frame, schema)
+    return {name: score(odds[name], truth[name]) for name in odds}
+
+
+Learn = Callable[[pd.DataFrame, np.random.Generator], CausalGraph]
+"""The runs of the other folds -> the graph to fit mechanisms on."""
+
+
+def held_out_odds(
+    frame: pd.DataFrame, schema: Schema, learn: Learn, rng: np.random.Generator, *, folds: int, n_jobs: int = 1
+) -> dict[str, FloatArray]:
+    """Odds of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each."""
     fold = rng.permutation(len(frame)) % folds
     seeds = rng.integers(2**32, size=folds)
-    tasks = (
-        delayed(_odds)(frame[fold != k], frame[fold == k], schema, graph, np.random.default_rng(seeds[k]))
-        for k in range(folds)
-    )
+
+    def predict(k: int) -> Mapping[str, FloatArray]:
+        own = np.random.default_rng(seeds[k])
+        runs = frame[fold != k]
+        return _odds(runs, frame[fold == k], schema, learn(runs, own), own)
+
     with parallel_config("loky", n_jobs=min(n_jobs, folds), inner_max_num_threads=1):
-        predicted = Parallel()(tasks)
+        predicted = Parallel()(delayed(predict)(k) for k in range(folds))
     odds: dict[str, FloatArray] = {}
     for k, values in enumerate(predicted):
         for name, held_out in values.items():
             odds.setdefault(name, np.full(len(frame), np.nan))[fold == k] = held_out
-    truth: dict[str, FloatArray] = {objective.name: met(objective, frame) for objective in schema.objectives}
-    truth["all"] = np.all([np.nan_to_num(kept, nan=0.0) == 1.0 for kept in truth.values()], axis=0).astype(float)
-    return {name: score(odds[name], truth[name]) for name in odds}
+    return odds
+
+
+def all_met(frame: pd.DataFrame, schema: Schema) -> FloatArray:
+    """1 where every objective has a value that keeps its threshold, else 0; shape (n,)."""
+    kept = [np.nan_to_num(met(objective, frame), nan=0.0) == 1.0 for objective in schema.objectives]
+    return np.all(kept, axis=0).astype(float)
 
 
 def _odds(

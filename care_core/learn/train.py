@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,13 +14,14 @@ from threadpoolctl import threadpool_limits
 
 from care_core.causal.effects import Effect, acceptable_values, along, average_causal_effect
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import FloatArray, Mechanism, solve
+from care_core.causal.mechanisms import FloatArray, Mechanism, solve, transformed
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.bootstrap import support as measure_support
-from care_core.learn.fitting import METRIC, OUTCOME
+from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME
 from care_core.learn.identification import identify, is_answered_by
-from care_core.learn.outcomes import fit_on, fit_outcomes, fit_total, groups_that_move_together
+from care_core.learn.knowledge import with_known
+from care_core.learn.outcomes import badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
 from care_core.learn.skill import cross_validated_skill
 from care_core.learn.structure import Structure, learn_structure
 from care_core.profile.model import EdgeRecord, EffectRecord, Model, OutcomeRecord, PathRecord, Summary, Training
@@ -35,6 +35,8 @@ BACKGROUND = 32
 EFFECT_RESAMPLES = 20
 """Bootstrap resamples behind the intervals of effects (mechanisms are refitted with their kernels kept)."""
 TOP_PATHS = 20
+WITNESS_Z = 1.96
+"""How many standard errors a correlation must be off 0 before a metric counts as a witness."""
 QUANTILES = np.linspace(0, 1, 21)
 
 
@@ -79,7 +81,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Prog
 
 @dataclass(frozen=True, eq=False)
 class Learned:
-    """A graph with the share of resamples that hold each finding, and the mechanisms on it."""
+    """A graph as found in runs, the share of resamples that hold each finding, and the mechanisms on it."""
 
     graph: CausalGraph
     support: Mapping[Finding, float]
@@ -98,11 +100,11 @@ def assemble(
 ) -> Model:
     """Measure effects and skill on the table, and put the model together."""
     report("measuring effects", 0.6)
-    graph, support = learned.graph, learned.support
+    graph, support = with_known(learned.graph, frame, schema), learned.support
     resamples = _Resamples.draw(len(frame), rng)
     edges = _edge_effects(frame, schema, graph, settings, resamples)
     report("cross-validating", 0.8)
-    skill = cross_validated_skill(frame, schema, graph, rng, folds=settings.folds, n_jobs=settings.n_jobs)
+    skill = cross_validated_skill(frame, schema, learned.graph, rng, folds=settings.folds, n_jobs=settings.n_jobs)
     return Model(
         schema_digest=schema.digest,
         graph=graph,
@@ -112,6 +114,7 @@ def assemble(
         paths=_paths(schema, graph, edges, support),
         outcomes=learned.outcomes,
         summaries=_summaries(frame, schema),
+        witnesses=_witnesses(frame, schema, learned.mechanisms),
         skill=skill,
         training=learned.training,
         mechanisms=learned.mechanisms,
@@ -164,23 +167,26 @@ def _measure(
     stacked, ends = np.vstack(grids), np.cumsum([len(grid) for grid in grids])[:-1]
     spread = 0.5 * mechanism.scale if mechanism.binary else mechanism.scale
 
-    def effects(m: Mechanism) -> list[Effect]:
-        answers = np.split(m.odds(stacked) if m.binary else m.latent(stacked), ends)
-        responses = [a.reshape(len(background), -1).mean(axis=0) for a in answers]
+    # One kernel serves the fit and all its resamples: only the weights of the training points differ.
+    weights = np.column_stack([mechanism.weights, *(_reweighted(mechanism, rows) for rows in resamples.rows)])
+    cross = mechanism.kernel(mechanism.scaled(stacked), mechanism.points)
+    latent = mechanism.mean + mechanism.scale * (cross @ weights)
+
+    def effects(answer: FloatArray) -> list[Effect]:
+        responses = [part.reshape(len(background), -1).mean(axis=0) for part in np.split(answer, ends)]
         return [average_causal_effect(response, spread) for response in responses]
 
-    drawn = [[e.magnitude for e in effects(_refitted(mechanism, rows))] for rows in resamples.rows]
-    by_name = zip(names, effects(mechanism), np.transpose(drawn), strict=True)
-    return {name: _Measured(effect, resampled) for name, effect, resampled in by_name}
+    whole, *drawn = [effects(answer) for answer in (mechanism.odds_of(latent) if mechanism.binary else latent).T]
+    magnitudes = np.array([[effect.magnitude for effect in resample] for resample in drawn])
+    return {name: _Measured(whole[i], magnitudes[:, i]) for i, name in enumerate(names)}
 
 
-def _refitted(mechanism: Mechanism, rows: NDArray[np.int64]) -> Mechanism:
-    """The mechanism on resampled training points, its kernel kept."""
+def _reweighted(mechanism: Mechanism, rows: NDArray[np.int64]) -> FloatArray:
+    """Weights of all training points, shape (n,), when the mechanism rests on a resample and its kernel is kept."""
     chosen = (rows % len(mechanism.targets))[: len(mechanism.targets)]
-    points, targets = mechanism.points[chosen], mechanism.targets[chosen]
-    return dataclasses.replace(
-        mechanism, points=points, targets=targets, weights=solve(mechanism.kernel, points, targets)
-    )
+    weights = np.zeros(len(mechanism.targets))
+    np.add.at(weights, chosen, solve(mechanism.kernel, mechanism.points[chosen], mechanism.targets[chosen]))
+    return weights
 
 
 def _metric_mechanisms(
@@ -204,7 +210,7 @@ def _edge_effects(
     def measure(i: int, child: str) -> dict[Edge, _Measured]:
         parents = sorted(graph.parents(child))
         rng = np.random.default_rng([settings.seed, i])
-        mechanism = fit_on(parents, child, frame, schema, rng, effort=METRIC) if parents else None
+        mechanism = fit_on([parents], child, frame, schema, rng, effort=METRIC) if parents else None
         if mechanism is None:
             return {}
         effects = _measure(parents, mechanism, frame, schema, resamples)
@@ -311,6 +317,28 @@ def _paths(
         for objective in schema.objectives
         if objective.name in graph.nodes
     }
+
+
+def _witnesses(frame: pd.DataFrame, schema: Schema, mechanisms: Mapping[str, Mechanism]) -> dict[str, dict[str, float]]:
+    """Per objective the metrics that go with missing it: correlation with how bad it was, where it is sure not to be 0.
+
+    Each on the scale of its mechanism, so that a metric times its correlation says how much of the miss it shows.
+    """
+    found: dict[str, dict[str, float]] = {}
+    for objective in schema.objectives:
+        bad = badness(objective, frame)
+        for metric in schema.metrics:
+            mechanism = mechanisms.get(metric.name)
+            if mechanism is None:
+                continue
+            values = transformed(frame[metric.name].to_numpy(dtype=float), mechanism.transform)
+            both = np.isfinite(values) & np.isfinite(bad)
+            if both.sum() < MIN_ROWS or np.ptp(values[both]) == 0 or np.ptp(bad[both]) == 0:
+                continue
+            r = float(np.corrcoef(values[both], bad[both])[0, 1])
+            if abs(r) > WITNESS_Z / np.sqrt(both.sum()):
+                found.setdefault(objective.name, {})[metric.name] = r
+    return found
 
 
 def _summaries(frame: pd.DataFrame, schema: Schema) -> dict[str, Summary]:

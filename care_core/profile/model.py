@@ -148,6 +148,7 @@ class _ModelFile(_Record):
     paths: tuple[PathRecord, ...]
     outcomes: tuple[OutcomeRecord, ...]
     summaries: dict[str, Summary]
+    witnesses: dict[str, dict[str, float]] = Field(default_factory=dict)
     skill: dict[str, dict[str, float]]
     training: Training
     mechanisms: dict[str, _MechanismRecord]
@@ -169,6 +170,8 @@ class Model:
     skill: Mapping[str, Mapping[str, float]]
     training: Training
     mechanisms: Mapping[str, Mechanism] = field(default_factory=dict)
+    witnesses: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Per objective the metrics that go with missing it: correlation over the training runs, on scaled values."""
 
     def supports(self, option: str, value: float) -> bool:
         """Whether the training runs reach this value of the option."""
@@ -188,6 +191,7 @@ def write_model(model: Model, folder: Path) -> None:
         paths=tuple(path for paths in model.paths.values() for path in paths),
         outcomes=tuple(model.outcomes.values()),
         summaries=dict(model.summaries),
+        witnesses={name: dict(found) for name, found in model.witnesses.items()},
         skill={name: dict(values) for name, values in model.skill.items()},
         training=model.training,
         mechanisms={key: _mechanism_record(key, m) for key, m in stored.items()},
@@ -313,6 +317,7 @@ def _to_model(record: _ModelFile, graph: CausalGraph, mechanisms: Mapping[str, M
         paths=paths,
         outcomes={o.objective: o for o in record.outcomes},
         summaries=record.summaries,
+        witnesses=record.witnesses,
         skill=record.skill,
         training=record.training,
         mechanisms=mechanisms,

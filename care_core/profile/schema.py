@@ -91,6 +91,13 @@ class _EvidenceRule(_Strict):
         return text
 
 
+class _Known(_Strict):
+    """What people know to act on what: every cause may act on every effect."""
+
+    causes: list[str]
+    effects: list[str]
+
+
 class _Profile(_Strict):
     schema_version: Literal[1]
     name: str
@@ -103,6 +110,7 @@ class _Profile(_Strict):
     mission: dict[str, Any] = Field(default_factory=dict)
     evidence: list[_EvidenceRule] = Field(default_factory=list)
     circumstances: dict[str, dict[str, Side]] = Field(default_factory=dict)
+    known: list[_Known] = Field(default_factory=list)
     variables: dict[str, _Variable]
 
     @model_validator(mode="after")
@@ -115,6 +123,8 @@ class _Profile(_Strict):
                 _declared([rule.circumstance], self.circumstances, f"evidence '{rule.text}' names the circumstance")
         for name, sides in self.circumstances.items():
             _declared(sides, met, f"circumstance '{name}' names the context or metric")
+        for known in self.known:
+            _declared((*known.causes, *known.effects), self.variables, "'known' names")
         return self
 
 
@@ -168,6 +178,8 @@ class Schema:
     variables: Mapping[str, Variable]
     circumstances: Mapping[str, Mapping[str, Side]] = field(default_factory=dict)
     """What no parameter sets (wind, battery) -> the contexts and metrics that show it, and their bad side."""
+    known: frozenset[tuple[str, str]] = frozenset()
+    """(cause, effect): direct effects that people know to be possible. Data say how large they are."""
     digest: str = field(default="", compare=False)
     """SHA-256 of the variables' names, roles, types, ranges and extraction: what a model was learned for."""
 
@@ -246,6 +258,7 @@ def _to_schema(data: _Profile) -> Schema:
         evidence=tuple(map(_to_rule, data.evidence)),
         variables=variables,
         circumstances=data.circumstances,
+        known=frozenset((a, b) for rule in data.known for a in rule.causes for b in rule.effects),
         digest=_digest(variables),
     )
 

@@ -154,8 +154,8 @@ def test_the_middle_of_the_line_is_fitted_on_the_missions_that_have_it() -> None
 
 def test_too_few_or_constant_values_give_no_mechanism() -> None:
     frame, rng = missions(), np.random.default_rng(0)
-    assert fit_on(["gain"], "time", frame.iloc[:15], SMALL, rng, effort=QUICK) is None
-    assert fit_on(["gain"], "time", frame.assign(time=3.0), SMALL, rng, effort=QUICK) is None
+    assert fit_on([["gain"]], "time", frame.iloc[:15], SMALL, rng, effort=QUICK) is None
+    assert fit_on([["gain"]], "time", frame.assign(time=3.0), SMALL, rng, effort=QUICK) is None
 
 
 def test_objectives_that_nearly_repeat_each_other_are_grouped() -> None:

@@ -54,14 +54,14 @@ def test_shapley_values_share_an_interaction_and_ignore_a_bystander() -> None:
 
 def test_contributions_add_up_to_what_a_full_reset_would_bring(planted: Profile) -> None:
     here = world(planted, speed=1.4, planner=2, reserve=45, accel=0.6)
-    found = suspects(here, "time", DEFAULTS)
+    found = suspects(here, SCHEMA, "time", DEFAULTS)
     before, after = here.predict("time", [here.config, {**here.config, **DEFAULTS}]).p_ok
     assert sum(s.contribution for s in found) == pytest.approx(after - before)
     assert [s.contribution for s in found] == sorted((s.contribution for s in found), reverse=True)
 
 
 def test_only_options_off_their_reference_with_a_path_are_suspects(planted: Profile) -> None:
-    found = suspects(world(planted, speed=1.4, accel=3.0, inert=0.0), "time", DEFAULTS)
+    found = suspects(world(planted, speed=1.4, accel=3.0, inert=0.0), SCHEMA, "time", DEFAULTS)
     names = {s.option for s in found}
     assert "speed" in names
     assert "planner" not in names
@@ -78,7 +78,7 @@ def test_an_effect_that_is_not_identified_is_not_ranked(planted: Profile) -> Non
     effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
     here = world(planted, speed=1.4, planner=2)
     blind = World(replace(planted.model, effects=effects), here.config, here.observed, here.thresholds)
-    assert "speed" not in {s.option for s in suspects(blind, "time", DEFAULTS)}
+    assert "speed" not in {s.option for s in suspects(blind, SCHEMA, "time", DEFAULTS)}
 
 
 def test_the_reference_is_the_default_or_the_middle_of_the_training_runs(planted: Profile) -> None:
@@ -99,7 +99,7 @@ def test_zero_is_no_deviation_from_zero() -> None:
 
 def test_one_path_an_option_the_strongest(planted: Profile) -> None:
     model = planted.model
-    found = best_paths(model, "time")
+    found = best_paths(model, "time", [o.name for o in OPTIONS])
     assert found["reserve"].nodes == ("reserve", "hold_s", "time")
     for option, path in found.items():
         rivals = [record.ace for record in model.paths["time"] if record.nodes[0] == option]
@@ -108,7 +108,9 @@ def test_one_path_an_option_the_strongest(planted: Profile) -> None:
 
 def test_a_path_tells_what_the_run_met_and_what_it_would_have(planted: Profile) -> None:
     run, here = planted_run(reserve=58), world(planted, reserve=58)
-    path = describe_path(best_paths(planted.model, "time")["reserve"], here, SCHEMA, run, DEFAULTS)
+    path = describe_path(
+        best_paths(planted.model, "time", [o.name for o in OPTIONS])["reserve"], here, SCHEMA, run, DEFAULTS
+    )
     option, hold, time = path
     assert (option.value, option.expected) == (58, 20)
     assert hold.value == run.metrics["hold_s"]
@@ -122,12 +124,16 @@ def test_a_path_tells_what_the_run_met_and_what_it_would_have(planted: Profile) 
 
 def test_a_decreasing_edge_is_negative(planted: Profile) -> None:
     run, here = planted_run(speed=1.4), world(planted, speed=1.4)
-    path = describe_path(best_paths(planted.model, "time")["speed"], here, SCHEMA, run, DEFAULTS)
+    path = describe_path(
+        best_paths(planted.model, "time", [o.name for o in OPTIONS])["speed"], here, SCHEMA, run, DEFAULTS
+    )
     signs = {node.name: node.effect for node in path if node.effect is not None}
     assert signs["mean_speed"] < 0 < signs["speed"]
 
 
 def test_a_refused_mission_has_unknown_values_on_the_path(planted: Profile) -> None:
     run, here = planted_run(min_sats=14), world(planted, min_sats=14)
-    path = describe_path(best_paths(planted.model, "success")["radius"], here, SCHEMA, run, DEFAULTS)
+    path = describe_path(
+        best_paths(planted.model, "success", [o.name for o in OPTIONS])["radius"], here, SCHEMA, run, DEFAULTS
+    )
     assert [node.value for node in path] == [0.5, None, 0.0]

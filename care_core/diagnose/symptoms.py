@@ -1,0 +1,82 @@
+"""What this run's metrics say about its options, where the odds say little.
+
+A run that takes too long shows where: its last ten metres took a minute more than the reference would. That is a
+symptom, a metric that is off in the direction that goes with missing the objective. It points at the options that
+moved it: those that its mechanism, or what people know of the platform, says act on it. Odds of the whole mission need
+many runs to be learned, a phase or an error that few options act on needs few.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from care_core.causal.counterfactual import Config, World
+from care_core.causal.mechanisms import LEAST, Mechanism, columns, transformed
+from care_core.profile.schema import Schema
+from care_core.run import Evidence
+
+UNLEARNED = 0.02
+"""Effect of a known cause moved across its whole range, in spreads of the metric, where no run has shown more."""
+SAID, REFUSED = 1.0, 10.0
+"""Spreads that a message naming an option counts for; a check that refused the mission leaves no room for others."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pointer:
+    """How much of a run's symptoms an option accounts for (0 to 1), and the metric that shows it best, if any."""
+
+    share: float
+    metric: str | None
+
+
+def pointers(
+    world: World, schema: Schema, objective: str, names: Sequence[str], reference: Config, said: Sequence[Evidence]
+) -> dict[str, Pointer]:
+    """What the metrics and the messages of this run say about the options `names`. The shares add up to 1, or are 0.
+
+    A symptom weighs as much as it shows of the miss: its distance from what the reference would give, in spreads of
+    the training runs, times its correlation with missing the objective. It is split by how much of it goes away when
+    each option alone goes back.
+    """
+    shown: dict[str, dict[str, float]] = {name: {} for name in names}
+    for metric, correlation in world.model.witnesses.get(objective, {}).items():
+        for name, part in _split(world, schema, metric, correlation, names, reference).items():
+            shown[name][metric] = part
+    spoken = dict.fromkeys(names, 0.0)
+    for message in said if schema.variables[objective].kind == "functional" else ():
+        for name in spoken.keys() & set(message.options):
+            spoken[name] += (REFUSED if message.kind == "refusal" else SAID) / len(message.options)
+    total = {name: spoken[name] + sum(shown[name].values()) for name in names}
+    whole = sum(total.values()) or 1.0
+    return {
+        name: Pointer(total[name] / whole, max(shown[name], key=shown[name].__getitem__, default=None))
+        for name in names
+    }
+
+
+def _split(
+    world: World, schema: Schema, metric: str, correlation: float, names: Sequence[str], reference: Config
+) -> Mapping[str, float]:
+    mechanism, seen = world.model.mechanisms[metric], world.known(metric)
+    if seen is None or not names or (not mechanism.binary and seen <= LEAST[mechanism.transform]):
+        return {}
+    configs = [reference, world.config, *({**world.config, name: reference[name]} for name in names)]
+    expected, here, *back = _latent(mechanism, configs)
+    value = 2 * seen - 1 if mechanism.binary else float(transformed(np.array(seen), mechanism.transform))
+    off = (value - expected) / mechanism.scale
+    if correlation * off <= 0:
+        return {}
+    moved = {}
+    for name, there in zip(names, back, strict=True):
+        moved[name] = max(0.0, float(np.sign(off)) * (here - there) / mechanism.scale)
+        if (name, metric) in schema.known:
+            moved[name] += UNLEARNED * schema.variables[name].distance(reference[name], world.config[name])
+    whole = sum(moved.values())
+    return {name: correlation * off * part / whole for name, part in moved.items() if part > 0}
+
+
+def _latent(mechanism: Mechanism, configs: Sequence[Config]) -> list[float]:
+    return [float(value) for value in mechanism.latent(columns(configs, mechanism.inputs))]
