@@ -53,7 +53,7 @@ def _profiles_are_read_once() -> object:
     known: dict[str, Profile] = {}
 
     def load(name: str | Path) -> Profile:
-        return known.setdefault(str(name), load_profile(name))
+        return known.get(str(name)) or known.setdefault(str(name), load_profile(name))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("care_core.profile.store.load_profile", load)
