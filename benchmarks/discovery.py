@@ -2,11 +2,11 @@
 
     python -m benchmarks.discovery [--robots 12] [--runs 400 1500]
 
-The robots (`tests/robots.py`) have codes, counts, heavy tails and yes-or-no metrics, effects that bend or have an optimum
-inside, two options that matter only together, a context that confounds, hidden causes, and refused missions without
-metrics. Printed per alternative: structural Hamming distance to the true graph (pairs whose edges differ) and F1 of "this
-option has a directed path to this objective", means over the robots with the standard error of the difference to the
-default, robot by robot.
+The robots (`tests/robots.py`) have codes, counts, heavy tails and yes-or-no metrics, effects that bend or have an
+optimum inside, two options that matter only together, a context that confounds, hidden causes, and refused missions
+without metrics. Printed per alternative: structural Hamming distance to the true graph (pairs whose edges differ) and
+F1 of "this option has a directed path to this objective", means over the robots with the standard error of the
+difference to the default, robot by robot.
 """
 
 from __future__ import annotations
@@ -91,6 +91,7 @@ WAYS: Mapping[str, Way] = {
     "scores and magnitudes": Way(WithMagnitudes),
     "alpha 0.001": Way(alpha=0.001),
     "alpha 0.05": Way(alpha=0.05),
+    "completion at 0.1": Way(completion_rate=0.1),
     "completion at 0.01": Way(completion_rate=0.01),
     "magnitudes, completion at 0.01": Way(WithMagnitudes, completion_rate=0.01),
     "without completion": Way(completion_rate=None),

@@ -18,6 +18,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise, permutations
 from pathlib import Path
 
 import numpy as np
@@ -71,10 +72,9 @@ def _published_fci(frame: pd.DataFrame, schema: Schema) -> None:
     varying = frame.loc[:, frame.nunique() > 1].dropna()
     nodes = {str(name): GraphNode(str(name)) for name in varying}
     knowledge = BackgroundKnowledge()
-    for a in nodes:
-        for b in nodes:
-            if a != b and (schema.variables[a].role, schema.variables[b].role) in ALWAYS:
-                knowledge.add_forbidden_by_node(nodes[a], nodes[b])
+    for a, b in permutations(nodes, 2):
+        if (schema.variables[a].role, schema.variables[b].role) in ALWAYS:
+            knowledge.add_forbidden_by_node(nodes[a], nodes[b])
     with contextlib.redirect_stdout(io.StringIO()), threadpool_limits(1):
         fci(
             varying.to_numpy(dtype=float), "fisherz", PUBLISHED_ALPHA, background_knowledge=knowledge,
@@ -99,7 +99,7 @@ def _training(part: str, frame: pd.DataFrame, schema: Schema) -> None:
     with _measured(f"whole training, {resamples} resamples, {JOBS} processes") as took:
         train(frame, schema, Settings(n_jobs=JOBS), lambda step, _share: steps.append((step, time.monotonic())))
         steps.append(("", time.monotonic()))
-    for (step, began), (_, ended) in zip(steps, steps[1:], strict=False):
+    for (step, began), (_, ended) in pairwise(steps):
         print(f"    {step}: {ended - began:.1f} s")
     print(f"  bar {BAR_S:.0f} s: {took() / BAR_S:.2f} of it")
 

@@ -126,8 +126,8 @@ def show(title: str, parts: list[dict[str, Score]]) -> None:
         misses = [m for s in mine for m in s.misses]
         swayed = [m for s in mine for m in s.swayed_misses]
         print(
-            f"  {name:30s} {f'{hits}/{asked}':>13s} {sum(s.fooled for s in mine):>7d} {sum(s.silent for s in mine):>7d} "
-            f"{np.mean(misses):>11.3f} {f'{np.mean(swayed):.3f}' if swayed else '-':>7s} "
+            f"  {name:30s} {f'{hits}/{asked}':>13s} {sum(s.fooled for s in mine):>7d} "
+            f"{sum(s.silent for s in mine):>7d} {np.mean(misses):>11.3f} {f'{np.mean(swayed):.3f}' if swayed else 'none':>7s} "
             f"{sum(s.refused for s in mine):>8d}"
         )
 

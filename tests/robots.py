@@ -35,13 +35,13 @@ class Law:
     strength: float
 
     def __call__(self, cause: FloatArray) -> FloatArray:
-        shapes = {
-            "line": lambda: cause,
-            "bend": lambda: cause + 0.4 * np.tanh(2 * cause),
-            "bump": lambda: 1.2 * (cause**2 - 1),
-            "step": lambda: 1.1 * np.sign(cause - 0.4),
-        }
-        return np.asarray(self.strength * shapes[self.shape](), dtype=float)
+        moved = {
+            "line": cause,
+            "bend": cause + 0.4 * np.tanh(2 * cause),
+            "bump": 1.2 * (cause**2 - 1),
+            "step": 1.1 * np.sign(cause - 0.4),
+        }[self.shape]
+        return np.asarray(self.strength * moved)
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Robot:
         return rng.uniform(0, 1, n)
 
     def _gone_where_refused(self, columns: dict[str, FloatArray]) -> pd.DataFrame:
-        frame = pd.DataFrame({name: columns[name] for name in self.schema.variables})
+        frame: pd.DataFrame = pd.DataFrame({name: columns[name] for name in self.schema.variables})
         if "armed" in frame:
             refused = frame["armed"] == 0
             flight = [m.name for m in self.schema.metrics if m.name != "armed"]

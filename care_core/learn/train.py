@@ -205,7 +205,11 @@ def _metric_mechanisms(
 def _edge_effects(
     frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: Settings, resamples: _Resamples
 ) -> dict[Edge, _Measured]:
-    """Direct effect of every directed edge: the child's mechanism over all its parents, the others held."""
+    """Direct effect of every directed edge: the child's mechanism over all its parents, the others held.
+
+    An edge from an option that shares a hidden cause with its effect has none that the runs could tell, and carries
+    no path.
+    """
 
     def measure(i: int, child: str) -> dict[Edge, _Measured]:
         parents = sorted(graph.parents(child))
@@ -214,7 +218,8 @@ def _edge_effects(
         if mechanism is None:
             return {}
         effects = _measure(parents, mechanism, frame, schema, resamples)
-        return {(parent, child): effect for parent, effect in effects.items()}
+        options = {option.name for option in schema.options} & {*graph.siblings(child)}
+        return {(parent, child): effect for parent, effect in effects.items() if parent not in options}
 
     order = graph.topological_order()
     measured = _in_parallel(settings, (delayed(measure)(i, child) for i, child in enumerate(order)))
