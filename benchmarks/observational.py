@@ -125,11 +125,9 @@ def show(title: str, parts: list[dict[str, Score]]) -> None:
         asked, hits = sum(s.asked for s in mine), sum(s.hits for s in mine)
         misses = [m for s in mine for m in s.misses]
         swayed = [m for s in mine for m in s.swayed_misses]
-        print(
-            f"  {name:30s} {f'{hits}/{asked}':>13s} {sum(s.fooled for s in mine):>7d} "
-            f"{sum(s.silent for s in mine):>7d} {np.mean(misses):>11.3f} {f'{np.mean(swayed):.3f}' if swayed else 'none':>7s} "
-            f"{sum(s.refused for s in mine):>8d}"
-        )
+        right, far = f"{hits}/{asked}", f"{np.mean(swayed):.3f}" if swayed else "none"
+        fooled, silent, refused = (sum(getattr(s, key) for s in mine) for key in ("fooled", "silent", "refused"))
+        print(f"  {name:30s} {right:>13s} {fooled:>7d} {silent:>7d} {np.mean(misses):>11.3f} {far:>7s} {refused:>8d}")
 
 
 def main() -> None:

@@ -390,7 +390,7 @@ def _evidence(triples: Sequence[tuple[int, int, int]], sets: SeparatingSets, tes
     without = [(x, y, sorted(sets[x, y] - {middle})) for x, middle, y in triples]
     beside = [(x, y, [*given, middle]) for (x, y, given), (_, middle, _) in zip(without, triples, strict=True)]
     before, after = (ndtri(np.maximum(_p_of(test, tests), 1e-300) / 2) ** 2 for tests in (without, beside))
-    return np.nan_to_num(after - before, nan=0.0).tolist()
+    return [0.0 if np.isnan(difference) else float(difference) for difference in after - before]
 
 
 def _p_of(test: IndependenceTest, tests: Sequence[tuple[int, int, Sequence[int]]]) -> FloatArray:

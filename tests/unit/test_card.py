@@ -39,7 +39,7 @@ def test_what_the_model_cannot_say_is_said(planted: Profile) -> None:
     model = planted.model
     outcomes = {name: outcome for name, outcome in model.outcomes.items() if name != "energy"}
     effects = dict(model.effects)
-    effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
+    effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False, "functional": ""})
     training = model.training.model_copy(
         update={
             "screened_out": ("inert",),
