@@ -13,6 +13,7 @@ from care_tui.console import emit, say
 
 if TYPE_CHECKING:
     from care_core.profile.schema import Schema
+    from care_core.profile.store import Profile
     from care_core.variables import Variable
 
 app = typer.Typer(help="What is installed, and whether it is sound.", rich_markup_mode=None)
@@ -38,16 +39,31 @@ def list_profiles() -> None:
 
 @app.command("show")
 def show(name: Annotated[str, typer.Argument(metavar="PROFILE")]) -> None:
-    """Show what a profile knows: its variables, ranges and thresholds."""
+    """Show what a profile knows: its variables, ranges and thresholds, and which effects its runs cannot tell."""
     from care_core.profile.store import load_profile
 
-    schema = load_profile(name).schema
+    profile = load_profile(name)
+    schema = profile.schema
     lines = [f"{schema.name} {schema.version}: {schema.platform}", schema.doc]
     for role, variables in _by_role(schema).items():
         lines += ["", f"{role} ({len(variables)})", *(f"  {_described(variable)}" for variable in variables)]
+    lines += ["", *_identified(profile)]
     verified = _verified(schema)
     lines += ["", verified] if verified else []
     emit("\n".join(lines) + "\n")
+
+
+def _identified(profile: Profile) -> list[str]:
+    """How many effects the training runs identify, and which they do not."""
+    from care_core.errors import ProfileError
+
+    try:
+        effects = profile.model.effects.values()
+    except ProfileError as err:
+        return [f"no effects: {err.message}"]
+    unknown = [f"  {e.option} on {e.objective}" for e in effects if not e.identified]
+    counted = f"effects of an option on an objective: {len(effects) - len(unknown)} identified"
+    return [counted, *([f"not identified, never ranked ({len(unknown)})", *unknown] if unknown else [])]
 
 
 def _verified(schema: Schema) -> str:

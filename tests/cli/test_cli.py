@@ -297,7 +297,10 @@ def test_the_published_schema_is_printed(care: Care) -> None:
 def test_profiles_are_listed_and_shown(care: Care) -> None:
     assert care("profiles").stdout == care("profiles", "list").stdout
     assert "arducopter" in care("profiles").stdout
-    assert "objectives (4)" in care("profiles", "show", "arducopter").stdout
+    shown = care("profiles", "show", "arducopter").stdout
+    assert "objectives (4)" in shown
+    assert "effects of an option on an objective:" in shown
+    assert "not identified" not in shown
     assert care("profiles", "show", "none").code == 2
 
 
