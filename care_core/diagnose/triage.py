@@ -12,8 +12,10 @@ from care_core.diagnose.fixes import (
     Assignment,
     best_alone,
     change_notes,
+    needs_unsafe,
     prediction,
     search,
+    settled,
     smallest_good,
     to_fix,
 )
@@ -124,7 +126,10 @@ def diagnose(
         result.variable.name: suspects(world, schema, result.variable.name, reference, run.evidence)
         for result in broken
     }
-    faults = tuple(Fault(result, _causes(case, result, found[result.variable.name], top)) for result in broken)
+    faults = tuple(
+        Fault(result, () if _out_of_reach(case, result) else _causes(case, result, found[result.variable.name], top))
+        for result in broken
+    )
     report("searching for a fix", 0.85)
     fixes = _fixes(case, {s.option for group in found.values() for s in group})
     abstained = _abstains(case, faults, fixes)
@@ -226,7 +231,10 @@ def _fixes(case: _Case, options: set[str]) -> list[Fix]:
     others += [detour[smallest_good(detour)]] if detour else []
     useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
     ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
-    return [to_fix(case.world, variables, assignment, odds) for assignment, odds in ranked]
+    return [
+        to_fix(case.world, variables, *settled(case.world, variables, assignment, case.reference))
+        for assignment, _odds in ranked
+    ]
 
 
 def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]) -> bool:
@@ -241,6 +249,11 @@ def _has_effect(case: _Case, option: str) -> bool:
 
 
 def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str | None:
+    variables = case.profile.schema.variables
+    for fault in faults:
+        out_of_reach = _out_of_reach(case, fault.objective)
+        if out_of_reach is not None:
+            return out_of_reach
     if not any(not cause.is_lead for fault in faults for cause in fault.causes):
         return (
             "no option that this profile models explains the fault: look at what the run met "
@@ -252,9 +265,32 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str |
     if unknown:
         return f"too few training missions to predict {', '.join(unknown)}: the causes are named, no change is promised"
     if not fixes or fixes[0].p_fixed < max(MIN_ODDS, now + MIN_CONTRIBUTION):
+        unsafe = needs_unsafe(
+            case.world, variables, case.world.config.keys() - set(case.keep), case.reference, MIN_ODDS
+        )
+        if unsafe is not None:
+            return (
+                f"only '{unsafe}' past its default would be likely to help, and it is a safety option: "
+                "it is never made looser"
+            )
         pinned = f", with {', '.join(sorted(case.keep))} kept as it is" if case.keep else ""
         return f"no change inside the acceptable ranges is likely enough to meet every threshold{pinned}"
     return None
+
+
+def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
+    """Said of a threshold that no training run came near: no option can be blamed for missing it."""
+    name, bound = result.variable.name, result.threshold
+    summary = case.world.model.summaries.get(name)
+    if bound is None or summary is None or result.variable.kind == "functional":
+        return None
+    best = summary.low if bound.op in ("<=", "<") else summary.high
+    if bound.op == "==" or bound.met(best):
+        return None
+    unit = f" {result.variable.unit}" if result.variable.unit else ""
+    return (
+        f"no run of the profile's training met {name} {bound}{unit} (the best: {best:g}{unit}): no option explains it"
+    )
 
 
 def _notes(case: _Case) -> tuple[str, ...]:
