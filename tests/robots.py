@@ -147,7 +147,11 @@ def random_robot(
     stages = ["m_0"] if not refusals else ["armed", "m_0"]
     ms = [*stages, *(f"m_{i}" for i in range(1, metrics))]
     flight = ms[ms.index("m_0") :]
-    kinds = {m: METRIC_KINDS[i % 4] for i, m in enumerate(flight)} | {"armed": "armed", "success": "success", "time": "float"}
+    kinds = {m: METRIC_KINDS[i % 4] for i, m in enumerate(flight)} | {
+        "armed": "armed",
+        "success": "success",
+        "time": "float",
+    }
     laws: dict[Edge, Law] = {}
 
     def law(shapes: tuple[Shape, ...] = SHAPES) -> Law:
@@ -207,9 +211,7 @@ def _schema(
     if chosen != "by something hidden":
         variables.append(Variable("wind", Role.CONTEXT))
     variables += [Variable(m, Role.METRIC, "bool" if kinds[m] in ("bool", "armed") else "float") for m in metrics]
-    variables.append(
-        Variable("success", Role.OBJECTIVE, "bool", kind="functional", threshold=Threshold(">=", 1))
-    )
+    variables.append(Variable("success", Role.OBJECTIVE, "bool", kind="functional", threshold=Threshold(">=", 1)))
     variables.append(Variable("time", Role.OBJECTIVE, kind="non-functional", threshold=Threshold("<=", TIME_LIMIT)))
     return Schema(
         name="robot", version="1", platform="simulated", doc="", match={}, logs=(), mission={}, evidence=(),

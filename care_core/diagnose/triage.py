@@ -249,33 +249,29 @@ def _has_effect(case: _Case, option: str) -> bool:
 
 
 def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str | None:
-    variables = case.profile.schema.variables
-    for fault in faults:
-        out_of_reach = _out_of_reach(case, fault.objective)
-        if out_of_reach is not None:
-            return out_of_reach
-    if not any(not cause.is_lead for fault in faults for cause in fault.causes):
-        return (
-            "no option that this profile models explains the fault: look at what the run met "
-            "(wind, battery, positioning, obstacles) or at parameters outside the profile"
-        )
-    now = float(case.world.odds([case.world.config])[0])
+    out_of_reach = next(filter(None, (_out_of_reach(case, fault.objective) for fault in faults)), None)
+    if out_of_reach is not None:
+        return out_of_reach
     names = [fault.objective.variable.name for fault in faults]
     unknown = [name for name in names if name not in case.world.model.outcomes]
     if unknown:
         return f"too few training missions to predict {', '.join(unknown)}: the causes are named, no change is promised"
-    if not fixes or fixes[0].p_fixed < max(MIN_ODDS, now + MIN_CONTRIBUTION):
-        unsafe = needs_unsafe(
-            case.world, variables, case.world.config.keys() - set(case.keep), case.reference, MIN_ODDS
+    now = float(case.world.odds([case.world.config])[0])
+    enough = max(MIN_ODDS, now + MIN_CONTRIBUTION)
+    has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
+    if has_cause and fixes and fixes[0].p_fixed >= enough:
+        return None
+    options = {option.name: option for option in case.profile.schema.options}
+    unsafe = needs_unsafe(case.world, options, options.keys() - set(case.keep), case.reference, enough)
+    if unsafe is not None:
+        return f"only '{unsafe}' past its default is likely to help, and a safety option is never made looser"
+    if not has_cause:
+        return (
+            "no option that this profile models explains the fault: look at what the run met "
+            "(wind, battery, positioning, obstacles) or at parameters outside the profile"
         )
-        if unsafe is not None:
-            return (
-                f"only '{unsafe}' past its default would be likely to help, and it is a safety option: "
-                "it is never made looser"
-            )
-        pinned = f", with {', '.join(sorted(case.keep))} kept as it is" if case.keep else ""
-        return f"no change inside the acceptable ranges is likely enough to meet every threshold{pinned}"
-    return None
+    pinned = f", with {', '.join(sorted(case.keep))} kept as it is" if case.keep else ""
+    return f"no change inside the acceptable ranges is likely enough to meet every threshold{pinned}"
 
 
 def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:

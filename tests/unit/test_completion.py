@@ -145,7 +145,9 @@ def test_one_fit_and_one_by_one_give_the_exact_test(share: float) -> None:
     names = ["a", "b", "c", "flag", "code"]
     others = {name: [n for n in names if n != name] for name in names}
     together = Regressions(frame).p_of_each(names, "y")
-    np.testing.assert_allclose(together, [Regressions(frame).p_of(name, others[name], "y") for name in names], rtol=1e-6)
+    np.testing.assert_allclose(
+        together, [Regressions(frame).p_of(name, others[name], "y") for name in names], rtol=1e-6
+    )
     np.testing.assert_allclose(together, [exact_p(frame, name, others[name], "y") for name in names], rtol=1e-6)
 
 

@@ -108,7 +108,9 @@ def test_one_path_an_option_the_strongest(planted: Profile) -> None:
 
 def test_a_path_tells_what_the_run_met_and_what_it_would_have(planted: Profile) -> None:
     run, here = planted_run(reserve=58), world(planted, reserve=58)
-    path = describe_path(best_paths(planted.model, "time", [o.name for o in OPTIONS])["reserve"], here, SCHEMA, run, DEFAULTS)
+    path = describe_path(
+        best_paths(planted.model, "time", [o.name for o in OPTIONS])["reserve"], here, SCHEMA, run, DEFAULTS
+    )
     option, hold, time = path
     assert (option.value, option.expected) == (58, 20)
     assert hold.value == run.metrics["hold_s"]
@@ -122,12 +124,16 @@ def test_a_path_tells_what_the_run_met_and_what_it_would_have(planted: Profile) 
 
 def test_a_decreasing_edge_is_negative(planted: Profile) -> None:
     run, here = planted_run(speed=1.4), world(planted, speed=1.4)
-    path = describe_path(best_paths(planted.model, "time", [o.name for o in OPTIONS])["speed"], here, SCHEMA, run, DEFAULTS)
+    path = describe_path(
+        best_paths(planted.model, "time", [o.name for o in OPTIONS])["speed"], here, SCHEMA, run, DEFAULTS
+    )
     signs = {node.name: node.effect for node in path if node.effect is not None}
     assert signs["mean_speed"] < 0 < signs["speed"]
 
 
 def test_a_refused_mission_has_unknown_values_on_the_path(planted: Profile) -> None:
     run, here = planted_run(min_sats=14), world(planted, min_sats=14)
-    path = describe_path(best_paths(planted.model, "success", [o.name for o in OPTIONS])["radius"], here, SCHEMA, run, DEFAULTS)
+    path = describe_path(
+        best_paths(planted.model, "success", [o.name for o in OPTIONS])["radius"], here, SCHEMA, run, DEFAULTS
+    )
     assert [node.value for node in path] == [0.5, None, 0.0]
