@@ -62,6 +62,18 @@ class World:
             total *= np.min([p_ok[name] for name in group], axis=0)
         return total
 
+    def ignorance(self, configs: Sequence[Config]) -> FloatArray:
+        """How little training says about the objectives there: 0 (known) to 1, the least known one's; shape (m,)."""
+        keys = [
+            key
+            for name, outcome in self.model.outcomes.items()
+            if name in self.thresholds
+            for key in ([stage.mechanism for stage in outcome.stages] or [outcome.mechanism])
+        ]
+        used = [self.model.mechanisms[key] for key in keys]
+        least: FloatArray = np.max([m.ignorance(columns(configs, m.inputs)) for m in used], axis=0)
+        return least
+
     def _groups(self, names: Mapping[str, FloatArray]) -> list[list[str]]:
         together = [[name for name in group if name in names] for group in self.model.training.moves_together]
         grouped = {name for group in together for name in group}

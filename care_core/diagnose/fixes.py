@@ -21,6 +21,8 @@ GAIN_FOR_ONE_MORE = 0.1
 """Odds that one more change must add: each change is something an operator has to do and to believe."""
 DISTANCE_COST = 0.02
 """Odds given up for leaving a value where it is rather than moving it across its whole range."""
+NEARLY = 0.02
+"""Odds this close are the same: the surer set is taken, or the value nearer to the run's."""
 MAX_ALTERNATIVES = 3
 
 Assignment = Mapping[str, float]
@@ -50,46 +52,92 @@ def search(
 ) -> list[tuple[Assignment, float]]:
     """Best sets of changes by size (index 0: one change), each with the odds that all thresholds are met.
 
-    Beam search: every option alone at every value, then the best sets widened by one option at a time.
+    Beam search: every option alone back to its reference (yes-or-no options and codes to any other value), then the
+    best sets widened by one option at a time. `settled` then looks for values nearer to the run's.
     """
-    values = {
-        name: found
-        for name in candidates
-        if (found := candidate_values(options[name], world.config[name], reference[name], world.model))
-    }
+    values = {name: found for name in candidates if (found := _starts(world, options[name], reference[name]))}
     singles = [{name: value} for name, found in values.items() for value in found]
-    ranked = _ranked(world, options, singles)
-    best_single = {name: value for assignment, _ in reversed(ranked) for name, value in assignment.items()}
-    beam, found_sets = ranked[:BEAM], ranked[:1]
-    for _ in range(1, MAX_CHANGES):
-        wider = _widened((a for a, _ in beam), values, best_single, reference)
-        beam = _ranked(world, options, wider)[:BEAM]
-        if not beam:
+    beam = _ranked(world, options, singles)[:BEAM]
+    found_sets = []
+    while beam:
+        found_sets.append(_surest(world, beam))
+        if len(found_sets) == MAX_CHANGES:
             break
-        found_sets.append(beam[0])
+        beam = _ranked(world, options, _widened((a for a, _ in beam), values))[:BEAM]
     return found_sets
+
+
+def _starts(world: World, option: Variable, reference: float) -> tuple[float, ...]:
+    values = candidate_values(option, world.config[option.name], reference, world.model)
+    return values if _is_unordered(option) else values[:1]
+
+
+def _is_unordered(option: Variable) -> bool:
+    return bool(option.labels) or option.type == "bool"
+
+
+def settled(
+    world: World, options: Mapping[str, Variable], assignment: Assignment, reference: Config
+) -> tuple[Assignment, float]:
+    """The same options with values as near to the run's as is safe, and the odds of that.
+
+    A nearer value than the reference is taken only where the value one step nearer still would do nearly as well: the
+    edge of what works, and of what was flown in training, is not known to a step.
+    """
+    chosen = dict(assignment)
+    floor = float(world.odds([{**world.config, **chosen}])[0]) - NEARLY
+    for name in assignment:
+        if not _is_unordered(options[name]):
+            values = candidate_values(options[name], world.config[name], reference[name], world.model)
+            odds = world.odds([{**world.config, **chosen, name: value} for value in values])
+            works = int(np.argmin(odds >= floor)) if (odds < floor).any() else len(values)
+            chosen[name] = values[max(0, works - 2)]
+    return chosen, float(world.odds([{**world.config, **chosen}])[0])
 
 
 def best_alone(
     world: World, options: Mapping[str, Variable], name: str, reference: Config
 ) -> tuple[float, float] | None:
-    """The value of one option with the best odds when nothing else changes, and those odds."""
-    values = candidate_values(options[name], world.config[name], reference[name], world.model)
-    ranked = _ranked(world, options, [{name: value} for value in values])
-    return (ranked[0][0][name], ranked[0][1]) if ranked else None
+    """The value of one option to suggest when nothing else changes, and its odds."""
+    ranked = _ranked(world, options, [{name: value} for value in _starts(world, options[name], reference[name])])
+    if not ranked:
+        return None
+    assignment, odds = settled(world, options, ranked[0][0], reference)
+    return assignment[name], odds
 
 
-def _widened(
-    sets: Iterable[Assignment], values: Mapping[str, tuple[float, ...]], best_single: Assignment, reference: Config
-) -> list[Assignment]:
+def needs_unsafe(
+    world: World, options: Mapping[str, Variable], candidates: Collection[str], reference: Config, enough: float
+) -> str | None:
+    """A `safety` option that would fix the run only if it were moved past its default, which is never suggested."""
+    for name in sorted(candidates):
+        option = options[name]
+        if not option.safety or option.range is None:
+            continue
+        values = {option.snap(float(value)) for value in np.linspace(*option.range, STEPS + 1)}
+        default = reference[name]
+        past = [v for v in values if v != default and (v - default) * (world.config[name] - default) <= 0]
+        if past and world.odds([{**world.config, name: value} for value in past]).max() >= enough:
+            return name
+    return None
+
+
+def _widened(sets: Iterable[Assignment], values: Mapping[str, tuple[float, ...]]) -> list[Assignment]:
     wider: dict[tuple[tuple[str, float], ...], Assignment] = {}
     for assignment, name in product(sets, values):
-        if name in assignment:
-            continue
-        for value in dict.fromkeys((best_single[name], values[name][0])):
+        for value in () if name in assignment else values[name]:
             new = {**assignment, name: value}
             wider[tuple(sorted(new.items()))] = new
     return list(wider.values())
+
+
+def _surest(world: World, beam: Sequence[tuple[Assignment, float]]) -> tuple[Assignment, float]:
+    """The first of the sets, or the one among its equals in odds and fewer in doubt about the mechanisms."""
+    equals = [pair for pair in beam if pair[1] >= beam[0][1] - NEARLY]
+    if len(equals) == 1:
+        return equals[0]
+    doubt = world.ignorance([{**world.config, **assignment} for assignment, _ in equals])
+    return equals[int(np.argmin(np.round(doubt, 2)))]
 
 
 def _ranked(

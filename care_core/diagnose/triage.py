@@ -16,8 +16,10 @@ from care_core.diagnose.fixes import (
     Assignment,
     best_alone,
     change_notes,
+    needs_unsafe,
     prediction,
     search,
+    settled,
     smallest_good,
     to_fix,
 )
@@ -139,7 +141,10 @@ def diagnose(
         result.variable.name: suspects(world, schema, result.variable.name, reference, run.evidence)
         for result in broken
     }
-    faults = tuple(Fault(result, _causes(case, result, found[result.variable.name], top)) for result in broken)
+    faults = tuple(
+        Fault(result, () if _out_of_reach(case, result) else _causes(case, result, found[result.variable.name], top))
+        for result in broken
+    )
     report("searching for a fix", 0.85)
     fixes = _fixes(case, {s.option for group in found.values() for s in group})
     abstained = _abstains(case, faults, fixes)
@@ -252,7 +257,10 @@ def _fixes(case: _Case, options: set[str]) -> list[Fix]:
     others += [detour[smallest_good(detour)]] if detour else []
     useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
     ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
-    return [to_fix(case.world, variables, assignment, odds) for assignment, odds in ranked]
+    return [
+        to_fix(case.world, variables, *settled(case.world, variables, assignment, case.reference))
+        for assignment, _odds in ranked
+    ]
 
 
 def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]) -> bool:
@@ -267,20 +275,44 @@ def _has_effect(case: _Case, option: str) -> bool:
 
 
 def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str | None:
-    if not any(not cause.is_lead for fault in faults for cause in fault.causes):
-        return (
-            "no option that this profile models explains the fault: look at what the run met "
-            "(wind, battery, positioning, obstacles) or at parameters outside the profile"
-        )
-    now = float(case.world.odds([case.world.config])[0])
+    out_of_reach = next(filter(None, (_out_of_reach(case, fault.objective) for fault in faults)), None)
+    if out_of_reach is not None:
+        return out_of_reach
     names = [fault.objective.variable.name for fault in faults]
     unknown = [name for name in names if name not in case.world.model.outcomes]
     if unknown:
         return f"too few training missions to predict {', '.join(unknown)}: the causes are named, no change is promised"
-    if not fixes or fixes[0].p_fixed < max(MIN_ODDS, now + MIN_CONTRIBUTION):
-        pinned = f", with {', '.join(sorted(case.keep))} kept as it is" if case.keep else ""
-        return f"no change inside the acceptable ranges is likely enough to meet every threshold{pinned}"
-    return None
+    now = float(case.world.odds([case.world.config])[0])
+    enough = max(MIN_ODDS, now + MIN_CONTRIBUTION)
+    has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
+    if has_cause and fixes and fixes[0].p_fixed >= enough:
+        return None
+    options = {option.name: option for option in case.profile.schema.options}
+    unsafe = needs_unsafe(case.world, options, options.keys() - set(case.keep), case.reference, enough)
+    if unsafe is not None:
+        return f"only '{unsafe}' past its default is likely to help, and a safety option is never made looser"
+    if not has_cause:
+        return (
+            "no option that this profile models explains the fault: look at what the run met "
+            "(wind, battery, positioning, obstacles) or at parameters outside the profile"
+        )
+    pinned = f", with {', '.join(sorted(case.keep))} kept as it is" if case.keep else ""
+    return f"no change inside the acceptable ranges is likely enough to meet every threshold{pinned}"
+
+
+def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
+    """Said of a threshold that no training run came near: no option can be blamed for missing it."""
+    name, bound = result.variable.name, result.threshold
+    summary = case.world.model.summaries.get(name)
+    if bound is None or summary is None or result.variable.kind == "functional":
+        return None
+    best = summary.low if bound.op in ("<=", "<") else summary.high
+    if bound.op == "==" or bound.met(best):
+        return None
+    unit = f" {result.variable.unit}" if result.variable.unit else ""
+    return (
+        f"no run of the profile's training met {name} {bound}{unit} (the best: {best:g}{unit}): no option explains it"
+    )
 
 
 def _notes(case: _Case) -> tuple[str, ...]:

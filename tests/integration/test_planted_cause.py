@@ -153,7 +153,31 @@ def test_a_fault_that_no_option_explains_abstains(planted: Profile) -> None:
 def test_a_threshold_out_of_reach_abstains(planted: Profile) -> None:
     diagnosis = diagnosed(planted_run(reserve=58), planted, time=50)
     assert diagnosis.fix is None
-    assert diagnosis.abstained is not None
+    assert "no run of the profile's training met time <= 50 s" in (diagnosis.abstained or "")
+    assert [fault.causes for fault in diagnosis.faults] == [()]
+
+
+def test_where_only_a_safety_option_would_do_the_engine_says_so(planted: Profile) -> None:
+    """Nothing is off its default; only waiting with less in reserve than that makes the mission this much quicker."""
+    diagnosis = diagnosed(planted_run(), planted, time=132)
+    assert diagnosis.fix is None
+    assert "only 'reserve' past its default" in (diagnosis.abstained or "")
+
+
+def test_a_fix_weighs_every_objective(planted: Profile) -> None:
+    """Going fast again fixes the time; with this acceleration it would break the energy, so both change."""
+    diagnosis = diagnosed(planted_run(speed=1.4, accel=3.9), planted)
+    assert diagnosis.fix is not None
+    assert {c.option.name for c in diagnosis.fix.changes} == {"speed", "accel"}
+    assert repaired(diagnosis)
+
+
+def test_whole_numbers_and_codes_stay_what_they_are(planted: Profile) -> None:
+    diagnosis = diagnosed(planted_run(min_sats=13, planner=2), planted)
+    assert diagnosis.fix is not None
+    moves = {c.option.name: c.suggested for c in diagnosis.fix.changes}
+    assert moves["min_sats"] == int(moves["min_sats"])
+    assert moves["planner"] in {0.0, 1.0}
 
 
 @pytest.mark.parametrize("bound", [0.0, -1.0])

@@ -9,11 +9,13 @@ from hypothesis import strategies as st
 from care_core.causal.counterfactual import World
 from care_core.diagnose.fixes import (
     MAX_CHANGES,
+    NEARLY,
     best_alone,
     candidate_values,
     change_notes,
     prediction,
     search,
+    settled,
     smallest_good,
     to_fix,
 )
@@ -100,6 +102,22 @@ def test_sets_grow_by_one_and_stay_inside(planted: Profile, driven: dict[str, fl
 def test_nothing_free_nothing_found(planted: Profile) -> None:
     assert search(world(planted, reserve=58), BY_NAME, [], DEFAULTS) == []
     assert best_alone(world(planted), BY_NAME, "reserve", DEFAULTS) is None
+
+
+@QUICK
+@given(speed=st.floats(1.0, 2.0), radius=st.floats(0.75, 1.0))
+def test_a_nearer_value_than_the_reference_has_a_step_of_margin(planted: Profile, speed: float, radius: float) -> None:
+    here = world(planted, speed=speed, radius=radius)
+    back = {"speed": DEFAULTS["speed"], "radius": DEFAULTS["radius"]}
+    chosen, odds = settled(here, BY_NAME, back, DEFAULTS)
+    floor = here.odds([{**here.config, **back}])[0] - NEARLY
+    assert odds >= floor - 1e-12
+    name = "radius"  # settled last, so the other one is at its final value
+    values = candidate_values(BY_NAME[name], here.config[name], DEFAULTS[name], planted.model)
+    step = values.index(chosen[name])
+    if step:
+        beyond = {**here.config, **chosen, name: values[step + 1]}
+        assert here.odds([beyond])[0] >= floor
 
 
 def test_the_best_value_alone(planted: Profile) -> None:
