@@ -54,7 +54,9 @@ def _span(log: LogEntry) -> str:
     return f"read 00:00 to {_clock(log.read.to_s)} of {about} ({log.duration_s:.1f} s)"
 
 
-def _clock(seconds: float) -> str:
+def _clock(seconds: float | None) -> str:
+    if seconds is None:
+        return "an unknown time"
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes:02}:{rest:02}"

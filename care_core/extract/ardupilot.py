@@ -216,9 +216,9 @@ def _nothing_to_judge(mission: Mission, flight: Flight) -> Unavailable | None:
 
 
 def _flew_automatically(mission: Mission) -> bool:
-    """Whether Auto mode was in force at any time of the mission; a log without MODE is given the benefit."""
+    """Whether Auto mode was in force at any time of the mission; a log without its number is given the benefit."""
     modes = mission.tables.get("MODE")
-    if modes is None or not len(modes):
+    if modes is None or not has(modes, "ModeNum"):
         return True
     until = np.append(modes.t[1:], np.inf)
     in_force = (modes.t <= mission.end_s) & (until > mission.start_s)

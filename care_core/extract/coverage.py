@@ -10,6 +10,7 @@ from care_core.errors import CareError
 from care_core.extract.read import mission_kind, read_runs, reading_plan
 from care_core.extract.registry import find_extractor
 from care_core.extract.settings import readable
+from care_core.extract.telemetry import as_dataflash
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.run import MissionInfo, Run, Unavailable
@@ -49,7 +50,7 @@ def cover(log: Log, schema: Schema) -> Coverage:
     obstacle = _wrong_kind(log, schema)
     if obstacle:
         return Coverage(schema, obstacle, 0, 0, 0, (), ())
-    channels = {channel.name for channel in log.channels() if channel.count}
+    channels = {channel.name for channel in as_dataflash(log).channels() if channel.count}
     plan = reading_plan(schema)
     lost_options = _missed_options(log, schema)
     found, sources = len(schema.options) - len(lost_options), len(channels & plan.keys())

@@ -281,7 +281,7 @@ def angle_between(a: float, b: float) -> float:
 
 
 def heading(table: Table, prefix: str) -> Floats:
-    """Heading of a quaternion, rad."""
-    x, y, z, w = (np.asarray(table[f"{prefix}.{axis}"], np.float64) for axis in "xyzw")
+    """Heading of a unit quaternion, rad; a part beyond 1 is a damaged one."""
+    x, y, z, w = (np.clip(np.asarray(table[f"{prefix}.{axis}"], np.float64), -1.0, 1.0) for axis in "xyzw")
     yaw: Floats = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return yaw

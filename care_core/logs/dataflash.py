@@ -81,6 +81,9 @@ class _RecordColumns(Mapping[str, NDArray[Any]]):
             self._texts[name] = column
         return column
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._fields  # the inherited way would decode the column
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._fields)
 

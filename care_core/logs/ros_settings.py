@@ -101,7 +101,7 @@ def _described(table: Table | None, prefix: str, row: int | None) -> dict[str, f
         return values
     for kind in _KINDS:
         names, given = _cell(table, f"{prefix}{kind}.name", row), _cell(table, f"{prefix}{kind}.value", row)
-        pairs = zip(names, given, strict=True)
+        pairs = zip(names, given, strict=False)  # flipped bits make one shorter than the other
         values.update({name: value if isinstance(value, str) else float(value) for name, value in pairs})
     return values
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
@@ -68,9 +69,11 @@ class ParameterEntry(_Model):
 
 
 class MissionEntry(_Model):
+    """A mission; its times are null where the log stamps nothing around it."""
+
     index: int
-    start_s: float
-    end_s: float
+    start_s: float | None
+    end_s: float | None
     ended: bool
     fits: bool
     mismatch: str | None
@@ -113,7 +116,7 @@ def build_inspection(log: Log, coverages: Sequence[Coverage]) -> InspectDocument
     ranked = sorted(coverages, key=lambda c: (not c.is_usable, -(c.options + c.sources), c.schema.name))
     profiles = [_profile(coverage) for coverage in ranked]
     channels = [
-        ChannelEntry(name=clean(c.name), type=clean(c.type), count=c.count, rate_hz=c.rate_hz)
+        ChannelEntry(name=clean(c.name), type=clean(c.type), count=c.count, rate_hz=_finite(c.rate_hz))
         for c in sorted(log.channels(), key=lambda channel: channel.name)
     ]
     parameters = _parameters(log)
@@ -141,7 +144,7 @@ def _log(log: Log) -> LogEntry:
         duration_s=log.duration_s,
         bytes=size,
         facts={name: clean(text) for name, text in log.facts.items()},
-        damage=[DamageEntry(what=clean(d.what), byte=d.byte, time_s=d.time_s) for d in log.damage],
+        damage=[DamageEntry(what=clean(d.what), byte=d.byte, time_s=_finite(d.time_s)) for d in log.damage],
         read=ReadShare(to_s=log.duration_s, about_s=_about_s(log.damage, log.duration_s, size)),
     )
 
@@ -164,7 +167,7 @@ def _parameters(log: Log) -> ParameterEntry:
         ChangeEntry(name=clean(after.name), before=_shown(before.value), after=_shown(after.value), time_s=at_s)
         for history in histories.values()
         for before, after in pairwise(history)
-        if (at_s := after.changed_at_s) is not None
+        if (at_s := _finite(after.changed_at_s)) is not None
     ]
     changed.sort(key=lambda change: change.time_s)
     return ParameterEntry(count=len(histories), sources=dict(sorted(sources.items())), changed=changed)
@@ -174,7 +177,11 @@ def _shown(value: float | str) -> float | str:
     """Numbers that JSON cannot hold as text."""
     if isinstance(value, str):
         return clean(value)
-    return value if abs(value) < float("inf") else str(value)
+    return value if math.isfinite(value) else str(value)
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
 
 
 def _profile(coverage: Coverage) -> ProfileEntry:
@@ -197,8 +204,8 @@ def _profile(coverage: Coverage) -> ProfileEntry:
 def _mission(mission: MissionInfo) -> MissionEntry:
     return MissionEntry(
         index=mission.index,
-        start_s=mission.start_s,
-        end_s=mission.end_s,
+        start_s=_finite(mission.start_s),
+        end_s=_finite(mission.end_s),
         ended=mission.ended,
         fits=mission.fits,
         mismatch=clean(mission.mismatch) or None,

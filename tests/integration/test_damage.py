@@ -31,9 +31,45 @@ class Good(NamedTuple):
     profile: str
 
 
+def flight_as_text() -> bytes:
+    """The good flight as a ground station writes it down."""
+    from pymavlink import DFReader
+
+    log = DFReader.DFReader_binary(str(DATA / "arducopter_good.BIN"))
+    lines = []
+    while (message := log.recv_msg()) is not None:
+        values = [message.__getattr__(name) for name in message.fmt.columns]
+        lines.append(", ".join([message.get_type(), *(str(value) for value in values)]))
+    return ("\n".join(lines) + "\n").encode()
+
+
+def drive_as_mcap() -> bytes:
+    """The good drive as MCAP in the ros1 profile."""
+    from io import BytesIO
+
+    from mcap.writer import CompressionType, Writer
+    from rosbags.rosbag1 import Reader
+
+    stream = BytesIO()
+    writer = Writer(stream, chunk_size=16 * 1024, compression=CompressionType.LZ4)
+    writer.start(profile="ros1", library="test")
+    with Reader(DATA / "move_base_good.bag") as bag:
+        channels = {}
+        for connection in bag.connections:
+            kind = connection.msgtype.replace("/msg/", "/")
+            schema = writer.register_schema(kind, "ros1msg", connection.msgdef.data.encode())
+            channels[connection.id] = writer.register_channel(connection.topic, "ros1", schema)
+        for connection, time_ns, raw in bag.messages():
+            writer.add_message(channels[connection.id], time_ns, bytes(raw), time_ns)
+    writer.finish()  # type: ignore[no-untyped-call]
+    return stream.getvalue()
+
+
 LOGS = (
     Good("flight.BIN", (DATA / "arducopter_good.BIN").read_bytes, "arducopter"),
+    Good("flight.log", flight_as_text, "arducopter"),
     Good("drive.bag", (DATA / "move_base_good.bag").read_bytes, "move_base"),
+    Good("drive.mcap", drive_as_mcap, "move_base"),
 )
 FAILED = Good("failed.BIN", bundled("samples", "arducopter_failed.BIN").read_bytes, "arducopter")
 

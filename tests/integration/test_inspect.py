@@ -48,8 +48,7 @@ def test_many_damaged_places_are_folded(care: Care, tmp_path: Path) -> None:
     log.write_bytes(holed)
     shown = [line for line in care("inspect", log).stdout.splitlines() if line.startswith("Damage")]
     assert len(shown) < 8
-    assert "more like it" in shown[0]
-    assert len(json.loads(care("inspect", log, "--json").stdout)["log"]["damage"]) > 8
+    assert any("damaged places, the first" in line for line in shown)
 
 
 def test_what_was_not_recorded_is_named_with_how_to_record_it(care: Care, tmp_path: Path) -> None:
