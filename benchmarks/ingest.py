@@ -300,9 +300,8 @@ def report(case: Case, found: Measured, start: Cost) -> None:
     print(f"{case.name}, {found.size_mb:.1f} MB")
     for name, cost in (("care triage", found.triage), (f"{case.library}, all", found.decode), ("cat", found.cat)):
         times = found.triage.seconds / cost.seconds
-        print(
-            f"  {name:22s} {cost.seconds:7.2f} s {cost.cpu_s:7.2f} s cpu {cost.anonymous_mb:6.0f} MB   triage takes {times:.2f} times it"
-        )
+        used = f"{cost.seconds:7.2f} s {cost.cpu_s:7.2f} s cpu {cost.anonymous_mb:6.0f} MB"
+        print(f"  {name:22s} {used}   triage takes {times:.2f} times it")
     for bar, is_kept in bars.items():
         print(f"  {'kept  ' if is_kept else 'MISSED'} {bar}")
 
