@@ -144,16 +144,16 @@ class Terminal:
         os.close(self.fd)
 
 
-def first_frame(log: Path) -> float:
-    """Seconds from the start of the process to a step bar that answers keys."""
+def first_frame(log: Path) -> tuple[float, float]:
+    """Seconds from the start of the process to a step bar that answers keys, and seconds of processor it took."""
     command = [sys.executable, "-c", "from care_tui.cli import main; main()", str(log)]
     terminal = Terminal.start(command, 80, 24)
     seen = b""
     while b"Objectives" not in seen:
         seen += os.read(terminal.fd, 65536)
-    elapsed = time.perf_counter() - terminal.started
+    elapsed, cpu = time.perf_counter() - terminal.started, terminal.cpu_s()
     terminal.stop()
-    return elapsed
+    return elapsed, cpu
 
 
 def main() -> None:
@@ -164,7 +164,11 @@ def main() -> None:
     arguments = parser.parse_args()
     first_frame(arguments.log)
     frames = sorted(first_frame(arguments.log) for _ in range(arguments.runs))
-    print(f"first usable frame, warm: median {statistics.median(frames):.2f} s, best {frames[0]:.2f} s (bar 0.7 s)")
+    middle, cpu = statistics.median(frame[0] for frame in frames), frames[0][1]
+    print(f"load of the machine {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
+    print(
+        f"first usable frame, warm: median {middle:.2f} s, best {frames[0][0]:.2f} s, {cpu:.2f} s of processor (bar 0.7 s)"
+    )
     for width, height in ((80, 24), (120, 40)):
         _measure_keys(width, height)
 
@@ -178,8 +182,11 @@ def _measure_keys(width: int, height: int) -> None:
     for key in b"j" * 30 + b"k" * 10:
         moves.append(terminal.key(bytes([key])))
     cpu = (terminal.cpu_s() - before) / len(moves)
-    for key in b"4jjj +-3452342616":
+    keys = b"4jjj +-3452342616"
+    before = terminal.cpu_s()
+    for key in keys:
         switches.append(terminal.key(bytes([key])))
+    cpu_steps = (terminal.cpu_s() - before) / len(keys)
     terminal.key(b"3")
     idle = len(terminal.read(timeout=3.0)[0])
     before = terminal.cpu_s()
@@ -188,16 +195,11 @@ def _measure_keys(width: int, height: int) -> None:
     idle_cpu = terminal.cpu_s() - before
     terminal.stop()
     print(f"{width} x {height}, {OPTIONS} options and {PATHS} paths loaded:")
-    print(
-        f"  bytes for a cursor move in the causes: median {_middle(m[0] for m in moves)}, most {max(moves)[0]} (bar 2000)"
-    )
+    sizes = sorted(size for size, _ in moves)
+    print(f"  bytes for a cursor move in the causes: median {sizes[len(sizes) // 2]}, most {sizes[-1]} (bar 2000)")
     print(f"  key to repaint, cursor: {_times(moves)}; {1000 * cpu:.0f} ms of processor")
-    print(f"  key to repaint, steps and basket: {_times(switches)}")
+    print(f"  key to repaint, steps and basket: {_times(switches)}; {1000 * cpu_steps:.0f} ms of processor")
     print(f"  idle for 3 s: {idle} bytes, {1000 * idle_cpu:.0f} ms of processor")
-
-
-def _middle(values: object) -> int:
-    return round(statistics.median(values))  # type: ignore[call-overload, no-any-return]
 
 
 def _times(measured: Sequence[tuple[int, float]]) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from textual.message import Message
 
-from care_tui.jobs import Interrupt
+from care_tui.jobs import Job
 
 
 @dataclass
@@ -26,7 +26,7 @@ class Progressed(Message):
 class Fetched(Message):
     """A worker has an answer, or the CareError that says why it has none; `receive` takes it on the screen's side."""
 
-    interrupt: Interrupt
+    job: Job
     receive: Callable[[Any], None]
     answer: Any
 

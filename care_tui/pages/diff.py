@@ -34,7 +34,7 @@ class DiffPage(DiagnosisPage):
             self._text: str | CareError | None = None
             fix, case, side = self.session.fix, self.session.case, self.side
             if case is not None and fix is not None and (fix.changes or side == "changed"):
-                self.screen.fetch("diff", lambda: self.walk.engine.diff(case, fix, side), self._received)
+                self.screen.fetch("diff", lambda _job: self.walk.engine.diff(case, fix, side), self._received)
 
     def _received(self, text: str | CareError) -> None:
         self._text = text

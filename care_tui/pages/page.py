@@ -74,7 +74,7 @@ class Fetch(Generic[T]):
         """Fetch it, unless that was done before."""
         if not self._asked:
             self._asked = True
-            self._screen.fetch(self._key, work, self._receive)
+            self._screen.fetch(self._key, lambda _job: work(), self._receive)
 
     def _receive(self, answer: T | CareError) -> None:
         self.answer = answer

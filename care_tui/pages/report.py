@@ -30,7 +30,7 @@ class ReportPage(DiagnosisPage):
         if self.session.state == "data":
             self._text = None
             diagnosis, format = self.session.decided(), self.session.format
-            self.screen.fetch("report", lambda: self.walk.engine.report(diagnosis, format), self._received)
+            self.screen.fetch("report", lambda _job: self.walk.engine.report(diagnosis, format), self._received)
 
     def _received(self, text: str | CareError) -> None:
         self._text = text

@@ -6,7 +6,6 @@ The widgets are made once. Going to another page changes what they hold, so only
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from textual import on
@@ -16,7 +15,7 @@ from textual.containers import Container
 from textual.widgets import Static
 
 from care_core.errors import CareError
-from care_tui.jobs import CancelledError, Interrupt, as_care_error
+from care_tui.jobs import Job
 from care_tui.messages import Fetched
 from care_tui.pages.page import Page
 from care_tui.render.rows import Glyphs
@@ -46,7 +45,7 @@ class PanesScreen(CareScreen):
     def __init__(self, glyphs: Glyphs) -> None:
         super().__init__()
         self.glyphs = glyphs
-        self._interrupts: dict[str, Interrupt] = {}
+        self._jobs: dict[str, Job] = {}
 
     @property
     def page(self) -> Page:
@@ -163,39 +162,37 @@ class PanesScreen(CareScreen):
 
     # Work outside the event loop
 
-    def fetch(self, key: str, work: Callable[[], T], receive: Callable[[T | CareError], None]) -> None:
-        """Run `work` in a thread and hand its answer, or its error, to `receive`. New work of a key stops the old."""
+    def fetch(self, key: str, work: Callable[[Job], T], receive: Callable[[T | CareError], None]) -> None:
+        """Run `work` in a thread; its answer, or its error, goes to `receive`. New work of a key replaces the old."""
         self.cancel(key)
-        interrupt = self._interrupts[key] = Interrupt()
-        self.run_worker(partial(self._run, interrupt, work, receive), group=key, thread=True, exit_on_error=False)
+        job = self._jobs[key] = Job()
+        job.start(work, lambda answer: self._deliver(job, receive, answer))
 
-    def _run(self, interrupt: Interrupt, work: Callable[[], Any], receive: Callable[[Any], None]) -> None:
-        try:
-            with interrupt:
-                try:
-                    answer = work()
-                except Exception as err:
-                    answer = as_care_error(err)
-        except CancelledError:
-            return
-        self.post_message(Fetched(interrupt, receive, answer))
-
-    def cancel(self, key: str) -> None:
-        """Stop work that is under way; what it still answers is ignored."""
-        interrupt = self._interrupts.pop(key, None)
-        if interrupt is not None:
-            interrupt.cancel()
-
-    def cancel_all(self) -> None:
-        """Stop everything that is under way, so that nothing keeps the program from ending."""
-        for key in tuple(self._interrupts):
-            self.cancel(key)
-
-    def on_unmount(self) -> None:
-        self.cancel_all()
+    def _deliver(self, job: Job, receive: Callable[[Any], None], answer: object) -> None:
+        self.post_message(Fetched(job, receive, answer))
 
     @on(Fetched)
     def _take_answer(self, event: Fetched) -> None:
         event.stop()
-        if not event.interrupt.cancelled:
+        event.job.done = True
+        if not event.job.cancelled:
             event.receive(event.answer)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether an answer is still to come."""
+        return any(not job.done for job in self._jobs.values())
+
+    def cancel(self, key: str) -> None:
+        """Stop work that is under way; what it still answers is ignored."""
+        job = self._jobs.pop(key, None)
+        if job is not None:
+            job.cancelled = True
+
+    def cancel_all(self) -> None:
+        """Stop everything that is under way."""
+        for key in tuple(self._jobs):
+            self.cancel(key)
+
+    def on_unmount(self) -> None:
+        self.cancel_all()

@@ -16,7 +16,7 @@ from textual.binding import Binding, BindingType
 from care_core.diagnose.records import Fix
 from care_core.errors import CareError
 from care_tui.clipboard import fits, osc52
-from care_tui.jobs import CAUSES, Case, Engine, Request
+from care_tui.jobs import CAUSES, Case, Engine, Job, Request
 from care_tui.messages import Progressed, StepChosen
 from care_tui.pages.causes import CausesPage
 from care_tui.pages.diff import DiffPage
@@ -146,10 +146,16 @@ class WalkScreen(PanesScreen):
         self.session = Session(path=request.log.absolute(), progress=("starting", 0.0))
         self._visited.clear()
         self._show(LOG)
-        self.fetch("diagnose", partial(self.engine.diagnose, request, self._report), self._diagnosed)
+        self.fetch("diagnose", partial(self._diagnose, request), self._diagnosed)
 
-    def _report(self, step: str, fraction: float) -> None:
-        self.post_message(Progressed(step, fraction))
+    def _diagnose(self, request: Request, job: Job) -> Case:
+        """In the thread of the job."""
+
+        def report(step: str, fraction: float) -> None:
+            job.check()
+            self.post_message(Progressed(step, fraction))
+
+        return self.engine.diagnose(request, report)
 
     @on(Progressed)
     def _show_progress(self, event: Progressed) -> None:
@@ -185,7 +191,7 @@ class WalkScreen(PanesScreen):
         changes, case = dict(session.basket.ticked), session.case
         assert case is not None
         self.draw()
-        self.fetch("predict", lambda: self.engine.predict(case, changes), self._predicted)
+        self.fetch("predict", lambda _job: self.engine.predict(case, changes), self._predicted)
 
     def _predicted(self, answer: Fix | CareError) -> None:
         session = self.session
@@ -200,7 +206,7 @@ class WalkScreen(PanesScreen):
         """What the next run would bring with the configuration as driven; asked for once."""
         case = self.session.case
         if self.session.unchanged is None and case is not None:
-            self.fetch("unchanged", lambda: self.engine.predict(case, {}), self._unchanged_predicted)
+            self.fetch("unchanged", lambda _job: self.engine.predict(case, {}), self._unchanged_predicted)
 
     def _unchanged_predicted(self, answer: Fix | CareError) -> None:
         if not isinstance(answer, CareError):  # without it the odds stand alone, which is no failure

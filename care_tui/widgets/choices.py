@@ -136,10 +136,9 @@ class Choices(LineView):
         height, top = self._listing.height, self.scroll_offset.y
         first = self._cursor * height
         visible = self.scrollable_content_region.height
-        if first < top:
-            self.scroll_to(y=first, animate=False)
-        elif visible and first + height > top + visible:
-            self.scroll_to(y=first + height - visible, animate=False)
+        # Half a page at a time: every line moves, which a slow link should not pay for at every key.
+        if visible and not top <= first <= top + visible - height:
+            self.scroll_to(y=max(first - visible // (2 * height) * height, 0), animate=False)
 
     def watch_has_focus(self, has_focus: bool) -> None:
         super().watch_has_focus(has_focus)

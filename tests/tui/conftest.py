@@ -11,6 +11,7 @@ from textual.pilot import Pilot
 from care_core.diagnose.records import Change, Diagnosis, Fix
 from care_tui.app import CareApp
 from care_tui.jobs import Case, DiffSide, Engine, Progress, ReportFormat, Request
+from care_tui.screens.panes import PanesScreen
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
 
@@ -86,9 +87,16 @@ def make_app() -> MakeApp:
 
 async def settle(pilot: Pilot[int], *keys: str) -> None:
     """Press keys one by one, each after the work of the one before is shown."""
-    await pilot.app.workers.wait_for_complete()
-    await pilot.pause()
+    await quiet(pilot)
     for key in keys:
         await pilot.press(key)
-        await pilot.app.workers.wait_for_complete()
-        await pilot.pause()
+        await quiet(pilot)
+
+
+async def quiet(pilot: Pilot[int]) -> None:
+    """Wait for the workers of every screen, and for what they bring to be shown."""
+    await pilot.pause()
+    await pilot.app.workers.wait_for_complete()
+    while any(isinstance(screen, PanesScreen) and screen.is_busy for screen in pilot.app.screen_stack):
+        await pilot.pause(0.005)
+    await pilot.pause()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import threading
-import time
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,7 @@ from textual import events
 
 from care_core.errors import CareError, ExitCode, LogError, ProfileError
 from care_tui.app import CareApp
-from care_tui.jobs import CancelledError, Case, Engine, Interrupt, Progress, Request
+from care_tui.jobs import Case, Engine, Job, Progress, Request
 from care_tui.places import as_path, entries, found_logs, recent_logs, remember
 from care_tui.screens.open_log import OpenLogDialog
 from care_tui.settings import Settings
@@ -32,9 +31,7 @@ class SlowEngine:
     def diagnose(self, request: Request, progress: Progress) -> Case:
         progress("reading \x1b[31m[red]the log", 0.25)
         self.reached.set()
-        deadline = time.monotonic() + 5
-        while not self.go_on.is_set() and time.monotonic() < deadline:
-            time.sleep(0.001)
+        self.go_on.wait(5)
         self.finished = True
         return Case(sample.faulty(), sample.OPTIONS)
 
@@ -66,10 +63,11 @@ async def test_escape_stops_work_that_never_reports_and_r_starts_again() -> None
     async with app.run_test(size=(80, 24)) as pilot:
         slow.reached.wait(5)
         await pilot.press("escape")
-        await settle(pilot)
-        assert "was stopped" in text(app)
-        assert not slow.finished, "the thread itself was stopped"
+        await pilot.pause()
+        assert "was stopped" in text(app), "at once, whatever the work is doing"
         slow.go_on.set()
+        await pilot.pause(0.1)
+        assert "was stopped" in text(app), "a late answer is ignored"
         await settle(pilot, "r")
         await settle(pilot)
         assert walk(app).step == 2
@@ -218,32 +216,28 @@ def test_found_logs_are_the_newest_first_with_those_opened_before(tmp_path: Path
     ]
 
 
-def test_an_interrupt_stops_a_busy_thread_and_never_hits_later_work() -> None:
+def test_a_job_that_is_cancelled_ends_at_its_next_check_and_its_answer_is_dropped() -> None:
     ended: list[str] = []
-    started = threading.Event()
+    started, go_on, over = threading.Event(), threading.Event(), threading.Event()
 
-    def work(interrupt: Interrupt) -> None:
+    def work(job: Job) -> None:
+        started.set()
+        go_on.wait(5)
         try:
-            with interrupt:
-                started.set()
-                while True:
-                    try:
-                        sum(range(100))
-                    except Exception:  # as a reader that takes every error for damage
-                        ended.append("swallowed")
-        except CancelledError:
-            ended.append("stopped")
-        for _ in range(1000):
-            sum(range(100))
+            job.check()
+        except Exception:  # as a reader that takes every error for damage
+            ended.append("swallowed")
+        finally:
+            over.set()
         ended.append("went on")
 
-    interrupt = Interrupt()
-    thread = threading.Thread(target=work, args=(interrupt,))
-    thread.start()
+    job = Job()
+    job.start(work, lambda _answer: ended.append("answered"))
     started.wait(5)
-    interrupt.cancel()
-    thread.join(5)
-    assert ended == ["stopped", "went on"]
+    job.cancelled = True
+    go_on.set()
+    assert over.wait(5)
+    assert ended == []
 
 
 async def test_copying_sends_osc_52_and_leaves_a_file(make_app: MakeApp, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,7 +25,7 @@ WalkScreen.action_go = crash
 from care_tui.cli import main
 main()
 """
-ALT_SCREEN_OFF, CURSOR_ON, MOUSE_OFF = b"\x1b[?1049l", b"\x1b[?25h", b"\x1b[?1000l"
+ALT_SCREEN_OFF, CURSOR_ON, MOUSE_ON, MOUSE_OFF = b"\x1b[?1049l", b"\x1b[?25h", b"\x1b[?1000h", b"\x1b[?1000l"
 
 
 class Terminal:
@@ -69,7 +69,7 @@ class Terminal:
         tail = self.seen[self.seen.rfind(b"\x1b[?1049h") :]
         assert ALT_SCREEN_OFF in tail, "back on the normal screen"
         assert tail.rfind(CURSOR_ON) > tail.rfind(b"\x1b[?25l"), "the cursor is shown"
-        assert MOUSE_OFF in tail, "the mouse is the terminal's again"
+        assert (MOUSE_ON in tail) == (MOUSE_OFF in tail), "the mouse is the terminal's again"
         if attributes is not None:
             echo = termios.ECHO | termios.ICANON | termios.ISIG
             assert attributes[3] & echo == self.before[3] & echo, "keys are echoed and lines edited again"
