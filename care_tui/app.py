@@ -23,7 +23,7 @@ from care_tui.render.rows import ASCII, UNICODE
 from care_tui.screens.base import CareScreen
 from care_tui.screens.help import HelpScreen, Keys
 from care_tui.screens.panes import PanesScreen
-from care_tui.screens.walk import WalkScreen
+from care_tui.screens.walk import VIEWS, WalkScreen
 from care_tui.settings import Settings
 from care_tui.themes import DEFAULT, HIGH_CONTRAST
 from care_tui.widgets.step_bar import STEPS
@@ -143,6 +143,8 @@ class CareApp(App[int], inherit_bindings=False):
         if isinstance(screen, WalkScreen):
             for number, name in enumerate(STEPS, start=1):
                 yield SystemCommand(f"Go to {name}", f"Step {number}", lambda number=number: screen.action_go(number))
+            for view in VIEWS:
+                yield SystemCommand(view.capitalize(), VIEWS[view], lambda view=view: screen.action_view(view))
         if isinstance(screen, PanesScreen):
             for name in sorted(screen.page.ACTIONS):
                 about = (getattr(screen.page, name).__doc__ or "").strip().splitlines()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -21,20 +22,31 @@ from care_tui.messages import Progressed, StepChosen
 from care_tui.pages.causes import CausesPage
 from care_tui.pages.diff import DiffPage
 from care_tui.pages.fix import FixPage
+from care_tui.pages.graph import GraphPage
 from care_tui.pages.log import LogPage
+from care_tui.pages.messages import MessagesPage
 from care_tui.pages.objectives import ObjectivesPage
 from care_tui.pages.page import Page
+from care_tui.pages.profiles import ProfilesPage
 from care_tui.pages.report import ReportPage
+from care_tui.pages.signals import SignalsPage
 from care_tui.pages.step import StepPage
 from care_tui.places import remember
 from care_tui.render.rows import Glyphs
 from care_tui.screens.panes import PanesScreen
+from care_tui.screens.view import ViewScreen
 from care_tui.session import Session
 from care_tui.settings import Settings
 from care_tui.widgets.step_bar import STEPS, StepBar
 
 PAGES: tuple[type[StepPage], ...] = (LogPage, ObjectivesPage, CausesPage, FixPage, DiffPage, ReportPage)
-LOG, OBJECTIVES = 1, 2
+LOG, OBJECTIVES, CAUSES_STEP = 1, 2, 3
+VIEWS = {
+    "graph": "The causal model around the fault",
+    "messages": "What the robot's software said",
+    "signals": "Plots of the signals behind the metrics",
+    "profiles": "The installed profiles and their model cards",
+}
 
 
 class WalkScreen(PanesScreen):
@@ -45,6 +57,10 @@ class WalkScreen(PanesScreen):
             Binding(str(number), f"go({number})", "Jump to a step", show=False, id=f"step.{name.lower()}")
             for number, name in enumerate(STEPS, start=1)
         ),
+        Binding("f2,w", "view('graph')", "Causal graph", show=False, id="view.graph"),
+        Binding("f3,m", "view('messages')", "Messages of the log", show=False, id="view.messages"),
+        Binding("f4,p", "view('signals')", "Plots of signals", show=False, id="view.signals"),
+        Binding("f6,b", "view('profiles')", "Profiles", show=False, id="view.profiles"),
         Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),
         Binding("left,h", "move(-1)", "Previous step", show=False, id="step.previous"),
         Binding("o", "do('pick')", "Other log", id="log.pick"),
@@ -129,6 +145,31 @@ class WalkScreen(PanesScreen):
             self._stop_reading()
         elif self._visited:
             self._show(self._visited.pop())
+
+    def action_view(self, name: str) -> None:
+        """Open a page beside the walk."""
+        case = self.session.case
+        if name == "profiles":
+            used = None if case is None else case.diagnosis.profile.name
+            self._open(lambda screen: ProfilesPage(screen, used))
+        elif case is None:
+            self.say("Open a log first: 1 leads to them.")
+        elif name == "graph":
+            self._open(lambda screen: GraphPage(screen, case, self._subject()))
+        elif name == "messages":
+            self._open(lambda screen: MessagesPage(screen, case))
+        else:
+            self._open(lambda screen: SignalsPage(screen, case))
+
+    def _open(self, make: Callable[[PanesScreen], Page]) -> None:
+        self.app.push_screen(ViewScreen(self.glyphs, make))
+
+    def _subject(self) -> str | None:
+        """The variable that the operator is looking at: the cause under the cursor, else the objective."""
+        session, index = self.session, self.choices.highlighted
+        if self.step == CAUSES_STEP and index is not None:
+            return session.causes[index].option.name
+        return None if session.result is None else session.result.variable.name
 
     @on(StepChosen)
     def _step_chosen(self, event: StepChosen) -> None:

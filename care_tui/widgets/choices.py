@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from textual.binding import Binding, BindingType
 from textual.content import Content
-from textual.events import Click
+from textual.events import Click, Resize
 from textual.geometry import Size
 from textual.message import Message
 
@@ -139,6 +139,10 @@ class Choices(LineView):
         # Half a page at a time: every line moves, which a slow link should not pay for at every key.
         if visible and not top <= first <= top + visible - height:
             self.scroll_to(y=max(first - visible // (2 * height) * height, 0), animate=False)
+
+    def on_resize(self, event: Resize) -> None:
+        self._bring_into_view()
+        super().on_resize(event)
 
     def watch_has_focus(self, has_focus: bool) -> None:
         super().watch_has_focus(has_focus)
