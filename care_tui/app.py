@@ -18,7 +18,7 @@ from textual.scrollbar import ScrollBar, ScrollBarRender
 
 from care_core.errors import CareError, ExitCode, UsageError, nearest
 from care_tui.jobs import Case, Engine, Request, exit_code
-from care_tui.places import as_path
+from care_tui.places import as_path, is_openable
 from care_tui.render.rows import ASCII, UNICODE
 from care_tui.screens.base import CareScreen
 from care_tui.screens.help import HelpScreen, Keys
@@ -99,7 +99,7 @@ class CareApp(App[int], inherit_bindings=False):
     def on_paste(self, event: Paste) -> None:
         """A file that is dropped on the terminal arrives as its pasted path."""
         path = as_path(event.text)
-        if event.text.strip() and "\n" not in event.text.strip() and path.is_file():
+        if event.text.strip() and "\n" not in event.text.strip() and (path.is_file() or is_openable(path)):
             while self.screen is not self._walk:
                 self.pop_screen()
             self._walk.open_log(path)

@@ -12,9 +12,13 @@ from typing import TYPE_CHECKING, Literal, TypeVar
 from care_core.errors import CareError, ExitCode
 
 if TYPE_CHECKING:
-    from care_core.diagnose.records import Diagnosis, Fix
+    from care_core.diagnose.records import Diagnosis, Fix, ProfileChoice
+    from care_core.diagnose.whatif import Question
+    from care_core.logs.base import Log
+    from care_core.logs.digest import Sha256
     from care_core.profile.model import Model
     from care_core.profile.schema import Schema
+    from care_core.profile.store import Profile
     from care_core.variables import Variable
 
 T = TypeVar("T")
@@ -74,19 +78,6 @@ CAUSES = 10
 """Most causes per fault in the app: more than a report shows, for here they scroll."""
 
 
-@dataclass(frozen=True, slots=True)
-class Request:
-    """What an operator asks: a log, and how to look at it. The fields are the options of `care triage`."""
-
-    log: Path
-    profile: str | None = None
-    configs: tuple[Path, ...] = ()
-    keep: tuple[str, ...] = ()
-    thresholds: Mapping[str, float] = field(default_factory=dict)
-    top: int = 5
-    mission: int | None = None
-
-
 @dataclass(frozen=True, eq=False)
 class Case:
     """A diagnosis with what is needed to ask more about it."""
@@ -96,23 +87,61 @@ class Case:
     """Every option of the profile, in its order."""
     schema: Schema | None = None
     model: Model | None = None
-    configs: tuple[Path, ...] = ()
+    question: Question | None = None
+    """The run ready to be asked what other options would have done."""
+    configs: tuple[str | Path, ...] = ()
     """Configuration files that the operator named."""
 
 
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What an operator asks: a log, and how to look at it. The fields are the options of `care triage`."""
+
+    log: Path
+    profile: str | None = None
+    configs: tuple[str | Path, ...] = ()
+    """Files as the operator names them: FILE or NAMESPACE=FILE."""
+    keep: tuple[str, ...] = ()
+    thresholds: Mapping[str, float] = field(default_factory=dict)
+    top: int = 5
+    mission: int | None = None
+    since: Path | None = None
+
+
+def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
+    """The answer alone, as `care triage` prints it. Raises CareError."""
+    return _answer(request, progress)[0]
+
+
 def open_case(request: Request, progress: Progress) -> Case:
-    """The whole line from a log file to its diagnosis. Raises CareError."""
+    """The answer with all that is needed to ask more about it. Raises CareError."""
+    from care_core.diagnose.whatif import question
+
+    diagnosis, profile, choice = _answer(request, progress)
+    asked = question(diagnosis.run, profile, choice, request.thresholds)
+    schema = profile.schema
+    return Case(diagnosis, schema.options, schema, profile.model, asked, request.configs)
+
+
+def _answer(request: Request, progress: Progress) -> tuple[Diagnosis, Profile, ProfileChoice]:
+    """The whole line from a log file to its diagnosis."""
+    from care_core.logs import sniff
+    from care_core.logs.digest import hashing
+
+    sniff(request.log)
+    # Begun before anything else is imported: of a large log it takes as long as all the rest.
+    with hashing(request.log) as sha256:
+        return _diagnose(request, sha256, progress)
+
+
+def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> tuple[Diagnosis, Profile, ProfileChoice]:
     from care_core.configs import read_configs
     from care_core.diagnose.triage import triage
     from care_core.logs import open_log
-    from care_core.profile.select import choose_profile
-    from care_core.profile.store import available_profiles, load_profile
 
     configs = read_configs(request.configs)
     progress("opening the log", 0.0)
-    log = open_log(request.log)
-    names: list[Path] | list[str] = available_profiles() if request.profile is None else [request.profile]
-    chosen, choice = choose_profile(log, [load_profile(name) for name in names])
+    log, chosen, choice = open_and_choose(request.log, request.profile)
     diagnosis = triage(
         log,
         chosen,
@@ -121,40 +150,89 @@ def open_case(request: Request, progress: Progress) -> Case:
         keep=request.keep,
         thresholds=request.thresholds,
         mission=request.mission,
+        since=None if request.since is None else open_log(request.since),
         top=request.top,
         progress=progress,
+        sha256=sha256,
     )
-    return Case(diagnosis, chosen.schema.options, chosen.schema, chosen.model, request.configs)
+    return diagnosis, chosen, choice
 
 
-def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
-    """The answer alone, as `care triage` prints it. Raises CareError."""
-    return open_case(request, progress).diagnosis
+def open_and_choose(path: Path, profile: str | None) -> tuple[Log, Profile, ProfileChoice]:
+    """A log with the profile that fits it, or the one that was named. Raises CareError."""
+    from care_core.logs import open_log
+    from care_core.profile.select import choose_profile
+    from care_core.profile.store import available_profiles, load_profile
+
+    log = open_log(path)
+    names: list[Path] | list[str] = available_profiles() if profile is None else [profile]
+    return (log, *choose_profile(log, [load_profile(name) for name in names]))
+
+
+def question_of(request: Request, progress: Progress) -> Question:
+    """A run ready to be asked what other options would have done. Raises CareError."""
+    from care_core.configs import read_configs
+    from care_core.diagnose.whatif import question_of_log
+
+    configs = read_configs(request.configs)
+    progress("reading the log", 0.0)
+    log, profile, choice = open_and_choose(request.log, request.profile)
+    return question_of_log(
+        log, profile, choice, configs=configs, thresholds=request.thresholds, mission=request.mission
+    )
 
 
 def predict(case: Case, changes: Mapping[str, float]) -> Fix:
     """What these changes are predicted to bring; without any, what the same configuration would bring again."""
-    from care_core.causal.counterfactual import World
-    from care_core.diagnose.fixes import to_fix
-    from care_core.diagnose.ranking import reference_config
-    from care_core.run import is_known
+    from care_core.diagnose.records import Fix
 
-    if case.model is None or case.schema is None:
+    if case.question is None:
         raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
-    run = case.diagnosis.run
-    met = {name: value for name, value in run.context.items() if is_known(value)}
-    config = {**reference_config(case.schema, case.model), **met, **run.config}
-    bounds = {r.variable.name: r.threshold for r in case.diagnosis.objectives if r.threshold is not None}
-    world = World(case.model, config, {**run.metrics, **run.objectives}, bounds)
-    odds = float(world.odds([{**config, **changes}])[0])
-    return to_fix(world, case.schema.variables, changes, odds)
+    answer = case.question.ask(changes)
+    predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
+    return Fix(answer.changes, answer.p_ok, predicted)
 
 
 def diff_of(case: Case, fix: Fix, side: DiffSide) -> str:
-    """Two of these as a unified diff: the configuration as driven, the operator's file, the suggested one."""
+    """A unified diff: what was driven, or the operator's files, against the suggestion; or one against the other."""
     from care_core.configs import unified_diff
 
-    return unified_diff(case.diagnosis.run, fix)
+    if side == "driven":
+        return unified_diff(case.diagnosis.run, fix)
+    if side == "file":
+        return _patch_of(case, fix)
+    return _file_against_driven(case)
+
+
+def _patch_of(case: Case, fix: Fix) -> str:
+    """The operator's files with the fix put in, comments and order kept."""
+    from difflib import unified_diff
+
+    from care_core.configs.edit import Wanted, apply_changes
+    from care_core.extract.settings import readable
+
+    wanted = [
+        Wanted(change.option, parameter, change.suggested)
+        for change in fix.changes
+        for parameter in readable(change.option)
+    ]
+    lines: list[str] = []
+    for file in apply_changes([str(name) for name in case.configs], wanted):
+        before, after = file.before.splitlines(), file.after.splitlines()
+        lines += unified_diff(before, after, f"a/{file.path}", f"b/{file.path}", lineterm="")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _file_against_driven(case: Case) -> str:
+    """What the files hold otherwise than the robot drove."""
+    from care_core.configs import read_configs, resolve
+    from care_core.configs.compare import Side, compare
+
+    settings = case.diagnosis.run.settings
+    held = resolve(read_configs(case.configs), settings)
+    found = compare(Side("as driven", {name: settings[name] for name in held if name in settings}), Side("file", held))
+    lines = [str(difference) for difference in found]
+    return "".join(f"{line}\n" for line in lines)
 
 
 def report_of(diagnosis: Diagnosis, format: ReportFormat) -> str:
@@ -174,7 +252,7 @@ def commands_of(diagnosis: Diagnosis) -> list[str]:
 
     if diagnosis.fix is None:
         return []
-    return apply_commands(diagnosis.fix.changes, format_for(diagnosis.run.log.format))
+    return apply_commands(diagnosis.fix.changes, format_for(diagnosis.run.log.format, diagnosis.run.settings))
 
 
 def save_text(path: Path, text: str) -> None:

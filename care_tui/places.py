@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-PLACES = (Path(), Path("logs"), Path.home() / "logs", Path.home() / ".ros")
-"""Folders that are looked through for logs."""
+PLACES = (
+    Path(),
+    Path("logs"),
+    Path("APM/LOGS"),
+    Path.home() / "logs",
+    Path.home() / ".ros",
+    Path.home() / ".ros" / "bags",
+    Path.home() / "APM" / "LOGS",
+    Path.home() / "Documents" / "Mission Planner" / "logs",
+    Path.home() / "Documents" / "QGroundControl" / "Telemetry",
+    Path.home() / "Documents" / "QGroundControl" / "Logs",
+)
+"""Where `care` without a log looks for the newest one: here, and where recorders and ground stations put theirs."""
+
+DEEP = 3
+"""Folders below a place that are looked into: Mission Planner sorts by vehicle and system."""
 
 RECENT = 20
 """How many opened logs are remembered."""
@@ -25,37 +39,49 @@ class LogFile:
 
 def found_logs(places: Iterable[Path]) -> list[LogFile]:
     """Logs of these folders and those opened before, the newest first. What cannot be looked at is left out."""
-    from care_core.extract.table import LOG_SUFFIXES
-
     recent = recent_logs()
-    files = [path for place in places for path in _files(place) if path.suffix.lower() in LOG_SUFFIXES]
+    files = [path for place in places if place.is_dir() for path in logs_in(place)]
     unique = {path.absolute(): path.absolute() in recent for path in (*files, *recent)}
     logs = [log for path, is_recent in unique.items() if (log := _look(path, is_recent)) is not None]
     return sorted(logs, key=lambda log: -log.modified_s)
 
 
-def newest_log(places: Iterable[Path]) -> Path | None:
-    """The log that was written last in these folders, None when they hold none."""
-    from care_core.extract.table import LOG_SUFFIXES
+def logs_in(folder: Path, deep: int = DEEP) -> Iterator[Path]:
+    """The logs and recordings in a folder, and in those so deep below it."""
+    from care_core.extract.table import is_log, is_recording
 
-    logs = [_look(path, False) for place in places for path in _files(place) if path.suffix.lower() in LOG_SUFFIXES]
-    newest = max((log for log in logs if log), key=lambda log: log.modified_s, default=None)
-    return None if newest is None else newest.path
-
-
-def _files(place: Path) -> list[Path]:
     try:
-        return list(place.expanduser().iterdir())
-    except OSError:  # no such folder, or not ours to read
-        return []
+        inside = list(folder.iterdir())
+    except OSError:  # not ours to look into
+        return
+    for path in inside:
+        if is_log(path) or (path.is_dir() and is_recording(path)):
+            yield path
+        elif path.is_dir() and deep > 1 and not path.is_symlink() and _may_hold_logs(folder, path):
+            yield from logs_in(path, deep - 1)
+
+
+def _may_hold_logs(folder: Path, path: Path) -> bool:
+    """The working folder may be anything, so only what a recorder may have made in it is looked into."""
+    return folder != Path() or path.name.startswith("rosbag2_")
+
+
+def files_of(path: Path) -> list[Path]:
+    """The files of a log; a recording may be a folder of them."""
+    return [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
+
+
+def written_s(path: Path) -> float:
+    """When a log was last written to, seconds since 1970."""
+    return max((file.stat().st_mtime for file in files_of(path)), default=0.0)
 
 
 def _look(path: Path, is_recent: bool) -> LogFile | None:
     try:
-        facts = path.stat()
-    except OSError:
+        size = sum(file.stat().st_size for file in files_of(path))
+        return LogFile(path, written_s(path), size, is_recent)
+    except OSError:  # gone, or not ours to look at
         return None
-    return LogFile(path, facts.st_mtime, facts.st_size, is_recent) if path.is_file() else None
 
 
 def recent_logs() -> list[Path]:
@@ -102,15 +128,23 @@ def as_path(typed: str) -> Path:
 
 def entries(typed: str) -> list[Path]:
     """Folders and logs that the typed path could go on with, folders first; hidden ones only when asked for."""
-    from care_core.extract.table import LOG_SUFFIXES
-
     path = as_path(typed)
     folder, start = (path, "") if typed.endswith("/") else (path.parent, path.name.casefold())
+    try:
+        inside = list(folder.iterdir())
+    except OSError:  # no such folder, or not ours to look into
+        return []
     found = [
         entry
-        for entry in _files(folder)
+        for entry in inside
         if entry.name.casefold().startswith(start) and (start.startswith(".") or not entry.name.startswith("."))
+        if entry.is_dir() or is_openable(entry)
     ]
-    folders = sorted((entry for entry in found if entry.is_dir()), key=lambda entry: entry.name.casefold())
-    logs = [entry for entry in found if entry.suffix.lower() in LOG_SUFFIXES and entry.is_file()]
-    return [*folders, *sorted(logs, key=lambda entry: entry.name.casefold())]
+    return sorted(found, key=lambda entry: (is_openable(entry), entry.name.casefold()))
+
+
+def is_openable(path: Path) -> bool:
+    """Whether this may be a log, or a recording that is a folder."""
+    from care_core.extract.table import is_log, is_recording
+
+    return is_log(path) or (path.is_dir() and is_recording(path))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from care_core.errors import CareError
 from care_tui.jobs import Case
@@ -154,3 +157,56 @@ def installed_profiles() -> list[Installed]:
 def _card(folder: Path) -> str:
     card = folder / "MODEL_CARD.md"
     return card.read_text(encoding="utf-8") if card.is_file() else "It has no model card.\n"
+
+
+@dataclass(frozen=True)
+class Past:
+    """A run that was triaged before."""
+
+    at: str
+    log: str
+    profile: str
+    verdict: str
+    cause: str
+    values: Mapping[str, float | None]
+    config: Mapping[str, float]
+
+
+def past_runs() -> list[Past]:
+    """What the local history holds, the newest first; nothing where it is switched off."""
+    from care_core.history import History, history_path
+
+    path = history_path()
+    if path is None or not path.is_file():
+        return []
+    return [_past(triaged.at, triaged.document) for triaged in History(path).triages()]
+
+
+def _past(at: str, document: Mapping[str, Any]) -> Past:
+    broken = [entry["name"] for entry in document["objectives"] if entry["status"] == "fault"]
+    unknown = [entry["name"] for entry in document["objectives"] if entry["status"] == "not_evaluated"]
+    verdict = f"FAULT {', '.join(broken)}" if broken else "NOT ALL EVALUATED" if unknown else "OK"
+    causes = [cause["option"] for fault in document["faults"] for cause in fault["causes"]]
+    return Past(
+        at=at,
+        log=document["log"]["path"],
+        profile=document["profile"]["name"],
+        verdict=verdict,
+        cause=causes[0] if causes else "",
+        values={entry["name"]: entry["value"] for entry in document["objectives"]},
+        config=document["config"],
+    )
+
+
+def remember_run(case: Case) -> None:
+    """Put a diagnosis into the local history. One that cannot be used is no reason to stop."""
+    from care_core.history import History, HistoryError, history_path
+    from care_core.report import build_document, published
+
+    path = history_path()
+    if path is None or case.question is None:
+        return
+    try:
+        History(path).add_triage(published(build_document(case.diagnosis)), case.diagnosis.run.mission.index)
+    except HistoryError as err:
+        logging.getLogger(__name__).warning("not remembered: %s", err)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
+import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -11,12 +13,18 @@ import typer
 
 from care_core.errors import UsageError
 from care_tui.commands.arguments import ConfigPaths, ProfileName
+from care_tui.console import say
 from care_tui.jobs import CAUSES, Request
+from care_tui.places import files_of, logs_in, written_s
 
 app = typer.Typer()
 
 OPEN = "open"
 """The hidden command behind `care LOG`."""
+
+
+QUIET_S, LOOK_S = 5.0, 0.5
+"""A log that was written to more recently may still be growing: it is looked at for so long."""
 
 
 @app.command(OPEN, hidden=True)
@@ -32,7 +40,6 @@ def open_app(
 ) -> None:
     """Open a log in the terminal app: the newest one when none is named."""
     from care_core.logs import sniff
-    from care_tui.places import newest_log
     from care_tui.settings import load_settings, prepare_terminal, with_flags
 
     chosen = with_flags(load_settings(settings), ascii=ascii, mouse=not no_mouse, color=color, theme=theme)
@@ -48,3 +55,33 @@ def open_app(
 
     request = None if path is None else Request(path, profile, tuple(config or ()), top=CAUSES)
     raise typer.Exit(run(request, chosen))
+
+
+def newest_log(places: Iterable[Path]) -> Path | None:
+    """The log that was written last in these folders, None when they hold none.
+
+    One still being written is passed over with a sentence.
+
+    Raises:
+        UsageError: none of them is finished.
+    """
+    found = {path for place in places if place.is_dir() for path in logs_in(place)}
+    logs = sorted(found, key=written_s, reverse=True)
+    for path in logs:
+        if not _is_growing(path):
+            return path
+        say(f"{path} is still being written, so an older log is taken")
+    if logs:
+        raise UsageError("The only log in the usual places is still being written.", hint="Stop the recording first.")
+    return None
+
+
+def _is_growing(path: Path) -> bool:
+    """Whether a recorder says so by the name, or a file that was written to just now grows while we look."""
+    if path.suffix == ".active":
+        return True
+    if time.time() - written_s(path) > QUIET_S:
+        return False
+    before = [file.stat().st_size for file in files_of(path)]
+    time.sleep(LOOK_S)
+    return before != [file.stat().st_size for file in files_of(path)]

@@ -35,7 +35,7 @@ def serve(
     _check_free(HOST, port)
     words = [sys.executable, "-m", "care_tui", *([str(log.absolute())] if log else [])]
     words += ["--profile", profile] if profile else []
-    words += [word for path in config or () for word in ("--config", str(path.absolute()))]
+    words += [word for path in config or () for word in ("--config", path)]
     server = TokenServer(shlex.join(words), port, secrets.token_urlsafe(24))
     emit(f"{server.address}\n")
     say("Open this address in a browser of this machine. Ctrl+C ends it.")

@@ -50,8 +50,7 @@ class CausesPage(DiagnosisPage):
         cause = session.causes[index]
         model = session.case.model
         effect = model.effects.get((cause.option.name, result.variable.name)) if model else None
-        evidence = session.diagnosis.run.evidence
-        return cause_detail(cause, session.causes, result, effect, evidence, session.dismissed, self.glyphs)
+        return cause_detail(cause, session.causes, result, effect, session.diagnosis, session.dismissed, self.glyphs)
 
     def open(self, index: int | None) -> None:
         self.session.option = None if index is None else self.session.causes[index].option.name

@@ -91,9 +91,6 @@ class FixPage(DiagnosisPage):
         session, value = self.session, self.session.basket.values.get(option.name)
         notes = [note for change in (session.fix.changes if session.fix else ()) if change.option.name == option.name
                  for note in change.notes]  # fmt: skip
-        model = session.case.model if session.case else None
-        if value is not None and model is not None and not model.supports(option.name, value):
-            notes.append("no training run had such a value: the prediction is a guess")
         if option.safety and value is not None and value != option.default:
             notes.append("a safety option: think twice before it leaves its default")
         if option.name in session.dismissed:

@@ -8,7 +8,6 @@ from textual.content import Content
 
 from care_core.diagnose.records import Cause, Diagnosis, ObjectiveResult, PathNode
 from care_core.profile.model import EffectRecord
-from care_core.run import Evidence
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.render.fix import prediction
@@ -97,7 +96,7 @@ def cause_detail(
     rivals: Sequence[Cause],
     objective: ObjectiveResult,
     effect: EffectRecord | None,
-    evidence: Sequence[Evidence],
+    diagnosis: Diagnosis,
     dismissed: Mapping[str, str],
     glyphs: Glyphs,
 ) -> Rows:
@@ -119,6 +118,8 @@ def cause_detail(
         rows.append(labelled("Parameter", ", ".join(option.parameters)))
     if option.doc:
         rows.append(labelled("About", option.doc))
+    rows += doubt_rows(diagnosis)
+    evidence = diagnosis.run.evidence
     if evidence:
         rows += [Row(Content()), heading("The log says"), *(evidence_row(part, option.name) for part in evidence)]
     return Rows(rows)
@@ -146,4 +147,11 @@ def no_cause_rows(diagnosis: Diagnosis, objective: ObjectiveResult | None) -> Ro
     if objective.status == "not_evaluated":
         return Rows([Row(Content("Not evaluated, so no cause is known.")), warning("Reason", objective.reason)])
     reason = diagnosis.abstained or "no option of the profile explains this objective"
-    return Rows([Row(Content("Outside its threshold, but no cause is named.")), warning("Reason", reason)])
+    head = [Row(Content("Outside its threshold, but no cause is named.")), warning("Reason", reason)]
+    return Rows([*head, *doubt_rows(diagnosis)])
+
+
+def doubt_rows(diagnosis: Diagnosis) -> list[Row]:
+    """What the run met that may be the cause instead, and what would tell more."""
+    rows = [warning("Perhaps", f"{rival.name}: {rival.text}") for rival in diagnosis.rivals]
+    return rows + [labelled("Would tell", advice) for advice in diagnosis.tell_more]

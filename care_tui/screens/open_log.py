@@ -13,7 +13,7 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
-from care_tui.places import as_path, entries
+from care_tui.places import as_path, entries, is_openable
 from care_tui.render.rows import Glyphs, text
 from care_tui.widgets.choices import Choices, Listing
 
@@ -83,7 +83,7 @@ class OpenLogDialog(ModalScreen[Path | None]):
         typed = as_path(event.value)
         index = self.query_one(Choices).highlighted
         path = typed if typed.is_file() or index is None else self._entries[index]
-        if path.is_file():
+        if path.is_file() or is_openable(path):
             self.dismiss(path)
         elif path.is_dir():
             self._put(path)

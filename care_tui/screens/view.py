@@ -17,6 +17,7 @@ class ViewScreen(PanesScreen):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("left,h,backspace", "do('step_back')", "Back a step", key_display="h", id="graph.back"),
+        Binding("x", "do('mark')", "Compare", id="history.mark"),
         Binding("n", "do('next_marked')", "Next marked", id="messages.next"),
     ]
 

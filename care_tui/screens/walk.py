@@ -23,6 +23,7 @@ from care_tui.pages.causes import CausesPage
 from care_tui.pages.diff import DiffPage
 from care_tui.pages.fix import FixPage
 from care_tui.pages.graph import GraphPage
+from care_tui.pages.history import HistoryPage
 from care_tui.pages.log import LogPage
 from care_tui.pages.messages import MessagesPage
 from care_tui.pages.objectives import ObjectivesPage
@@ -32,6 +33,7 @@ from care_tui.pages.report import ReportPage
 from care_tui.pages.signals import SignalsPage
 from care_tui.pages.step import StepPage
 from care_tui.places import remember
+from care_tui.reading import remember_run
 from care_tui.render.rows import Glyphs
 from care_tui.screens.panes import PanesScreen
 from care_tui.screens.view import ViewScreen
@@ -45,6 +47,7 @@ VIEWS = {
     "graph": "The causal model around the fault",
     "messages": "What the robot's software said",
     "signals": "Plots of the signals behind the metrics",
+    "history": "Past runs with trends, two side by side",
     "profiles": "The installed profiles and their model cards",
 }
 
@@ -60,6 +63,7 @@ class WalkScreen(PanesScreen):
         Binding("f2,w", "view('graph')", "Causal graph", show=False, id="view.graph"),
         Binding("f3,m", "view('messages')", "Messages of the log", show=False, id="view.messages"),
         Binding("f4,p", "view('signals')", "Plots of signals", show=False, id="view.signals"),
+        Binding("f5,y", "view('history')", "History", show=False, id="view.history"),
         Binding("f6,b", "view('profiles')", "Profiles", show=False, id="view.profiles"),
         Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),
         Binding("left,h", "move(-1)", "Previous step", show=False, id="step.previous"),
@@ -152,6 +156,8 @@ class WalkScreen(PanesScreen):
         if name == "profiles":
             used = None if case is None else case.diagnosis.profile.name
             self._open(lambda screen: ProfilesPage(screen, used))
+        elif name == "history":
+            self._open(HistoryPage)
         elif case is None:
             self.say("Open a log first: 1 leads to them.")
         elif name == "graph":
@@ -196,7 +202,10 @@ class WalkScreen(PanesScreen):
             job.check()
             self.post_message(Progressed(step, fraction))
 
-        return self.engine.diagnose(request, report)
+        case = self.engine.diagnose(request, report)
+        remember(request.log)
+        remember_run(case)
+        return case
 
     @on(Progressed)
     def _show_progress(self, event: Progressed) -> None:
@@ -212,8 +221,6 @@ class WalkScreen(PanesScreen):
             self.draw()
             return
         self.session.take(answer)
-        if self.session.path is not None:
-            remember(self.session.path)
         if self.step == LOG:
             self.action_go(OBJECTIVES)
         else:
