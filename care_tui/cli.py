@@ -15,7 +15,18 @@ from typer.core import TyperGroup
 
 from care_core.errors import UsageError, nearest
 from care_tui import __version__
-from care_tui.commands import asking, configuring, diagnosing, formats, learning, opening, past, profiles, reading
+from care_tui.commands import (
+    asking,
+    configuring,
+    diagnosing,
+    formats,
+    learning,
+    opening,
+    past,
+    profiles,
+    reading,
+    serving,
+)
 from care_tui.commands.opening import OPEN
 from care_tui.console import emit, explain
 
@@ -57,7 +68,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Which parameter made the run fail, along which path, and what to change. 'care LOG' opens the terminal app.",
 )
-for commands in (opening, diagnosing, asking, configuring, past, reading, learning):
+for commands in (opening, serving, diagnosing, asking, configuring, past, reading, learning):
     app.add_typer(commands.app)
 app.add_typer(profiles.app, name="profiles", invoke_without_command=True)
 app.add_typer(formats.app, name="schema")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeVar
 
 from care_core.errors import CareError, ExitCode
 
@@ -15,18 +16,81 @@ if TYPE_CHECKING:
     from care_core.diagnose.whatif import Question
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
+    from care_core.profile.model import Model
+    from care_core.profile.schema import Schema
     from care_core.profile.store import Profile
-    from care_core.run import Run
+    from care_core.variables import Variable
 
+T = TypeVar("T")
 Progress = Callable[[str, float], None]
-ReportFormat = Literal["yaml", "markdown", "json"]
+ReportFormat = Literal["yaml", "markdown", "html", "json", "patch"]
+DiffSide = Literal["driven", "file", "changed"]
 
-SUFFIXES: dict[str, ReportFormat] = {".yaml": "yaml", ".yml": "yaml", ".md": "markdown", ".json": "json"}
+SUFFIXES: dict[str, ReportFormat] = {
+    ".yaml": "yaml",
+    ".yml": "yaml",
+    ".md": "markdown",
+    ".html": "html",
+    ".htm": "html",
+    ".json": "json",
+    ".patch": "patch",
+    ".diff": "patch",
+}
 """File suffix to report format; the first suffix of a format is its default."""
 
 
-class CancelledError(Exception):
-    """The operator took the work back. Raised out of a progress call to unwind the engine."""
+class CancelledError(BaseException):
+    """The operator took the work back. Not an Exception: no reader may mistake it for damage and go on."""
+
+
+class Job:
+    """Work in a thread of its own that nobody waits for: not the operator who stops it, nor the end of the program.
+
+    A thread cannot be stopped from outside without leaving locks behind (that of an import, for one), so one that is
+    cancelled ends at its next `check`; whatever it answers is dropped.
+    """
+
+    def __init__(self) -> None:
+        self.cancelled = False
+        self.done = False
+
+    def start(self, work: Callable[[Job], T], receive: Callable[[T | CareError], None]) -> None:
+        """Run `work`; its answer, or its error, goes to `receive`, in that thread."""
+        threading.Thread(target=self._run, args=(work, receive), daemon=True).start()
+
+    def _run(self, work: Callable[[Job], T], receive: Callable[[T | CareError], None]) -> None:
+        try:
+            answer: T | CareError = work(self)
+        except CancelledError:
+            return
+        except Exception as err:
+            answer = as_care_error(err)
+        if not self.cancelled:
+            receive(answer)
+
+    def check(self) -> None:
+        """Raise CancelledError when the work is not wanted any more."""
+        if self.cancelled:
+            raise CancelledError
+
+
+CAUSES = 10
+"""Most causes per fault in the app: more than a report shows, for here they scroll."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A diagnosis with what is needed to ask more about it."""
+
+    diagnosis: Diagnosis
+    options: tuple[Variable, ...] = ()
+    """Every option of the profile, in its order."""
+    schema: Schema | None = None
+    model: Model | None = None
+    question: Question | None = None
+    """The run ready to be asked what other options would have done."""
+    configs: tuple[str | Path, ...] = ()
+    """Configuration files that the operator named."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +109,22 @@ class Request:
 
 
 def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
-    """The whole line from a log file to its diagnosis. Raises CareError."""
+    """The answer alone, as `care triage` prints it. Raises CareError."""
+    return _answer(request, progress)[0]
+
+
+def open_case(request: Request, progress: Progress) -> Case:
+    """The answer with all that is needed to ask more about it. Raises CareError."""
+    from care_core.diagnose.whatif import question
+
+    diagnosis, profile, choice = _answer(request, progress)
+    asked = question(diagnosis.run, profile, choice, request.thresholds)
+    schema = profile.schema
+    return Case(diagnosis, schema.options, schema, profile.model, asked, request.configs)
+
+
+def _answer(request: Request, progress: Progress) -> tuple[Diagnosis, Profile, ProfileChoice]:
+    """The whole line from a log file to its diagnosis."""
     from care_core.logs import sniff
     from care_core.logs.digest import hashing
 
@@ -55,7 +134,7 @@ def diagnose_log(request: Request, progress: Progress) -> Diagnosis:
         return _diagnose(request, sha256, progress)
 
 
-def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> Diagnosis:
+def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> tuple[Diagnosis, Profile, ProfileChoice]:
     from care_core.configs import read_configs
     from care_core.diagnose.triage import triage
     from care_core.logs import open_log
@@ -63,7 +142,7 @@ def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> Diagnosis
     configs = read_configs(request.configs)
     progress("opening the log", 0.0)
     log, chosen, choice = open_and_choose(request.log, request.profile)
-    return triage(
+    diagnosis = triage(
         log,
         chosen,
         choice,
@@ -76,6 +155,7 @@ def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> Diagnosis
         progress=progress,
         sha256=sha256,
     )
+    return diagnosis, chosen, choice
 
 
 def open_and_choose(path: Path, profile: str | None) -> tuple[Log, Profile, ProfileChoice]:
@@ -102,23 +182,81 @@ def question_of(request: Request, progress: Progress) -> Question:
     )
 
 
-def diff_of(run: Run, fix: Fix) -> str:
-    """The configuration as driven against the suggested one, as a unified diff."""
+def predict(case: Case, changes: Mapping[str, float]) -> Fix:
+    """What these changes are predicted to bring; without any, what the same configuration would bring again."""
+    from care_core.diagnose.records import Fix
+
+    if case.question is None:
+        raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
+    answer = case.question.ask(changes)
+    predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
+    return Fix(answer.changes, answer.p_ok, predicted)
+
+
+def diff_of(case: Case, fix: Fix, side: DiffSide) -> str:
+    """A unified diff: what was driven, or the operator's files, against the suggestion; or one against the other."""
     from care_core.configs import unified_diff
 
-    return unified_diff(run, fix)
+    if side == "driven":
+        return unified_diff(case.diagnosis.run, fix)
+    if side == "file":
+        return _patch_of(case, fix)
+    return _file_against_driven(case)
+
+
+def _patch_of(case: Case, fix: Fix) -> str:
+    """The operator's files with the fix put in, comments and order kept."""
+    from difflib import unified_diff
+
+    from care_core.configs.edit import Wanted, apply_changes
+    from care_core.extract.settings import readable
+
+    wanted = [
+        Wanted(change.option, parameter, change.suggested)
+        for change in fix.changes
+        for parameter in readable(change.option)
+    ]
+    lines: list[str] = []
+    for file in apply_changes([str(name) for name in case.configs], wanted):
+        before, after = file.before.splitlines(), file.after.splitlines()
+        lines += unified_diff(before, after, f"a/{file.path}", f"b/{file.path}", lineterm="")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _file_against_driven(case: Case) -> str:
+    """What the files hold otherwise than the robot drove."""
+    from care_core.configs import read_configs, resolve
+    from care_core.configs.compare import Side, compare
+
+    settings = case.diagnosis.run.settings
+    held = resolve(read_configs(case.configs), settings)
+    found = compare(Side("as driven", {name: settings[name] for name in held if name in settings}), Side("file", held))
+    lines = [str(difference) for difference in found]
+    return "".join(f"{line}\n" for line in lines)
 
 
 def report_of(diagnosis: Diagnosis, format: ReportFormat) -> str:
     """The fix report in one of its formats."""
-    from care_core.report import build_document, to_json, to_markdown, to_yaml
+    from care_core.report import build_document, to_html, to_json, to_markdown, to_yaml
 
-    write = {"yaml": to_yaml, "markdown": to_markdown, "json": to_json}[format]
-    return write(build_document(diagnosis))
+    document = build_document(diagnosis)
+    if format == "patch":
+        return document.diff
+    write = {"yaml": to_yaml, "markdown": to_markdown, "html": to_html, "json": to_json}[format]
+    return write(document)
 
 
-def save_report(path: Path, text: str) -> None:
-    """Write the report; the file is whole or not there at all."""
+def commands_of(diagnosis: Diagnosis) -> list[str]:
+    """The shell or ground station commands that make the changes of the fix."""
+    from care_core.configs import apply_commands, format_for
+
+    if diagnosis.fix is None:
+        return []
+    return apply_commands(diagnosis.fix.changes, format_for(diagnosis.run.log.format, diagnosis.run.settings))
+
+
+def save_text(path: Path, text: str) -> None:
+    """Write a file; it is whole or not there at all."""
     from care_core.report import write_atomically
 
     write_atomically(path, text)
@@ -126,12 +264,14 @@ def save_report(path: Path, text: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Engine:
-    """Everything the app asks of care_core."""
+    """Everything the walk asks of care_core."""
 
-    diagnose: Callable[[Request, Progress], Diagnosis] = diagnose_log
-    diff: Callable[[Run, Fix], str] = diff_of
+    diagnose: Callable[[Request, Progress], Case] = open_case
+    predict: Callable[[Case, Mapping[str, float]], Fix] = predict
+    diff: Callable[[Case, Fix, DiffSide], str] = diff_of
     report: Callable[[Diagnosis, ReportFormat], str] = report_of
-    save: Callable[[Path, str], None] = save_report
+    commands: Callable[[Diagnosis], list[str]] = commands_of
+    save: Callable[[Path, str], None] = save_text
 
 
 def exit_code(diagnosis: Diagnosis) -> ExitCode:
@@ -143,15 +283,25 @@ def exit_code(diagnosis: Diagnosis) -> ExitCode:
 
 
 def fixes(diagnosis: Diagnosis) -> tuple[Fix, ...]:
-    """Every fix the operator can choose from, the suggested one first."""
+    """Every fix that the engine found, the suggested one first."""
     return () if diagnosis.fix is None else (diagnosis.fix, *diagnosis.alternatives)
 
 
-def with_fix(diagnosis: Diagnosis, index: int) -> Diagnosis:
-    """The diagnosis with another of its fixes as the suggested one."""
-    chosen = fixes(diagnosis)[index]
-    others = tuple(fix for fix in fixes(diagnosis) if fix is not chosen)
-    return replace(diagnosis, fix=chosen, alternatives=others)
+def decided(diagnosis: Diagnosis, fix: Fix | None, dismissed: Mapping[str, str]) -> Diagnosis:
+    """The diagnosis with what the operator made of it: the changes that are ticked, and the causes set aside."""
+    from care_core.diagnose.records import Dismissal
+
+    aside = tuple(Dismissal(option, reason) for option, reason in dismissed.items())
+    if fix is None or not fix.changes:
+        return replace(diagnosis, fix=None, alternatives=fixes(diagnosis), dismissed=aside)
+    wanted = changes_of(fix)
+    others = tuple(other for other in fixes(diagnosis) if changes_of(other) != wanted)
+    return replace(diagnosis, fix=fix, alternatives=others, dismissed=aside)
+
+
+def changes_of(fix: Fix) -> dict[str, float]:
+    """The fix as option to value."""
+    return {change.option.name: change.suggested for change in fix.changes}
 
 
 def as_care_error(err: Exception) -> CareError:

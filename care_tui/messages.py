@@ -1,13 +1,14 @@
-"""What screens, steps and workers tell each other: past-tense facts with a typed payload."""
+"""What screens, widgets and workers tell each other: past-tense facts with a typed payload."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from textual.message import Message
 
-from care_core.diagnose.records import Cause, Diagnosis
-from care_core.errors import CareError
+from care_tui.jobs import Job
 
 
 @dataclass
@@ -22,17 +23,12 @@ class Progressed(Message):
 
 
 @dataclass
-class DiagnosisReady(Message):
-    """The engine has an answer."""
+class Fetched(Message):
+    """A worker has an answer, or the CareError that says why it has none; `receive` takes it on the screen's side."""
 
-    diagnosis: Diagnosis
-
-
-@dataclass
-class DiagnosisFailed(Message):
-    """The engine has no answer."""
-
-    error: CareError
+    job: Job
+    receive: Callable[[Any], None]
+    answer: Any
 
 
 @dataclass
@@ -40,45 +36,3 @@ class StepChosen(Message):
     """The operator wants to see another step of the walk, counted from 1."""
 
     step: int
-
-
-@dataclass
-class ObjectiveChosen(Message):
-    """The operator wants the causes of an objective."""
-
-    index: int
-
-
-@dataclass
-class CauseChosen(Message):
-    """The operator wants the fix of a cause."""
-
-    cause: Cause
-
-
-@dataclass
-class FixChosen(Message):
-    """The operator looks at a fix, which diff and report follow; 0 is the suggested one."""
-
-    index: int
-
-
-@dataclass
-class DiffReady(Message):
-    """The diff of the chosen fix, or why there is none."""
-
-    text: str | CareError
-
-
-@dataclass
-class ReportReady(Message):
-    """The report in the chosen format, or why there is none."""
-
-    text: str | CareError
-
-
-@dataclass
-class ReportWritten(Message):
-    """Where the report went."""
-
-    path: str

@@ -179,6 +179,14 @@ class Since:
 
 
 @dataclass(frozen=True, slots=True)
+class Dismissal:
+    """A cause that the operator has set aside, and why."""
+
+    option: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Diagnosis:
     """The whole answer for one run. `fix` is None when nothing is broken or the engine abstains (`abstained`)."""
 
@@ -196,3 +204,4 @@ class Diagnosis:
     """What the run met that may explain the fault instead; only where no cause is sure."""
     tell_more: tuple[str, ...] = ()
     """What would tell more: a metric to record, an experiment; only where no cause is sure."""
+    dismissed: tuple[Dismissal, ...] = ()

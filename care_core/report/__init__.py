@@ -1,6 +1,7 @@
-"""A diagnosis as text, JSON, YAML and Markdown, and writing it to a file."""
+"""A diagnosis as text, JSON, YAML, Markdown and HTML, and writing it to a file."""
 
 from care_core.report.document import Report, TriageDocument, build_document, json_schema
+from care_core.report.html import to_html
 from care_core.report.reading import read_report
 from care_core.report.terminal import to_text
 from care_core.report.verification import VerifyDocument, verify_json, verify_log, verify_schema, verify_text
@@ -16,6 +17,7 @@ __all__ = [
     "json_schema",
     "published",
     "read_report",
+    "to_html",
     "to_json",
     "to_markdown",
     "to_text",

@@ -160,6 +160,13 @@ class CircumstanceEntry(Strict):
     text: str
 
 
+class DismissedEntry(Strict):
+    """A cause that the operator has set aside."""
+
+    option: str
+    reason: str
+
+
 class TriageDocument(Strict):
     """The answer for one run, as `care triage --json` prints it."""
 
@@ -186,6 +193,7 @@ class TriageDocument(Strict):
     evidence: list[EvidenceEntry] = Field(default_factory=list)
     rivals: list[CircumstanceEntry] = Field(default_factory=list)
     tell_more: list[str] = Field(default_factory=list)
+    dismissed: list[DismissedEntry] = Field(default_factory=list)
 
 
 class Report(TriageDocument):
@@ -235,6 +243,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
         evidence=[_evidence(evidence) for evidence in run.evidence],
         rivals=[_circumstance(rival) for rival in diagnosis.rivals],
         tell_more=[clean(advice) for advice in diagnosis.tell_more],
+        dismissed=[DismissedEntry(option=d.option, reason=clean(d.reason)) for d in diagnosis.dismissed],
         diff=unified_diff(run, diagnosis.fix) if diagnosis.fix is not None else "",
         apply=apply_commands(diagnosis.fix.changes, format_for(log.format, run.settings))
         if diagnosis.fix is not None

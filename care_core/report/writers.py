@@ -84,6 +84,7 @@ def _markdown(report: Report) -> Iterator[str]:
         yield from _since_section(report.since)
     yield from _listed("It may be no parameter", (f"{one.circumstance}: {one.text}" for one in report.rivals))
     yield from _listed("What would tell more", report.tell_more)
+    yield from _listed("Set aside by the operator", (f"{one.option}: {one.reason}" for one in report.dismissed))
     yield from _listed("Notes", report.notes)
     yield ""
     yield from _origin(report)

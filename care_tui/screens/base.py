@@ -10,21 +10,20 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 MIN_WIDTH, MIN_HEIGHT = 60, 20
-WIDE = 110
-"""From this width on, lists and what they explain stand side by side."""
+WIDE, HUGE = 110, 180
+"""From these widths on, lists and what they explain stand side by side, and the list gets more of the room."""
 
 
 class CareScreen(Screen[None]):
     """A screen that says so where the terminal is too small for it, and asks for nothing else there."""
 
     # Textual declares both as instance variables, so they cannot be ClassVar here.
-    HORIZONTAL_BREAKPOINTS = [(0, "-too-narrow"), (MIN_WIDTH, "-narrow"), (WIDE, "-wide")]  # noqa: RUF012
+    HORIZONTAL_BREAKPOINTS = [(0, "-too-narrow"), (MIN_WIDTH, "-narrow"), (WIDE, "-wide"), (HUGE, "-huge")]  # noqa: RUF012
     VERTICAL_BREAKPOINTS = [(0, "-too-low"), (MIN_HEIGHT, "-tall")]  # noqa: RUF012
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("tab", "app.focus_next", "Next pane", show=False, id="screen.next-pane"),
         Binding("shift+tab", "app.focus_previous", "Previous pane", show=False, id="screen.previous-pane"),
     ]
-    HELP_TEXT = ""
 
     def compose(self) -> ComposeResult:
         yield Static(
@@ -38,4 +37,4 @@ class CareScreen(Screen[None]):
 
     def help_text(self) -> str:
         """One or two sentences for the help screen on what can be done here."""
-        return self.HELP_TEXT
+        raise NotImplementedError

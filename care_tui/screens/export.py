@@ -17,7 +17,8 @@ from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError, UsageError
 from care_core.text import clean
 from care_tui.jobs import SUFFIXES, Engine, as_care_error
-from care_tui.messages import DiagnosisFailed, ReportWritten
+
+NAMES = ".yaml, .md, .html, .json or .patch"
 
 
 class OverwriteDialog(ModalScreen[bool]):
@@ -50,48 +51,37 @@ class ExportDialog(ModalScreen[str | None]):
         self._engine = engine
 
     def compose(self) -> ComposeResult:
-        box = Input(str(self._default), select_on_focus=False, compact=True, id="file-name")
+        box = Input(str(self._default), select_on_focus=False, compact=True, classes="box")
         box.cursor_blink = False
         with Vertical(classes="dialog small"):
             yield Static("Write the report to", classes="title", markup=False)
             yield box
-            yield Static("The name chooses the format: .yaml, .md or .json. Enter writes, Esc cancels.", classes="hint")
-            yield Static(id="export-error", markup=False)
+            yield Static(f"The name chooses the format: {NAMES}. Enter writes, Esc cancels.", classes="hint")
+            yield Static(classes="error", markup=False)
 
     @on(Input.Submitted)
-    async def _submit(self, event: Input.Submitted) -> None:
-        path = Path(event.value.strip()).expanduser()
+    def _submit(self, event: Input.Submitted) -> None:
+        event.stop()
+        self._export(Path(event.value.strip()).expanduser())
+
+    @work(exclusive=True, group="export")
+    async def _export(self, path: Path) -> None:
         if path.suffix.lower() not in SUFFIXES:
-            self._say(UsageError("The file name must end in .yaml, .md or .json."))
-        elif path.exists():
-            self._ask_then_write(path)
-        else:
-            self._write(path)
+            self._say(UsageError(f"The file name must end in {NAMES}."))
+        elif not path.exists() or await self.app.push_screen_wait(OverwriteDialog(path)):
+            error = await self._write(path).wait()
+            if error is None:
+                self.dismiss(str(path.absolute()))
+            else:
+                self._say(error)
 
-    @work(exclusive=True, group="ask")
-    async def _ask_then_write(self, path: Path) -> None:
-        if await self.app.push_screen_wait(OverwriteDialog(path)):
-            self._write(path)
-
-    @work(thread=True, exclusive=True, exit_on_error=False)
-    def _write(self, path: Path) -> None:
+    @work(thread=True, exclusive=True, group="write", exit_on_error=False)
+    def _write(self, path: Path) -> CareError | None:
         try:
-            text = self._engine.report(self._diagnosis, SUFFIXES[path.suffix.lower()])
-            self._engine.save(path, text)
+            self._engine.save(path, self._engine.report(self._diagnosis, SUFFIXES[path.suffix.lower()]))
         except Exception as err:
-            self.post_message(DiagnosisFailed(as_care_error(err)))
-        else:
-            self.post_message(ReportWritten(str(path.absolute())))
-
-    @on(ReportWritten)
-    def _finish(self, event: ReportWritten) -> None:
-        event.stop()
-        self.dismiss(event.path)
-
-    @on(DiagnosisFailed)
-    def _show_error(self, event: DiagnosisFailed) -> None:
-        event.stop()
-        self._say(event.error)
+            return as_care_error(err)
+        return None
 
     def _say(self, error: CareError) -> None:
-        self.query_one("#export-error", Static).update(Content.styled(f"! {clean(str(error))}", "bold $text-error"))
+        self.query_one(".error", Static).update(Content.styled(f"! {clean(str(error))}", "bold $text-error"))

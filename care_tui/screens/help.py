@@ -12,10 +12,11 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Static
 
-from care_tui.render import Row, Rows
+from care_tui.render.rows import Row, Rows
 from care_tui.widgets.lines import Lines
 
-Keys = Iterable[tuple[str, str]]
+Keys = Iterable[tuple[str, str, str]]
+"""Keys, what they do, and the id by which the settings give the action another key."""
 
 
 class HelpScreen(ModalScreen[None]):
@@ -31,10 +32,11 @@ class HelpScreen(ModalScreen[None]):
         self._keys = tuple(keys)
 
     def compose(self) -> ComposeResult:
-        width = max((len(key) for key, _ in self._keys), default=0) + 2
+        width = max((len(key) for key, _, _ in self._keys), default=0) + 2
         rows = [Row(Content(self._about)), Row(Content())]
         rows += [
-            Row(Content.assemble((f"{key:<{width}}", "bold $text-accent"), does), width) for key, does in self._keys
+            Row(Content.assemble((f"{key:<{width}}", "bold $text-accent"), f"{does:<22}", (id, "dim")), width)
+            for key, does, id in self._keys
         ]
         with Vertical(classes="dialog"):
             yield Static("Keys that work here (Esc closes)", classes="title", markup=False)

@@ -1,51 +1,56 @@
-"""The five steps of the walk, with the operator's place in them."""
+"""The six steps of the walk, with the operator's place in them: one line, one widget."""
 
 from __future__ import annotations
 
-from textual.app import ComposeResult
-from textual.containers import Horizontal
 from textual.content import Content
+from textual.events import Click
 from textual.widgets import Static
 
 from care_core.text import clean
 from care_tui.messages import StepChosen
-from care_tui.render import Glyphs
+from care_tui.render.rows import Glyphs
 
-STEPS = ("Objectives", "Causes", "Fix", "Diff", "Report")
-
-
-class StepTab(Static):
-    """One step; a click opens it."""
-
-    def __init__(self, number: int, glyphs: Glyphs) -> None:
-        super().__init__(classes="step-tab", markup=False)
-        self._number = number
-        self._glyphs = glyphs
-
-    def mark(self, current: bool) -> None:
-        """Show whether the operator is here, with a sign beside the colour."""
-        sign = self._glyphs.here if current else " "
-        self.update(Content(f"{sign}{self._number} {STEPS[self._number - 1]}"))
-        self.set_class(current, "-current")
-
-    def on_click(self) -> None:
-        self.post_message(StepChosen(self._number))
+STEPS = ("Log", "Objectives", "Causes", "Fix", "Diff", "Report")
 
 
-class StepBar(Horizontal):
+class StepBar(Static):
     """All steps in a row, and the name of the log where there is room."""
 
-    def __init__(self, log_name: str, glyphs: Glyphs) -> None:
-        super().__init__()
-        self._log_name = log_name
+    def __init__(self, glyphs: Glyphs) -> None:
+        super().__init__(markup=False)
         self._glyphs = glyphs
+        self._step = 1
+        self._log_name = ""
 
-    def compose(self) -> ComposeResult:
-        for number in range(1, len(STEPS) + 1):
-            yield StepTab(number, self._glyphs)
-        yield Static(Content(clean(self._log_name)), id="log-name")
+    def mark(self, step: int, log_name: str) -> None:
+        """Mark the step (counted from 1) as the operator's place, with a sign beside the style."""
+        self._step, self._log_name = step, clean(log_name)
+        self._draw()
 
-    def mark(self, step: int) -> None:
-        """Mark the step (counted from 1) as the operator's place."""
-        for number, tab in enumerate(self.query(StepTab), start=1):
-            tab.mark(number == step)
+    def on_resize(self) -> None:
+        self._draw()
+
+    def _tabs(self) -> list[str]:
+        return [
+            f"{self._glyphs.here if number == self._step else ' '}{number} {name} "
+            for number, name in enumerate(STEPS, start=1)
+        ]
+
+    def _draw(self) -> None:
+        tabs = self._tabs()
+        line = Content.assemble(
+            *((tab, "bold reverse" if number == self._step else "") for number, tab in enumerate(tabs, start=1))
+        )
+        room = self.size.width - line.cell_length - 2
+        name = Content(self._log_name)
+        if room >= min(name.cell_length, 12):
+            line += Content.styled(" " + name.right(room, ellipsis=True).plain, "dim")
+        self.update(line, layout=False)
+
+    def on_click(self, event: Click) -> None:
+        end = 0
+        for number, tab in enumerate(self._tabs(), start=1):
+            end += len(tab)
+            if event.x < end:
+                self.post_message(StepChosen(number))
+                return

@@ -15,7 +15,6 @@ from typing import Any
 import pytest
 
 from care_core.diagnose.records import Diagnosis
-from care_core.errors import UsageError
 from care_core.extract.table import ABOUT
 from care_core.profile.store import load_profile
 from care_tui import __version__, console
@@ -115,12 +114,11 @@ def test_the_newest_log_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[s
         path = tmp_path / name
         path.touch()
         os.utime(path, (age, age))
-    assert newest_log([tmp_path / "none", tmp_path]).name == "new.bag"
+    assert newest_log([tmp_path / "none", tmp_path]) == tmp_path / "new.bag"
     assert "now.bag.active is still being written" in capsys.readouterr().err
     (tmp_path / "new.bag").unlink()
-    assert newest_log([tmp_path]).name == "rosbag2_today"
-    with pytest.raises(UsageError, match="no log in the usual places"):
-        newest_log([tmp_path / "none"])
+    assert newest_log([tmp_path]) == tmp_path / "rosbag2_today"
+    assert newest_log([tmp_path / "none"]) is None
 
 
 def test_triage_prints_data_on_stdout_alone(care: Care, made: dict[str, Any]) -> None:

@@ -2,23 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
 from textual.pilot import Pilot
 
-from care_core.diagnose.records import Diagnosis, Fix
-from care_core.run import Run
+from care_core.diagnose.records import Change, Diagnosis, Fix
 from care_tui.app import CareApp
-from care_tui.jobs import Engine, Progress, ReportFormat, Request
+from care_tui.jobs import Case, DiffSide, Engine, Progress, ReportFormat, Request
+from care_tui.screens.panes import PanesScreen
+from care_tui.settings import Settings
+from tests.tui import sample_diagnosis as sample
 
 LOG = Path("/flights/00000042.BIN")
 MakeApp = Callable[..., CareApp]
 
 
-def fake_diff(run: Run, fix: Fix) -> str:
-    lines = ["--- as driven", "+++ suggested"]
+@pytest.fixture(autouse=True)
+def _nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hide the settings and the recent logs of whoever runs the tests."""
+    folder = tmp_path_factory.mktemp("home")
+    for name in ("XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_DATA_HOME"):
+        monkeypatch.setenv(name, str(folder))
+    monkeypatch.setenv("CARE_HISTORY", str(folder / "history.sqlite3"))
+    for name in ("NO_COLOR", "TEXTUAL_THEME", "TMUX", "SSH_CONNECTION"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def fake_predict(case: Case, changes: Mapping[str, float]) -> Fix:
+    """Half the odds for every change that is not LAND_SPEED to 50."""
+    options = {option.name: option for option in sample.OPTIONS}
+    made = tuple(Change(options[name], case.diagnosis.run.config.get(name, 0.0), to) for name, to in changes.items())
+    odds = 0.02 if not changes else 0.9 if changes.get("LAND_SPEED") == 50 else 0.45
+    return Fix(made, odds, sample.PREDICTED)
+
+
+def fake_diff(case: Case, fix: Fix, side: DiffSide) -> str:
+    lines = [f"--- {side}", "+++ suggested"]
     for change in fix.changes:
         lines += [f"-{change.option.name} {change.current:g}", f"+{change.option.name} {change.suggested:g}"]
     return "\n".join(lines)
@@ -27,30 +48,56 @@ def fake_diff(run: Run, fix: Fix) -> str:
 def fake_report(diagnosis: Diagnosis, format: ReportFormat) -> str:
     assert diagnosis.fix is None or diagnosis.fix.changes
     changes = () if diagnosis.fix is None else diagnosis.fix.changes
-    return "\n".join([f"report: {format}", *(f"  {change.option.name}: {change.suggested:g}" for change in changes)])
+    aside = [f"  aside: {entry.option}: {entry.reason}" for entry in diagnosis.dismissed]
+    return "\n".join(
+        [f"report: {format}", *(f"  {change.option.name}: {change.suggested:g}" for change in changes), *aside]
+    )
+
+
+def fake_commands(diagnosis: Diagnosis) -> list[str]:
+    changes = () if diagnosis.fix is None else diagnosis.fix.changes
+    return [f"param set {change.option.name} {change.suggested:g}" for change in changes]
+
+
+def fake_engine(diagnose: Callable[..., Case]) -> Engine:
+    return Engine(diagnose, fake_predict, fake_diff, fake_report, fake_commands)
 
 
 @pytest.fixture
 def make_app() -> MakeApp:
     """An app that shows a given diagnosis, or raises a given error instead."""
 
-    def make(outcome: Diagnosis | Exception, *, ascii: bool = False) -> CareApp:
-        def diagnose(request: Request, progress: Progress) -> Diagnosis:
+    def make(
+        outcome: Diagnosis | Exception,
+        *,
+        ascii: bool = False,
+        configs: tuple[Path, ...] = (),
+        settings: Settings | None = None,
+    ) -> CareApp:
+        def diagnose(request: Request, progress: Progress) -> Case:
             progress("reading the log", 0.5)
             if isinstance(outcome, Exception):
                 raise outcome
-            return outcome
+            return Case(outcome, sample.OPTIONS, configs=request.configs)
 
-        return CareApp(Request(LOG), engine=Engine(diagnose, fake_diff, fake_report), ascii=ascii)
+        settings = settings or Settings(ascii=ascii, places=())
+        return CareApp(Request(LOG, configs=configs), engine=fake_engine(diagnose), settings=settings)
 
     return make
 
 
 async def settle(pilot: Pilot[int], *keys: str) -> None:
     """Press keys one by one, each after the work of the one before is shown."""
-    await pilot.app.workers.wait_for_complete()
-    await pilot.pause()
+    await quiet(pilot)
     for key in keys:
         await pilot.press(key)
-        await pilot.app.workers.wait_for_complete()
-        await pilot.pause()
+        await quiet(pilot)
+
+
+async def quiet(pilot: Pilot[int]) -> None:
+    """Wait for the workers of every screen, and for what they bring to be shown."""
+    await pilot.pause()
+    await pilot.app.workers.wait_for_complete()
+    while any(isinstance(screen, PanesScreen) and screen.is_busy for screen in pilot.app.screen_stack):
+        await pilot.pause(0.005)
+    await pilot.pause()

@@ -140,6 +140,7 @@ SWITCHED = replace(
     path=(PathNode("ARMING_MODE", "", 1.0, 0.0, effect=None, support=None), FLIES_SLOWLY.path[-1]),
 )
 
+OPTIONS = (LAND_SPEED, WPNAV_SPEED, BRD_TYPE)
 PREDICTED = {
     "success": Prediction(1.0, 1.0, 1.0, 0.99),
     "mission_time": Prediction(139.0, 131.0, 148.0, 0.93),

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input, Static
 
-from care_tui.screens.diagnosis import DiagnosisScreen
 from care_tui.screens.export import ExportDialog, OverwriteDialog
+from care_tui.screens.walk import WalkScreen
 from care_tui.widgets.lines import Lines
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, settle
@@ -24,7 +24,9 @@ def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ([], "00000042.care.yaml", "report: yaml"),
         (["f"], "00000042.care.md", "report: markdown"),
-        (["f", "f"], "00000042.care.json", "report: json"),
+        (["f", "f"], "00000042.care.html", "report: html"),
+        (["f", "f", "f"], "00000042.care.json", "report: json"),
+        (["f", "f", "f", "f"], "00000042.care.patch", "report: patch"),
     ],
 )
 async def test_export_writes_the_format_in_view_beside_the_operator(
@@ -32,12 +34,12 @@ async def test_export_writes_the_format_in_view_beside_the_operator(
 ) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(120, 24)) as pilot:
-        await settle(pilot, "5", *formats)
-        assert app.screen.query_one("#report", Lines).plain.startswith(start)
+        await settle(pilot, "6", *formats)
+        assert app.screen.query_one("#text", Lines).plain.startswith(start)
         await settle(pilot, "e", "enter")
-        assert isinstance(app.screen, DiagnosisScreen)
+        assert isinstance(app.screen, WalkScreen)
         assert (tmp_path / name).read_text().startswith(start)
-        assert str(tmp_path / name) in str(app.screen.query_one("#step-5 .title", Static).content)
+        assert str(tmp_path / name) in str(app.screen.query_one(".title", Static).content)
 
 
 @pytest.mark.parametrize(("answer", "replaced"), [("y", True), ("n", False), ("escape", False)])
@@ -48,36 +50,36 @@ async def test_an_existing_file_is_replaced_only_when_asked_for(
     target.write_text("precious")
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "5", "e")
+        await settle(pilot, "6", "e")
         await pilot.press("enter")
         await pilot.pause()
         assert isinstance(app.screen, OverwriteDialog)
         await pilot.press(answer)
         await settle(pilot)
-        assert isinstance(app.screen, DiagnosisScreen if replaced else ExportDialog)
+        assert isinstance(app.screen, WalkScreen if replaced else ExportDialog)
     assert (target.read_text() != "precious") is replaced
 
 
 async def test_another_name_can_be_given_and_a_wrong_one_is_explained(make_app: MakeApp, tmp_path: Path) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "5", "e")
+        await settle(pilot, "6", "e")
         box = app.screen.query_one(Input)
         box.value = "report.txt"
         await settle(pilot, "enter")
-        assert ".yaml, .md or .json" in str(app.screen.query_one("#export-error", Static).content)
+        assert ".yaml, .md, .html" in str(app.screen.query_one(".error", Static).content)
         box.value = "missing/folder.md"
         await settle(pilot, "enter")
-        assert "No such file" in str(app.screen.query_one("#export-error", Static).content)
+        assert "No such file" in str(app.screen.query_one(".error", Static).content)
         box.value = "mine.json"
         await settle(pilot, "enter")
-        assert isinstance(app.screen, DiagnosisScreen)
+        assert isinstance(app.screen, WalkScreen)
     assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["mine.json"]
 
 
 async def test_escape_leaves_without_writing(make_app: MakeApp, tmp_path: Path) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "5", "e", "escape")
-        assert isinstance(app.screen, DiagnosisScreen)
+        await settle(pilot, "6", "e", "escape")
+        assert isinstance(app.screen, WalkScreen)
     assert not [path for path in tmp_path.iterdir() if path.is_file()]

@@ -29,8 +29,8 @@ def press(*keys: str) -> Callable[[Pilot[Any]], Awaitable[None]]:
 @pytest.mark.parametrize("size", SIZES, ids=["80x24", "120x40"])
 @pytest.mark.parametrize(
     "keys",
-    [(), ("2",), ("3", "j"), ("4",), ("5",)],
-    ids=["objectives", "causes", "fix", "diff", "report"],
+    [("1",), ("2",), ("3",), ("4", "j"), ("5",), ("6",)],
+    ids=["log", "objectives", "causes", "fix", "diff", "report"],
 )
 def test_steps(snap_compare: SnapCompare, make_app: MakeApp, size: tuple[int, int], keys: tuple[str, ...]) -> None:
     assert snap_compare(make_app(sample.faulty()), terminal_size=size, run_before=press(*keys))
@@ -43,7 +43,7 @@ def test_other_verdicts(snap_compare: SnapCompare, make_app: MakeApp, kind: str)
 
 
 def test_smallest_terminal(snap_compare: SnapCompare, make_app: MakeApp) -> None:
-    assert snap_compare(make_app(sample.faulty()), terminal_size=(60, 20), run_before=press("2"))
+    assert snap_compare(make_app(sample.faulty()), terminal_size=(60, 20), run_before=press("3"))
 
 
 def test_too_small_terminal(snap_compare: SnapCompare, make_app: MakeApp) -> None:
@@ -51,7 +51,7 @@ def test_too_small_terminal(snap_compare: SnapCompare, make_app: MakeApp) -> Non
 
 
 def test_ascii(snap_compare: SnapCompare, make_app: MakeApp) -> None:
-    assert snap_compare(make_app(sample.faulty(), ascii=True), terminal_size=(80, 24), run_before=press("2"))
+    assert snap_compare(make_app(sample.faulty(), ascii=True), terminal_size=(80, 24), run_before=press("3"))
 
 
 def test_no_colour(snap_compare: SnapCompare, make_app: MakeApp, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,11 +60,11 @@ def test_no_colour(snap_compare: SnapCompare, make_app: MakeApp, monkeypatch: py
 
 
 def test_help(snap_compare: SnapCompare, make_app: MakeApp) -> None:
-    assert snap_compare(make_app(sample.faulty()), terminal_size=(80, 24), run_before=press("2", "question_mark"))
+    assert snap_compare(make_app(sample.faulty()), terminal_size=(80, 24), run_before=press("3", "question_mark"))
 
 
 def test_export_dialog(snap_compare: SnapCompare, make_app: MakeApp) -> None:
-    assert snap_compare(make_app(sample.faulty()), terminal_size=(80, 24), run_before=press("5", "e"))
+    assert snap_compare(make_app(sample.faulty()), terminal_size=(80, 24), run_before=press("6", "e"))
 
 
 def test_error(snap_compare: SnapCompare, make_app: MakeApp) -> None:

@@ -1,81 +1,85 @@
-"""Loading, cancelling and failing."""
+"""Loading, cancelling, failing, and having no log at all."""
 
 from __future__ import annotations
 
+import os
 import threading
+from pathlib import Path
 
 import pytest
-from textual.widgets import Static
+from textual import events
 
-from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError, ExitCode, LogError, ProfileError
 from care_tui.app import CareApp
-from care_tui.jobs import Engine, Progress, Request
-from care_tui.screens.diagnosis import DiagnosisScreen
-from care_tui.screens.loading import ErrorScreen, LoadingScreen
-from care_tui.widgets.lines import Lines
+from care_tui.jobs import Case, Engine, Job, Progress, Request
+from care_tui.places import as_path, entries, found_logs, recent_logs, remember
+from care_tui.screens.open_log import OpenLogDialog
+from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
-from tests.tui.conftest import LOG, MakeApp, fake_diff, fake_report, settle
+from tests.tui.conftest import LOG, MakeApp, fake_engine, fake_predict, fake_report, settle
+from tests.tui.test_walk import hints, items, text, title, walk
 
 
 class SlowEngine:
-    """Reports its first step, then waits to be let go, and reports again."""
+    """Reports its first step, then works on without a word until it is let go."""
 
     def __init__(self) -> None:
         self.reached = threading.Event()
         self.go_on = threading.Event()
         self.finished = False
 
-    def diagnose(self, request: Request, progress: Progress) -> Diagnosis:
+    def diagnose(self, request: Request, progress: Progress) -> Case:
         progress("reading \x1b[31m[red]the log", 0.25)
         self.reached.set()
-        assert self.go_on.wait(5)
-        progress("ranking the causes", 0.7)
+        self.go_on.wait(5)
         self.finished = True
-        return sample.faulty()
+        return Case(sample.faulty(), sample.OPTIONS)
 
 
 def slow_app() -> tuple[CareApp, SlowEngine]:
     slow = SlowEngine()
-    return CareApp(Request(LOG), engine=Engine(slow.diagnose, fake_diff, fake_report)), slow
+    return CareApp(Request(LOG), engine=fake_engine(slow.diagnose), settings=Settings(places=())), slow
 
 
-async def test_loading_shows_step_and_share_done() -> None:
+async def test_loading_shows_step_and_share_done_on_every_step() -> None:
     app, slow = slow_app()
     async with app.run_test(size=(80, 24)) as pilot:
         slow.reached.wait(5)
-        await pilot.pause()
-        assert isinstance(app.screen, LoadingScreen)
-        assert str(app.screen.query_one("#step", Static).content) == r"reading \x1b[31m[red]the log"
-        assert "25 %" in str(app.screen.query_one("#progress", Static).content)
+        await pilot.pause(0.1)
+        assert r"reading \x1b[31m[red]the log" in text(app)
+        assert "25 %" in text(app)
+        for step in "23456":
+            await pilot.press(step)
+            await pilot.pause()
+            assert "25 %" in text(app)
         slow.go_on.set()
         await settle(pilot)
-        assert isinstance(app.screen, DiagnosisScreen)
+        assert walk(app).step == 6, "the operator is left where they are"
+        assert text(app).startswith("report: yaml")
 
 
-async def test_escape_cancels_and_r_starts_again() -> None:
+async def test_escape_stops_work_that_never_reports_and_r_starts_again() -> None:
     app, slow = slow_app()
     async with app.run_test(size=(80, 24)) as pilot:
         slow.reached.wait(5)
         await pilot.press("escape")
-        assert isinstance(app.screen, ErrorScreen)
+        await pilot.pause()
+        assert "was stopped" in text(app), "at once, whatever the work is doing"
         slow.go_on.set()
         await pilot.pause(0.1)
-        assert isinstance(app.screen, ErrorScreen), "a late answer is ignored"
-        assert not slow.finished
+        assert "was stopped" in text(app), "a late answer is ignored"
         await settle(pilot, "r")
         await settle(pilot)
-        assert isinstance(app.screen, DiagnosisScreen)
+        assert walk(app).step == 2
         assert app.code == ExitCode.FAULT
 
 
 @pytest.mark.parametrize("key", ["q", "ctrl+c"])
-async def test_leaving_while_loading_is_an_interruption(key: str) -> None:
+async def test_leaving_while_loading_is_an_interruption_and_waits_for_nothing(key: str) -> None:
     app, slow = slow_app()
     async with app.run_test(size=(80, 24)) as pilot:
         slow.reached.wait(5)
         await pilot.press(key)
-        slow.go_on.set()
     assert app.return_value == ExitCode.INTERRUPTED
     assert not slow.finished
 
@@ -85,33 +89,167 @@ async def test_leaving_while_loading_is_an_interruption(key: str) -> None:
     [
         (LogError("Not a log: [red]PK\x1b[31m.", hint="Give the .BIN file.", where="a.BIN"), ExitCode.UNREADABLE),
         (ProfileError("No profile fits the log.", hint="See 'care profiles'."), ExitCode.USAGE),
+        (ZeroDivisionError("division by zero"), ExitCode.USAGE),
     ],
 )
-async def test_an_error_says_what_is_wrong_and_what_to_do(make_app: MakeApp, error: CareError, code: ExitCode) -> None:
+async def test_an_error_says_what_is_wrong_and_what_to_do(make_app: MakeApp, error: Exception, code: ExitCode) -> None:
     app = make_app(error)
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        text = app.screen.query_one("#error", Lines).plain
-        assert error.hint in text
-        assert error.message.replace("\x1b", "\\x1b") in text
+        for step in "123456":
+            await settle(pilot, step)
+            assert str(error.args[0]).replace("\x1b", "\\x1b") in text(app)
+            assert getattr(error, "hint", "please report it") in text(app)
+            await settle(pilot, "a", "d", "space", "plus", "c", "f", "u")
         await pilot.press("q")
     assert app.return_value == code
 
 
-async def test_a_defect_is_shown_not_thrown(make_app: MakeApp) -> None:
-    app = make_app(ZeroDivisionError("division by zero"))
-    async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot)
-        assert "ZeroDivisionError" in app.screen.query_one("#error", Lines).plain
-        await pilot.press("q")
-    assert app.return_value == ExitCode.USAGE
-
-
-async def test_a_diff_that_fails_is_shown_in_its_step() -> None:
-    def no_diff(run: object, fix: object) -> str:
+async def test_a_step_whose_work_fails_shows_that_and_the_others_go_on() -> None:
+    def fails(*_: object) -> str:
         raise CareError("No configuration format.", hint="Report it.")
 
-    app = CareApp(Request(LOG), engine=Engine(lambda *_: sample.faulty(), no_diff, fake_report))
+    def diagnose(*_: object) -> Case:
+        return Case(sample.faulty(), sample.OPTIONS)
+
+    app = CareApp(Request(LOG), engine=Engine(diagnose, fake_predict, fails, fake_report), settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "4")
-        assert "No configuration format." in app.screen.query_one("#diff", Lines).plain
+        await settle(pilot, "5")
+        assert "No configuration format." in text(app)
+        await settle(pilot, "6")
+        assert text(app).startswith("report: yaml")
+    app = CareApp(Request(LOG), engine=Engine(diagnose, fails, fails, fake_report), settings=Settings(places=()))  # type: ignore[arg-type]
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "4", "space")
+        assert "No configuration format." in text(app)
+        assert "No prediction" in title(app)
+
+
+async def test_without_a_log_the_first_step_lists_what_there_is(make_app: MakeApp, tmp_path: Path) -> None:
+    (tmp_path / "old.BIN").write_bytes(b"x")
+    app = CareApp(
+        engine=fake_engine(lambda *_: Case(sample.faulty(), sample.OPTIONS)), settings=Settings(places=(tmp_path,))
+    )
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        assert walk(app).step == 1
+        assert "old.BIN" in items(app)
+        await settle(pilot, "3")
+        assert "No log is open" in text(app)
+        (tmp_path / "new.BIN").write_bytes(b"xy")
+        await settle(pilot, "1", "R")
+        assert "new.BIN" in items(app)
+        await settle(pilot, "enter")
+        await settle(pilot)
+        assert walk(app).step == 2
+    assert recent_logs()[0].name in ("old.BIN", "new.BIN")
+
+
+async def test_with_no_log_anywhere_it_says_where_it_looked(tmp_path: Path) -> None:
+    app = CareApp(settings=Settings(places=(tmp_path,)))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        assert str(tmp_path)[:20] in text(app)
+        await settle(pilot, "q")
+    assert app.return_value == ExitCode.OK
+
+
+async def test_o_opens_any_log_by_its_path(make_app: MakeApp, tmp_path: Path) -> None:
+    folder = tmp_path / "flights"
+    folder.mkdir()
+    (folder / "a.BIN").write_bytes(b"x")
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "1", "o")
+        assert isinstance(app.screen, OpenLogDialog)
+        box = app.screen.query_one("Input")
+        box.value = f"{tmp_path}/fli"  # type: ignore[attr-defined]
+        await settle(pilot, "tab")
+        assert box.value == f"{folder}/"  # type: ignore[attr-defined]
+        await settle(pilot, "down", "up", "enter")
+        await settle(pilot)
+        assert walk(app).session.path == folder / "a.BIN"
+        await settle(pilot, "1", "o")
+        app.screen.query_one("Input").value = "/nowhere/x.BIN"  # type: ignore[attr-defined]
+        await settle(pilot, "enter")
+        assert "no such file" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]
+        await settle(pilot, "escape")
+        assert walk(app).step == 1
+
+
+async def test_a_file_dropped_on_the_terminal_is_opened(make_app: MakeApp, tmp_path: Path) -> None:
+    log = tmp_path / "with space.BIN"
+    log.write_bytes(b"x")
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        app.post_message(events.Paste(str(log).replace(" ", "\\ ")))
+        await settle(pilot)
+        await settle(pilot)
+        assert walk(app).session.path == log
+
+
+def test_paths_are_read_as_terminals_write_them(tmp_path: Path) -> None:
+    tmp_path = tmp_path / "logs"
+    tmp_path.mkdir()
+    log = tmp_path / "a b.BIN"
+    log.write_bytes(b"x")
+    for typed in (str(log), f"'{log}'", f'"{log}"', str(log).replace(" ", "\\ "), f"file://{tmp_path}/a%20b.BIN"):
+        assert as_path(f" {typed}\n") == log
+    (tmp_path / ".hidden").mkdir()
+    (tmp_path / "notes.txt").write_text("x")
+    assert entries(f"{tmp_path}/") == [log]
+
+
+def test_found_logs_are_the_newest_first_with_those_opened_before(tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.mkdir()
+    for age, log in enumerate((tmp_path / "a.BIN", tmp_path / "b.bag", other / "c.BIN")):
+        log.write_bytes(b"x")
+        os.utime(log, (1e9 - age, 1e9 - age))
+    remember(other / "c.BIN")
+    remember(tmp_path / "gone.BIN")
+    assert [(log.path.name, log.is_recent) for log in found_logs([tmp_path, tmp_path / "missing"])] == [
+        ("a.BIN", False),
+        ("b.bag", False),
+        ("c.BIN", True),
+    ]
+
+
+def test_a_job_that_is_cancelled_ends_at_its_next_check_and_its_answer_is_dropped() -> None:
+    ended: list[str] = []
+    started, go_on, over = threading.Event(), threading.Event(), threading.Event()
+
+    def work(job: Job) -> None:
+        started.set()
+        go_on.wait(5)
+        try:
+            job.check()
+        except Exception:  # as a reader that takes every error for damage
+            ended.append("swallowed")
+        finally:
+            over.set()
+        ended.append("went on")
+
+    job = Job()
+    job.start(work, lambda _answer: ended.append("answered"))
+    started.wait(5)
+    job.cancelled = True
+    go_on.set()
+    assert over.wait(5)
+    assert ended == []
+
+
+async def test_copying_sends_osc_52_and_leaves_a_file(make_app: MakeApp, monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[str] = []
+    app = make_app(sample.faulty())
+    monkeypatch.setattr(app, "write_control", sent.append)
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot, "6", "c")
+        name = hints(app).rsplit(" ", 1)[1]
+        assert Path(name).read_text() == "param set LAND_SPEED 50\n"
+        Path(name).unlink()
+        await settle(pilot, "5", "c")
+        Path(hints(app).rsplit(" ", 1)[1]).unlink()
+    assert len(sent) == 2
+    assert sent[0].startswith("\x1b]52;c;")

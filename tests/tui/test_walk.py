@@ -1,120 +1,224 @@
-"""The walk through the steps, by keyboard."""
+"""The walk through the six steps, by keyboard."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
-from textual.widgets import ContentSwitcher
 
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import ExitCode
 from care_tui.app import CareApp
-from care_tui.screens.diagnosis import DiagnosisScreen
+from care_tui.screens.export import ExportDialog, OverwriteDialog
 from care_tui.screens.help import HelpScreen
+from care_tui.screens.open_log import OpenLogDialog
+from care_tui.screens.panes import PanesScreen
+from care_tui.screens.prompt import Prompt
+from care_tui.screens.walk import WalkScreen
+from care_tui.settings import Settings
 from care_tui.widgets.choices import Choices
+from care_tui.widgets.filter_bar import FilterBar
 from care_tui.widgets.lines import Lines
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, settle
 
 
-def shown(app: CareApp, selector: str) -> str:
-    return app.screen.query_one(selector, Lines).plain
+def walk(app: CareApp) -> WalkScreen:
+    assert isinstance(app.screen, WalkScreen)
+    return app.screen
 
 
-def step(app: CareApp) -> str | None:
-    return app.screen.query_one(ContentSwitcher).current
+def title(app: CareApp) -> str:
+    return str(app.screen.query_one(".title").content)  # type: ignore[attr-defined]
 
 
-async def test_enter_leads_from_the_objective_to_the_report(make_app: MakeApp) -> None:
+def text(app: CareApp) -> str:
+    return app.screen.query_one("#text", Lines).plain
+
+
+def items(app: CareApp) -> str:
+    return app.screen.query_one("#list", Choices).plain
+
+
+def hints(app: CareApp) -> str:
+    return str(app.screen.query_one("KeyHints").content)  # type: ignore[attr-defined]
+
+
+async def test_enter_leads_from_the_objective_to_the_export(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        assert isinstance(app.screen, DiagnosisScreen)
-        assert app.screen.query_one("#objective-list", Choices).highlighted == 1, "starts at the first fault"
-        visited = [step(app)]
+        assert walk(app).step == 2
+        assert walk(app).choices.highlighted == 1, "starts at the first fault"
+        visited = []
         for _ in range(4):
             await settle(pilot, "enter")
-            visited.append(step(app))
-        assert visited == [f"step-{number}" for number in range(1, 6)]
-        await settle(pilot, "escape", "escape")
-        assert step(app) == "step-3"
+            visited.append(walk(app).step)
+        assert visited == [3, 4, 5, 6]
+        await settle(pilot, "enter")
+        assert isinstance(app.screen, ExportDialog)
+        await settle(pilot, "escape", "escape", "escape")
+        assert walk(app).step == 4
 
 
 async def test_digits_and_sideways_keys_move_between_steps(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "4")
-        assert step(app) == "step-4"
+        await settle(pilot, "5")
+        assert walk(app).step == 5
         await settle(pilot, "h", "left")
-        assert step(app) == "step-2"
+        assert walk(app).step == 3
         await settle(pilot, "l", "right", "right", "right", "right")
-        assert step(app) == "step-5"
-        await settle(pilot, "1")
-        assert step(app) == "step-1"
-        assert app.focused is app.screen.query_one("#objective-list")
+        assert walk(app).step == 6
+        for number in range(1, 7):
+            await settle(pilot, str(number))
+            assert walk(app).step == number
+            assert f"▸{number} " in str(app.screen.query_one("StepBar").content)  # type: ignore[attr-defined]
 
 
-async def test_the_first_step_tells_all_three_states_and_where_the_run_came_from(make_app: MakeApp) -> None:
+async def test_the_objectives_tell_all_three_states_and_where_the_run_came_from(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(120, 40)) as pilot:
         await settle(pilot)
-        text = shown(app, "#run-summary")
         for fact in ("00000042.BIN", "1 of 2", "arducopter 1.0", "31 of 31", "4.3.6", "byte 1048576", "Land: slow"):
-            assert fact in text
+            assert fact in text(app)
+        assert "2 outside, 1 within their thresholds, 1 not evaluated" in title(app)
+        for line in ("✓ OK", "✗ FAULT          mission_time", "? NOT EVALUATED  path_error"):
+            assert line in items(app)
+        await settle(pilot, "G")
+        assert "LOG_BITMASK" in text(app)
 
 
 async def test_the_path_follows_the_highlighted_cause(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "2")
-        path = shown(app, "#causal-path")
-        assert "LAND_SPEED    16 cm/s  (expected 50)" in path
-        assert "effect -0.81, in 97 % of resamples" in path
-        assert "outside the training support" in path
+        await settle(pilot, "3")
+        assert "LAND_SPEED    16 cm/s  (expected 50)" in text(app)
+        assert "effect -0.81, in 97 % of resamples" in text(app)
+        assert "outside the training support" in text(app)
+        assert "Runner-up     WPNAV_SPEED, costs 6 %" in text(app)
         await settle(pilot, "j")
-        assert "WPNAV_SPEED" in shown(app, "#causal-path")
-        assert "! few" in shown(app, "#causal-path")
+        assert "WPNAV_SPEED" in text(app)
+        assert "! few" in text(app)
         await settle(pilot, "G")
-        assert "1 (on)  (expected 0 (off))" in shown(app, "#causal-path")
+        assert "1 (on)  (expected 0 (off))" in text(app)
         await settle(pilot, "down", "g")
-        assert "LAND_SPEED" in shown(app, "#causal-path")
+        assert "● LAND_SPEED" in text(app)
 
 
 async def test_o_shows_the_causes_of_the_next_fault(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "2", "o")
-        assert app.screen.query_one("#cause-list", Choices).option_count == 1
+        await settle(pilot, "3", "o")
+        assert walk(app).choices.option_count == 1
+        assert "Causes of energy  (2 of 2 faults" in title(app)
         await settle(pilot, "o")
-        assert app.screen.query_one("#cause-list", Choices).option_count == 3
+        assert walk(app).choices.option_count == 3
 
 
-async def test_the_chosen_fix_goes_into_diff_and_report(make_app: MakeApp) -> None:
+async def test_a_cause_set_aside_leaves_the_fix_and_its_reason_is_in_the_report(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "3")
-        assert "reboot" not in shown(app, "#fix-detail")
-        await settle(pilot, "j")
-        assert "! reboot needed" in shown(app, "#fix-detail")
-        assert "NOT EVALUATED  no prediction" in shown(app, "#fix-detail")
+        await settle(pilot, "3", "d")
+        assert isinstance(app.screen, Prompt)
+        await settle(pilot, *"slow on purpose", "enter")
+        assert "set aside: slow on purpose" in items(app)
+        assert "taken out of the fix" in hints(app)
+        await settle(pilot, "6")
+        assert text(app) == "report: yaml\n  aside: LAND_SPEED: slow on purpose"
+        await settle(pilot, "3", "d", "6")
+        assert text(app) == "report: yaml", "d takes it back; the fix stays as the operator left it"
+
+
+async def test_the_boxes_decide_the_odds_and_what_diff_and_report_hold(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4")
-        assert "+LAND_SPEED 45" in shown(app, "#diff")
-        assert "-WPNAV_SPEED 1000" in shown(app, "#diff")
+        assert "91 %  (as driven 2 %)  1 change" in title(app)
+        assert "[x] LAND_SPEED   16 → 50 cm/s" in items(app)
+        assert "[ ] WPNAV_SPEED  1000 → 1400 cm/s" in items(app)
+        await settle(pilot, "space")
+        assert "nothing ticked" in title(app)
+        assert "[ ] LAND_SPEED" in items(app)
+        await settle(pilot, "j", "space")
+        assert "45 %" in title(app)
+        assert "! reboot" in items(app)
         await settle(pilot, "5")
-        assert shown(app, "#report") == "report: yaml\n  LAND_SPEED: 45\n  WPNAV_SPEED: 1400"
+        assert text(app) == "--- driven\n+++ suggested\n-WPNAV_SPEED 1000\n+WPNAV_SPEED 1400"
+        await settle(pilot, "6")
+        assert text(app) == "report: yaml\n  WPNAV_SPEED: 1400"
 
 
-async def test_enter_on_a_cause_opens_the_fix_that_changes_it(make_app: MakeApp) -> None:
+async def test_u_takes_every_change_of_the_basket_back(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "2", "j", "enter")
-        assert step(app) == "step-3"
-        assert app.screen.query_one("#fix-list", Choices).highlighted == 1
+        await settle(pilot, "4", "space", "j", "space", "plus", "a")
+        basket = walk(app).session.basket
+        assert basket.values["WPNAV_SPEED"] > 1400
+        await settle(pilot, "u", "u", "u", "u")
+        assert basket.ticked == {"LAND_SPEED": 50.0}
+        await settle(pilot, "u")
+        assert "nothing to take back" in hints(app)
+
+
+async def test_a_and_s_load_the_alternatives_and_the_suggestion(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "4", "a")
+        assert walk(app).session.basket.ticked == {"LAND_SPEED": 45.0, "WPNAV_SPEED": 1400.0}
+        assert "alternative 1 of 1" in hints(app)
+        await settle(pilot, "a")
+        assert walk(app).session.basket.ticked == {"LAND_SPEED": 50.0}
+        await settle(pilot, "space", "s")
+        assert walk(app).session.basket.ticked == {"LAND_SPEED": 50.0}
+
+
+async def test_values_are_nudged_and_typed_and_only_acceptable_ones_taken(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "4", "minus")
+        assert walk(app).session.basket.ticked["LAND_SPEED"] < 50
+        await settle(pilot, "plus", "plus")
+        assert walk(app).session.basket.ticked["LAND_SPEED"] > 50
+        await settle(pilot, "equals_sign", "9", "9", "9", "enter")
+        assert isinstance(app.screen, Prompt), "999 is beyond the range"
+        assert "from 30 to 200 cm/s" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]
+        await settle(pilot, "backspace", "enter")
+        assert walk(app).session.basket.ticked["LAND_SPEED"] == 99
+        await settle(pilot, "i", "escape")
+        assert walk(app).session.basket.ticked["LAND_SPEED"] == 99
+
+
+async def test_slash_filters_and_escape_clears(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "4", "slash", *"wpn")
+        assert walk(app).choices.option_count == 1
+        assert "WPNAV_SPEED" in text(app), "the text follows what is left"
+        await settle(pilot, "enter", "space")
+        assert "WPNAV_SPEED" in walk(app).session.basket.ticked, "keys work on what is left"
+        await settle(pilot, "escape")
+        assert walk(app).choices.option_count == 3
+        assert walk(app).step == 4
+        await settle(pilot, "5", "slash", *"suggested")
+        assert text(app) == "+++ suggested"
+        await settle(pilot, "escape")
+        assert "-LAND_SPEED 16" in text(app)
+        assert app.screen.query_one(FilterBar).display is False
+
+
+async def test_enter_on_a_cause_opens_the_fix_at_its_option(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3", "j", "enter")
+        assert walk(app).step == 4
+        assert walk(app).choices.highlighted == 1
 
 
 @pytest.mark.parametrize(
     ("diagnosis", "causes", "fix"),
     [
-        (sample.all_ok(), "nothing to explain", "nothing to change"),
+        (sample.all_ok(), "nothing to explain", "No fault was found"),
         (sample.abstaining(), "mean lean 19 deg", "mean lean 19 deg"),
         (sample.not_evaluated(), "nothing to explain", "not everything could be evaluated"),
     ],
@@ -124,54 +228,79 @@ async def test_without_a_cause_every_step_says_why(
 ) -> None:
     app = make_app(diagnosis)
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "2")
-        assert causes in shown(app, "#causal-path")
         await settle(pilot, "3")
-        assert fix in shown(app, "#fix-detail")
+        assert causes in text(app)
         await settle(pilot, "4")
-        assert fix in shown(app, "#diff")
+        assert fix in text(app)
         await settle(pilot, "5")
-        assert shown(app, "#report") == "report: yaml"
+        assert fix in text(app)
+        await settle(pilot, "6")
+        assert text(app) == "report: yaml"
+        await settle(pilot, "c")
+        assert "no commands" in hints(app)
 
 
 async def test_an_objective_that_was_not_evaluated_has_no_causes_but_a_reason(make_app: MakeApp) -> None:
     app = make_app(sample.not_evaluated())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "G", "enter")
-        assert "LOG_BITMASK" in shown(app, "#causal-path")
+        assert "LOG_BITMASK" in text(app)
+
+
+async def test_f_turns_the_diff_to_the_file_on_disk(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty(), configs=(Path("robot.param"),))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "5")
+        for side in ("driven", "file", "changed", "driven"):
+            assert text(app).startswith(f"--- {side}")
+            await settle(pilot, "f")
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "5", "f")
+        assert "--config" in hints(app)
 
 
 @pytest.mark.parametrize("key", ["question_mark", "f1"])
-async def test_help_lists_the_keys_that_work_here(make_app: MakeApp, key: str) -> None:
+async def test_help_lists_the_keys_that_work_here_with_their_ids(make_app: MakeApp, key: str) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "5", key)
+        await settle(pilot, "6", key)
         assert isinstance(app.screen, HelpScreen)
-        assert "Export" in shown(app, "#help")
-        await settle(pilot, "escape", "1", key)
-        assert "Export" not in shown(app, "#help"), "the first step has nothing to export"
+        shown = app.screen.query_one("#help", Lines)
+        assert "report.export" in shown.plain
+        await settle(pilot, "escape", "2", key)
+        assert "report.export" not in app.screen.query_one("#help", Lines).plain
         await settle(pilot, "q")
-        assert isinstance(app.screen, DiagnosisScreen)
+        assert isinstance(app.screen, WalkScreen)
 
 
 async def test_tab_moves_between_panes(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "2", "tab")
-        assert app.focused is app.screen.query_one("#causal-path")
+        await settle(pilot, "3", "tab")
+        assert app.focused is not None
+        assert app.focused.id == "text"
         await settle(pilot, "G")
-        assert app.screen.query_one("#causal-path", Lines).scroll_y > 0
+        assert walk(app).text.scroll_y > 0
+        await settle(pilot, "g", "j", "k", "pagedown", "pageup")
+        assert walk(app).text.scroll_y == 0
         await settle(pilot, "tab")
-        assert app.focused is app.screen.query_one("#cause-list")
+        assert app.focused.id == "list"
 
 
-async def test_a_click_on_a_step_opens_it(make_app: MakeApp) -> None:
+async def test_the_mouse_opens_steps_and_items(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        await pilot.click("StepBar", offset=(18, 0))
-        await pilot.pause()
-        assert step(app) == "step-2"
+        await pilot.click("StepBar", offset=(25, 0))
+        await settle(pilot)
+        assert walk(app).step == 3
+        await pilot.click("#list", offset=(5, 2))
+        await settle(pilot)
+        assert walk(app).choices.highlighted == 1
+        await pilot.click("#list", offset=(5, 3))
+        await settle(pilot)
+        assert walk(app).step == 4
 
 
 @pytest.mark.parametrize(
@@ -194,32 +323,80 @@ async def test_text_of_the_log_is_neither_markup_nor_escape_sequence(make_app: M
     app = make_app(sample.faulty())
     async with app.run_test(size=(120, 40)) as pilot:
         await settle(pilot)
+        assert r"PreArm: [bold]check[/bold] \x1b[31mfences\x1b[0m\u202e" in text(app)
         screen = "\n".join(strip.text for strip in app.screen._compositor.render_strips())
-        assert r"PreArm: [bold]check[/bold] \x1b[31mfences\x1b[0m\u202e" in screen
         assert "\x1b" not in screen
         assert "\u202e" not in screen
 
 
-@pytest.mark.parametrize(("size", "too_small"), [((60, 20), False), ((59, 24), True), ((80, 19), True)])
-async def test_a_terminal_that_is_too_small_is_said(make_app: MakeApp, size: tuple[int, int], too_small: bool) -> None:
+@pytest.mark.parametrize("step", "123456")
+@pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60)])
+async def test_no_step_is_wider_than_its_terminal(make_app: MakeApp, size: tuple[int, int], step: str) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=size) as pilot:
+        await settle(pilot, step)
+        assert app.screen.query_one("#too-small").display is False
+        for pane in (walk(app).choices, walk(app).text):
+            if pane.display:
+                assert pane.size.height >= 3, "there is room to read"
+                assert all(pane.line(y).cell_length <= pane.size.width for y in range(pane.line_count))
+
+
+@pytest.mark.parametrize("size", [(59, 24), (80, 19)])
+async def test_a_terminal_that_is_too_small_is_said(make_app: MakeApp, size: tuple[int, int]) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=size) as pilot:
         await settle(pilot)
-        assert app.screen.query_one("#too-small").display is too_small
-        assert app.screen.query_one(ContentSwitcher).display is not too_small
+        assert app.screen.query_one("#too-small").display
+        assert not app.screen.query_one("#panes").display
+        await pilot.resize_terminal(80, 24)
+        await settle(pilot)
+        assert not app.screen.query_one("#too-small").display
+        assert "FAULT" in items(app)
 
 
-def test_every_binding_has_an_id() -> None:
-    for owner in (CareApp, DiagnosisScreen, HelpScreen, Choices, Lines):
+def test_every_binding_has_an_id_and_leaves_reserved_keys_alone() -> None:
+    for owner in (CareApp, PanesScreen, WalkScreen, HelpScreen, Choices, Lines, Prompt, OpenLogDialog, OverwriteDialog):
         for binding in owner.BINDINGS:
             assert not isinstance(binding, tuple)
             assert binding.id
-            assert not {f"ctrl+{letter}" for letter in "sqjimhba"} & set(binding.key.split(","))
+            assert not {f"ctrl+{letter}" for letter in "sqzjimhba"} & set(binding.key.split(","))
 
 
-@pytest.mark.parametrize("keys", [("1",), ("question_mark",), ("5", "e")])
+async def test_keys_can_be_remapped_by_id(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty(), settings=Settings(places=(), keys={"step.next": "n", "app.quit": "x"}))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "n")
+        assert walk(app).step == 3
+        await settle(pilot, "l")
+        assert walk(app).step == 3, "the old key is free"
+        await settle(pilot, "x")
+    assert app.return_value == ExitCode.FAULT
+
+
+@pytest.mark.parametrize("keys", [("1",), ("question_mark",), ("6", "e"), ("4", "equals_sign"), ("slash",)])
 async def test_ctrl_c_leaves_from_anywhere(make_app: MakeApp, keys: tuple[str, ...]) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, *keys, "ctrl+c")
     assert app.return_value == ExitCode.INTERRUPTED
+
+
+async def test_the_palette_offers_steps_and_actions(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "4")
+        names = {command.title for command in app.get_system_commands(app.screen)}
+    assert {"Go to Log", "Go to Report", "Alternative", "Undo", "Type value", "Theme", "Help", "Quit"} <= names
+
+
+async def test_without_colours_and_in_ascii_nothing_is_lost(make_app: MakeApp, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NO_COLOR", "1")
+    app = make_app(sample.faulty(), ascii=True)
+    async with app.run_test(size=(80, 24)) as pilot:
+        for step in "123456":
+            await settle(pilot, step)
+            screen = "\n".join(strip.text for strip in app.screen._compositor.render_strips())
+            assert screen.isascii(), [c for c in screen if not c.isascii()]
+        await settle(pilot, "2")
+        assert "x FAULT" in items(app)

@@ -30,7 +30,7 @@ from care_core.text import clean
 from tests.made import DRIVEN, HOSTILE, LAND_SPEED, made_diagnosis
 
 KEYS = ["schema", "profile", "log", "config", "context", "metrics", "objectives", "faults", "fix", "abstained"]
-ADDED = ["notes", "sources", "since", "evidence", "rivals", "tell_more"]
+ADDED = ["notes", "sources", "since", "evidence", "rivals", "tell_more", "dismissed"]
 
 
 def test_the_document_has_exactly_the_published_keys() -> None:

@@ -1,0 +1,52 @@
+"""`care serve`: the terminal app in a browser."""
+
+from __future__ import annotations
+
+import secrets
+import shlex
+import socket
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from care_core.errors import UsageError
+from care_tui.commands.arguments import ConfigPaths, ProfileName
+from care_tui.console import emit, say
+
+app = typer.Typer()
+
+
+@app.command()
+def serve(
+    log: Annotated[Path | None, typer.Argument(metavar="[LOG]", show_default=False)] = None,
+    profile: ProfileName = None,
+    config: ConfigPaths = None,
+    port: Annotated[int, typer.Option("--port", min=1, max=65535, help="Port on this machine.")] = 8765,
+) -> None:
+    """Open the terminal app in a browser of this machine. For another one: ssh -L 8765:127.0.0.1:8765 ROBOT."""
+    try:
+        from care_tui.web import HOST, TokenServer
+    except ModuleNotFoundError as err:
+        hint = "Install it with: pip install 'care-tui[serve]'"
+        raise UsageError(f"'{err.name}' is not installed.", hint=hint) from err
+
+    _check_free(HOST, port)
+    words = [sys.executable, "-m", "care_tui", *([str(log.absolute())] if log else [])]
+    words += ["--profile", profile] if profile else []
+    words += [word for path in config or () for word in ("--config", path)]
+    server = TokenServer(shlex.join(words), port, secrets.token_urlsafe(24))
+    emit(f"{server.address}\n")
+    say("Open this address in a browser of this machine. Ctrl+C ends it.")
+    server.serve()
+
+
+def _check_free(host: str, port: int) -> None:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as err:
+            hint = "Choose another with --port."
+            raise UsageError(f"Port {port} cannot be used: {err.strerror}.", hint=hint) from err

@@ -1,0 +1,83 @@
+"""Step 3: what moved the objective the wrong way in this run, and along which path."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.content import Content
+
+from care_core.text import clean
+from care_tui.pages.page import View
+from care_tui.pages.step import DiagnosisPage
+from care_tui.render.causes import cause_detail, cause_item, no_cause_rows
+from care_tui.render.rows import Rows
+from care_tui.screens.prompt import Prompt
+from care_tui.widgets.choices import Listing
+
+
+class CausesPage(DiagnosisPage):
+    name = "Causes"
+    HELP = (
+        "Options that moved the objective the wrong way in this run, best first, with the causal path of the one under "
+        "the cursor. Enter goes to the fix. d sets a cause aside with a reason that goes into the report, or takes it "
+        "back. o turns to the next fault."
+    )
+    ACTIONS: ClassVar[frozenset[str]] = frozenset({"dismiss", "next_fault"})
+
+    def view_of_diagnosis(self) -> View:
+        causes, glyphs, dismissed = self.session.causes, self.glyphs, self.session.dismissed
+        listing = Listing(
+            len(causes),
+            lambda i, _width: cause_item(causes[i], dismissed.get(causes[i].option.name), glyphs),
+            lambda i: causes[i].option.name,
+            height=2,
+        )
+        return View(self._title(), self._detail, listing)
+
+    def _title(self) -> Content:
+        result, faults, fault = self.session.result, self.session.diagnosis.faults, self.session.fault
+        if result is None:
+            return Content("No objective")
+        title = Content.assemble("Causes of ", (clean(result.variable.name), "bold"))
+        if fault is None or len(faults) < 2:
+            return title
+        return title + Content.styled(f"  ({faults.index(fault) + 1} of {len(faults)} faults, o: next)", "dim")
+
+    def _detail(self, index: int | None) -> Rows:
+        session, result = self.session, self.session.result
+        if index is None or result is None or session.case is None:
+            return no_cause_rows(session.diagnosis, result)
+        cause = session.causes[index]
+        model = session.case.model
+        effect = model.effects.get((cause.option.name, result.variable.name)) if model else None
+        return cause_detail(cause, session.causes, result, effect, session.diagnosis, session.dismissed, self.glyphs)
+
+    def open(self, index: int | None) -> None:
+        self.session.option = None if index is None else self.session.causes[index].option.name
+        self.walk.action_go(4)
+
+    def next_fault(self) -> None:
+        """Turn to the causes of the next faulty objective."""
+        if self.session.state == "data" and self.session.next_fault():
+            self.screen.draw(index=0)
+
+    def dismiss(self) -> None:
+        """Set the cause under the cursor aside, or take it back."""
+        index = self.screen.choices.highlighted
+        if index is None:
+            return
+        option = self.session.causes[index].option.name
+        if self.session.dismissed.pop(option, None) is not None:
+            self.screen.draw()
+            return
+        prompt = Prompt(f"Set {option} aside", hint="Why? It goes into the report. Enter keeps it, Esc cancels.")
+        self.screen.app.push_screen(prompt, lambda reason: self._dismissed(option, reason))
+
+    def _dismissed(self, option: str, reason: str | None) -> None:
+        if reason:
+            self.session.dismissed[option] = reason
+            self.screen.draw()
+            if option in self.session.basket.ticked:
+                self.session.basket.drop(option)
+                self.walk.basket_changed()
+                self.screen.say(f"{option} was also taken out of the fix.")

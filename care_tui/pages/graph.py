@@ -1,0 +1,114 @@
+"""The causal model around a variable: what it depends on, and what depends on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from textual.content import Content
+
+from care_core.profile.model import EdgeRecord
+from care_core.run import is_known
+from care_tui.jobs import Case
+from care_tui.pages.page import Page, View, sentence
+from care_tui.render.rows import Row, Rows, heading, labelled, measure, padded, percent, warning
+from care_tui.screens.panes import PanesScreen
+from care_tui.widgets.choices import Listing
+
+FEW = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A neighbour of the variable in view."""
+
+    name: str
+    kind: str
+    effect: float | None
+    support: float | None
+
+
+class GraphPage(Page):
+    name = "Graph"
+    HELP = (
+        "The causal model around one variable, with the effect of every edge and how many resamples hold it. Enter "
+        "goes to the neighbour under the cursor, h goes back, Esc leaves."
+    )
+    ACTIONS: ClassVar[frozenset[str]] = frozenset({"step_back"})
+
+    def __init__(self, screen: PanesScreen, case: Case, node: str | None) -> None:
+        super().__init__(screen)
+        self._case = case
+        self._trail = [node] if node and case.model and node in case.model.graph.nodes else []
+
+    def view(self) -> View:
+        if self._case.model is None or not self._trail:
+            return View(Content("Causal model"), lambda _: sentence("The profile has no model of this."))
+        node, links = self._trail[-1], self._links(self._trail[-1])
+        title = Content.assemble("Around ", (node, "bold"), f"  {self._counts(links)}")
+        listing = Listing(len(links), lambda i, _width: (self._item(links[i]),), lambda i: links[i].name)
+        return View(title, lambda i: self._detail(node, None if i is None else links[i]), listing)
+
+    @staticmethod
+    def _counts(links: list[Link]) -> str:
+        kinds = [link.kind for link in links]
+        return f"causes {kinds.count('cause')}, effects {kinds.count('effect')}, confounded {kinds.count('confounded')}"
+
+    def _links(self, node: str) -> list[Link]:
+        model = self._case.model
+        assert model is not None
+        links = [_link(parent, "cause", model.edges.get((parent, node))) for parent in model.graph.parents(node)]
+        links += [_link(child, "effect", model.edges.get((node, child))) for child in model.graph.children(node)]
+        for edge in model.bidirected:
+            if node in (edge.source, edge.target):
+                other = edge.target if edge.source == node else edge.source
+                links.append(Link(other, "confounded", None, edge.support))
+        order = {"cause": 0, "effect": 1, "confounded": 2}
+        return sorted(links, key=lambda link: (order[link.kind], -abs(link.effect or 0.0), link.name))
+
+    def _item(self, link: Link) -> Content:
+        glyphs = self.glyphs
+        sign = {"cause": f"{glyphs.to} it", "effect": f"it {glyphs.to}", "confounded": f"{glyphs.root} both"}[link.kind]
+        effect = "" if link.effect is None else f"{link.effect:+.2f}"
+        support = "" if link.support is None else percent(link.support)
+        few = "  ! few" if link.support is not None and link.support < FEW else ""
+        return Content.assemble(f"{sign:<7} ", padded(link.name, 30, "bold"), f" {effect:>6}  {support:>5}{few}")
+
+    def _detail(self, node: str, link: Link | None) -> Rows:
+        rows = self._about(node)
+        if link is not None:
+            rows += [Row(Content()), *self._about(link.name)]
+            if link.kind == "confounded":
+                rows.append(warning("Confounded", "a hidden cause moves both: neither explains the other"))
+        return Rows(rows)
+
+    def _about(self, name: str) -> list[Row]:
+        case, run = self._case, self._case.diagnosis.run
+        variable = case.schema.variables.get(name) if case.schema else None
+        value = run.value(name)
+        rows = [heading(name)]
+        if variable is not None:
+            shown = measure(value, variable.unit) if is_known(value) else "not known in this run"
+            rows += [labelled("Role", variable.role.value), labelled("This run", shown)]
+            if variable.doc:
+                rows.append(labelled("About", variable.doc))
+        summary = case.model.summaries.get(name) if case.model else None
+        if summary is not None:
+            middle = summary.quantiles[len(summary.quantiles) // 2]
+            rows.append(labelled("Training", f"{summary.low:.4g} to {summary.high:.4g}, middle {middle:.4g}"))
+        return rows
+
+    def open(self, index: int | None) -> None:
+        if index is not None:
+            self._trail.append(self._links(self._trail[-1])[index].name)
+            self.screen.draw(index=0)
+
+    def step_back(self) -> None:
+        """Go back to the variable before."""
+        if len(self._trail) > 1:
+            self._trail.pop()
+            self.screen.draw(index=0)
+
+
+def _link(name: str, kind: str, edge: EdgeRecord | None) -> Link:
+    return Link(name, kind, None, None) if edge is None else Link(name, kind, edge.effect, edge.support)

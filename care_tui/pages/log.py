@@ -1,0 +1,123 @@
+"""Step 1: which log. Found ones newest first, any other by its path; progress while one is read."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import ClassVar
+
+from textual.content import Content
+
+from care_core.errors import CareError
+from care_core.text import clean
+from care_tui.pages.page import Fetch, View
+from care_tui.pages.step import StepPage
+from care_tui.places import LogFile, found_logs
+from care_tui.render.objectives import run_rows
+from care_tui.render.rows import Row, Rows, error_rows, labelled, padded, progress_bar, text
+from care_tui.screens.open_log import OpenLogDialog
+from care_tui.widgets.choices import Listing
+
+
+class LogPage(StepPage):
+    name = "Log"
+    HELP = (
+        "Logs of the usual places, newest first. Enter opens one, o asks for any other (or drop a file on the "
+        "terminal). While a log is read, Esc stops it. Nothing is ever written to a log."
+    )
+    ACTIONS: ClassVar[frozenset[str]] = frozenset({"pick", "again", "rescan"})
+
+    def enter(self) -> None:
+        self._found: Fetch[list[LogFile]] = getattr(self, "_found", None) or Fetch(self.screen, "logs")
+        self._found.start(lambda: found_logs(self.walk.settings.places))
+
+    def view(self) -> View:
+        found = self._found.answer
+        logs = found if isinstance(found, list) else []
+        now = time.time()
+        places = [log.path for log in logs]
+        listing = Listing(
+            len(logs), lambda i, _width: (self._item(logs[i], now),), lambda i: f"{logs[i].path.name} {logs[i].path}"
+        )
+        opened = self.session.path
+        index = places.index(opened) if opened in places else None
+        return View(self._title(), lambda i: self._detail(None if i is None else logs[i]), listing, index)
+
+    def _title(self) -> Content:
+        state, path = self.session.state, self.session.path
+        name = "" if path is None else clean(path.name)
+        return {
+            "empty": Content("Open a log: Enter, or o for one that is not listed"),
+            "loading": Content.assemble("Reading ", (name, "bold"), "  (Esc stops)"),
+            "data": Content.assemble("Open is ", (name, "bold"), "  (Enter opens another)"),
+            "error": Content.assemble("No diagnosis of ", (name, "bold"), "  (r tries again, o opens another)"),
+        }[state]
+
+    def _item(self, log: LogFile, now: float) -> Content:
+        mark = self.glyphs.here if log.path == self.session.path else " "
+        line = Content.assemble(
+            f"{mark} ",
+            padded(log.path.name, 28, "bold"),
+            f" {age(now - log.modified_s):>9}  {size(log.size):>8}  ",
+            "recent  " if log.is_recent else "        ",
+        )
+        return line + text(str(log.path.parent), "dim")
+
+    def _detail(self, log: LogFile | None) -> Rows:
+        session = self.session
+        if session.state == "loading" and session.progress is not None:
+            step, fraction = session.progress
+            return Rows([labelled("Doing", step), labelled("Done", progress_bar(fraction, self.glyphs))])
+        if session.error is not None:
+            return error_rows(session.error)
+        if session.case is not None and (log is None or log.path == session.path):
+            return run_rows(session.diagnosis)
+        if log is not None:
+            return Rows([labelled("Log", str(log.path)), labelled("Size", size(log.size))])
+        if isinstance(self._found.answer, CareError):
+            return error_rows(self._found.answer)
+        if self._found.answer is None:
+            return Rows([Row(Content("Looking for logs..."))])
+        looked = ", ".join(str(place) for place in self.walk.settings.places)
+        return Rows([labelled("No log", f"none was found in {looked}"), labelled("What to do", "press o and name one")])
+
+    def open(self, index: int | None) -> None:
+        found = self._found.answer
+        if isinstance(found, list) and index is not None:
+            path = found[index].path
+            if path == self.session.path and self.session.case is not None:
+                self.walk.action_go(2)
+            else:
+                self.walk.open_log(path)
+
+    def pick(self) -> None:
+        """Ask for the path of a log."""
+        start = self.session.path.parent if self.session.path else Path()
+        self.screen.app.push_screen(OpenLogDialog(start, self.glyphs), self._picked)
+
+    def _picked(self, path: Path | None) -> None:
+        if path is not None:
+            self.walk.open_log(path)
+
+    def again(self) -> None:
+        """Read the log again, after an error or a change."""
+        if self.session.path is not None:
+            self.walk.open_log(self.session.path)
+
+    def rescan(self) -> None:
+        """Look for logs again."""
+        self._found.forget()
+        self.enter()
+
+
+def age(seconds: float) -> str:
+    """How long ago, in the largest unit that fits."""
+    for unit, length in (("d", 86400), ("h", 3600), ("min", 60)):
+        if seconds >= length:
+            return f"{seconds // length:.0f} {unit} ago"
+    return "just now"
+
+
+def size(count: int) -> str:
+    """Bytes as people say them."""
+    return f"{count / 1e6:.1f} MB" if count >= 1e5 else f"{count / 1e3:.1f} kB"

@@ -1,0 +1,90 @@
+"""What the robot's software said, around the moment of failure."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.content import Content
+
+from care_tui.jobs import Case
+from care_tui.pages.page import Fetch, Page, View, sentence
+from care_tui.reading import LogMessage, messages_of
+from care_tui.render.rows import Row, Rows, labelled, text
+from care_tui.screens.panes import PanesScreen
+from care_tui.widgets.choices import Listing
+
+LOUD = {"ERR", "WARN", "ERROR", "FATAL"}
+NEAR_S = 0.5
+"""A message is the one that a piece of evidence was found in when it is this near to it."""
+
+
+class MessagesPage(Page):
+    name = "Messages"
+    HELP = (
+        "Messages of the log in time order; ! marks warnings and errors, > what the diagnosis rests on. n goes to the "
+        "next marked one, / filters, Esc leaves."
+    )
+    ACTIONS: ClassVar[frozenset[str]] = frozenset({"next_marked"})
+
+    def __init__(self, screen: PanesScreen, case: Case) -> None:
+        super().__init__(screen)
+        self._case = case
+        self._found: Fetch[list[LogMessage]] = Fetch(screen, "messages")
+        self._placed = False
+
+    def enter(self) -> None:
+        self._found.start(lambda: messages_of(self._case))
+
+    def view(self) -> View:
+        return self._found.view("Messages of the log", self._show)
+
+    def _show(self, messages: list[LogMessage]) -> View:
+        title = Content(f"Messages of the log  {len(messages)}, mission {self._span()}")
+        if not messages:
+            return View(title, lambda _: sentence("The log holds no message in words."))
+        listing = Listing(
+            len(messages),
+            lambda i, _width: (self._item(messages[i]),),
+            lambda i: f"{messages[i].kind} {messages[i].text}",
+        )
+        index = None if self._placed else self._moment(messages)
+        self._placed = True
+        return View(title, lambda i: self._detail(None if i is None else messages[i]), listing, index)
+
+    def _span(self) -> str:
+        mission = self._case.diagnosis.run.mission
+        return f"{mission.start_s:.1f} to {mission.end_s:.1f} s"
+
+    def _moment(self, messages: list[LogMessage]) -> int:
+        """The first message that the diagnosis rests on, else the last of the mission."""
+        marked = [i for i, message in enumerate(messages) if self._is_evidence(message)]
+        end = self._case.diagnosis.run.mission.end_s
+        before = [i for i, message in enumerate(messages) if message.time_s <= end]
+        return marked[0] if marked else before[-1] if before else 0
+
+    def _is_evidence(self, message: LogMessage) -> bool:
+        evidence = self._case.diagnosis.run.evidence
+        return any(abs(part.time_s - message.time_s) < NEAR_S and part.text in message.text for part in evidence)
+
+    def _item(self, message: LogMessage) -> Content:
+        mark = self.glyphs.here if self._is_evidence(message) else "!" if message.kind in LOUD else " "
+        style = "bold" if mark != " " else ""
+        return Content.assemble(f"{mark} {message.time_s:8.1f} s  {message.kind:<8} ") + text(message.text, style)
+
+    def _detail(self, message: LogMessage | None) -> Rows:
+        if message is None:
+            return Rows([])
+        rows = [labelled(f"{message.time_s:.2f} s", message.text)]
+        for part in self._case.diagnosis.run.evidence:
+            if abs(part.time_s - message.time_s) < NEAR_S:
+                points = f", points at {', '.join(part.options)}" if part.options else ""
+                rows.append(Row(text(f"Evidence: {part.kind}{points}", "bold")))
+        return Rows(rows)
+
+    def next_marked(self) -> None:
+        """Go to the next warning, error or piece of evidence."""
+        messages, here = self._found.answer, self.screen.choices.highlighted
+        if isinstance(messages, list) and here is not None:
+            marked = [i for i, m in enumerate(messages) if m.kind in LOUD or self._is_evidence(m)]
+            if marked:
+                self.screen.draw(index=next((i for i in marked if i > here), marked[0]))

@@ -1,0 +1,94 @@
+"""What a page is: it says what to show in the list and the text of its screen, and what keys do. It is no widget."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+
+from textual.content import Content
+
+from care_core.errors import CareError
+from care_tui.render.rows import Glyphs, Row, Rows, error_rows
+from care_tui.widgets.choices import NOTHING, Listing
+
+if TYPE_CHECKING:
+    from care_tui.screens.panes import PanesScreen
+
+T = TypeVar("T")
+
+
+def sentence(words: str) -> Rows:
+    """A text of one sentence."""
+    return Rows([Row(Content(words))])
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What a screen shows: a title, a list (may be empty), and the text beside the item under the cursor."""
+
+    title: Content
+    detail: Callable[[int | None], Rows]
+    listing: Listing = NOTHING
+    index: int | None = None
+
+
+class Page:
+    """One page of the app. `ACTIONS` names the methods that keys of this page call."""
+
+    name: ClassVar[str]
+    HELP: ClassVar[str]
+    ACTIONS: ClassVar[frozenset[str]] = frozenset()
+
+    def __init__(self, screen: PanesScreen) -> None:
+        self.screen = screen
+
+    @property
+    def glyphs(self) -> Glyphs:
+        return self.screen.glyphs
+
+    def view(self) -> View:
+        """What to show now."""
+        raise NotImplementedError
+
+    def enter(self) -> None:
+        """The page comes into view."""
+
+    def moved(self, index: int) -> None:
+        """The cursor came to an item."""
+
+    def open(self, index: int | None) -> None:
+        """Enter was pressed, on an item where there is one."""
+
+
+class Fetch(Generic[T]):
+    """Something that a worker fetches once, with the view for each state it can be in."""
+
+    def __init__(self, screen: PanesScreen, key: str) -> None:
+        self._screen = screen
+        self._key = key
+        self._asked = False
+        self.answer: T | CareError | None = None
+
+    def start(self, work: Callable[[], T]) -> None:
+        """Fetch it, unless that was done before."""
+        if not self._asked:
+            self._asked = True
+            self._screen.fetch(self._key, lambda _job: work(), self._receive)
+
+    def _receive(self, answer: T | CareError) -> None:
+        self.answer = answer
+        self._screen.draw()
+
+    def forget(self) -> None:
+        """Fetch it again the next time it is asked for."""
+        self._asked, self.answer = False, None
+
+    def view(self, title: str, show: Callable[[T], View]) -> View:
+        """The view of the answer, of the error, or of the wait for either."""
+        if self.answer is None:
+            return View(Content(title), lambda _: sentence("Loading..."))
+        if isinstance(self.answer, CareError):
+            error = self.answer
+            return View(Content(title), lambda _: error_rows(error))
+        return show(self.answer)

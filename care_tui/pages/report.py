@@ -1,0 +1,82 @@
+"""Step 6: the fix report as it will be written, and the commands that apply it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from textual.content import Content
+
+from care_core.errors import CareError
+from care_core.text import clean
+from care_tui.jobs import SUFFIXES
+from care_tui.pages.page import View, sentence
+from care_tui.pages.step import DiagnosisPage
+from care_tui.render.rows import error_rows, plain_rows
+from care_tui.screens.export import ExportDialog
+from care_tui.session import FORMATS
+
+LABELS = {"yaml": "YAML", "markdown": "Markdown", "html": "HTML", "json": "JSON", "patch": "patch"}
+
+
+class ReportPage(DiagnosisPage):
+    name = "Report"
+    HELP = "The report as it will be written. f changes the format, Enter writes it to a file, c copies the commands."
+    ACTIONS: ClassVar[frozenset[str]] = frozenset({"next_format", "export", "copy_commands"})
+    _text: str | CareError | None = None
+    _written = ""
+
+    def enter(self) -> None:
+        if self.session.state == "data":
+            self._text = None
+            diagnosis, format = self.session.decided(), self.session.format
+            self.screen.fetch("report", lambda _job: self.walk.engine.report(diagnosis, format), self._received)
+
+    def _received(self, text: str | CareError) -> None:
+        self._text = text
+        if self.screen.page is self:
+            self.screen.draw()
+
+    def view_of_diagnosis(self) -> View:
+        tail = f"written to {clean(self._written)}" if self._written else "Enter writes it, f changes the format"
+        title = Content.assemble(f"Report as {LABELS[self.session.format]}", (f"  {tail}", "dim"))
+        text = self._text
+        if isinstance(text, CareError):
+            return View(title, lambda _: error_rows(text))
+        if text is None:
+            return View(title, lambda _: sentence("Writing..."))
+        if not text:
+            return View(title, lambda _: sentence("Nothing changes, so there is no patch."))
+        return View(title, lambda _: plain_rows(text))
+
+    def next_format(self) -> None:
+        """Show the report in the next format."""
+        session = self.session
+        session.format = FORMATS[(FORMATS.index(session.format) + 1) % len(FORMATS)]
+        self._written = ""
+        self.enter()
+        self.screen.draw()
+
+    def export(self) -> None:
+        """Ask where the report goes, and write it."""
+        if self.session.state != "data":
+            return
+        suffix = next(suffix for suffix, format in SUFFIXES.items() if format == self.session.format)
+        name = f"{Path(self.session.diagnosis.run.log.path).stem}.care{suffix}"
+        self.screen.app.push_screen(ExportDialog(self.session.decided(), Path(name), self.walk.engine), self._exported)
+
+    def _exported(self, path: str | None) -> None:
+        if path is not None:
+            self._written = path
+            self.screen.draw()
+
+    def copy_commands(self) -> None:
+        """Copy the commands that apply the fix."""
+        commands = self.walk.engine.commands(self.session.decided()) if self.session.state == "data" else []
+        if commands:
+            self.walk.copy("\n".join(commands) + "\n", f"{len(commands)} commands", ".commands.sh")
+        else:
+            self.screen.say("Nothing changes, so there are no commands.")
+
+    def open(self, index: int | None) -> None:
+        self.export()

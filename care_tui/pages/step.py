@@ -1,0 +1,48 @@
+"""What the pages of the six steps share: the session, and what to show before there is a diagnosis."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+from textual.content import Content
+
+from care_tui.pages.page import Page, View, sentence
+from care_tui.render.rows import Rows, error_rows, labelled, progress_bar
+from care_tui.session import Session
+
+if TYPE_CHECKING:
+    from care_tui.screens.walk import WalkScreen
+
+
+class StepPage(Page):
+    """One step of the walk."""
+
+    @property
+    def walk(self) -> WalkScreen:
+        return cast("WalkScreen", self.screen)
+
+    @property
+    def session(self) -> Session:
+        return self.walk.session
+
+
+class DiagnosisPage(StepPage):
+    """A step that needs a diagnosis: says so while there is none."""
+
+    def view(self) -> View:
+        session = self.session
+        if session.state == "data":
+            return self.view_of_diagnosis()
+        title = Content.styled(self.name, "bold")
+        if session.error is not None:
+            error = session.error
+            return View(title, lambda _: error_rows(error))
+        if session.state == "empty":
+            return View(title, lambda _: sentence("No log is open. 1 leads to the logs."))
+        step, fraction = session.progress or ("starting", 0.0)
+        bar = progress_bar(fraction, self.glyphs)
+        return View(title, lambda _: Rows([labelled("Doing", step), labelled("Done", bar)]))
+
+    def view_of_diagnosis(self) -> View:
+        """What to show once there is one."""
+        raise NotImplementedError

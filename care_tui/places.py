@@ -1,0 +1,150 @@
+"""Where logs usually are, and which were opened last."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+PLACES = (
+    Path(),
+    Path("logs"),
+    Path("APM/LOGS"),
+    Path.home() / "logs",
+    Path.home() / ".ros",
+    Path.home() / ".ros" / "bags",
+    Path.home() / "APM" / "LOGS",
+    Path.home() / "Documents" / "Mission Planner" / "logs",
+    Path.home() / "Documents" / "QGroundControl" / "Telemetry",
+    Path.home() / "Documents" / "QGroundControl" / "Logs",
+)
+"""Where `care` without a log looks for the newest one: here, and where recorders and ground stations put theirs."""
+
+DEEP = 3
+"""Folders below a place that are looked into: Mission Planner sorts by vehicle and system."""
+
+RECENT = 20
+"""How many opened logs are remembered."""
+
+
+@dataclass(frozen=True, slots=True)
+class LogFile:
+    """A log that could be opened; `modified_s` in seconds since 1970, `size` in bytes."""
+
+    path: Path
+    modified_s: float
+    size: int
+    is_recent: bool = False
+
+
+def found_logs(places: Iterable[Path]) -> list[LogFile]:
+    """Logs of these folders and those opened before, the newest first. What cannot be looked at is left out."""
+    recent = recent_logs()
+    files = [path for place in places if place.is_dir() for path in logs_in(place)]
+    unique = {path.absolute(): path.absolute() in recent for path in (*files, *recent)}
+    logs = [log for path, is_recent in unique.items() if (log := _look(path, is_recent)) is not None]
+    return sorted(logs, key=lambda log: -log.modified_s)
+
+
+def logs_in(folder: Path, deep: int = DEEP) -> Iterator[Path]:
+    """The logs and recordings in a folder, and in those so deep below it."""
+    from care_core.extract.table import is_log, is_recording
+
+    try:
+        inside = list(folder.iterdir())
+    except OSError:  # not ours to look into
+        return
+    for path in inside:
+        if is_log(path) or (path.is_dir() and is_recording(path)):
+            yield path
+        elif path.is_dir() and deep > 1 and not path.is_symlink() and _may_hold_logs(folder, path):
+            yield from logs_in(path, deep - 1)
+
+
+def _may_hold_logs(folder: Path, path: Path) -> bool:
+    """The working folder may be anything, so only what a recorder may have made in it is looked into."""
+    return folder != Path() or path.name.startswith("rosbag2_")
+
+
+def files_of(path: Path) -> list[Path]:
+    """The files of a log; a recording may be a folder of them."""
+    return [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
+
+
+def written_s(path: Path) -> float:
+    """When a log was last written to, seconds since 1970."""
+    return max((file.stat().st_mtime for file in files_of(path)), default=0.0)
+
+
+def _look(path: Path, is_recent: bool) -> LogFile | None:
+    try:
+        size = sum(file.stat().st_size for file in files_of(path))
+        return LogFile(path, written_s(path), size, is_recent)
+    except OSError:  # gone, or not ours to look at
+        return None
+
+
+def recent_logs() -> list[Path]:
+    """Logs that were opened before, the last one first."""
+    try:
+        return [Path(line) for line in _recent_file().read_text(encoding="utf-8").splitlines() if line]
+    except (OSError, UnicodeDecodeError):
+        return []
+
+
+def remember(path: Path) -> None:
+    """Put a log at the head of the recent ones. A disk that cannot be written to is no reason to stop."""
+    from care_core.errors import CareError
+    from care_core.report import write_atomically
+
+    path = path.absolute()
+    recent = [path, *(other for other in recent_logs() if other != path)][:RECENT]
+    try:
+        _recent_file().parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(_recent_file(), "".join(f"{log}\n" for log in recent))
+    except (OSError, CareError):
+        return
+
+
+def _recent_file() -> Path:
+    from platformdirs import user_state_path
+
+    return user_state_path("care") / "recent-logs"
+
+
+def as_path(typed: str) -> Path:
+    """The path that was typed, pasted, or dropped on the terminal (quoted, escaped, or as a file: address)."""
+    typed = typed.strip()
+    if len(typed) > 1 and typed[0] == typed[-1] and typed[0] in "'\"":
+        typed = typed[1:-1]
+    elif not Path(typed).exists():
+        typed = typed.replace("\\ ", " ")
+    if typed.startswith("file://"):
+        from urllib.parse import unquote
+
+        typed = unquote(typed.removeprefix("file://"))
+    return Path(typed).expanduser()
+
+
+def entries(typed: str) -> list[Path]:
+    """Folders and logs that the typed path could go on with, folders first; hidden ones only when asked for."""
+    path = as_path(typed)
+    folder, start = (path, "") if typed.endswith("/") else (path.parent, path.name.casefold())
+    try:
+        inside = list(folder.iterdir())
+    except OSError:  # no such folder, or not ours to look into
+        return []
+    found = [
+        entry
+        for entry in inside
+        if entry.name.casefold().startswith(start) and (start.startswith(".") or not entry.name.startswith("."))
+        if entry.is_dir() or is_openable(entry)
+    ]
+    return sorted(found, key=lambda entry: (is_openable(entry), entry.name.casefold()))
+
+
+def is_openable(path: Path) -> bool:
+    """Whether this may be a log, or a recording that is a folder."""
+    from care_core.extract.table import is_log, is_recording
+
+    return is_log(path) or (path.is_dir() and is_recording(path))

@@ -1,0 +1,157 @@
+"""Ranked causes, and the causal path of one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from textual.content import Content
+
+from care_core.diagnose.records import Cause, Diagnosis, ObjectiveResult, PathNode
+from care_core.profile.model import EffectRecord
+from care_core.text import clean
+from care_core.variables import Variable
+from care_tui.render.fix import prediction
+from care_tui.render.objectives import evidence_row
+from care_tui.render.rows import (
+    Glyphs,
+    Row,
+    Rows,
+    change_text,
+    heading,
+    labelled,
+    limit,
+    measure,
+    percent,
+    setting,
+    status,
+    text,
+    warning,
+)
+
+FEW_RESAMPLES = 0.5
+"""Edges that fewer bootstrap resamples hold are flagged."""
+
+
+def cause_item(cause: Cause, dismissed: str | None, glyphs: Glyphs) -> tuple[Content, Content]:
+    """One cause of the ranked list: the option with its change, then what it is worth, with its caveats beside it."""
+    option = cause.option
+    head = Content.assemble(
+        f"{cause.rank:>2} ",
+        text(option.name, "bold"),
+        "  ",
+        change_text(option, cause.current, cause.suggested, glyphs),
+    )
+    if dismissed is not None:
+        return head, Content("   set aside: " + clean(dismissed))
+    worth = [f"{cause.confidence} confidence"]
+    worth.append("not ruled out" if cause.is_lead else f"costs {percent(cause.contribution)}")
+    if cause.p_fixed is not None:
+        worth.append(f"alone fixes {percent(cause.p_fixed)}")
+    caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
+    return head, Content("   " + ", ".join(worth) + caveats)
+
+
+def caveats_of(cause: Cause) -> tuple[str, ...]:
+    """What weakens a cause; a value outside the training support is always said."""
+    if cause.in_support or any("support" in note for note in cause.notes):
+        return cause.notes
+    return ("outside the training support", *cause.notes)
+
+
+def path_rows(cause: Cause, objective: ObjectiveResult, glyphs: Glyphs) -> list[Row]:
+    """The causal path as a vertical chain: nodes with this run's and the expected value, edges with their effect."""
+    width = max(len(clean(node.name)) for node in cause.path)
+    last = len(cause.path) - 1
+    rows: list[Row] = []
+    for place, node in enumerate(cause.path):
+        sign = glyphs.down if place else glyphs.root
+        line = Content.assemble(f"{sign} ", text(node.name, "bold").pad_right(width - len(clean(node.name)) + 2))
+        line += text(node_value(node, cause.option if place == 0 else None))
+        if place == last:
+            verdict = Content.assemble("  ", status(objective.status, glyphs), "  ")
+            rows += [Row(line, width + 4), Row(verdict + text(limit(objective.threshold, node.unit)), 4)]
+        else:
+            rows += [Row(line, width + 4), Row(edge_line(node, glyphs), 4)]
+    return rows
+
+
+def node_value(node: PathNode, option: Variable | None) -> str:
+    """This run's value and the expected one; an option's codes and switches by their names."""
+    if option is not None and option.name == node.name:
+        return f"{setting(option, node.value)}  (expected {option.show(node.expected)})"
+    expected = "unknown" if node.expected is None else f"{node.expected:.4g}"
+    return f"{measure(node.value, node.unit)}  (expected {expected})"
+
+
+def edge_line(node: PathNode, glyphs: Glyphs) -> Content:
+    effect = "effect unknown" if node.effect is None else f"effect {node.effect:+.2f}"
+    if node.support is None:
+        return Content.styled(f"{glyphs.line} {effect}", "dim")
+    line = Content.styled(f"{glyphs.line} {effect}, in {percent(node.support)} of resamples", "dim")
+    return line + Content.styled("  ! few", "$text-warning") if node.support < FEW_RESAMPLES else line
+
+
+def cause_detail(
+    cause: Cause,
+    rivals: Sequence[Cause],
+    objective: ObjectiveResult,
+    effect: EffectRecord | None,
+    diagnosis: Diagnosis,
+    dismissed: Mapping[str, str],
+    glyphs: Glyphs,
+) -> Rows:
+    """Everything about one cause: its path, what it is worth, its caveats, the runner-up, what the log says."""
+    option = cause.option
+    rows = [*path_rows(cause, objective, glyphs), Row(Content())]
+    if option.name in dismissed:
+        rows.append(warning("Set aside", dismissed[option.name]))
+    gain = "" if cause.p_fixed is None else f", odds that it alone keeps all thresholds {percent(cause.p_fixed)}"
+    rows.append(labelled("Confidence", f"{cause.confidence}{gain}"))
+    rows += [warning("Caveat", note) for note in caveats_of(cause)]
+    rows.append(labelled("Contribution", f"costs {percent(cause.contribution)} of this run's odds of no fault"))
+    rows += _runner_up(cause, rivals)
+    if cause.predicted is not None and cause.suggested is not None:
+        change = change_text(option, cause.current, cause.suggested, glyphs)
+        rows.append(labelled("With", change + Content(": ") + prediction(objective.variable, cause.predicted, glyphs)))
+    rows.append(labelled("Effect", _effect(cause, effect)))
+    if option.parameters and option.parameters != (option.name,):
+        rows.append(labelled("Parameter", ", ".join(option.parameters)))
+    if option.doc:
+        rows.append(labelled("About", option.doc))
+    rows += doubt_rows(diagnosis)
+    evidence = diagnosis.run.evidence
+    if evidence:
+        rows += [Row(Content()), heading("The log says"), *(evidence_row(part, option.name) for part in evidence)]
+    return Rows(rows)
+
+
+def _runner_up(cause: Cause, rivals: Sequence[Cause]) -> list[Row]:
+    other = next((rival for rival in rivals if rival.rank != cause.rank), None)
+    if other is None:
+        return [labelled("Runner-up", "no other option is under suspicion")]
+    label = "Runner-up" if cause.rank == 1 else "First is"
+    return [labelled(label, f"{other.option.name}, costs {percent(other.contribution)}")]
+
+
+def _effect(cause: Cause, effect: EffectRecord | None) -> str:
+    interval = "" if effect is None else f" ({effect.low:.2f} to {effect.high:.2f})"
+    return f"{cause.total_effect:.2f}{interval} in all, path {cause.path_ace:.2f}, scaled, over the platform"
+
+
+def no_cause_rows(diagnosis: Diagnosis, objective: ObjectiveResult | None) -> Rows:
+    """Why there is nothing to rank."""
+    if objective is None:
+        return Rows([labelled("No objective", "the profile declares none, so nothing can be at fault")])
+    if objective.status == "ok":
+        return Rows([Row(Content("Within its threshold: there is nothing to explain."))])
+    if objective.status == "not_evaluated":
+        return Rows([Row(Content("Not evaluated, so no cause is known.")), warning("Reason", objective.reason)])
+    reason = diagnosis.abstained or "no option of the profile explains this objective"
+    head = [Row(Content("Outside its threshold, but no cause is named.")), warning("Reason", reason)]
+    return Rows([*head, *doubt_rows(diagnosis)])
+
+
+def doubt_rows(diagnosis: Diagnosis) -> list[Row]:
+    """What the run met that may be the cause instead, and what would tell more."""
+    rows = [warning("Perhaps", f"{rival.name}: {rival.text}") for rival in diagnosis.rivals]
+    return rows + [labelled("Would tell", advice) for advice in diagnosis.tell_more]

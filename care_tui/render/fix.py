@@ -1,0 +1,100 @@
+"""Changes and what they are predicted to bring."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from textual.content import Content
+
+from care_core.diagnose.records import Change, Diagnosis, Fix, ObjectiveResult, Prediction
+from care_core.text import clean
+from care_core.variables import Variable
+from care_tui.basket import acceptable
+from care_tui.render.rows import (
+    Glyphs,
+    Row,
+    Rows,
+    change_text,
+    labelled,
+    measure,
+    padded,
+    percent,
+    setting,
+    status,
+    text,
+    warning,
+)
+
+
+def option_item(
+    option: Variable, current: float | None, value: float | None, ticked: bool, alone: str, width: int, glyphs: Glyphs
+) -> Content:
+    """One option of the basket on one line: its box, its name padded to `width`, its change, its odds alone."""
+    box = ("[x]" if ticked else "[ ]") if value is not None else "   "
+    change = text(setting(option, current)) if value is None else change_text(option, current or 0.0, value, glyphs)
+    line = Content.assemble(f"{box} ", padded(option.name, width + 2, "bold" if ticked else ""), change)
+    if ticked and option.reboot_required:
+        line += Content.styled("  ! reboot", "$text-warning")
+    return line + Content.styled(f"  {alone}", "dim") if alone else line
+
+
+def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs) -> list[Row]:
+    """What every objective should become."""
+    width = max((len(clean(result.variable.name)) for result in objectives), default=0)
+    rows = []
+    for result in objectives:
+        predicted = fix.predicted.get(result.variable.name)
+        outcome = (
+            status("not_evaluated", glyphs) + Content("  no prediction")
+            if predicted is None
+            else prediction(result.variable, predicted, glyphs)
+        )
+        rows.append(Row(Content.assemble("  ", padded(result.variable.name, width + 2), outcome), width + 4))
+        if result.value is not None and result.variable.kind != "functional":
+            now = f"now {measure(result.value, result.variable.unit)}"
+            rows[-1] = Row(rows[-1].content + Content.styled(f"  ({now})", "dim"), width + 4)
+    return rows
+
+
+def option_rows(option: Variable, notes: Sequence[str], glyphs: Glyphs) -> list[Row]:
+    """What an operator has to know about the option under the cursor."""
+    rows = [labelled(option.name, option.doc or "the profile says nothing about it")]
+    rows.append(labelled("", acceptable(option)))
+    if option.parameters and option.parameters != (option.name,):
+        rows.append(labelled("", "sets " + ", ".join(option.parameters)))
+    return rows + [warning("Caveat", note) for note in notes]
+
+
+def change_rows(change: Change, glyphs: Glyphs) -> list[Row]:
+    option = change.option
+    line = Content.assemble(
+        "  ", text(option.name, "bold"), "  ", change_text(option, change.current, change.suggested, glyphs)
+    )
+    if option.reboot_required:
+        line += Content.styled("  ! reboot needed", "$text-warning")
+    rows = [Row(line, 4)]
+    keys = tuple(key for key in option.parameters if key != option.name)
+    if keys:
+        rows.append(Row(Content.styled(f"    sets {clean(', '.join(keys))}", "dim"), 6))
+    rows += [Row(Content.styled(f"    ! {clean(note)}", "$text-warning"), 6) for note in change.notes]
+    return rows
+
+
+def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs) -> Content:
+    """`✓ OK  139, 131 to 150 s, odds 91 %`."""
+    odds = "" if predicted.p_ok is None else f", odds {percent(predicted.p_ok)}"
+    if variable.kind == "functional":  # a yes-or-no objective has odds, not a value
+        return status(predicted.status(), glyphs) + text(odds.replace(",", " ", 1))
+    span = f"  {predicted.value:.4g}, {predicted.low:.4g} to {measure(predicted.high, variable.unit)}"
+    return status(predicted.status(), glyphs) + text(f"{span}{odds}")
+
+
+def no_fix_rows(diagnosis: Diagnosis) -> Rows:
+    """Why there is no fix."""
+    if diagnosis.abstained:
+        return Rows([Row(Content("No fix is suggested.")), warning("Reason", diagnosis.abstained)])
+    if diagnosis.faults:
+        return Rows([Row(Content("No change of options is predicted to keep all thresholds."))])
+    if all(objective.status == "ok" for objective in diagnosis.objectives):
+        return Rows([Row(Content("No fault was found: there is nothing to change."))])
+    return Rows([Row(Content("No fault was found, but not everything could be evaluated: no change is suggested."))])

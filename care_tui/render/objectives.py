@@ -1,0 +1,131 @@
+"""The verdict on a run: its objectives, and where the run came from."""
+
+from __future__ import annotations
+
+from textual.content import Content
+
+from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status
+from care_core.profile.model import Summary
+from care_core.run import Damage, Evidence, is_known
+from care_core.text import clean
+from care_tui.render.rows import (
+    WORDS,
+    Glyphs,
+    Row,
+    Rows,
+    heading,
+    labelled,
+    measure,
+    padded,
+    percent,
+    status,
+    text,
+    warning,
+)
+
+STATUS_WIDTH = 17
+VALUE_WIDTH = 11
+STRIP_WIDTH = 50
+
+
+def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
+    """The verdict on the run in one line; it counts all three states, so it never reads as a false all-clear."""
+    statuses = [objective.status for objective in diagnosis.objectives]
+    faults, unknown = statuses.count("fault"), statuses.count("not_evaluated")
+    worst: Status = "fault" if faults else "not_evaluated" if unknown or not statuses else "ok"
+    counts = f"  {faults} outside, {statuses.count('ok')} within their thresholds, {unknown} not evaluated"
+    return status(worst, glyphs) + Content(counts)
+
+
+def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Content:
+    """One objective on one line: status, name padded to `width`, value, threshold."""
+    variable, bound = result.variable, result.threshold
+    return Content.assemble(
+        status(result.status, glyphs).pad_right(STATUS_WIDTH - len(WORDS[result.status]) - 2),
+        padded(variable.name, width + 2, "bold"),
+        padded("" if result.value is None else measure(result.value, variable.unit), VALUE_WIDTH),
+        text("no threshold" if bound is None else f"{bound} {variable.unit}".rstrip()),
+    )
+
+
+def objective_detail(result: ObjectiveResult, summary: Summary | None, glyphs: Glyphs) -> list[Row]:
+    """Why it was not evaluated, or where its value lies among the training runs."""
+    variable = result.variable
+    rows = [labelled("About", variable.doc)] if variable.doc else []
+    if result.reason:
+        rows.append(warning("Reason", result.reason))
+    if result.value is None or variable.kind == "functional":
+        return rows
+    if summary is None:
+        return [*rows, labelled("Distribution", "the profile holds none for this objective")]
+    rows.append(labelled("", _strip(result, summary, glyphs)))
+    below = percent(summary.percentile(result.value))
+    middle = measure(summary.quantiles[len(summary.quantiles) // 2], variable.unit)
+    rows.append(labelled("Distribution", f"{below} of {summary.count} training runs are lower; the middle is {middle}"))
+    signs = f"{glyphs.root} this run, {glyphs.line} threshold, {glyphs.done} middle half of the runs"
+    return [*rows, Row(Content.styled(" " * 14 + signs, "dim"), 14)]
+
+
+def _strip(result: ObjectiveResult, summary: Summary, glyphs: Glyphs) -> Content:
+    """The training runs from least to most as a line, with this run's value and the threshold on it."""
+    assert result.value is not None
+    quantiles, bound = summary.quantiles, result.threshold
+    marks = [result.value] if bound is None else [result.value, bound.value]
+    low, high = min(quantiles[0], *marks), max(quantiles[-1], *marks)
+
+    def place(value: float) -> int:
+        return round((value - low) / ((high - low) or 1.0) * (STRIP_WIDTH - 1))
+
+    cells = [" "] * STRIP_WIDTH
+    for start, end, sign in ((0, -1, glyphs.rule), (len(quantiles) // 4, 3 * len(quantiles) // 4, glyphs.done)):
+        first, last = place(quantiles[start]), place(quantiles[end])
+        cells[first : last + 1] = sign * (last + 1 - first)
+    if bound is not None:
+        cells[place(bound.value)] = glyphs.line
+    cells[place(result.value)] = glyphs.root
+    return Content("".join(cells))
+
+
+def run_rows(diagnosis: Diagnosis) -> Rows:
+    """Where the run came from, which profile judged it, and everything that limits the answer."""
+    log, mission, profile = diagnosis.run.log, diagnosis.run.mission, diagnosis.profile
+    start = log.start or "no wall clock"
+    which = f"{mission.index} of {mission.count}, from {mission.start_s:.1f} s to {mission.end_s:.1f} s of the log"
+    rows = [
+        heading("This run"),
+        labelled("Log", log.path),
+        labelled("", f"{log.format}, {start}, {log.duration_s:.0f} s"),
+        labelled("Mission", which),
+        labelled("Profile", f"{profile.name} {profile.version} ({profile.platform})"),
+        labelled("", profile.reason),
+    ]
+    if diagnosis.abstained:
+        rows.append(warning("No cause", diagnosis.abstained))
+    if not mission.ended:
+        rows.append(warning("Mission", "the log stops before the mission does"))
+    if mission.mismatch:
+        rows.append(warning("Mission", mission.mismatch))
+    rows += [warning("Profile", line) for line in profile.warnings]
+    rows += [warning("Damage", damage(part)) for part in log.damage]
+    rows += [warning("Note", line) for line in diagnosis.notes]
+    rows += [labelled(key.capitalize(), value) for key, value in log.facts.items()]
+    context = {name: value for name, value in diagnosis.run.context.items() if is_known(value)}
+    if context:
+        rows.append(labelled("Met", ", ".join(f"{name} {value:.4g}" for name, value in context.items())))
+    if diagnosis.run.evidence:
+        rows += [heading("The log says"), *(evidence_row(part) for part in diagnosis.run.evidence)]
+    return Rows(rows)
+
+
+def damage(part: Damage) -> str:
+    byte = "" if part.byte is None else f" at byte {part.byte}"
+    time = "" if part.time_s is None else f" at {part.time_s:.1f} s"
+    return f"{part.what}{byte}{time}"
+
+
+def evidence_row(part: Evidence, option: str = "") -> Row:
+    """A message of the log; marked where it points at `option`."""
+    points = option and option in part.options
+    head = f"{part.time_s:8.1f} s  {clean(part.kind):<9} "
+    tail = "  (points at this option)" if points else ""
+    return Row(Content.assemble(head, text(part.text), (tail, "bold")), len(head))

@@ -1,0 +1,91 @@
+"""Any log by its path: typing narrows the list down, Enter goes into a folder or opens the log."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Vertical
+from textual.content import Content
+from textual.screen import ModalScreen
+from textual.widgets import Input, Static
+
+from care_tui.places import as_path, entries, is_openable
+from care_tui.render.rows import Glyphs, text
+from care_tui.widgets.choices import Choices, Listing
+
+
+class OpenLogDialog(ModalScreen[Path | None]):
+    """A path to type, with what is in its folder below. Answers None when the operator goes back."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("escape", "dismiss(None)", "Cancel", id="open.cancel"),
+        Binding("down", "move(1)", "Next", id="open.down", priority=True),
+        Binding("up", "move(-1)", "Previous", id="open.up", priority=True),
+        Binding("tab", "complete", "Complete", id="open.complete", priority=True),
+    ]
+
+    def __init__(self, start: Path, glyphs: Glyphs) -> None:
+        super().__init__()
+        self._start = start.absolute()
+        self._glyphs = glyphs
+        self._entries: list[Path] = []
+
+    def compose(self) -> ComposeResult:
+        box = Input(f"{self._start}/", select_on_focus=False, compact=True, classes="box")
+        box.cursor_blink = False
+        with Vertical(classes="dialog"):
+            yield Static("Open a log", classes="title", markup=False)
+            yield box
+            yield Static("Up and Down choose, Tab completes, Enter opens, Esc goes back", classes="hint", markup=False)
+            yield Choices(self._glyphs.more, id="entries")
+            yield Static(classes="error", markup=False)
+
+    def on_mount(self) -> None:
+        self._list(self.query_one(Input).value)
+
+    @on(Input.Changed)
+    def _typed(self, event: Input.Changed) -> None:
+        event.stop()
+        self._list(event.value)
+
+    def _list(self, typed: str) -> None:
+        self._entries = entries(typed)
+        shown = self._entries
+        self.query_one(Choices).show(
+            Listing(len(shown), lambda i, _width: (self._item(shown[i]),), lambda i: shown[i].name), 0
+        )
+
+    @staticmethod
+    def _item(path: Path) -> Content:
+        return text(f"{path.name}/", "bold") if path.is_dir() else text(path.name)
+
+    def action_move(self, by: int) -> None:
+        self.query_one(Choices).action_move(by)
+
+    def action_complete(self) -> None:
+        """Put the entry under the cursor into the line."""
+        index = self.query_one(Choices).highlighted
+        if index is not None:
+            self._put(self._entries[index])
+
+    def _put(self, path: Path) -> None:
+        box = self.query_one(Input)
+        box.value = f"{path}/" if path.is_dir() else str(path)
+        box.cursor_position = len(box.value)
+
+    @on(Input.Submitted)
+    def _submit(self, event: Input.Submitted) -> None:
+        event.stop()
+        typed = as_path(event.value)
+        index = self.query_one(Choices).highlighted
+        path = typed if typed.is_file() or index is None else self._entries[index]
+        if path.is_file() or is_openable(path):
+            self.dismiss(path)
+        elif path.is_dir():
+            self._put(path)
+        else:
+            self.query_one(".error", Static).update(Content.styled("! There is no such file.", "bold $text-error"))

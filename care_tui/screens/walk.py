@@ -1,0 +1,275 @@
+"""The walk from the log to the report: owns the place in it and the session."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import ClassVar
+
+from textual import on
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from care_core.diagnose.records import Fix
+from care_core.errors import CareError
+from care_tui.clipboard import fits, osc52
+from care_tui.jobs import CAUSES, Case, Engine, Job, Request
+from care_tui.messages import Progressed, StepChosen
+from care_tui.pages.causes import CausesPage
+from care_tui.pages.diff import DiffPage
+from care_tui.pages.fix import FixPage
+from care_tui.pages.graph import GraphPage
+from care_tui.pages.history import HistoryPage
+from care_tui.pages.log import LogPage
+from care_tui.pages.messages import MessagesPage
+from care_tui.pages.objectives import ObjectivesPage
+from care_tui.pages.page import Page
+from care_tui.pages.profiles import ProfilesPage
+from care_tui.pages.report import ReportPage
+from care_tui.pages.signals import SignalsPage
+from care_tui.pages.step import StepPage
+from care_tui.places import remember
+from care_tui.reading import remember_run
+from care_tui.render.rows import Glyphs
+from care_tui.screens.panes import PanesScreen
+from care_tui.screens.view import ViewScreen
+from care_tui.session import Session
+from care_tui.settings import Settings
+from care_tui.widgets.step_bar import STEPS, StepBar
+
+PAGES: tuple[type[StepPage], ...] = (LogPage, ObjectivesPage, CausesPage, FixPage, DiffPage, ReportPage)
+LOG, OBJECTIVES, CAUSES_STEP = 1, 2, 3
+VIEWS = {
+    "graph": "The causal model around the fault",
+    "messages": "What the robot's software said",
+    "signals": "Plots of the signals behind the metrics",
+    "history": "Past runs with trends, two side by side",
+    "profiles": "The installed profiles and their model cards",
+}
+
+
+class WalkScreen(PanesScreen):
+    """Six steps; Enter leads on, Esc leads back, digits jump."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        *(
+            Binding(str(number), f"go({number})", "Jump to a step", show=False, id=f"step.{name.lower()}")
+            for number, name in enumerate(STEPS, start=1)
+        ),
+        Binding("f2,w", "view('graph')", "Causal graph", show=False, id="view.graph"),
+        Binding("f3,m", "view('messages')", "Messages of the log", show=False, id="view.messages"),
+        Binding("f4,p", "view('signals')", "Plots of signals", show=False, id="view.signals"),
+        Binding("f5,y", "view('history')", "History", show=False, id="view.history"),
+        Binding("f6,b", "view('profiles')", "Profiles", show=False, id="view.profiles"),
+        Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),
+        Binding("left,h", "move(-1)", "Previous step", show=False, id="step.previous"),
+        Binding("o", "do('pick')", "Other log", id="log.pick"),
+        Binding("r", "do('again')", "Read again", show=False, id="log.again"),
+        Binding("R", "do('rescan')", "Look for logs again", show=False, id="log.rescan"),
+        Binding("d", "do('dismiss')", "Set aside", id="causes.dismiss"),
+        Binding("o", "do('next_fault')", "Next fault", show=False, id="causes.next-fault"),
+        Binding("space", "do('toggle')", "Tick", key_display="space", id="fix.toggle", priority=True),
+        Binding("plus,right_square_bracket", "do('nudge_up')", "More", key_display="+", id="fix.more"),
+        Binding("minus,left_square_bracket", "do('nudge_down')", "Less", key_display="-", id="fix.less"),
+        Binding("equals_sign,i", "do('type_value')", "Type value", key_display="=", id="fix.value"),
+        Binding("a", "do('alternative')", "Alternative", id="fix.alternative"),
+        Binding("s", "do('suggestion')", "Suggestion", show=False, id="fix.suggestion"),
+        Binding("u", "do('undo')", "Undo", show=False, id="fix.undo"),
+        Binding("f", "do('other_side')", "Compare with file", id="diff.side"),
+        Binding("c", "do('copy_diff')", "Copy", id="diff.copy"),
+        Binding("f", "do('next_format')", "Format", id="report.format"),
+        Binding("e", "do('export')", "Export", id="report.export"),
+        Binding("c", "do('copy_commands')", "Copy commands", id="report.copy"),
+    ]
+
+    def __init__(
+        self,
+        engine: Engine,
+        settings: Settings,
+        glyphs: Glyphs,
+        *,
+        request: Request | None = None,
+    ) -> None:
+        super().__init__(glyphs)
+        self.engine = engine
+        self.settings = settings
+        self.session = Session()
+        self.step = LOG
+        self._pages = tuple(page(self) for page in PAGES)
+        self._visited: list[int] = []
+        self._request = request
+
+    def compose_body(self) -> ComposeResult:
+        yield StepBar(self.glyphs)
+        yield from super().compose_body()
+
+    def on_mount(self) -> None:
+        if self._request is not None:
+            self._read(self._request)
+        else:
+            self._show(LOG)
+
+    @property
+    def page(self) -> Page:
+        return self._pages[self.step - 1]
+
+    # Moving through the steps
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        if action == "move":
+            return LOG <= self.step + int(str(parameters[0])) <= len(STEPS)
+        if action == "do" and parameters == ("toggle",):  # a priority key must leave the space bar to what is typed
+            return super().check_action(action, parameters) and self.focused is self.choices
+        return super().check_action(action, parameters)
+
+    def _show(self, step: int) -> None:
+        self.step = step
+        with self.app.batch_update():
+            self._mark()
+            self.turn_to_page()
+
+    def _mark(self) -> None:
+        path = self.session.path
+        self.query_one(StepBar).mark(self.step, "" if path is None else path.name)
+
+    def action_go(self, step: int) -> None:
+        if step != self.step:
+            self._visited.append(self.step)
+            self._show(step)
+
+    def action_move(self, by: int) -> None:
+        self.action_go(self.step + by)
+
+    def leave(self) -> None:
+        if self.session.state == "loading":
+            self._stop_reading()
+        elif self._visited:
+            self._show(self._visited.pop())
+
+    def action_view(self, name: str) -> None:
+        """Open a page beside the walk."""
+        case = self.session.case
+        if name == "profiles":
+            used = None if case is None else case.diagnosis.profile.name
+            self._open(lambda screen: ProfilesPage(screen, used))
+        elif name == "history":
+            self._open(HistoryPage)
+        elif case is None:
+            self.say("Open a log first: 1 leads to them.")
+        elif name == "graph":
+            self._open(lambda screen: GraphPage(screen, case, self._subject()))
+        elif name == "messages":
+            self._open(lambda screen: MessagesPage(screen, case))
+        else:
+            self._open(lambda screen: SignalsPage(screen, case))
+
+    def _open(self, make: Callable[[PanesScreen], Page]) -> None:
+        self.app.push_screen(ViewScreen(self.glyphs, make))
+
+    def _subject(self) -> str | None:
+        """The variable that the operator is looking at: the cause under the cursor, else the objective."""
+        session, index = self.session, self.choices.highlighted
+        if self.step == CAUSES_STEP and index is not None:
+            return session.causes[index].option.name
+        return None if session.result is None else session.result.variable.name
+
+    @on(StepChosen)
+    def _step_chosen(self, event: StepChosen) -> None:
+        event.stop()
+        self.action_go(event.step)
+
+    # Reading a log
+
+    def open_log(self, path: Path) -> None:
+        """Diagnose a log, asked for as the one before; what was chosen for that one is gone."""
+        self._read(replace(self._request, log=path) if self._request else Request(path, top=CAUSES))
+
+    def _read(self, request: Request) -> None:
+        self._request = request
+        self.session = Session(path=request.log.absolute(), progress=("starting", 0.0))
+        self._visited.clear()
+        self._show(LOG)
+        self.fetch("diagnose", partial(self._diagnose, request), self._diagnosed)
+
+    def _diagnose(self, request: Request, job: Job) -> Case:
+        """In the thread of the job."""
+
+        def report(step: str, fraction: float) -> None:
+            job.check()
+            self.post_message(Progressed(step, fraction))
+
+        case = self.engine.diagnose(request, report)
+        remember(request.log)
+        remember_run(case)
+        return case
+
+    @on(Progressed)
+    def _show_progress(self, event: Progressed) -> None:
+        event.stop()
+        if self.session.state == "loading":
+            self.session.progress = (event.step, event.fraction)
+            self.draw()
+
+    def _diagnosed(self, answer: Case | CareError) -> None:
+        self.app.note(answer)
+        if isinstance(answer, CareError):
+            self.session.error = answer
+            self.draw()
+            return
+        self.session.take(answer)
+        if self.step == LOG:
+            self.action_go(OBJECTIVES)
+        else:
+            self._show(self.step)
+
+    def _stop_reading(self) -> None:
+        self.cancel("diagnose")
+        self._diagnosed(CareError("The diagnosis was stopped.", hint="r starts it again, o opens another log."))
+
+    # What the ticked changes would bring
+
+    def basket_changed(self) -> None:
+        """Predict again with the boxes as they are now."""
+        session = self.session
+        session.fix = session.fix_error = None
+        changes, case = dict(session.basket.ticked), session.case
+        assert case is not None
+        self.draw()
+        self.fetch("predict", lambda _job: self.engine.predict(case, changes), self._predicted)
+
+    def _predicted(self, answer: Fix | CareError) -> None:
+        session = self.session
+        if isinstance(answer, CareError):
+            session.fix_error = answer
+        else:
+            session.fix = answer
+        self.page.enter()
+        self.draw()
+
+    def predict_unchanged(self) -> None:
+        """What the next run would bring with the configuration as driven; asked for once."""
+        case = self.session.case
+        if self.session.unchanged is None and case is not None:
+            self.fetch("unchanged", lambda _job: self.engine.predict(case, {}), self._unchanged_predicted)
+
+    def _unchanged_predicted(self, answer: Fix | CareError) -> None:
+        if not isinstance(answer, CareError):  # without it the odds stand alone, which is no failure
+            self.session.unchanged = answer
+            self.draw()
+
+    # Copying
+
+    def copy(self, text: str, what: str, suffix: str) -> None:
+        """Send a text to the operator's clipboard, and to a file, for no terminal says whether it took it."""
+        handle, name = tempfile.mkstemp(prefix="care-", suffix=suffix)
+        with os.fdopen(handle, "w", encoding="utf-8") as stream:
+            stream.write(text)
+        if fits(text):
+            self.app.write_control(osc52(text))
+            self.say(f"Sent {what} to the clipboard; also in {name}")
+        else:
+            self.say(f"Too long for the clipboard: {what} are in {name}")

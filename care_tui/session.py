@@ -1,0 +1,128 @@
+"""What the operator has opened and chosen so far. Values only: pages show it, workers fill it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult
+from care_core.errors import CareError
+from care_core.variables import Variable
+from care_tui.basket import Basket
+from care_tui.jobs import Case, ReportFormat, changes_of, decided, fixes
+
+FORMATS: tuple[ReportFormat, ...] = ("yaml", "markdown", "html", "json", "patch")
+State = Literal["empty", "loading", "data", "error"]
+
+
+@dataclass
+class Session:
+    """One log on its way from the fault to the report. A new log gets a new session."""
+
+    path: Path | None = None
+    progress: tuple[str, float] | None = None
+    case: Case | None = None
+    error: CareError | None = None
+    objective: int = 0
+    """Place of the objective that the causes are shown of."""
+    option: str | None = None
+    """The option that the operator came to the fix with."""
+    basket: Basket = field(default_factory=Basket)
+    fix: Fix | None = None
+    """What the ticked changes are predicted to bring; None while it is computed."""
+    fix_error: CareError | None = None
+    unchanged: Fix | None = None
+    """What the configuration as driven would bring again."""
+    dismissed: dict[str, str] = field(default_factory=dict)
+    format: ReportFormat = "yaml"
+
+    @property
+    def state(self) -> State:
+        if self.case is not None:
+            return "data"
+        if self.error is not None:
+            return "error"
+        return "empty" if self.path is None else "loading"
+
+    @property
+    def diagnosis(self) -> Diagnosis:
+        """The diagnosis; only asked for in the state `data`."""
+        assert self.case is not None
+        return self.case.diagnosis
+
+    def take(self, case: Case) -> None:
+        """A diagnosis has come: start at its first fault, with the suggested fix in the basket."""
+        self.case = case
+        statuses = [result.status for result in case.diagnosis.objectives]
+        self.objective = statuses.index("fault") if "fault" in statuses else 0
+        self.fix = case.diagnosis.fix
+        if self.fix is not None:
+            self.basket = Basket(changes_of(self.fix), self.suggested())
+        elif case.diagnosis.faults:
+            self.basket = Basket({}, self.suggested())
+
+    def suggested(self) -> dict[str, float]:
+        """A value for every option that the engine would change: in a fix, an alternative, or for a cause."""
+        values: dict[str, float] = {}
+        for fix in fixes(self.diagnosis):
+            values = {**changes_of(fix), **values}
+        for fault in self.diagnosis.faults:
+            for cause in fault.causes:
+                if cause.suggested is not None:
+                    values.setdefault(cause.option.name, cause.suggested)
+        return values
+
+    def alone(self) -> dict[str, float]:
+        """Odds of keeping all thresholds with one option changed as suggested for it."""
+        causes = (cause for fault in self.diagnosis.faults for cause in fault.causes)
+        return {cause.option.name: cause.p_fixed for cause in causes if cause.p_fixed is not None}
+
+    @property
+    def result(self) -> ObjectiveResult | None:
+        """The objective that the causes are shown of."""
+        results = self.diagnosis.objectives
+        return results[self.objective] if results else None
+
+    @property
+    def fault(self) -> Fault | None:
+        """The fault of that objective, if it has one."""
+        result = self.result
+        return None if result is None else self.fault_of(result)
+
+    def fault_of(self, result: ObjectiveResult) -> Fault | None:
+        name = result.variable.name
+        return next((fault for fault in self.diagnosis.faults if fault.objective.variable.name == name), None)
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        return () if self.fault is None else self.fault.causes
+
+    def next_fault(self) -> bool:
+        """Turn to the next faulty objective, the first after the last; False when there is no other."""
+        places = [i for i, result in enumerate(self.diagnosis.objectives) if self.fault_of(result)]
+        if len(places) < 2:
+            return False
+        self.objective = next((place for place in places if place > self.objective), places[0])
+        return True
+
+    def options(self) -> list[Variable]:
+        """Every option, those that the engine would change first."""
+        known = {option.name: option for option in (self.case.options if self.case else ())}
+        for fix in fixes(self.diagnosis):
+            known |= {change.option.name: change.option for change in fix.changes}
+        known |= {cause.option.name: cause.option for fault in self.diagnosis.faults for cause in fault.causes}
+        first = [name for name in self.suggested() if name in known]
+        return [known[name] for name in (*first, *(name for name in known if name not in first))]
+
+    def current(self, option: Variable) -> float | None:
+        """The option's value in this run; where no source holds it, what the engine took it to be."""
+        for fault in self.diagnosis.faults:
+            for cause in fault.causes:
+                if cause.option.name == option.name:
+                    return cause.current
+        return self.diagnosis.run.config.get(option.name, option.default)
+
+    def decided(self) -> Diagnosis:
+        """The diagnosis with the ticked changes as its fix, and the causes set aside."""
+        return decided(self.diagnosis, self.fix, self.dismissed)

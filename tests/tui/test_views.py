@@ -1,0 +1,127 @@
+"""The views beside the walk, on the real sample: graph, messages, signals, profiles, history, and a file on disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from textual.widgets import Static
+
+from care_core.resources import bundled
+from care_tui.app import CareApp
+from care_tui.jobs import Request
+from care_tui.pages.history import HistoryPage
+from care_tui.render.plot import dots_across, plot
+from care_tui.screens.view import ViewScreen
+from care_tui.screens.walk import WalkScreen
+from care_tui.settings import Settings
+from tests.tui import sample_diagnosis as sample
+from tests.tui.conftest import MakeApp, settle
+from tests.tui.test_walk import hints, items, text, title, walk
+
+SAMPLE = bundled("samples", "arducopter_failed.BIN")
+needs_sample = pytest.mark.skipif(not SAMPLE.is_file(), reason="the sample is not bundled")
+
+
+def real(configs: tuple[str | Path, ...] = ()) -> CareApp:
+    return CareApp(Request(SAMPLE, configs=configs, top=10), settings=Settings(places=()))
+
+
+@needs_sample
+async def test_every_view_opens_shows_the_run_and_closes() -> None:
+    app = real()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "w")
+        assert title(app).startswith("Around mission_time")
+        first = items(app).splitlines()[0]
+        await settle(pilot, "enter")
+        assert f"Around {first.split()[2]}" in title(app)
+        await settle(pilot, "h")
+        assert title(app).startswith("Around mission_time")
+        await settle(pilot, "escape", "m")
+        assert "ArduCopter V4.5.4" in items(app)
+        await settle(pilot, "n", "slash", *"arming")
+        assert "arming" in items(app).casefold()
+        await settle(pilot, "escape", "escape", "p")
+        assert "BAT" in items(app)
+        await settle(pilot, "slash", *"bat volt", "enter")
+        assert any("\u2800" < sign <= "\u28ff" for sign in text(app)), "a curve is drawn"
+        await settle(pilot, "escape", "escape", "b")
+        assert "▸ arducopter" in items(app)
+        assert "Model card: arducopter" in text(app)
+        await settle(pilot, "escape", "y")
+        assert "FAULT mission_time, energy" in items(app)
+        assert "LAND_SPEED" in text(app)
+        await settle(pilot, "x", "x", "escape")
+        assert isinstance(app.screen, WalkScreen)
+        await settle(pilot, "3", "f2")
+        assert title(app).startswith("Around LAND_SPEED"), "the graph starts at the cause under the cursor"
+        await settle(pilot, "1", "question_mark", "escape", "escape")
+        assert isinstance(app.screen, WalkScreen)
+
+
+@needs_sample
+async def test_odds_follow_the_value_that_is_typed() -> None:
+    app = real()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "4")
+        suggested = walk(app).session.fix
+        assert suggested is not None
+        await settle(pilot, "equals_sign", *"17", "enter")
+        worse = walk(app).session.fix
+        assert worse is not None
+        assert worse.p_fixed < suggested.p_fixed / 2
+        await settle(pilot, "u")
+        again = walk(app).session.fix
+        assert again is not None
+        assert again.p_fixed == pytest.approx(suggested.p_fixed, abs=0.01)
+
+
+@needs_sample
+async def test_the_file_on_disk_is_patched_with_its_comments_kept(tmp_path: Path) -> None:
+    file = tmp_path / "robot.param"
+    file.write_text("# landing, agreed with Anna\nLAND_SPEED,20  # slow\nWPNAV_SPEED,1000\n")
+    app = real((file,))
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "5", "f")
+        assert "-LAND_SPEED,20  # slow" in text(app)
+        assert "+LAND_SPEED,40  # slow" in text(app)
+        await settle(pilot, "f")
+        assert "! LAND_SPEED  16 -> 20" in text(app)
+    assert "LAND_SPEED,20" in file.read_text(), "nothing is written"
+
+
+async def test_views_of_a_log_need_one_and_the_others_do_not(make_app: MakeApp) -> None:
+    app = CareApp(settings=Settings(places=()))
+    async with app.run_test(size=(80, 24)) as pilot:
+        for key in ("f2", "f3", "f4"):
+            await settle(pilot, key)
+            assert "Open a log first" in hints(app)
+        await settle(pilot, "f5")
+        assert isinstance(app.screen, ViewScreen)
+        assert isinstance(app.screen.page, HistoryPage)
+        assert "No run was triaged before" in text(app)
+        await settle(pilot, "escape", "f6")
+        assert "arducopter" in items(app)
+
+
+async def test_a_view_that_cannot_read_the_log_says_so(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "m")
+        assert "No such file" in text(app)
+        await settle(pilot, "escape", "w")
+        assert "no model of this" in text(app)
+        assert app.screen.query_one(".title", Static).display
+
+
+def test_a_plot_is_as_wide_and_as_high_as_asked_for() -> None:
+    columns = [(float(x), float(x)) for x in range(40)]
+    braille = plot(columns, 0.0, 39.0, 5, ascii=False)
+    assert [len(line) for line in braille] == [20] * 5
+    assert braille[0].strip() == braille[0].lstrip()
+    assert braille[-1].startswith("⣀") or braille[-1][0] != " "
+    stars = plot([None, (0.0, 1.0), (1.0, 1.0)], 0.0, 1.0, 3, ascii=True)
+    assert stars == [" **", " * ", " * "]
+    assert dots_across(20, ascii=False) == 40
+    assert dots_across(20, ascii=True) == 20

@@ -1,0 +1,144 @@
+"""The parts of the app that need no terminal: basket, clipboard, settings."""
+
+from __future__ import annotations
+
+import base64
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_core.errors import ConfigError, UsageError
+from care_core.variables import Role, Variable
+from care_tui.basket import Basket, nudged, parsed
+from care_tui.clipboard import MAX_BYTES, fits, osc52
+from care_tui.settings import Settings, load_settings, prepare_terminal, with_flags
+
+FLOAT = Variable("gain", Role.OPTION, "float", "", "", (0.01, 10.0), 1.0)
+INT = Variable("speed", Role.OPTION, "int", "cm/s", "", (30, 200), 50)
+ENUM = Variable("mode", Role.OPTION, "enum", "", "", None, 0, ((0, "off"), (2, "on")))
+FLAG = Variable("flag", Role.OPTION, "bool", "", "", None, 0)
+
+
+@given(st.lists(st.sampled_from(["tick", "set", "load", "drop"]), max_size=8))
+def test_undo_takes_back_whatever_was_done(steps: list[str]) -> None:
+    basket = Basket({"a": 1.0}, {"a": 1.0, "b": 2.0})
+    states = [(dict(basket.ticked), dict(basket.values))]
+    for number, step in enumerate(steps):
+        if step == "tick":
+            basket.toggle("b")
+        elif step == "set":
+            basket.set("c", float(number), current=0.0)
+        elif step == "load":
+            basket.load({"d": float(number)})
+        else:
+            basket.drop("a")
+        if (dict(basket.ticked), dict(basket.values)) != states[-1] or step in ("set", "load"):
+            states.append((dict(basket.ticked), dict(basket.values)))
+    for ticked, values in reversed(states[:-1]):
+        assert basket.undo()
+        assert (basket.ticked, basket.values) == (ticked, values)
+    assert not basket.undo()
+
+
+def test_the_value_of_the_run_is_no_change() -> None:
+    basket = Basket()
+    basket.set("a", 3.0, current=1.0)
+    basket.set("a", 1.0, current=1.0)
+    assert basket.ticked == {}
+    assert basket.toggle("a") is False, "nothing to tick"
+
+
+@given(st.sampled_from([FLOAT, INT, ENUM, FLAG]), st.integers(-30, 30))
+def test_a_nudge_stays_acceptable_and_moves(option: Variable, by: int) -> None:
+    start = 0.0 if option in (ENUM, FLAG) else 50.0 if option is INT else 1.0
+    value = nudged(option, start, by)
+    assert option.accepts(value)
+    if option in (FLOAT, INT) and by:
+        assert (value > start) == (by > 0)
+
+
+@pytest.mark.parametrize(
+    ("option", "typed", "value"),
+    [(FLOAT, "0.123456", 0.123456), (INT, "70", 70.0), (ENUM, "ON", 2.0), (FLAG, "true", 1.0)],
+)
+def test_values_are_typed_as_operators_write_them(option: Variable, typed: str, value: float) -> None:
+    assert parsed(option, typed) == value
+
+
+@pytest.mark.parametrize(
+    ("option", "typed", "says"),
+    [(FLOAT, "11", "from 0.01 to 10"), (FLOAT, "nan", "from"), (FLOAT, "x", "no number"), (INT, "50.5", "whole"),
+     (ENUM, "1", "0 (off), 2 (on)"), (INT, "1e9", "cm/s")],
+)  # fmt: skip
+def test_what_cannot_be_taken_is_refused_with_what_can(option: Variable, typed: str, says: str) -> None:
+    with pytest.raises(ValueError, match=r".") as refused:
+        parsed(option, typed)
+    assert says in str(refused.value)
+
+
+def test_osc_52_is_wrapped_for_the_multiplexer() -> None:
+    plain = osc52("param set A 1\n", {})
+    assert base64.b64decode(plain.removeprefix("\x1b]52;c;").removesuffix("\x07")) == b"param set A 1\n"
+    tmux = osc52("x", {"TMUX": "/tmp/tmux-0/default,1,0", "TERM": "screen-256color"})
+    assert tmux == "\x1bPtmux;\x1b" + osc52("x", {}) + "\x1b\\"
+    screen = osc52("x" * 999, {"TERM": "screen.xterm"})
+    parts = [part for part in screen.split("\x1b\\") if part]
+    assert "".join(part.removeprefix("\x1bP") for part in parts) == osc52("x" * 999, {})
+    assert fits("x" * MAX_BYTES)
+    assert not fits("x" * (MAX_BYTES + 1))
+
+
+def test_settings_are_read_checked_and_beaten_by_flags(tmp_path: Path) -> None:
+    file = tmp_path / "s.yaml"
+    file.write_text("theme: high-contrast\ncolor: 256\nmouse: false\nkeys: {step.next: n}\nplaces: [/logs]\n")
+    settings = load_settings(file)
+    assert settings == Settings(
+        theme="high-contrast", color="256", mouse=False, keys={"step.next": "n"}, places=(Path("/logs"),)
+    )
+    typed = with_flags(settings, ascii=True, mouse=True, color="16", theme=None)
+    assert (typed.ascii, typed.mouse, typed.color, typed.theme) == (True, False, "16", "high-contrast")
+    with pytest.raises(UsageError, match="cannot be 'pink'"):
+        with_flags(settings, ascii=False, mouse=True, color="pink", theme=None)
+    file.write_text("")
+    assert load_settings(file) == Settings()
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [("them: x", "Did you mean 'theme'"), ("mouse: 3", "true or false"), ("fps: 900", "0 to 60"), ("- a", "no mapping"),
+     ("color: blue", "auto or truecolor"), ("keys: {a: 1}", "action to key"), ("a: [", "no YAML"),
+     ("places: x", "list")],
+)  # fmt: skip
+def test_settings_that_cannot_be_taken_are_refused_with_the_key(tmp_path: Path, content: str, says: str) -> None:
+    file = tmp_path / "s.yaml"
+    file.write_text(content)
+    with pytest.raises(ConfigError) as refused:
+        load_settings(file)
+    assert says in str(refused.value)
+    assert str(file) in str(refused.value)
+
+
+def test_a_settings_file_that_is_named_must_exist(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ConfigError, match="No such file"):
+        load_settings(tmp_path / "none.yaml")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    assert load_settings() == Settings()
+
+
+def test_ssh_gets_fewer_frames_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("TEXTUAL_FPS", "NO_COLOR", "TEXTUAL_COLOR_SYSTEM"):
+        monkeypatch.setenv(name, "")
+        monkeypatch.delenv(name)
+    prepare_terminal(Settings())
+    assert "TEXTUAL_FPS" not in os.environ
+    monkeypatch.setenv("SSH_CONNECTION", "1.2.3.4 1 5.6.7.8 22")
+    prepare_terminal(Settings(color="16"))
+    assert os.environ["TEXTUAL_FPS"] == "15"
+    assert os.environ["TEXTUAL_COLOR_SYSTEM"] == "standard"
+    prepare_terminal(Settings(color="none"))
+    assert os.environ["NO_COLOR"] == "1"
+    for name in ("TEXTUAL_FPS", "NO_COLOR", "TEXTUAL_COLOR_SYSTEM"):
+        monkeypatch.setenv(name, "")
