@@ -76,6 +76,8 @@ app.add_typer(formats.app, name="schema")
 
 def main() -> None:
     """Entry point of the console script."""
+    # numpy's own threads only wait for each other on matrices as small as these. Read when numpy is first imported.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     app(prog_name="care")
 
 

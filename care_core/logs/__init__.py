@@ -100,13 +100,14 @@ def log_digest(path: str | Path) -> str:
     """SHA-256 of the file, or of a folder's files one after the other by name, in hex, read in pieces."""
     path = Path(path)
     digest = hashlib.sha256()
+    # One large buffer: after each piece the thread waits for its turn among those that compute.
+    piece = memoryview(bytearray(1 << 22))
     try:
         files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
         for file in files:
-            with file.open("rb") as stream:
-                # Large pieces: after each the thread waits for its turn among those that compute.
-                while piece := stream.read(1 << 23):
-                    digest.update(piece)
+            with file.open("rb", buffering=0) as stream:
+                while size := stream.readinto(piece):
+                    digest.update(piece[:size])
     except OSError as err:
         raise _cannot_open(path, err) from err
     return digest.hexdigest()
