@@ -67,7 +67,8 @@ def held_out_odds(
 def all_met(frame: pd.DataFrame, schema: Schema) -> FloatArray:
     """1 where every objective has a value that keeps its threshold, else 0; shape (n,)."""
     kept = [np.nan_to_num(met(objective, frame), nan=0.0) == 1.0 for objective in schema.objectives]
-    return np.all(kept, axis=0).astype(float)
+    met_all: FloatArray = np.all(kept, axis=0).astype(float)
+    return met_all
 
 
 def _odds(
