@@ -46,7 +46,7 @@ def cause_item(cause: Cause, dismissed: str | None, glyphs: Glyphs) -> tuple[Con
     worth = [f"{cause.confidence} confidence"]
     worth.append("not ruled out" if cause.is_lead else f"costs {percent(cause.contribution)}")
     if cause.p_fixed is not None:
-        worth.append(f"alone fixes {percent(cause.p_fixed)}")
+        worth.append(f"changed alone {percent(cause.p_fixed)}")
     caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
     return head, Content("   " + ", ".join(worth) + caveats)
 

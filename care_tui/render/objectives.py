@@ -25,7 +25,7 @@ from care_tui.render.rows import (
 
 STATUS_WIDTH = 17
 VALUE_WIDTH = 11
-STRIP_WIDTH = 50
+STRIP_WIDTH = 42
 
 
 def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
@@ -33,7 +33,7 @@ def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
     statuses = [objective.status for objective in diagnosis.objectives]
     faults, unknown = statuses.count("fault"), statuses.count("not_evaluated")
     worst: Status = "fault" if faults else "not_evaluated" if unknown or not statuses else "ok"
-    counts = f"  {faults} outside, {statuses.count('ok')} within their thresholds, {unknown} not evaluated"
+    counts = f"  {faults} outside, {statuses.count('ok')} within, {unknown} not evaluated"
     return status(worst, glyphs) + Content(counts)
 
 
