@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from textual.content import Content
 
 from care_core.diagnose.records import Cause, Diagnosis, ObjectiveResult, PathNode
-from care_core.profile.model import EffectRecord
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.render.fix import prediction
@@ -27,6 +27,9 @@ from care_tui.render.rows import (
     text,
     warning,
 )
+
+if TYPE_CHECKING:  # reading models is not needed for the first frame
+    from care_core.profile.model import EffectRecord
 
 FEW_RESAMPLES = 0.5
 """Edges that fewer bootstrap resamples hold are flagged."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status
-from care_core.profile.model import Summary
 from care_core.run import Damage, Evidence, is_known
 from care_core.text import clean
 from care_tui.render.rows import (
@@ -22,6 +23,9 @@ from care_tui.render.rows import (
     text,
     warning,
 )
+
+if TYPE_CHECKING:  # reading models is not needed for the first frame
+    from care_core.profile.model import Summary
 
 STATUS_WIDTH = 17
 VALUE_WIDTH = 11
