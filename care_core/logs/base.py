@@ -6,12 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from care_core.run import Damage, Setting
+
+if TYPE_CHECKING:  # a log is told by its first bytes before anything needs numbers
+    import numpy as np
+    from numpy.typing import NDArray
 
 Wanted = Mapping[str, Sequence[str]]
 """Channel name to the fields to decode; ROS fields are dotted paths such as `pose.pose.position.x`."""
@@ -65,6 +66,8 @@ class Table:
 
     def between(self, start_s: float, end_s: float) -> Table:
         """The messages with start_s <= t <= end_s."""
+        import numpy as np
+
         if np.all(self.t[:-1] <= self.t[1:]):  # in order, as nearly always: views instead of copies
             low, high = np.searchsorted(self.t, start_s, "left"), np.searchsorted(self.t, end_s, "right")
             return self.where(slice(int(low), int(high)))

@@ -17,7 +17,7 @@ from care_tui.render.rows import Row, Rows, error_rows, heading, percent
 from care_tui.screens.prompt import Prompt
 from care_tui.widgets.choices import Listing
 
-NAME_WIDTH = 24
+NAME_WIDTH = 26
 
 
 class FixPage(DiagnosisPage):
@@ -62,11 +62,10 @@ class FixPage(DiagnosisPage):
             return Content("No prediction")
         count = len(session.basket.ticked)
         changes = f"{count} change{'' if count == 1 else 's'}" if count else "nothing ticked"
-        odds = "..." if session.fix is None else percent(session.fix.p_fixed)
-        if session.fix is None and not count and session.unchanged is None:
-            odds = "unknown"
+        shown = session.fix if count else session.unchanged
+        odds = "..." if shown is None else percent(shown.p_fixed)
         now = "" if session.unchanged is None else f"  (as driven {percent(session.unchanged.p_fixed)})"
-        return Content.assemble("Odds of keeping all thresholds ", (odds, "bold"), now, (f"  {changes}", "dim"))
+        return Content.assemble("Odds of no fault ", (odds, "bold"), now, (f"  {changes}", "dim"))
 
     def _detail(self, option: Variable | None) -> Rows:
         session = self.session

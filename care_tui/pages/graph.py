@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from textual.content import Content
 
-from care_core.profile.model import EdgeRecord
 from care_core.run import is_known
 from care_tui.jobs import Case
 from care_tui.pages.page import Page, View, sentence
 from care_tui.render.rows import Row, Rows, heading, labelled, measure, padded, percent, warning
 from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
+
+if TYPE_CHECKING:  # reading models is not needed for the first frame
+    from care_core.profile.model import EdgeRecord
 
 FEW = 0.5
 

@@ -29,7 +29,8 @@ class LogPage(StepPage):
 
     def enter(self) -> None:
         self._found: Fetch[list[LogFile]] = getattr(self, "_found", None) or Fetch(self.screen, "logs")
-        self._found.start(lambda: found_logs(self.walk.settings.places))
+        # After the first frame, as the reading of the log.
+        self.screen.call_after_refresh(self._found.start, lambda: found_logs(self.walk.settings.places))
 
     def view(self) -> View:
         found = self._found.answer

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from textual.content import Content
 
 from care_core.diagnose.records import Cause, Diagnosis, ObjectiveResult, PathNode
-from care_core.profile.model import EffectRecord
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.render.fix import prediction
@@ -28,6 +28,9 @@ from care_tui.render.rows import (
     warning,
 )
 
+if TYPE_CHECKING:  # reading models is not needed for the first frame
+    from care_core.profile.model import EffectRecord
+
 FEW_RESAMPLES = 0.5
 """Edges that fewer bootstrap resamples hold are flagged."""
 
@@ -46,7 +49,7 @@ def cause_item(cause: Cause, dismissed: str | None, glyphs: Glyphs) -> tuple[Con
     worth = [f"{cause.confidence} confidence"]
     worth.append("not ruled out" if cause.is_lead else f"costs {percent(cause.contribution)}")
     if cause.p_fixed is not None:
-        worth.append(f"alone fixes {percent(cause.p_fixed)}")
+        worth.append(f"changed alone {percent(cause.p_fixed)}")
     caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
     return head, Content("   " + ", ".join(worth) + caveats)
 

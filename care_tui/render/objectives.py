@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status
-from care_core.profile.model import Summary
 from care_core.run import Damage, Evidence, is_known
 from care_core.text import clean
 from care_tui.render.rows import (
@@ -23,9 +24,12 @@ from care_tui.render.rows import (
     warning,
 )
 
+if TYPE_CHECKING:  # reading models is not needed for the first frame
+    from care_core.profile.model import Summary
+
 STATUS_WIDTH = 17
 VALUE_WIDTH = 11
-STRIP_WIDTH = 50
+STRIP_WIDTH = 42
 
 
 def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
@@ -33,7 +37,7 @@ def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
     statuses = [objective.status for objective in diagnosis.objectives]
     faults, unknown = statuses.count("fault"), statuses.count("not_evaluated")
     worst: Status = "fault" if faults else "not_evaluated" if unknown or not statuses else "ok"
-    counts = f"  {faults} outside, {statuses.count('ok')} within their thresholds, {unknown} not evaluated"
+    counts = f"  {faults} outside, {statuses.count('ok')} within, {unknown} not evaluated"
     return status(worst, glyphs) + Content(counts)
 
 

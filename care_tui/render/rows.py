@@ -158,7 +158,7 @@ def text(value: str, style: str = "") -> Content:
 def labelled(label: str, value: Content | str, style: str = "") -> Row:
     """A row `label  value` with the values in one column."""
     body = text(value) if isinstance(value, str) else value
-    return Row(Content.assemble((f"{label:<{LABEL_WIDTH}}", style), body), LABEL_WIDTH)
+    return Row(Content.assemble((f"{label:<{LABEL_WIDTH - 1}} ", style), body), LABEL_WIDTH)
 
 
 def heading(value: str) -> Row:
@@ -234,6 +234,6 @@ def error_rows(error: CareError) -> Rows:
 
 
 def padded(value: str, width: int, style: str = "") -> Content:
-    """Foreign text, cleaned, filled up to a column."""
+    """Foreign text, cleaned, filled up to a column; a longer one still keeps its distance from what follows."""
     content = text(value, style)
-    return content.pad_right(max(width - content.cell_length, 0))
+    return content.pad_right(max(width - content.cell_length, 1))

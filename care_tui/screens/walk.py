@@ -193,7 +193,8 @@ class WalkScreen(PanesScreen):
         self.session = Session(path=request.log.absolute(), progress=("starting", 0.0))
         self._visited.clear()
         self._show(LOG)
-        self.fetch("diagnose", partial(self._diagnose, request), self._diagnosed)
+        # After the first frame, which the imports of the work would hold up.
+        self.call_after_refresh(self.fetch, "diagnose", partial(self._diagnose, request), self._diagnosed)
 
     def _diagnose(self, request: Request, job: Job) -> Case:
         """In the thread of the job."""

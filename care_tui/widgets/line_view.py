@@ -33,6 +33,7 @@ class LineView(ScrollView, can_focus=True, inherit_bindings=False):
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._drawn: list[Content] = []
+        self._changed: dict[int, tuple[int, int]] = {}
 
     @property
     def line_count(self) -> int:
@@ -63,7 +64,7 @@ class LineView(ScrollView, can_focus=True, inherit_bindings=False):
         before += [Content()] * (height - len(before))
         for row, (old, new) in enumerate(zip(before, self._drawn, strict=False)):
             if not old.is_same(new):
-                first, last = changed_cells(old, new)
+                self._changed[row] = first, last = changed_cells(old, new)
                 self.refresh(Region(first, row, last - first, 1))
 
     def _visible(self, height: int) -> list[Content]:
@@ -85,7 +86,11 @@ class LineView(ScrollView, can_focus=True, inherit_bindings=False):
         width, style = self.size.width, self.visual_style
         if y >= len(self._drawn):
             return Strip.blank(width, style.rich_style)
-        return Visual.to_strips(self, Rows([Row(self._drawn[y])]), width, 1, style, pad=True)[0].simplify()
+        strip = Visual.to_strips(self, Rows([Row(self._drawn[y])]), width, 1, style, pad=True)[0].simplify()
+        # Textual sends whole segments: cut where the change begins and ends, only that part is sent.
+        first, last = self._changed.get(y, (0, width))
+        cuts = sorted({first, min(last, width), width} - {0})
+        return Strip.join(strip.divide(cuts))
 
 
 def changed_cells(old: Content, new: Content) -> tuple[int, int]:
