@@ -67,11 +67,7 @@ def measure(runs: int, faults: int) -> None:
     p, met = np.array(odds), np.array(fixed, dtype=float)
     print(f"\ntrained on {runs} missions: {seen} faults, {abstained} abstained, median changes {np.median(sizes):g}")
     print(f"  suggested values that fixed the fault: {met.mean():.2f} (promised {p.mean():.2f}); "
-<<<<<<< HEAD
           f"the same options at their reference: {np.mean(reset):.2f}; {nearer} nearer to the run's")  # fmt: skip
-=======
-          f"the same options at their reference: {np.mean(reset):.2f}; {nearer} nearer values")  # fmt: skip
->>>>>>> fd153584808913e218b0bf69746d981bf0e4da2a
     print(f"  calibration error {calibration_error(p, met):.3f}; predicted, fixed, n:")
     for predicted, seen_share, count in reliability(p, met):
         print(f"    {predicted:4.2f} {seen_share:4.2f} {count:4d}")
