@@ -123,14 +123,17 @@ class CareApp(App[int], inherit_bindings=False):
         if isinstance(screen, CareScreen):
             self.push_screen(HelpScreen(screen.help_text(), self._keys_of(screen)))
 
-    def _keys_of(self, screen: Screen[None]) -> Keys:
+    def _keys_of(self, screen: CareScreen) -> Keys:
         """Every key that works on the screen, keys of one action together, in the order they are looked up."""
         keys: dict[tuple[str, str], list[str]] = {}
         # Keys with priority come first there; they are those of the app and belong at the end.
         for key, active in sorted(screen.active_bindings.items(), key=lambda item: item[1].binding.priority):
             binding = active.binding
             if active.enabled and binding.description and binding.id:
-                does = (binding.description, binding.id.split(".")[0] if binding.id.startswith("step.") else binding.id)
+                does = (
+                    screen.described(binding),
+                    binding.id.split(".")[0] if binding.id.startswith("step.") else binding.id,
+                )
                 keys.setdefault(does, []).append(self.get_key_display(binding.with_key(key)))
         return [(" ".join(shown), description, id) for (description, id), shown in keys.items()]
 
@@ -146,7 +149,7 @@ class CareApp(App[int], inherit_bindings=False):
             for view in VIEWS:
                 yield SystemCommand(view.capitalize(), VIEWS[view], lambda view=view: screen.action_view(view))
         if isinstance(screen, PanesScreen):
-            for name in sorted(screen.page.ACTIONS):
+            for name in sorted(filter(screen.page.works, screen.page.ACTIONS)):
                 about = (getattr(screen.page, name).__doc__ or "").strip().splitlines()
                 yield SystemCommand(
                     name.replace("_", " ").capitalize(), about[0] if about else "", getattr(screen.page, name)

@@ -46,6 +46,11 @@ class Session:
         return "empty" if self.path is None else "loading"
 
     @property
+    def is_readable(self) -> bool:
+        """Whether there is a log to look into, though it may have no diagnosis."""
+        return self.path is not None and self.state != "loading" and self.path.exists()
+
+    @property
     def diagnosis(self) -> Diagnosis:
         """The diagnosis; only asked for in the state `data`."""
         assert self.case is not None

@@ -22,6 +22,7 @@ LABELS = {"yaml": "YAML", "markdown": "Markdown", "html": "HTML", "json": "JSON"
 class ReportPage(DiagnosisPage):
     name = "Report"
     HELP = "The report as it will be written. f changes the format, Enter writes it to a file, c copies the commands."
+    ENTER = "Export"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"next_format", "export", "copy_commands"})
     _text: str | CareError | None = None
     _written = ""
