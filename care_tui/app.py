@@ -104,6 +104,14 @@ class CareApp(App[int], inherit_bindings=False):
                 self.pop_screen()
             self._walk.open_log(path)
 
+    def _fatal_error(self) -> None:
+        """End after a defect with its traceback, without the values of variables: a diagnosis fills megabytes."""
+        from rich.console import Group
+        from rich.traceback import Traceback
+
+        report = "This is a defect of care, not of your robot: please report it with the log."
+        self.panic(Group(Traceback(show_locals=False), report))
+
     # Keys and commands that work everywhere
 
     async def action_quit(self) -> None:
@@ -163,4 +171,4 @@ def run(request: Request | None, settings: Settings) -> int:
     """Open the app; answers the exit code."""
     app = CareApp(request, settings=settings)
     answer = app.run(mouse=settings.mouse)
-    return int(app.code if answer is None else answer)
+    return int(ExitCode.USAGE if answer is None else answer)
