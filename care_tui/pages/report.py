@@ -16,7 +16,7 @@ from care_tui.render.rows import error_rows, plain_rows
 from care_tui.screens.export import ExportDialog
 from care_tui.session import FORMATS
 
-LABELS = {"yaml": "YAML", "markdown": "Markdown", "html": "HTML", "json": "JSON", "patch": "patch"}
+LABELS = {"yaml": "YAML", "markdown": "Markdown", "html": "HTML, its text here", "json": "JSON", "patch": "patch"}
 
 
 class ReportPage(DiagnosisPage):
@@ -30,7 +30,8 @@ class ReportPage(DiagnosisPage):
     def enter(self) -> None:
         if self.session.state == "data":
             self._text = None
-            diagnosis, format = self.session.decided(), self.session.format
+            diagnosis = self.session.decided()
+            format = "markdown" if self.session.format == "html" else self.session.format
             self.screen.fetch("report", lambda _job: self.walk.engine.report(diagnosis, format), self._received)
 
     def _received(self, text: str | CareError) -> None:
