@@ -132,10 +132,9 @@ class CareApp(App[int], inherit_bindings=False):
             self.push_screen(HelpScreen(screen.help_text(), self._keys_of(screen)))
 
     def _keys_of(self, screen: CareScreen) -> Keys:
-        """Every key that works on the screen, keys of one action together, in the order they are looked up."""
+        """Every key that works on the screen, keys of one action together, those of the page first."""
         keys: dict[tuple[str, str], list[str]] = {}
-        # Keys with priority come first there; they are those of the app and belong at the end.
-        for key, active in sorted(screen.active_bindings.items(), key=lambda item: item[1].binding.priority):
+        for key, active in sorted(screen.active_bindings.items(), key=lambda item: _order(item[1].binding)):
             binding = active.binding
             if active.enabled and binding.description and binding.id:
                 does = (
@@ -147,7 +146,8 @@ class CareApp(App[int], inherit_bindings=False):
 
     def get_key_display(self, binding: Binding) -> str:
         """How a key is written; by its name where arrows and the like cannot be drawn."""
-        return (binding.key_display or binding.key) if self._glyphs is ASCII else super().get_key_display(binding)
+        is_named = self._glyphs is ASCII or binding.key == "enter"
+        return (binding.key_display or binding.key) if is_named else super().get_key_display(binding)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
         """What the command palette offers: the steps, and every action of the page."""
@@ -165,6 +165,14 @@ class CareApp(App[int], inherit_bindings=False):
         yield SystemCommand("Help", "The keys that work here", self.action_help)
         yield SystemCommand("Theme", "Change the colours", self.action_change_theme)
         yield SystemCommand("Quit", "Leave care", self.action_quit)
+
+
+def _order(binding: Binding) -> int:
+    """Where a key belongs in the list of keys: what only this page can do first, what works everywhere last."""
+    places = ("do(", "open", "back", "filter", "go(", "view(", "move(")
+    if binding.priority and not binding.action.startswith("do("):
+        return len(places) + 1
+    return next((place for place, start in enumerate(places) if binding.action.startswith(start)), len(places))
 
 
 def run(request: Request | None, settings: Settings) -> int:

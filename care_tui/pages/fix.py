@@ -44,7 +44,7 @@ class FixPage(DiagnosisPage):
         def item(index: int, _width: int) -> tuple[Content]:
             option = options[index]
             value = basket.values.get(option.name)
-            odds = alone.get(option.name)
+            odds = None if value is None else alone.get((option.name, value))
             shown = "" if odds is None else f"alone {percent(odds)}"
             ticked = option.name in basket.ticked
             return (option_item(option, session.current(option), value, ticked, shown, width, glyphs),)

@@ -69,7 +69,8 @@ class ReportPage(DiagnosisPage):
 
     def _exported(self, path: str | None) -> None:
         if path is not None:
-            self._written = path
+            written = Path(path)
+            self._written = str(written.relative_to(Path.cwd()) if written.is_relative_to(Path.cwd()) else written)
             self.screen.draw()
 
     def copy_commands(self) -> None:

@@ -35,6 +35,8 @@ def keys_of(*bindings: Iterable[BindingType]) -> list[str]:
 
 
 HERE = (CareApp.BINDINGS, PanesScreen.BINDINGS)
+DOES = [binding for binding in WalkScreen.BINDINGS if isinstance(binding, Binding) and binding.action.startswith("do(")]
+"""What the keys of single steps do; on every other step they have to do nothing."""
 
 
 async def leave_dialogs(pilot: Pilot[int]) -> None:
@@ -49,7 +51,7 @@ async def test_no_key_fails_on_a_step(make_app: MakeApp, step: str, verdict: str
     app = make_app(getattr(sample, verdict)())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, step)
-        for key in keys_of(*HERE, WalkScreen.BINDINGS):
+        for key in keys_of(*HERE, DOES):
             await pilot.press(key)
             await leave_dialogs(pilot)
             if not isinstance(app.screen, WalkScreen):
@@ -81,7 +83,7 @@ async def test_no_key_fails_without_a_log(step: str) -> None:
     app = CareApp(settings=Settings(places=()))
     async with app.run_test(size=(60, 20)) as pilot:
         await settle(pilot, step)
-        for key in keys_of(WalkScreen.BINDINGS, PanesScreen.BINDINGS):
+        for key in keys_of(WalkScreen.BINDINGS):
             await pilot.press(key)
             await leave_dialogs(pilot)
             while not isinstance(app.screen, WalkScreen):
