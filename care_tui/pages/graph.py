@@ -82,7 +82,7 @@ class GraphPage(Page):
             "" if link.support is None else f"in {percent(link.support):>5}{' of resamples' if width > NARROW else ''}"
         )
         few = "  ! few" if link.support is not None and link.support < FEW else ""
-        return Content.assemble(f"{sign:<7} ", padded(link.name, 26, "bold"), f" {effect:>6}  {held}{few}")
+        return Content.assemble(f"{sign:<7} ", padded(link.name, 24, "bold"), f" {effect:>6}  {held}{few}")
 
     def _detail(self, node: str, link: Link | None) -> Rows:
         rows = self._about(node)
