@@ -55,7 +55,7 @@ def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
     changed = {change.option.name for change in fix.changes}
     confidence = next((cause.confidence for cause in causes if cause.option.name in changed), None)
     changes = _changes(fix)
-    sure = f", {confidence} confidence" if confidence else ""
+    sure = f", {confidence} confidence in the cause" if confidence else ""
     warnings = "".join(f"; {warning}" for warning in diagnosis.profile.warnings)
     return f"Change {changes}: {fix.p_fixed:.0%} odds that all objectives are met{sure}{warnings}"
 
@@ -173,12 +173,11 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _prediction(objective: Variable, predicted: Prediction) -> str:
     """A yes-or-no objective has odds, not a value."""
-    odds = "" if predicted.p_ok is None else f"{predicted.p_ok:.0%} odds"
-    word = STATUS_WORDS[predicted.status()]
+    odds = STATUS_WORDS[predicted.status()] if predicted.p_ok is None else f"{predicted.p_ok:.0%} odds"
     if objective.kind == "functional":
-        return f"predicted {objective.name}: {odds}  {word}"
+        return f"predicted {objective.name}: {odds}"
     interval = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
-    return f"predicted {objective.name}: {interval}, {odds}  {word}"
+    return f"predicted {objective.name}: {interval}, {odds}"
 
 
 def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
