@@ -6,9 +6,9 @@ Simulated robots (`tests/robots.py`) whose table was not randomised: three optio
 metric that the objectives hang on. Once the wind is a context in the table, once no column holds it. Asked of 12 failed
 runs a robot: does the reset of the first-ranked option really help (odds of meeting everything rise by half of what the
 best single reset gives, at least 0.1), and how far are the predicted odds of every single reset from the true ones
-(1000 simulated missions each, the option set by intervention)? A reset is named only where its predicted odds reach those
-below which `care` abstains; "wrong" ones would have cost a field day, "fooled" are those of them that the wind chose.
-"said no" counts options that were not ranked because their effect is not identified.
+(1000 simulated missions each, the option set by intervention)? A reset is named only where its predicted odds reach
+those below which `care` abstains; "wrong" ones would have cost a field day, "fooled" are those of them that the wind
+chose. "said no" counts options that were not ranked because their effect is not identified.
 """
 
 from __future__ import annotations
