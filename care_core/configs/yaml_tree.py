@@ -19,6 +19,9 @@ from care_core.errors import ConfigError
 _BARE = re.compile(r"[A-Za-z][\w/]*")
 """A text that needs no quotes in a list."""
 
+_REFERENCE = re.compile(r"(^|[\[,\s])[&*!]")
+"""An anchor, an alias or a tag in a list, which no parameter has and which can make a short one endless."""
+
 _DEEPEST = 32
 _MOST_VALUES = 50_000
 """Bounds on aliases, which can make a small file endless."""
@@ -135,10 +138,10 @@ def plain(value: float | str) -> Any:
         return value if isinstance(value, int) else float(f"{value:.9g}")
     if value in ("true", "false"):
         return value == "true"
-    if value.startswith("[") and value.endswith("]"):
+    if value.startswith("[") and value.endswith("]") and not _REFERENCE.search(value):
         try:
             items = YAML(typ="safe", pure=True).load(value)
-        except YAMLError:
+        except (YAMLError, RecursionError):
             return value
         return items if isinstance(items, list) else value
     return value
