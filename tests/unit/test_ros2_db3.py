@@ -183,10 +183,8 @@ def test_a_file_of_parameters_keeps_the_types_that_they_had(tmp_path: Path) -> N
         parameter("footprint", 8, np.array([1.0, 2.5])), parameter("plugins", 9, ["a", "b c"]),
         parameter("flags", 6, np.array([True, False])), parameter("text", 4, "1.0"),
     ]  # fmt: skip
-    driven = {
-        name: history[-1]
-        for name, history in open_log(write_db3(tmp_path / "bag", messages=[event("/n", 0, new, [])])).settings().items()
-    }
+    log = open_log(write_db3(tmp_path / "bag", messages=[event("/n", 0, new, [])]))
+    driven = {name: history[-1] for name, history in log.settings().items()}
     file = tmp_path / "as_driven.yaml"
     file.write_text(write_params(driven, ConfigFormat.ROS2_YAML), encoding="utf-8")
     assert YAML(typ="safe").load(file)["/n"]["ros__parameters"] == {
