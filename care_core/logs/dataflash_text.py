@@ -179,7 +179,7 @@ class DataFlashTextLog:
         if not count or set(codes) & (_TEXT_CODES | _MAYBE_TEXT_CODES):
             return None
         ends = self._ends[np.searchsorted(self._ends, places)]
-        data = memoryview(self._data)
+        data = self._data.data
         lines = [bytes(data[a:b]) for a, b in zip((places + len(name) + 1).tolist(), ends.tolist(), strict=True)]
         if any(line.count(b",") != len(codes) - 1 for line in lines):
             return None
