@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from care_core.diagnose.faults import judge, thresholds_in_force
-from care_core.errors import CareError, ExitCode
+from care_core.errors import CareError, ExitCode, LogError
 from care_core.extract.read import read_run
 from care_core.logs import open_log
 from care_core.profile.select import choose_profile
@@ -236,13 +236,17 @@ def test_a_px4_log_is_read_as_far_as_it_goes(tmp_path: Path) -> None:
     for damaged in (*cuts, *flipped(raw, FLIPS, 0)):
         path.write_bytes(damaged)
         started = time.monotonic()
-        try:
-            log = open_log(path)
-            tables = log.read({"battery_status": ("voltage_v", "id"), "logged_messages": ("message",)})
-            counts.append(sum(len(table) for table in tables.values()) + len(log.settings()))
-        except CareError as err:
-            assert err.exit_code is ExitCode.UNREADABLE
-            counts.append(0)
+        counts.append(_rows(path))
         assert time.monotonic() - started < SECONDS
     assert counts[:CUTS] == sorted(counts[:CUTS])
     assert counts[CUTS - 1] >= 100
+
+
+def _rows(path: Path) -> int:
+    """How much of a PX4 log can be read, 0 where it is refused."""
+    try:
+        log = open_log(path)
+    except LogError:
+        return 0
+    tables = log.read({"battery_status": ("voltage_v", "id"), "logged_messages": ("message",)})
+    return sum(len(table) for table in tables.values()) + len(log.settings())
