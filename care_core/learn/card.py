@@ -47,8 +47,9 @@ def _graph(model: Model) -> str:
         f"## Graph\n\n{len(model.graph.nodes)} nodes, {len(model.edges)} directed edges "
         f"({strong} found in at least 80 % of resamples), {len(model.bidirected)} confounded pairs."
     )
-    if model.training.screened_out:
-        text += f"\n\nOptions that nothing was found to depend on: {', '.join(model.training.screened_out)}."
+    inert = [option for option in model.training.screened_out if not model.graph.children(option)]
+    if inert:
+        text += f"\n\nOptions that nothing was found to depend on: {', '.join(inert)}."
     if model.training.direct_edges:
         rows = ((a, b, f"{p:.2g}") for a, b, p in model.training.direct_edges)
         text += "\n\nEffects that the metrics do not carry in full, kept as direct edges:\n\n" + _table(

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed, parallel_config
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
@@ -53,10 +54,10 @@ def held_out_odds(
     def predict(k: int) -> Mapping[str, FloatArray]:
         own = np.random.default_rng(seeds[k])
         runs = frame[fold != k]
-        return _odds(runs, frame[fold == k], schema, learn(runs, own), own)
+        with threadpool_limits(1):  # the last digits depend on the number of threads
+            return _odds(runs, frame[fold == k], schema, learn(runs, own), own)
 
-    with parallel_config("loky", n_jobs=min(n_jobs, folds), inner_max_num_threads=1):
-        predicted = Parallel()(delayed(predict)(k) for k in range(folds))
+    predicted = Parallel(n_jobs=min(n_jobs, folds))(delayed(predict)(k) for k in range(folds))
     odds: dict[str, FloatArray] = {}
     for k, values in enumerate(predicted):
         for name, held_out in values.items():

@@ -30,6 +30,8 @@ Offsets = NDArray[np.integer[Any]]
 _FMT, _FMT_LENGTH = 0x80, 89
 _MAX_TYPES = 256
 _CHUNK = 1 << 22
+_LONGEST_RECORD = 256
+"""Bytes; the length of a record is one byte of its format."""
 
 # Format character of a field -> numpy type of its bytes, divisor of the stored integer.
 _FIELD_TYPES: dict[str, tuple[str, float]] = {
@@ -382,6 +384,8 @@ def _follow_records(data: Bytes, starts: Offsets, formats: list[Format]) -> tupl
 
 
 def _gap_text(low: int, high: int, size: int) -> str:
+    if high == size and high - low < _LONGEST_RECORD:
+        return f"the log breaks off inside a record, its last {high - low} bytes"
     where = "at the end " if high == size else ""
     return f"{high - low} bytes {where}are not readable records"
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from care_core.causal.graph import CausalGraph
 from care_core.learn.card import model_card
 from care_core.profile.store import Profile
 from tests.planted import SCHEMA
@@ -50,6 +51,7 @@ def test_what_the_model_cannot_say_is_said(planted: Profile) -> None:
     bare = replace(
         model,
         outcomes=outcomes,
+        graph=CausalGraph(model.graph.nodes, frozenset(e for e in model.graph.directed if e[0] != "inert")),
         effects=effects,
         training=training,
         skill={"time": {"runs": 0.0}, "all": score_of_one()},
