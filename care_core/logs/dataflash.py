@@ -122,7 +122,6 @@ class DataFlashLog:
     def __init__(self, path: Path) -> None:
         self.path = path
         data = self._bytes()
-        self._size = len(data)
         starts = _find_headers(data)
         formats, redefined = _read_formats(data, starts)
         starts, gaps = _follow_records(data, starts, formats)
@@ -138,6 +137,10 @@ class DataFlashLog:
         self.damage = (*redefined, *untimely, *self._describe(data, starts, gaps))
 
     def channels(self) -> tuple[Channel, ...]:
+        return self._channels
+
+    @cached_property
+    def _channels(self) -> tuple[Channel, ...]:
         data = self._bytes()
         found = []
         for name in sorted(self._formats):
@@ -182,14 +185,18 @@ class DataFlashLog:
         return wall_clock(self.read({"GPS": GPS_TIME}))
 
     def _bytes(self) -> Bytes:
-        """The file as an array of bytes, mapped and not copied."""
+        """The file as an array of bytes, mapped and not copied. Raises LogError where it has become shorter since."""
         try:
-            data = np.asarray(np.memmap(self.path, dtype=np.uint8, mode="r"))
+            data, size = self._mapped, self.path.stat().st_size
         except (OSError, ValueError) as err:
             raise LogError(f"Cannot read the file: {err}.", where=str(self.path)) from err
-        if len(data) < getattr(self, "_size", 0):
+        if size < len(data):  # touching a byte that is gone ends the process
             raise LogError("The file was cut while it was read.", hint="Try again.", where=str(self.path))
         return data
+
+    @cached_property
+    def _mapped(self) -> Bytes:
+        return np.asarray(np.memmap(self.path, dtype=np.uint8, mode="r"))
 
     def _count(self, name: str) -> int:
         return sum(len(self._offsets[number]) for number in self._types(name))
@@ -277,7 +284,7 @@ class DataFlashLog:
                     return float(self._clock.seconds(_stamps(data, place, form), place)[0])
             return None
 
-        found = [Damage(_gap_text(low, high, self._size), low, time_at(low)) for low, high in gaps]
+        found = [Damage(_gap_text(low, high, len(self._mapped)), low, time_at(low)) for low, high in gaps]
         return summarised(found, "damaged places")
 
 

@@ -213,10 +213,17 @@ def _code(text: str) -> str:
 def write_atomically(path: Path, text: str) -> None:
     """Write a file through a temporary one beside it: a reader sees the old file or the new one, never half.
 
+    What a link leads to is written, and the link stays. A pipe or a device is written to as it is.
+
     Raises:
-        UsageError: the folder does not exist or may not be written to.
+        UsageError: the folder does not exist or may not be written to, or the file is a log.
     """
+    refuse_recording(path)
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            path.write_text(text, encoding="utf-8")
+            return
+        path = path.resolve()
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         try:
             with os.fdopen(handle, "w", encoding="utf-8") as stream:
@@ -230,6 +237,14 @@ def write_atomically(path: Path, text: str) -> None:
         raise UsageError(
             f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
         ) from err
+
+
+def refuse_recording(path: Path) -> None:
+    """Raise UsageError for a path that holds a log: logs are never written to."""
+    from care_core.logs import is_recording
+
+    if path.is_file() and is_recording(path):
+        raise UsageError("This is a log, and logs are never overwritten.", hint="Name another file.", where=str(path))
 
 
 def _mode(path: Path) -> int:
