@@ -6,6 +6,7 @@ Data goes to stdout and talk to stderr (`console`); exit codes are `care_core.er
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
@@ -78,6 +79,9 @@ def main() -> None:
     """Entry point of the console script."""
     # numpy's own threads only wait for each other on matrices as small as these. Read when numpy is first imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Whoever closes a stream wants none of it (cron, `>&-`).
+    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     app(prog_name="care")
 
 

@@ -46,6 +46,9 @@ def emit(text: str, out: Path | None = None) -> None:
 
 def check_writable(out: Path) -> None:
     """Refuse, before any work is done, a file that could not be written. Raises UsageError."""
+    from care_core.report.writers import refuse_recording
+
+    refuse_recording(out)
     if out.is_dir():
         raise UsageError("This is a folder.", hint="Name a file in it.", where=str(out))
     if not out.parent.is_dir():

@@ -50,8 +50,8 @@ def as_text(document: InspectDocument) -> str:
 def _span(log: LogEntry) -> str:
     if not log.damage:
         return f"{_clock(log.duration_s)} ({log.duration_s:.1f} s)"
-    about = "an unknown time" if log.read.about_s is None else f"about {_clock(log.read.about_s)}"
-    return f"read 00:00 to {_clock(log.read.to_s)} of {about} ({log.duration_s:.1f} s)"
+    about = "" if log.read.about_s is None else f" of about {_clock(log.read.about_s)}"
+    return f"read 00:00 to {_clock(log.read.to_s)}{about} ({log.duration_s:.1f} s), see Damage"
 
 
 def _clock(seconds: float | None) -> str:

@@ -87,8 +87,10 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
     yaml = YAML()
     yaml.width = 120
     data: Any = yaml.load(text)
+    source = data["name"]
     data["name"] = name
-    data["doc"] = f"{str(data.get('doc', '')).strip()} Carried over from profile '{data['name']}' with {runs}.".strip()
+    data["platform"] = f"{name}, carried over from: {data.get('platform', source)}"
+    data["doc"] = f"Carried over from profile '{source}' with {runs}. Of the source: {data.get('doc', '')}".strip()
     for option in outside:
         entry = data["variables"][option.option]
         low, high = option.target

@@ -62,7 +62,7 @@ _OF_LOG = {
 }
 """By how the name of a log's format begins; any other is of an ArduPilot vehicle."""
 
-_LARGEST_BYTES = 10_000_000
+_LARGEST_BYTES = 1_000_000
 _YAML_SUFFIXES = (".yaml", ".yml")
 _PARAMETER_LINE = re.compile(r"[A-Z][A-Z0-9_]*(\s*,\s*|\s+)[-+.\w]+(\s|$)")
 _YAML_LINE = re.compile(r"---|[%&!{]|[^\s,#]+\s*:(\s|$)")
@@ -142,9 +142,10 @@ def _text(path: Path) -> str:
             raise ConfigError("Too large for a configuration file.", hint="Is it a log?", where=str(path))
         return path.read_text(encoding="utf-8-sig")
     except OSError as err:
-        raise ConfigError(f"Cannot read the configuration: {err.strerror}.", where=str(path)) from err
+        hint = "Check the path."
+        raise ConfigError(f"Cannot read the configuration: {err.strerror}.", hint=hint, where=str(path)) from err
     except UnicodeDecodeError as err:
-        raise ConfigError("Not a configuration file: it is not text.", where=str(path)) from err
+        raise ConfigError("Not a configuration file: it is not text.", hint="Is it a log?", where=str(path)) from err
 
 
 def read_configs(named: Iterable[str | Path]) -> tuple[ConfigFile, ...]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from care_core.configs import ConfigFile, ConfigFormat, resolve
+from care_core.configs import ConfigFile, ConfigFormat, resolve, yaml_tree
 from care_core.extract.self_written import is_self_written
 from care_core.run import Setting, shown
 
@@ -79,7 +79,7 @@ def same_value(a: float | str, b: float | str) -> bool:
     """Equal as far as a vehicle or a file holds a value: `true` is 1, and 0.1 is 0.1 in 32 bits."""
     one, other = _number(a), _number(b)
     if one is None or other is None:
-        return str(a).strip() == str(b).strip()
+        return bool(yaml_tree.plain(str(a).strip()) == yaml_tree.plain(str(b).strip()))  # lists, however quoted
     return math.isclose(one, other, rel_tol=FLOAT32, abs_tol=1e-12) or (math.isnan(one) and math.isnan(other))
 
 

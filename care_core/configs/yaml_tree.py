@@ -19,9 +19,13 @@ from care_core.errors import ConfigError
 _BARE = re.compile(r"[A-Za-z][\w/]*")
 """A text that needs no quotes in a list."""
 
+_REFERENCE = re.compile(r"(^|[\[,\s])[&*!]")
+"""An anchor, an alias or a tag in a list, which no parameter has and which can make a short one endless."""
+
 _DEEPEST = 32
-_MOST_VALUES = 50_000
+_MOST_NODES = 100_000
 """Bounds on aliases, which can make a small file endless."""
+_NOT_ONE = "Is it the robot's configuration?"
 
 _NULL_TAG = "tag:yaml.org,2002:null"
 _INT_TAG = "tag:yaml.org,2002:int"
@@ -50,11 +54,13 @@ def compose(text: str, path: Path) -> MappingNode | None:
         mark = getattr(err, "problem_mark", None)
         where = f"{path}:{mark.line + 1}" if mark is not None else str(path)
         problem = getattr(err, "problem", None) or "the text cannot be read"
+        if problem.startswith("but "):
+            problem = f"{getattr(err, 'context', '')} {problem}"
         raise ConfigError(f"Not valid YAML: {problem}.", hint="Correct the line.", where=where) from err
     except RecursionError as err:
-        raise ConfigError("The file is nested too deeply.", where=str(path)) from err
+        raise ConfigError("The file is nested too deeply.", hint=_NOT_ONE, where=str(path)) from err
     if node is not None and not isinstance(node, MappingNode):
-        raise ConfigError("Not a parameter file: it is no mapping of names.", where=str(path))
+        raise ConfigError("Not a parameter file: it is no mapping of names.", hint=_NOT_ONE, where=str(path))
     return node
 
 
@@ -67,60 +73,72 @@ def leaves(root: MappingNode, path: Path, *, unwrap: str = "") -> Iterator[Leaf]
     Raises:
         ConfigError: deeper or longer than any configuration.
     """
-    for count, leaf in enumerate(_walk(root, (), path, unwrap)):
-        if count > _MOST_VALUES:
-            raise ConfigError("The file holds more values than a configuration can.", where=str(path))
-        yield leaf
+    return _Walk(path, unwrap).mapping(root, ())
 
 
-def _walk(node: MappingNode, keys: tuple[str, ...], path: Path, unwrap: str) -> Iterator[Leaf]:
-    if len(keys) > _DEEPEST:
-        raise ConfigError("The file is nested too deeply.", where=str(path))
-    dumped = bool(unwrap) and unwrap in str(node.tag)
-    for key, value in node.value:
-        name = str(key.value).strip("/") or str(key.value)
-        if dumped and name == "dictitems" and isinstance(value, MappingNode):
-            yield from _walk(value, keys, path, unwrap)
-        elif dumped:
-            continue
-        elif isinstance(value, MappingNode):
-            yield from _walk(value, (*keys, name), path, unwrap)
-        elif (plain := _plain(value, path)) is not None:
-            yield Leaf((*keys, name), plain, value.start_mark.line + 1)
+class _Walk:
+    """Goes through a tree once, counting what it meets: an alias is met again each time it is named."""
 
+    def __init__(self, path: Path, unwrap: str) -> None:
+        self._path, self._unwrap, self._left = path, unwrap, _MOST_NODES
 
-def _plain(node: Node, path: Path) -> float | str | None:
-    if isinstance(node, ScalarNode) and node.tag != _NULL_TAG:
-        return _scalar(node)
-    if isinstance(node, SequenceNode) and node.tag == _LIST_TAG:
-        return _list(node, path, 0)
-    return None
+    def mapping(self, node: MappingNode, keys: tuple[str, ...]) -> Iterator[Leaf]:
+        self._met(len(keys))
+        dumped = bool(self._unwrap) and self._unwrap in str(node.tag)
+        for key, value in node.value:
+            name = str(key.value).strip("/") or str(key.value)
+            if dumped and name == "dictitems" and isinstance(value, MappingNode):
+                yield from self.mapping(value, keys)
+            elif dumped:
+                continue
+            elif isinstance(value, MappingNode):
+                yield from self.mapping(value, (*keys, name))
+            elif (plain := self._plain(value)) is not None:
+                yield Leaf((*keys, name), plain, value.start_mark.line + 1)
+
+    def _plain(self, node: Node) -> float | str | None:
+        if isinstance(node, ScalarNode) and node.tag != _NULL_TAG:
+            self._met(0)
+            return _scalar(node)
+        if isinstance(node, SequenceNode) and node.tag == _LIST_TAG:
+            return self._list(node, 0)
+        return None
+
+    def _list(self, node: SequenceNode, depth: int) -> str | None:
+        """A list as its text, `[1.0, 2.0]`; None for one that holds mappings."""
+        parts = []
+        for item in node.value:
+            self._met(depth)
+            if isinstance(item, SequenceNode):
+                part = self._list(item, depth + 1)
+            else:
+                part = _item(item) if isinstance(item, ScalarNode) else None
+            if part is None:
+                return None
+            parts.append(part)
+        return f"[{', '.join(parts)}]"
+
+    def _met(self, depth: int) -> None:
+        self._left -= 1
+        if depth > _DEEPEST:
+            raise ConfigError("The file is nested too deeply.", hint=_NOT_ONE, where=str(self._path))
+        if self._left < 0:
+            raise ConfigError("The file holds more values than a configuration can.", hint=_NOT_ONE,
+                              where=str(self._path))  # fmt: skip
 
 
 def _scalar(node: ScalarNode) -> float | str:
     """A number where YAML resolves one, else the text; an integer stays one, since ROS minds the difference."""
     text = str(node.value)
-    if node.tag == _INT_TAG:
-        return int(text.replace("_", ""), 0) if text.lstrip("+-").startswith(("0x", "0o", "0b")) else int(text)
-    if node.tag == _FLOAT_TAG:
-        return float(text.replace("_", "").replace(".inf", "inf").replace(".nan", "nan").replace(".NaN", "nan"))
-    return text.lower() if node.tag == _BOOL_TAG else text
-
-
-def _list(node: SequenceNode, path: Path, depth: int) -> str | None:
-    """A list as its text, `[1.0, 2.0]`; None for one that holds mappings."""
-    if depth > _DEEPEST:
-        raise ConfigError("The file is nested too deeply.", where=str(path))
-    parts = []
-    for item in node.value:
-        if isinstance(item, SequenceNode):
-            part = _list(item, path, depth + 1)
-        else:
-            part = _item(item) if isinstance(item, ScalarNode) else None
-        if part is None:
-            return None
-        parts.append(part)
-    return f"[{', '.join(parts)}]"
+    if node.tag == _BOOL_TAG:
+        return text.lower()
+    plain = text.replace("_", "").lower()
+    try:
+        if node.tag == _INT_TAG:
+            return int(plain, 0) if plain.lstrip("+-").startswith(("0x", "0o", "0b")) else int(plain)
+        return float(plain.replace(".inf", "inf").replace(".nan", "nan")) if node.tag == _FLOAT_TAG else text
+    except ValueError:  # an integer of more digits than any number has
+        return text
 
 
 def _item(node: ScalarNode) -> str:
@@ -135,10 +153,10 @@ def plain(value: float | str) -> Any:
         return value if isinstance(value, int) else float(f"{value:.9g}")
     if value in ("true", "false"):
         return value == "true"
-    if value.startswith("[") and value.endswith("]"):
+    if value.startswith("[") and value.endswith("]") and not _REFERENCE.search(value):
         try:
             items = YAML(typ="safe", pure=True).load(value)
-        except YAMLError:
+        except (YAMLError, RecursionError):
             return value
         return items if isinstance(items, list) else value
     return value

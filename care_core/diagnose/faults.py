@@ -11,6 +11,9 @@ from care_core.profile.schema import Schema
 from care_core.run import Run, Unavailable
 from care_core.variables import Threshold, Variable
 
+_FEW = 10
+"""As many names can be listed in a sentence."""
+
 
 def thresholds_in_force(schema: Schema, overrides: Mapping[str, float]) -> dict[str, Threshold]:
     """The profile's thresholds with the operator's values put in."""
@@ -27,17 +30,19 @@ def thresholds_in_force(schema: Schema, overrides: Mapping[str, float]) -> dict[
 def check_wishes(schema: Schema, keep: Iterable[str], thresholds: Mapping[str, float]) -> None:
     """Refuse options to keep and thresholds that the profile does not have. Raises UsageError."""
     for name in keep:
-        _known(name, schema.options, "option", "--keep")
+        _known(name, schema.options, "option", "--keep", schema.name)
     for name, bound in thresholds.items():
-        objective = _known(name, schema.objectives, "objective", "--threshold")
+        objective = _known(name, schema.objectives, "objective", "--threshold", schema.name)
         if objective.kind == "functional" and bound not in (0, 1):
             raise UsageError(f"{name} is 0 or 1, never {bound:g}.", hint="Write 0 or 1.", where="--threshold")
 
 
-def _known(name: str, variables: Iterable[Variable], what: str, where: str) -> Variable:
+def _known(name: str, variables: Iterable[Variable], what: str, where: str, profile: str) -> Variable:
     by_name = {variable.name: variable for variable in variables}
     if name not in by_name:
-        hint = nearest(name, by_name) or f"Known are {', '.join(by_name)}."
+        few = len(by_name) <= _FEW
+        known = f"Known are {', '.join(by_name)}." if few else f"List them with 'care profiles show {profile}'."
+        hint = nearest(name, by_name) or known
         raise UsageError(f"The profile has no {what} '{name}'.", hint=hint, where=where)
     return by_name[name]
 

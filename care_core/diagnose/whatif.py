@@ -162,4 +162,5 @@ def _option(name: str, schema: Schema) -> Variable:
     folded = {known.casefold(): known for known in names}
     close = folded.get(name.casefold())
     hint = f"Did you mean '{close}'?" if close else nearest(name, [*names, *by_parameter])
-    raise UsageError(f"The profile has no option '{name}'.", hint=hint or "See 'care profiles show'.", where="--set")
+    hint = hint or f"List them with 'care profiles show {schema.name}'."
+    raise UsageError(f"The profile has no option '{name}'.", hint=hint, where="--set")

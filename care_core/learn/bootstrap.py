@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
 
 from care_core.causal.graph import Edge
 from care_core.errors import LearningError
@@ -64,7 +65,8 @@ def _findings(frame: pd.DataFrame, schema: Schema, seed: np.random.SeedSequence,
     rows = rng.choice(len(frame), size=round(SHARE * len(frame)), replace=False)
     resample = frame.iloc[np.sort(rows)].reset_index(drop=True)
     try:
-        graph = learn_structure(resample, schema, alpha=alpha, rng=rng).graph
+        with threadpool_limits(1):  # as many resamples at once as processes; the last digits depend on the threads
+            graph = learn_structure(resample, schema, alpha=alpha, rng=rng).graph
     except LearningError:  # a rare outcome may be in no run of the resample
         return ()
     options = {option.name for option in schema.options}

@@ -77,7 +77,7 @@ def _update(source: Model, schema: Schema, frame: pd.DataFrame, settings: Settin
     report("carrying the mechanisms over", 0.2)
     outcomes, mechanisms = carry_over(source, schema, frame, graph, rng)
     training = Training(
-        origin=f"{source.training.origin}, carried over with {settings.origin}",
+        origin=f"{source.training.origin.rstrip('.')}; carried over with {settings.origin}.",
         runs=len(frame),
         seed=settings.seed,
         alpha=source.training.alpha,

@@ -89,6 +89,14 @@ def sniff(path: Path) -> LogFormat:
     raise LogError("Not a log of a known format.", hint=f"Readable are {READABLE}.", where=str(path))
 
 
+def is_recording(path: Path) -> bool:
+    """Whether a file begins like a log or an archive, readable or not: what nobody wants overwritten."""
+    try:
+        return _read_head(path).startswith(tuple(magic for magic, *_ in UNREADABLE_MAGIC)) or bool(sniff(path))
+    except LogError:
+        return False
+
+
 def whole_recording(path: Path) -> Path:
     """The folder of a ROS 2 bag that was split into several files, given one of them; any other file itself."""
     from care_core.logs import recording
@@ -131,6 +139,8 @@ def _read_head(path: Path, size: int = _SNIFF_BYTES) -> bytes:
 
         path = recording_at(path).files[0]
     try:
+        if path.exists() and not path.is_file():  # reading a pipe could wait for ever
+            raise LogError("This is no file but a pipe or a device.", hint="Save the log to a file.", where=str(path))
         with path.open("rb") as stream:
             head = stream.read(size)
     except OSError as err:

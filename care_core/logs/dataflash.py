@@ -30,6 +30,8 @@ Offsets = NDArray[np.integer[Any]]
 _FMT, _FMT_LENGTH = 0x80, 89
 _MAX_TYPES = 256
 _CHUNK = 1 << 22
+_LONGEST_RECORD = 256
+"""Bytes; the length of a record is one byte of its format."""
 
 # Format character of a field -> numpy type of its bytes, divisor of the stored integer.
 _FIELD_TYPES: dict[str, tuple[str, float]] = {
@@ -120,7 +122,6 @@ class DataFlashLog:
     def __init__(self, path: Path) -> None:
         self.path = path
         data = self._bytes()
-        self._size = len(data)
         starts = _find_headers(data)
         formats, redefined = _read_formats(data, starts)
         starts, gaps = _follow_records(data, starts, formats)
@@ -136,6 +137,10 @@ class DataFlashLog:
         self.damage = (*redefined, *untimely, *self._describe(data, starts, gaps))
 
     def channels(self) -> tuple[Channel, ...]:
+        return self._channels
+
+    @cached_property
+    def _channels(self) -> tuple[Channel, ...]:
         data = self._bytes()
         found = []
         for name in sorted(self._formats):
@@ -180,14 +185,18 @@ class DataFlashLog:
         return wall_clock(self.read({"GPS": GPS_TIME}))
 
     def _bytes(self) -> Bytes:
-        """The file as an array of bytes, mapped and not copied."""
+        """The file as an array of bytes, mapped and not copied. Raises LogError where it has become shorter since."""
         try:
-            data = np.asarray(np.memmap(self.path, dtype=np.uint8, mode="r"))
+            data, size = self._mapped, self.path.stat().st_size
         except (OSError, ValueError) as err:
             raise LogError(f"Cannot read the file: {err}.", where=str(self.path)) from err
-        if len(data) < getattr(self, "_size", 0):
+        if size < len(data):  # touching a byte that is gone ends the process
             raise LogError("The file was cut while it was read.", hint="Try again.", where=str(self.path))
         return data
+
+    @cached_property
+    def _mapped(self) -> Bytes:
+        return np.asarray(np.memmap(self.path, dtype=np.uint8, mode="r"))
 
     def _count(self, name: str) -> int:
         return sum(len(self._offsets[number]) for number in self._types(name))
@@ -275,7 +284,7 @@ class DataFlashLog:
                     return float(self._clock.seconds(_stamps(data, place, form), place)[0])
             return None
 
-        found = [Damage(_gap_text(low, high, self._size), low, time_at(low)) for low, high in gaps]
+        found = [Damage(_gap_text(low, high, len(self._mapped)), low, time_at(low)) for low, high in gaps]
         return summarised(found, "damaged places")
 
 
@@ -375,6 +384,8 @@ def _follow_records(data: Bytes, starts: Offsets, formats: list[Format]) -> tupl
 
 
 def _gap_text(low: int, high: int, size: int) -> str:
+    if high == size and high - low < _LONGEST_RECORD:
+        return f"the log breaks off inside a record, its last {high - low} bytes"
     where = "at the end " if high == size else ""
     return f"{high - low} bytes {where}are not readable records"
 

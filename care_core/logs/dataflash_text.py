@@ -5,6 +5,7 @@ Lines before the first FMT are a greeting. A line that is not what its FMT says 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +26,9 @@ Floats = NDArray[np.float64]
 Offsets = NDArray[np.int64]
 
 _TEXT_CODES = frozenset("nNZ")
+_MAYBE_TEXT_CODES = frozenset("aM")
 _NAME_BYTES = 5  # four of a message's name and the comma
+_PIECE = 2048  # lines parsed in one go
 
 
 class Columns(NamedTuple):
@@ -108,8 +111,8 @@ class DataFlashTextLog:
 
     def _index(self) -> dict[str, Offsets]:
         """Message name -> the first bytes of its lines. What does not begin like a message is under ''."""
-        ends = np.flatnonzero(self._data == ord("\n"))
-        starts = np.append(0, ends + 1)
+        self._ends = np.append(np.flatnonzero(self._data == ord("\n")), len(self._data))
+        starts = np.append(0, self._ends[:-1] + 1)
         starts = starts[starts < len(self._data)]
         within = np.minimum(starts[:, None] + np.arange(_NAME_BYTES), len(self._data) - 1)
         heads = self._data[within]
@@ -155,10 +158,40 @@ class DataFlashTextLog:
                 continue
             if name == "FMT":
                 continue
-            sound = np.array([self._values(name, place) is not None for place in places.tolist()], dtype=bool)
+            sound = self._sound(name, places)
             broken += [(place, f"a line is no whole {name}") for place in places[~sound].tolist()]
             self._lines[name] = places[sound]
         return sorted(broken)
+
+    def _sound(self, name: str, places: Offsets) -> NDArray[np.bool_]:
+        """Which of the lines are what their FMT says."""
+        sound = np.ones(len(places), dtype=bool)
+        for at in range(0, len(places), _PIECE):
+            piece = places[at : at + _PIECE]
+            if self._numbers(name, piece, len(self._formats[name].codes)) is None:
+                sound[at : at + _PIECE] = [self._values(name, place) is not None for place in piece.tolist()]
+        return sound
+
+    def _numbers(self, name: str, places: Offsets, count: int) -> Floats | None:
+        """The first `count` values of lines, shape (lines, count), parsed together: line by line takes ten times as
+        long. None where they are not all plain numbers, or a line has more or fewer values than declared."""
+        codes = self._formats[name].codes
+        if not count or set(codes) & (_TEXT_CODES | _MAYBE_TEXT_CODES):
+            return None
+        ends = self._ends[np.searchsorted(self._ends, places)]
+        data = self._data.data
+        lines = [bytes(data[a:b]) for a, b in zip((places + len(name) + 1).tolist(), ends.tolist(), strict=True)]
+        if any(line.count(b",") != len(codes) - 1 for line in lines):
+            return None
+        if count < len(codes):
+            lines = [b",".join(line.split(b",", count)[:count]) for line in lines]
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", DeprecationWarning)  # how numpy 1 says that it met no number
+                values = np.fromstring(b",".join(lines), sep=",")
+        except (ValueError, DeprecationWarning):
+            return None
+        return values.reshape(len(lines), count) if values.size == len(lines) * count else None
 
     def _values(self, name: str, place: int) -> list[str] | None:
         """The values of a line, None when they are not as many as declared or a number is none."""
@@ -174,12 +207,23 @@ class DataFlashTextLog:
 
     def _columns(self, name: str, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
         columns = self._formats[name]
-        if name == "FMT":
+        if name == "FMT" or not len(self._lines[name]):
             return {}
-        rows = [self._values(name, place) or [] for place in self._lines[name].tolist()]
         known = {field: at for at, field in enumerate(columns.names[: len(columns.codes)])}
-        return {field: _column([row[known[field]] for row in rows], columns.codes[known[field]])
-                for field in fields if field in known}  # fmt: skip
+        wanted = {field: known[field] for field in fields if field in known}
+        places, parts = self._lines[name], []
+        for first in range(0, len(places), _PIECE):
+            numbers = self._numbers(name, places[first : first + _PIECE], max(wanted.values(), default=-1) + 1)
+            if numbers is None:
+                return self._texts(name, wanted)
+            parts.append(numbers[:, list(wanted.values())])
+        return dict(zip(wanted, np.concatenate(parts).T, strict=True))
+
+    def _texts(self, name: str, wanted: Mapping[str, int]) -> dict[str, NDArray[Any]]:
+        """Columns of a message whose lines have to be looked at one by one."""
+        codes = self._formats[name].codes
+        rows = [self._values(name, place) or [] for place in self._lines[name].tolist()]
+        return {field: _column([row[at] for row in rows], codes[at]) for field, at in wanted.items()}
 
     def _keep_time(self) -> tuple[Damage, ...]:
         """Set `_places` and `_seconds`, the stamped lines and their time; drop lines with an impossible stamp."""

@@ -161,8 +161,8 @@ def _parse(path: Path, topics: Sequence[str] | None) -> Any:
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             return ULog(str(path), topics)
-    except OSError as err:
-        raise LogError(f"Cannot read the file: {err.strerror or err}.", where=str(path)) from err
+    except (FileNotFoundError, PermissionError) as err:
+        raise LogError(f"Cannot read the file: {err.strerror}.", hint="Check the path.", where=str(path)) from err
     except Exception as err:  # pyulog says not which errors a damaged file can raise
         raise LogError(
             "The log is too damaged for pyulog.", hint="Copy it from the vehicle again.", where=str(path)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from care_core.logs.base import Table, Wanted
 from care_core.run import Setting
 
@@ -102,7 +104,7 @@ def _described(table: Table | None, prefix: str, row: int | None) -> dict[str, f
     for kind in _KINDS:
         names, given = _cell(table, f"{prefix}{kind}.name", row), _cell(table, f"{prefix}{kind}.value", row)
         pairs = zip(names, given, strict=False)  # flipped bits make one shorter than the other
-        values.update({name: value if isinstance(value, str) else float(value) for name, value in pairs})
+        values.update({name: _plain(bool(value) if kind == "bools" else value) for name, value in pairs})
     return values
 
 
@@ -131,7 +133,10 @@ def _plain(value: Any) -> float | str:
         return value
     if hasattr(value, "__len__"):
         return str(value.tolist() if hasattr(value, "tolist") else list(value))
-    return float(value)
+    # A file of parameters minds the difference: true, 1 and 1.0 are three types to ROS 2.
+    if isinstance(value, (bool, np.bool_)):
+        return "true" if value else "false"
+    return int(value) if isinstance(value, (int, np.integer)) else float(value)
 
 
 def _cell(table: Table, path: str, row: int) -> Sequence[Any]:

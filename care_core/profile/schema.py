@@ -124,7 +124,7 @@ class _Profile(_Strict):
         for name, sides in self.circumstances.items():
             _declared(sides, met, f"circumstance '{name}' names the context or metric")
         for known in self.known:
-            _declared((*known.causes, *known.effects), self.variables, "'known' names")
+            _declared((*known.causes, *known.effects), self.variables, "Under 'known' stands")
         return self
 
 
@@ -240,8 +240,9 @@ def _explain(err: ValidationError, path: Path) -> ProfileError:
         model = _Variable if first["loc"][0] == "variables" else _Profile
         hint = nearest(str(first["loc"][-1]), model.model_fields)
         return ProfileError(f"Unknown key '{key}'.", hint=hint, where=str(path))
-    message = first["msg"].removeprefix("Value error, ")
-    return ProfileError(f"'{key}': {message}.", hint="Correct the key and run the command again.", where=str(path))
+    message = first["msg"].removeprefix("Value error, ").rstrip(".?") + ("?" if first["msg"].endswith("?") else ".")
+    told = f"'{key}': {message}" if key else message[0].upper() + message[1:]
+    return ProfileError(told, hint="Correct the key and run the command again.", where=str(path))
 
 
 def _to_schema(data: _Profile) -> Schema:

@@ -16,9 +16,12 @@ from care_core.report.document import (
     ObjectiveEntry,
     PredictedObjective,
     Report,
+    SinceEntry,
     ThresholdEntry,
 )
+from care_core.report.together import listed, together
 from care_core.report.writers import STATUS_WORDS
+from care_core.run import shown
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8886; --ok: #16803c; --fault: #c0261c; --unknown: #9a6a00; }
@@ -52,8 +55,9 @@ def _page(report: Report) -> Iterator[str]:
     yield f"<p>{_verdict(report)}</p>"
     yield "<h2>Objectives</h2>"
     yield from _table(("Objective", "Value", "Wanted", "Status", "Why"), map(_objective_row, report.objectives))
-    for fault in report.faults:
-        yield f"<h2>Causes of <code>{escape(fault.objective)}</code></h2>"
+    for faults in together(report.faults, lambda fault: [cause.path for cause in fault.causes]):
+        fault = faults[-1]
+        yield f"<h2>Causes of {listed([f'<code>{escape(one.objective)}</code>' for one in faults])}</h2>"
         if fault.causes:
             heads = ("", "Option", "Path", "Driven", "Suggested", "Odds", "Confidence", "Notes")
             yield from _table(heads, map(_cause_row, fault.causes))
@@ -61,6 +65,14 @@ def _page(report: Report) -> Iterator[str]:
             yield "<p>None was found among the options of the profile.</p>"
     if report.fix is not None:
         yield from _fix(report, report.fix)
+    if report.since is not None:
+        yield from _since(report.since)
+    if report.rivals:
+        yield "<h2>It may be no parameter</h2>"
+        yield from _list(f"{escape(rival.circumstance)}: {escape(rival.text)}" for rival in report.rivals)
+    if report.tell_more:
+        yield "<h2>What would tell more</h2>"
+        yield from _list(escape(advice) for advice in report.tell_more)
     if report.dismissed:
         yield "<h2>Set aside by the operator</h2>"
         yield from _list(f"<code>{escape(entry.option)}</code>: {escape(entry.reason)}" for entry in report.dismissed)
@@ -133,6 +145,20 @@ def _fix(report: Report, fix: FixEntry) -> Iterator[str]:
     if fix.alternatives:
         yield "<h3>Alternatives</h3>"
         yield from _list(_alternative(alternative) for alternative in fix.alternatives)
+
+
+def _since(since: SinceEntry) -> Iterator[str]:
+    yield f"<h2>Changed since <code>{escape(Path(since.log).name)}</code></h2>"
+    if since.warnings:
+        yield from _list(escape(warning) for warning in since.warnings)
+    if not since.changes:
+        yield "<p>No parameter that anybody sets.</p>"
+        return
+    rows = (
+        (f"<code>{escape(c.parameter)}</code>", escape(c.option or ""), escape(shown(c.from_)), escape(shown(c.to)))
+        for c in since.changes
+    )
+    yield from _table(("Parameter", "Option", "Then", "Now"), rows)
 
 
 def _prediction(objective: ObjectiveEntry, predicted: PredictedObjective) -> str:

@@ -150,14 +150,18 @@ def _log(log: Log) -> LogEntry:
 
 
 def _about_s(damage: Sequence[Damage], duration_s: float, size: int) -> float | None:
-    """How long the whole log was, taking its bytes to come evenly: known when it breaks off before the file ends."""
+    """How long the whole log was, taking its bytes to come evenly: known when it breaks off well before the file ends.
+
+    A file that ends in the middle of a record says nothing of what was lost behind it.
+    """
     if not damage:
         return duration_s
     last = max(damage, key=lambda d: d.byte or 0)
     breaks_off = last.time_s is None or last.time_s >= duration_s - 1.0
-    if not breaks_off or not last.byte or last.byte >= size:
+    if not breaks_off or not last.byte:
         return None
-    return duration_s * size / last.byte
+    whole_s = duration_s * size / last.byte
+    return whole_s if whole_s > duration_s + 1.0 else None
 
 
 def _parameters(log: Log) -> ParameterEntry:

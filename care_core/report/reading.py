@@ -49,7 +49,8 @@ def _load(path: Path) -> Any:
             raise ConfigError("Not a report: it is too large.", where=str(path))
         text = path.read_text(encoding="utf-8-sig")
     except OSError as err:
-        raise ConfigError(f"Cannot read the report: {err.strerror}.", where=str(path)) from err
+        hint = "Check the path."
+        raise ConfigError(f"Cannot read the report: {err.strerror}.", hint=hint, where=str(path)) from err
     except UnicodeDecodeError as err:
         raise ConfigError("Not a report: it is not text.", where=str(path)) from err
     try:

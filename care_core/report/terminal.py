@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from care_core.configs import apply_commands, format_for, unified_diff
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
+from care_core.report.together import listed, together
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
 from care_core.variables import Variable
@@ -23,7 +24,7 @@ def to_text(diagnosis: Diagnosis) -> str:
         _headline(diagnosis),
         _origin(diagnosis),
         _objectives(diagnosis),
-        *(_causes(fault) for fault in diagnosis.faults),
+        *(_causes(faults) for faults in together(diagnosis.faults, _paths)),
         _fix(diagnosis),
         _evidence(diagnosis),
         _since(diagnosis),
@@ -53,13 +54,17 @@ def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
     causes = [cause for fault in diagnosis.faults for cause in fault.causes]
     changed = {change.option.name for change in fix.changes}
     confidence = next((cause.confidence for cause in causes if cause.option.name in changed), None)
-    changes = ", ".join(
+    changes = _changes(fix)
+    sure = f", {confidence} confidence in the cause" if confidence else ""
+    warnings = "".join(f"; {warning}" for warning in diagnosis.profile.warnings)
+    return f"Change {changes}: {fix.p_fixed:.0%} odds that all objectives are met{sure}{warnings}"
+
+
+def _changes(fix: Fix) -> str:
+    return ", ".join(
         f"{change.option.name} {change.option.show(change.current)} -> {change.option.show(change.suggested)}"
         for change in fix.changes
     )
-    sure = f", {confidence} confidence" if confidence else ""
-    warnings = "".join(f"; {warning}" for warning in diagnosis.profile.warnings)
-    return f"Change {changes}: {fix.p_fixed:.0%} odds that all objectives are met{sure}{warnings}"
 
 
 def _measured(objective: ObjectiveResult) -> str:
@@ -98,8 +103,13 @@ def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
             yield from wrapped(objective.reason, " " * 17)
 
 
-def _causes(fault: Fault) -> Iterator[str]:
-    yield f"Causes of {fault.objective.variable.name}"
+def _paths(fault: Fault) -> list[list[str]]:
+    return [[node.name for node in cause.path] for cause in fault.causes]
+
+
+def _causes(faults: Sequence[Fault]) -> Iterator[str]:
+    yield from wrapped(f"Causes of {listed([fault.objective.variable.name for fault in faults])}")
+    fault = faults[-1]
     shown = [cause for cause in fault.causes if not cause.is_lead]
     if not shown:
         yield "  none was found among the options of the profile"
@@ -150,6 +160,8 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     for objective in (result.variable for result in diagnosis.objectives):
         if objective.name in fix.predicted:
             yield from wrapped(_prediction(objective, fix.predicted[objective.name]), "  ", "    ")
+    for other in diagnosis.alternatives:
+        yield from wrapped(f"or {_changes(other)}: {other.p_fixed:.0%} odds", "  ", "     ")
     yield ""
     yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix).splitlines())
     yield ""
@@ -161,12 +173,11 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _prediction(objective: Variable, predicted: Prediction) -> str:
     """A yes-or-no objective has odds, not a value."""
-    odds = "" if predicted.p_ok is None else f"{predicted.p_ok:.0%} odds"
-    word = STATUS_WORDS[predicted.status()]
+    odds = STATUS_WORDS[predicted.status()] if predicted.p_ok is None else f"{predicted.p_ok:.0%} odds"
     if objective.kind == "functional":
-        return f"predicted {objective.name}: {odds}  {word}"
+        return f"predicted {objective.name}: {odds}"
     interval = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
-    return f"predicted {objective.name}: {interval}, {odds}  {word}"
+    return f"predicted {objective.name}: {interval}, {odds}"
 
 
 def _evidence(diagnosis: Diagnosis) -> Iterator[str]:

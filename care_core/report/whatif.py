@@ -108,7 +108,7 @@ def _lines(question: Question, answer: Answer) -> Iterator[str]:
         option = change.option
         values = f"{option.show(change.current)} -> {option.show(change.suggested)} {option.unit}".rstrip()
         # Whoever reads the value must not miss what speaks against it.
-        yield clean("; ".join((f"{option.name}  {values}", *change.notes)))
+        yield from wrapped("; ".join((f"{option.name}  {values}", *change.notes)), "", "  ")
     yield ""
     width = max((len(outlook.objective.variable.name) for outlook in answer.outlooks), default=0)
     for outlook in answer.outlooks:
@@ -116,7 +116,7 @@ def _lines(question: Question, answer: Answer) -> Iterator[str]:
     if any(o.objective.variable.kind == "functional" and o.predicted.status() == "fault" for o in answer.outlooks):
         yield from wrapped("The mission is likely to fail; the other values are those of a mission that does not.")
     yield ""
-    yield (
+    yield from wrapped(
         f"Odds that all objectives are met: {answer.p_ok:.0%} with the change, "
         f"{answer.p_ok_now:.0%} if the same configuration runs again"
     )

@@ -16,6 +16,7 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 from care_core.errors import UsageError
 from care_core.report.document import (
     CauseEntry,
+    FixEntry,
     FixSet,
     ObjectiveEntry,
     PredictedValue,
@@ -23,6 +24,7 @@ from care_core.report.document import (
     SinceEntry,
     TriageDocument,
 )
+from care_core.report.together import listed, together
 from care_core.run import shown
 
 STATUS_WORDS = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
@@ -68,9 +70,10 @@ def _markdown(report: Report) -> Iterator[str]:
     yield "## Objectives"
     yield ""
     yield from _table(("Objective", "Value", "Wanted", "Status", "Why"), map(_objective_row, report.objectives))
-    for fault in report.faults:
+    for faults in together(report.faults, lambda fault: [cause.path for cause in fault.causes]):
+        fault = faults[-1]
         yield ""
-        yield f"## Causes of `{fault.objective}`"
+        yield f"## Causes of {listed([f'`{one.objective}`' for one in faults])}"
         yield ""
         if fault.causes:
             yield from _table(("", "Option", "Path", "Driven", "Suggested", "Odds"), map(_cause_row, fault.causes))
@@ -107,8 +110,12 @@ def _verdict(report: Report) -> str:
         return "**No fault found**, but not everything could be evaluated." if unknown else "**No fault found.**"
     if report.fix is None:
         return f"**Fault**: {names}."
-    changes = ", ".join(f"`{change.option}` from {change.from_:g} to {change.to:g}" for change in report.fix.changes)
-    return f"**Fault**: {names}. Change {changes}: {report.fix.p_fixed:.0%} odds that all objectives are met."
+    fix = report.fix
+    return f"**Fault**: {names}. Change {_changes(fix)}: {fix.p_fixed:.0%} odds that all objectives are met."
+
+
+def _changes(fix: FixSet) -> str:
+    return ", ".join(f"`{change.option}` from {change.from_:g} to {change.to:g}" for change in fix.changes)
 
 
 def _objective_row(objective: ObjectiveEntry) -> tuple[str, ...]:
@@ -127,7 +134,7 @@ def _cause_row(cause: CauseEntry) -> tuple[str, ...]:
     return str(cause.rank), f"`{cause.option}`", " → ".join(cause.path), f"{cause.current:g}", suggested, odds
 
 
-def _fix_section(report: Report, fix: FixSet) -> Iterator[str]:
+def _fix_section(report: Report, fix: FixEntry) -> Iterator[str]:
     yield "## Fix"
     yield ""
     objectives = {objective.name: objective for objective in report.objectives}
@@ -144,6 +151,11 @@ def _fix_section(report: Report, fix: FixSet) -> Iterator[str]:
     yield "```sh"
     yield from report.apply
     yield "```"
+    if fix.alternatives:
+        yield ""
+        yield "Or:"
+        yield ""
+        yield from (f"- {_changes(other)}: {other.p_fixed:.0%} odds" for other in fix.alternatives)
 
 
 def _since_section(since: SinceEntry) -> Iterator[str]:
@@ -201,10 +213,17 @@ def _code(text: str) -> str:
 def write_atomically(path: Path, text: str) -> None:
     """Write a file through a temporary one beside it: a reader sees the old file or the new one, never half.
 
+    What a link leads to is written, and the link stays. A pipe or a device is written to as it is.
+
     Raises:
-        UsageError: the folder does not exist or may not be written to.
+        UsageError: the folder does not exist or may not be written to, or the file is a log.
     """
+    refuse_recording(path)
     try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            path.write_text(text, encoding="utf-8")
+            return
+        path = path.resolve()
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         try:
             with os.fdopen(handle, "w", encoding="utf-8") as stream:
@@ -218,6 +237,14 @@ def write_atomically(path: Path, text: str) -> None:
         raise UsageError(
             f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
         ) from err
+
+
+def refuse_recording(path: Path) -> None:
+    """Raise UsageError for a path that holds a log: logs are never written to."""
+    from care_core.logs import is_recording
+
+    if path.is_file() and is_recording(path):
+        raise UsageError("This is a log, and logs are never overwritten.", hint="Name another file.", where=str(path))
 
 
 def _mode(path: Path) -> int:

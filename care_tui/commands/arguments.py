@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from care_tui.console import check_writable
+
 LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="The log to read.", show_default=False)]
 ProfileName = Annotated[
     str | None, typer.Option("--profile", "-p", help="Name or folder; chosen by the log if absent.")
@@ -19,7 +21,22 @@ ConfigPaths = Annotated[
         help="The robot's configuration file, for what the log lacks; may be repeated, a later one wins.",
     ),
 ]
-Out = Annotated[Path | None, typer.Option("--out", "-o", help="Write to this file instead of stdout.")]
+
+
+def _writable(out: Path | None) -> Path | None:
+    if out is not None:
+        check_writable(out)
+    return out
+
+
+def is_json(out: Path | None) -> bool:
+    """Whether the file that was named is to hold JSON."""
+    return out is not None and out.suffix.lower() == ".json"
+
+
+Out = Annotated[
+    Path | None, typer.Option("--out", "-o", callback=_writable, help="Write to this file instead of stdout.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Thresholds = Annotated[
     list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")

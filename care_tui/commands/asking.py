@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from care_core.errors import UsageError
-from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds
+from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds, is_json
 from care_tui.commands.diagnosing import bounds
 from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit
@@ -41,7 +41,7 @@ def whatif(
     with Progress() as progress:
         question = question_of(request, progress)
     answer = question.ask(dict(parse_change(text, question.schema) for text in set_))
-    emit((whatif_json if json else whatif_text)(question, answer), out)
+    emit((whatif_json if json or is_json(out) else whatif_text)(question, answer), out)
 
 
 @app.command()
@@ -58,6 +58,8 @@ def verify(
     from care_core.report import read_report, verify_json, verify_log, verify_text
     from care_core.report.verification import EXIT_CODES
 
+    if out is not None and out.exists() and report.exists() and out.samefile(report):
+        raise UsageError("That is the report itself.", hint="Name another file.", where=str(out))
     promised = read_report(report)
     with Progress() as progress:
         progress("reading the log", 0.0)
@@ -66,5 +68,5 @@ def verify(
     if not no_history:
         verified = document.model_dump(by_alias=True, mode="json")
         mention(remember(lambda history: history.add_verification(verified)))
-    emit((verify_json if json else verify_text)(document), out)
+    emit((verify_json if json or is_json(out) else verify_text)(document), out)
     raise typer.Exit(EXIT_CODES[document.verdict])

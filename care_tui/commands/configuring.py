@@ -44,16 +44,12 @@ def _side(name: str) -> Side:
     """A configuration out of whatever was named, told by its content."""
     from care_core.configs import read_configs, split_name
     from care_core.configs.compare import Side
-    from care_core.logs import open_log
+    from care_core.logs import is_recording, open_log
     from care_core.report import read_report
 
     path, _ = split_name(name)
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(_HEAD_BYTES)
-    except OSError as err:
-        raise ConfigError(f"Cannot read the file: {err.strerror}.", where=str(path)) from err
-    if b"\0" in head:
+    head = b"" if path.is_dir() else _head(path)
+    if path.is_dir() or b"\0" in head or is_recording(path):
         histories = open_log(path).settings()
         if not histories:
             raise ConfigError("The log holds no parameters.", hint="Compare a configuration file.", where=str(path))
@@ -62,6 +58,21 @@ def _side(name: str) -> Side:
         return _suggested(read_report(path), path)
     (file,) = read_configs([name])
     return Side(name, file.settings, file.format)
+
+
+def _head(path: Path) -> bytes:
+    """The first bytes of a file. Raises ConfigError for what is none, or empty."""
+    try:
+        if path.exists() and not path.is_file():
+            raise ConfigError("This is no file but a pipe or a device.", hint="Save it to a file.", where=str(path))
+        with path.open("rb") as stream:
+            head = stream.read(_HEAD_BYTES)
+    except OSError as err:
+        hint = "Check the path."
+        raise ConfigError(f"Cannot read the file: {err.strerror}.", hint=hint, where=str(path)) from err
+    if not head:
+        raise ConfigError("The file is empty.", hint="Was it copied whole?", where=str(path))
+    return head
 
 
 def _suggested(report: TriageDocument, path: Path) -> Side:

@@ -12,7 +12,7 @@ import typer
 from care_core.errors import LogError, UsageError
 from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds
 from care_tui.commands.past import NoHistory, mention
-from care_tui.console import Progress, check_writable, emit, painted
+from care_tui.console import Progress, emit, painted
 from care_tui.jobs import Request, diagnose_log, exit_code
 from care_tui.remembering import remember_triage
 
@@ -48,8 +48,6 @@ def triage(
     formats = [name for name, wanted in (("json", json), ("yaml", yaml), ("markdown", markdown)) if wanted]
     if len(formats) > 1:
         raise UsageError("Only one of --json, --yaml and --markdown can be printed.", hint="Leave the others out.")
-    if out is not None:
-        check_writable(out)
     request = Request(
         log,
         profile,

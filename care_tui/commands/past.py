@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from care_core.errors import CareError, UsageError
-from care_tui.commands.arguments import AsJson, Out
+from care_tui.commands.arguments import AsJson, Out, is_json
 from care_tui.console import emit, say
 
 app = typer.Typer()
@@ -48,4 +48,4 @@ def history(
         written = update_card(chosen.path, track_record(store.verifications(chosen.schema.name)))
         say(f"wrote {written}")
     document = history_document(store.triages(profile, limit), store.verifications(profile))
-    emit(history_json(document) if json else history_text(document, ascii=ascii), out)
+    emit(history_json(document) if json or is_json(out) else history_text(document, ascii=ascii), out)

@@ -225,4 +225,4 @@ def test_reads_a_wild_log_with_a_broken_tail() -> None:
     assert log.facts["firmware"] == "ArduCopter V4.0.2 (2cb4b85a)"
     assert log.start == "2020-03-03T11:49:20+00:00"
     assert len(log.settings()) == 1027
-    assert [one.what for one in log.damage] == ["38 bytes at the end are not readable records"]
+    assert [one.what for one in log.damage] == ["the log breaks off inside a record, its last 38 bytes"]

@@ -81,6 +81,28 @@ def test_broken_lines_are_damage(tmp_path: Path) -> None:
     assert log.damage[-1].byte == path.read_text().rindex("ATT")
 
 
+@pytest.mark.parametrize(
+    ("lines", "expected"),
+    [
+        (["1, 2", "3e-05,-4.5", "nan, inf"], [(1, 2), (3e-05, -4.5), (math.nan, math.inf)]),
+        (["1, 2", "3, 4, 5"], [(1, 2), (3, 4)]),  # one value more than declared
+        (["1, 2", "3", "4, 5, 6"], [(1, 2), (4, 5)]),  # as many values as there should be, but not on each line
+        (["1, 2", "3, ", "4x, 5", "0x6, 7", "8 9, 1"], [(1, 2)]),
+        (["1, 2", "1_0, 3"], [(1, 2), (10, 3)]),
+    ],
+)
+def test_lines_are_parsed_together_as_they_are_one_by_one(
+    tmp_path: Path, lines: list[str], expected: list[tuple[float, float]]
+) -> None:
+    path = tmp_path / "a.log"
+    head = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 1, 19, ATT, Qff, TimeUS,Roll,Pitch\n"
+    path.write_text(head + "".join(f"ATT, {1000 * row}, {line}\n" for row, line in enumerate(lines)))
+    log = open_log(path)
+    table = log.read({"ATT": ("Pitch", "Roll")})["ATT"]
+    np.testing.assert_array_equal(np.column_stack([table["Roll"], table["Pitch"]]), expected)
+    assert len(log.damage) == len(lines) - len(expected)
+
+
 SHARED = os.environ.get("CARE_SHARED")
 
 

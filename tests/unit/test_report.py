@@ -13,12 +13,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from care_core.diagnose.records import ParameterChange, Prediction, Since
+from care_core.diagnose.records import Fault, ObjectiveResult, ParameterChange, PathNode, Prediction, Since
 from care_core.diagnose.since import with_evidence
 from care_core.errors import UsageError
 from care_core.report import (
     build_document,
     json_schema,
+    to_html,
     to_json,
     to_markdown,
     to_text,
@@ -27,7 +28,7 @@ from care_core.report import (
 )
 from care_core.run import Damage
 from care_core.text import clean
-from tests.made import DRIVEN, HOSTILE, LAND_SPEED, made_diagnosis
+from tests.made import DRIVEN, ENERGY, HOSTILE, LAND_SPEED, made_diagnosis
 
 KEYS = ["schema", "profile", "log", "config", "context", "metrics", "objectives", "faults", "fix", "abstained"]
 ADDED = ["notes", "sources", "since", "evidence", "rivals", "tell_more", "dismissed"]
@@ -119,6 +120,27 @@ def test_the_terminal_text_answers_first_and_fits_80_columns() -> None:
         "high confidence",
     ):
         assert part in text
+
+
+def test_faults_that_move_together_are_shown_once_and_others_apart() -> None:
+    diagnosis = made_diagnosis()
+    (late,) = diagnosis.faults
+    (cause,) = late.causes
+    drained = ObjectiveResult(ENERGY, 15.0, ENERGY.threshold, "fault")
+    onward = replace(cause, path=(*cause.path, PathNode("energy", "Wh", 15.0, 11.0)))
+    elsewhere = replace(cause, path=(cause.path[0], PathNode("energy", "Wh", 15.0, 11.0)))
+    for causes, headings in (((onward,), ["mission_time and energy"]), ((elsewhere,), ["mission_time", "energy"])):
+        both = replace(diagnosis, faults=(late, Fault(drained, causes)))
+        text, document = to_text(both), build_document(both)
+        assert [line[10:] for line in text.splitlines() if line.startswith("Causes of ")] == headings
+        assert to_markdown(document).count("## Causes of") == to_html(document).count("<h2>Causes of") == len(headings)
+        assert [fault.objective for fault in document.faults] == ["mission_time", "energy"]
+
+
+def test_alternatives_are_offered_with_their_odds() -> None:
+    diagnosis = made_diagnosis()
+    assert "or land_speed 16 -> 50: 90% odds" in to_text(diagnosis)
+    assert "- `land_speed` from 16 to 50: 90% odds" in to_markdown(build_document(diagnosis))
 
 
 def test_the_other_headlines() -> None:

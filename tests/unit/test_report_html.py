@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from html.parser import HTMLParser
 
-from care_core.diagnose.records import Dismissal
+from care_core.diagnose.records import Circumstance, Dismissal
 from care_core.report import build_document, to_html, to_json, to_markdown
 from tests.made import made_diagnosis
 
@@ -61,3 +61,11 @@ def test_what_was_set_aside_is_in_every_format() -> None:
     report = build_document(replace(made_diagnosis(), dismissed=(Dismissal("land_speed", "slow on purpose"),)))
     for text in (to_json(report), to_markdown(report), to_html(report)):
         assert "slow on purpose" in text
+
+
+def test_what_is_uncertain_is_in_the_page_too() -> None:
+    rival = Circumstance("wind", "wind_lean", 9.0, "deg", 0.0, 6.0, 0.01, f"stronger than in training {HOSTILE}")
+    diagnosis = replace(made_diagnosis(), rivals=(rival,), tell_more=("fly it again",))
+    page = to_html(build_document(diagnosis))
+    assert "<li>wind: stronger than in training &lt;script&gt;" in page
+    assert "<li>fly it again</li>" in page

@@ -201,7 +201,7 @@ def test_settings_keep_every_value_and_its_bounds(tmp_path: Path) -> None:
     assert (first.value, first.changed_at_s, first.default, first.low, first.high) == (0.5, None, 0.25, None, 9.0)
     assert (second_value.value, second_value.changed_at_s) == (0.75, 2.0)
     assert first.source == "/move_base/P/parameter_updates"
-    assert [one.value for one in found["/move_base/P/use_it"]] == [1.0]
+    assert [one.value for one in found["/move_base/P/use_it"]] == ["true"]
     assert [one.value for one in found["/move_base/P/samples"]] == [6.0]
     assert [one.value for one in found["/move_base/P/frame"]] == ["odom"]
 

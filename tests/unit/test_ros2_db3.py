@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from rosbags.rosbag2 import CompressionMode
+from ruamel.yaml import YAML
 
+from care_core.configs import ConfigFormat, read_config, write_params
+from care_core.configs.compare import Side, compare
 from care_core.errors import LogError
 from care_core.logs import log_digest, open_log
 from care_core.logs.base import Log, LogFormat
@@ -168,10 +171,29 @@ def test_parameter_events(tmp_path: Path) -> None:
     assert (first.value, first.changed_at_s, first.source) == (0.26, None, "/parameter_events")
     assert (second.value, second.changed_at_s) == (0.5, 3.0)
     assert {name.partition(".")[2]: one[0].value for name, one in settings.items() if len(one) == 1} == {
-        "use_sim_time": 1.0, "count": -7.0, "frame": "odom", "footprint": "[1.0, 2.5]", "plugins": "['a', 'b']",
-        "a": 1.0,
+        "use_sim_time": "true", "count": -7, "frame": "odom", "footprint": "[1.0, 2.5]", "plugins": "['a', 'b']",
+        "a": 1,
     }  # fmt: skip
     assert "/ns/amcl.a" in settings
+
+
+def test_a_file_of_parameters_keeps_the_types_that_they_had(tmp_path: Path) -> None:
+    new = [
+        parameter("sim", 1, True), parameter("count", 2, 3), parameter("rate", 3, 20.0), parameter("frame", 4, "odom"),
+        parameter("footprint", 8, np.array([1.0, 2.5])), parameter("plugins", 9, ["a", "b c"]),
+        parameter("flags", 6, np.array([True, False])), parameter("text", 4, "1.0"),
+    ]  # fmt: skip
+    log = open_log(write_db3(tmp_path / "bag", messages=[event("/n", 0, new, [])]))
+    driven = {name: history[-1] for name, history in log.settings().items()}
+    file = tmp_path / "as_driven.yaml"
+    file.write_text(write_params(driven, ConfigFormat.ROS2_YAML), encoding="utf-8")
+    assert YAML(typ="safe").load(file)["/n"]["ros__parameters"] == {
+        "sim": True, "count": 3, "rate": 20.0, "frame": "odom", "footprint": [1.0, 2.5], "plugins": ["a", "b c"],
+        "flags": [True, False], "text": "1.0",
+    }  # fmt: skip
+    assert "count: 3\n" in file.read_text(encoding="utf-8")
+    assert "rate: 20.0\n" in file.read_text(encoding="utf-8")
+    assert not compare(Side("log", driven), Side("file", read_config(file), ConfigFormat.ROS2_YAML))
 
 
 def test_what_is_no_bag(tmp_path: Path) -> None:

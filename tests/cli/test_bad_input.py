@@ -1,0 +1,168 @@
+"""What a hostile operator may type or name: one sentence, the right exit code, nothing on stdout, nothing lost."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from care_core.configs import read_config
+from care_core.errors import ConfigError
+from care_core.report.writers import write_atomically
+from tests.conftest import Care
+
+ROOT = Path(__file__).parents[2]
+SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
+GOOD = ROOT / "tests" / "data" / "arducopter_good.BIN"
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    return Path(shutil.copy(SAMPLE, tmp_path / "flight.BIN"))
+
+
+def refused(care: Care, code: int, words: str, *args: object) -> None:
+    outcome = care(*map(str, args))
+    assert (outcome.code, outcome.stdout) == (code, ""), outcome
+    assert outcome.stderr.startswith("care: ")
+    assert words in outcome.stderr
+    assert outcome.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", ["triage", "params", "whatif", "verify", "apply"])
+def test_a_log_is_never_overwritten(care: Care, log: Path, tmp_path: Path, command: str) -> None:
+    digest = hashlib.sha256(log.read_bytes()).hexdigest()
+    other, link = tmp_path / "old.bag", tmp_path / "link.json"
+    other.write_bytes(b"#ROSBAG V1.2\n")
+    link.symlink_to(log)
+    args: list[object] = {"whatif": [log, "--set", "WPNAV_SPEED=500"], "verify": ["r.json", log]}.get(command, [log])
+    if command == "apply":
+        args = [report_of(care, log, tmp_path), tmp_path / "a.param"]
+        (tmp_path / "a.param").write_text("LAND_SPEED,16\n")
+    for target in (log, other, link):
+        outcome = care(command, *args, "--out", target)
+        assert (outcome.code, outcome.stdout) == (2, "")
+        assert "logs are never overwritten" in outcome.stderr
+    assert hashlib.sha256(log.read_bytes()).hexdigest() == digest
+    assert other.read_bytes() == b"#ROSBAG V1.2\n"
+
+
+def report_of(care: Care, log: Path, folder: Path) -> Path:
+    assert care("triage", log, "--no-history", "--out", folder / "report.json").code == 1
+    return folder / "report.json"
+
+
+def test_a_report_is_not_overwritten_by_its_own_verification(care: Care, log: Path, tmp_path: Path) -> None:
+    report = report_of(care, log, tmp_path)
+    refused(care, 2, "That is the report itself", "verify", report, GOOD, "--out", report)
+    assert care("verify", report, GOOD, "--no-history", "--out", tmp_path / "v.json").code == 0
+    assert json.loads((tmp_path / "v.json").read_text())["schema"] == "care.verify/1"
+
+
+def test_a_link_stays_one_and_a_device_too(tmp_path: Path) -> None:
+    (tmp_path / "real.yaml").write_text("old")
+    (tmp_path / "link.yaml").symlink_to("real.yaml")
+    write_atomically(tmp_path / "link.yaml", "new")
+    assert (tmp_path / "link.yaml").is_symlink()
+    assert (tmp_path / "real.yaml").read_text() == "new"
+    write_atomically(Path(os.devnull), "gone")
+    assert Path(os.devnull).is_char_device()
+
+
+@pytest.mark.parametrize("command", ["triage", "inspect", "params", "diff"])
+def test_a_pipe_is_not_waited_for(care: Care, tmp_path: Path, command: str) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    args = [pipe, SAMPLE] if command == "diff" else [pipe]
+    refused(care, 2 if command == "diff" else 4, "no file but a pipe", command, *args)
+
+
+def test_what_can_be_compared(care: Care, tmp_path: Path) -> None:
+    from tests.rewritten import write_text
+
+    text = write_text(tmp_path / "a.log", SAMPLE, only=("PARM",))
+    assert care("diff", text, SAMPLE).code == 0
+    (tmp_path / "empty.param").write_text("")
+    refused(care, 2, "The file is empty", "diff", tmp_path / "empty.param", SAMPLE)
+    refused(care, 4, "A folder, not a log", "diff", tmp_path, SAMPLE)
+
+
+def bomb(first: str, rest: str) -> str:
+    return f"a0: &a0 {first}\n" + "".join(f"a{n}: &a{n} {rest.replace('?', f'*a{n - 1}')}\n" for n in range(1, 40))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (bomb("{x: 1}", "{p: ?, q: ?}"), "more values than a configuration can"),
+        (bomb("{}", "{p: ?, q: ?}"), "more values than a configuration can"),
+        (bomb("[1, 2]", "[?, ?]"), "more values than a configuration can"),
+        ("a: &a\n  b: *a\n", "nested too deeply"),
+        ("a: &a [*a]\n", "nested too deeply"),
+        ("[" * 20_000, "nested too deeply"),
+        ("a:\t1\n\tb: 2\n", "Not valid YAML: found character"),
+        ("a: 1\n---\nb: 2\n", "expected a single document in the stream but found another document"),
+        ("- 1\n", "no mapping of names"),
+        ("a: " + "1" * 1_000_000, "Too large"),
+    ],
+)
+def test_yaml_that_is_no_configuration(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "a.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=words) as caught:
+        read_config(path)
+    assert caught.value.hint
+
+
+def test_odd_values_of_a_configuration(tmp_path: Path) -> None:
+    path = tmp_path / "a.yaml"
+    digits = "9" * 5000
+    path.write_text(f"a: 1\na: 2\nb: -.INF\nc: 0x1F\nd: {digits}\ne: !!python/object/apply:os.system [x]\nf: !foo 3\n")
+    values = {name: setting.value for name, setting in read_config(path).items()}
+    assert values == {"a": 2, "b": float("-inf"), "c": 31, "d": digits, "f": "3"}
+
+
+def test_names_of_files_do_not_steer_the_terminal(care: Care, tmp_path: Path) -> None:
+    for name in ("e\x1b[31m[red]x\x07\n.BIN", os.fsdecode(b"n\xff\xfe.BIN")):
+        path = tmp_path / name
+        try:
+            shutil.copy(SAMPLE, path)
+        except OSError:
+            pytest.skip("the file system refuses such names")
+        for command in (("triage",), ("triage", "--json"), ("triage", "--markdown"), ("inspect",)):
+            outcome = care(*command, path)
+            assert outcome.code in (0, 1)
+            assert "\x1b" not in outcome.stdout + outcome.stderr
+            outcome.stdout.encode("utf-8")
+        assert care("history", "--json").code == 0
+
+
+@pytest.mark.parametrize("closed", ["stdout", "stderr"])
+def test_a_closed_stream_is_no_error(closed: str) -> None:
+    redirect = {"stdout": ">&-", "stderr": "2>&- >/dev/null"}[closed]
+    command = f'"{sys.executable}" -c "from care_tui.cli import main; main()" inspect "{SAMPLE}" {redirect}'
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(["sh", "-c", command], stderr=subprocess.PIPE, timeout=60, env=environment, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_every_json_is_as_published(care: Care, log: Path, tmp_path: Path) -> None:
+    report = report_of(care, log, tmp_path)
+    assert care("triage", log, "--json").code == 1  # remembered
+    printed = {
+        "triage": care("triage", log, "--json"),
+        "inspect": care("inspect", log, "--json"),
+        "whatif": care("whatif", log, "--set", "WPNAV_SPEED=500", "--json"),
+        "verify": care("verify", report, GOOD, "--json"),
+        "history": care("history", "--json"),
+    }
+    for name, outcome in printed.items():
+        document = json.loads(outcome.stdout, parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
+        jsonschema.validate(document, json.loads(care("schema", name).stdout))
