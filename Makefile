@@ -10,7 +10,7 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check docs profiles screenshots clean
+.PHONY: demo test check docs profiles screenshots walk clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
@@ -32,6 +32,9 @@ profiles: $(DEV)
 
 screenshots: $(BASE)
 	$(BIN)/python -m benchmarks.screenshots
+
+walk: $(BASE)
+	$(BIN)/python -m benchmarks.walk
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache

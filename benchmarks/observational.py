@@ -4,10 +4,11 @@
 
 Simulated robots (`tests/robots.py`) whose table was not randomised: three options follow the wind, which also moves a
 metric that the objectives hang on. Once the wind is a context in the table, once no column holds it. Asked of 12 failed
-runs a robot: is the first-ranked option one whose reset really helps (odds of meeting everything rise by half of what
-the best single reset gives, at least 0.1), and how far are the predicted odds of every single reset from the true ones
-(1000 simulated missions each, the option set by intervention)? "said no" counts options that were not ranked because
-their effect is not identified.
+runs a robot: does the reset of the first-ranked option really help (odds of meeting everything rise by half of what the
+best single reset gives, at least 0.1), and how far are the predicted odds of every single reset from the true ones
+(1000 simulated missions each, the option set by intervention)? A reset is named only where its predicted odds reach
+those below which `care` abstains; "wrong" ones would have cost a field day, "fooled" are those of them that the wind
+chose. "said no" counts options that were not ranked because their effect is not identified.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from joblib import Parallel, delayed
 
 from care_core.causal.counterfactual import World
 from care_core.diagnose.ranking import deviating, reference_config, suspects
+from care_core.diagnose.triage import MIN_ODDS
 from care_core.learn.baselines import PlainClassifier
 from care_core.learn.outcomes import met
 from care_core.learn.train import Settings, train
@@ -37,11 +39,11 @@ METHODS = ("care", "care, declared as randomised", "plain classifier")
 
 @dataclass
 class Score:
-    """`fooled`: first-ranked options that were chosen by the wind and do not help."""
+    """`fooled`: options named first that were chosen by the wind and do not help."""
 
     asked: int = 0
-    hits: int = 0
-    silent: int = 0
+    right: int = 0
+    wrong: int = 0
     fooled: int = 0
     misses: list[float] = field(default_factory=list)
     swayed_misses: list[float] = field(default_factory=list)
@@ -101,10 +103,11 @@ def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
             score.misses += [abs(odds[option] - truth[option]) for option in odds]
             score.swayed_misses += [abs(odds[o] - truth[o]) for o in odds if o in robot.swayed]
             if helps:
+                named = ranking[0] if ranking and odds[ranking[0]] >= MIN_ODDS else None
                 score.asked += 1
-                score.silent += not ranking
-                score.hits += bool(ranking) and ranking[0] in helps
-                score.fooled += bool(ranking) and ranking[0] in robot.swayed and ranking[0] not in helps
+                score.right += named in helps
+                score.wrong += named is not None and named not in helps
+                score.fooled += named is not None and named not in helps and named in robot.swayed
     for name, engine in engines.items():
         scores[name].refused = len(engine.refused)
     return scores
@@ -118,16 +121,18 @@ def _true_odds(robot: Robot, config: Mapping[str, float], run: Mapping[str, floa
 
 def show(title: str, parts: list[dict[str, Score]]) -> None:
     print(f"\n{title}")
-    print(f"  {'method':30s} {'rank 1 helps':>13s} {'fooled':>7s} {'silent':>7s} {'odds error':>11s} {'swayed':>7s} "
-          f"{'said no':>8s}")  # fmt: skip
+    print(f"  {'method':30s} {'faults':>6s} {'right':>6s} {'wrong':>6s} {'fooled':>7s} {'no answer':>10s} "
+          f"{'odds error':>11s} {'swayed':>7s} {'said no':>8s}")  # fmt: skip
     for name in METHODS:
         mine = [part[name] for part in parts]
-        asked, hits = sum(s.asked for s in mine), sum(s.hits for s in mine)
+        asked, right, wrong, fooled, refused = (
+            sum(getattr(s, key) for s in mine) for key in ("asked", "right", "wrong", "fooled", "refused")
+        )
         misses = [m for s in mine for m in s.misses]
         swayed = [m for s in mine for m in s.swayed_misses]
-        right, far = f"{hits}/{asked}", f"{np.mean(swayed):.3f}" if swayed else "none"
-        fooled, silent, refused = (sum(getattr(s, key) for s in mine) for key in ("fooled", "silent", "refused"))
-        print(f"  {name:30s} {right:>13s} {fooled:>7d} {silent:>7d} {np.mean(misses):>11.3f} {far:>7s} {refused:>8d}")
+        far = f"{np.mean(swayed):.3f}" if swayed else "none"
+        print(f"  {name:30s} {asked:>6d} {right:>6d} {wrong:>6d} {fooled:>7d} {asked - right - wrong:>10d} "
+              f"{np.mean(misses):>11.3f} {far:>7s} {refused:>8d}")  # fmt: skip
 
 
 def main() -> None:

@@ -87,6 +87,7 @@ def serve_made() -> None:
         diff=lambda _case, _fix, _side: "-a\n+b\n",
         report=lambda _diagnosis, format: f"report {format}\n" * 100,
         commands=lambda _diagnosis: [],
+        remember=lambda _diagnosis: None,
     )
     CareApp(Request(Path("/logs/many.BIN")), engine=engine, settings=Settings(places=())).run()
 

@@ -104,6 +104,14 @@ class CareApp(App[int], inherit_bindings=False):
                 self.pop_screen()
             self._walk.open_log(path)
 
+    def _fatal_error(self) -> None:
+        """End after a defect with its traceback, without the values of variables: a diagnosis fills megabytes."""
+        from rich.console import Group
+        from rich.traceback import Traceback
+
+        report = "This is a defect of care, not of your robot: please report it with the log."
+        self.panic(Group(Traceback(show_locals=False), report))
+
     # Keys and commands that work everywhere
 
     async def action_quit(self) -> None:
@@ -123,20 +131,23 @@ class CareApp(App[int], inherit_bindings=False):
         if isinstance(screen, CareScreen):
             self.push_screen(HelpScreen(screen.help_text(), self._keys_of(screen)))
 
-    def _keys_of(self, screen: Screen[None]) -> Keys:
-        """Every key that works on the screen, keys of one action together, in the order they are looked up."""
+    def _keys_of(self, screen: CareScreen) -> Keys:
+        """Every key that works on the screen, keys of one action together, those of the page first."""
         keys: dict[tuple[str, str], list[str]] = {}
-        # Keys with priority come first there; they are those of the app and belong at the end.
-        for key, active in sorted(screen.active_bindings.items(), key=lambda item: item[1].binding.priority):
+        for key, active in sorted(screen.active_bindings.items(), key=lambda item: _order(item[1].binding)):
             binding = active.binding
             if active.enabled and binding.description and binding.id:
-                does = (binding.description, binding.id.split(".")[0] if binding.id.startswith("step.") else binding.id)
+                does = (
+                    screen.described(binding),
+                    binding.id.split(".")[0] if binding.id.startswith("step.") else binding.id,
+                )
                 keys.setdefault(does, []).append(self.get_key_display(binding.with_key(key)))
         return [(" ".join(shown), description, id) for (description, id), shown in keys.items()]
 
     def get_key_display(self, binding: Binding) -> str:
         """How a key is written; by its name where arrows and the like cannot be drawn."""
-        return (binding.key_display or binding.key) if self._glyphs is ASCII else super().get_key_display(binding)
+        is_named = self._glyphs is ASCII or binding.key == "enter"
+        return (binding.key_display or binding.key) if is_named else super().get_key_display(binding)
 
     def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
         """What the command palette offers: the steps, and every action of the page."""
@@ -146,7 +157,7 @@ class CareApp(App[int], inherit_bindings=False):
             for view in VIEWS:
                 yield SystemCommand(view.capitalize(), VIEWS[view], lambda view=view: screen.action_view(view))
         if isinstance(screen, PanesScreen):
-            for name in sorted(screen.page.ACTIONS):
+            for name in sorted(filter(screen.page.works, screen.page.ACTIONS)):
                 about = (getattr(screen.page, name).__doc__ or "").strip().splitlines()
                 yield SystemCommand(
                     name.replace("_", " ").capitalize(), about[0] if about else "", getattr(screen.page, name)
@@ -156,8 +167,16 @@ class CareApp(App[int], inherit_bindings=False):
         yield SystemCommand("Quit", "Leave care", self.action_quit)
 
 
+def _order(binding: Binding) -> int:
+    """Where a key belongs in the list of keys: what only this page can do first, what works everywhere last."""
+    places = ("do(", "open", "back", "filter", "go(", "view(", "move(")
+    if binding.priority and not binding.action.startswith("do("):
+        return len(places) + 1
+    return next((place for place, start in enumerate(places) if binding.action.startswith(start)), len(places))
+
+
 def run(request: Request | None, settings: Settings) -> int:
     """Open the app; answers the exit code."""
     app = CareApp(request, settings=settings)
     answer = app.run(mouse=settings.mouse)
-    return int(app.code if answer is None else answer)
+    return int(ExitCode.USAGE if answer is None else answer)

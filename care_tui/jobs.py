@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeVar
 
 from care_core.errors import CareError, ExitCode
+from care_tui.remembering import remember_triage
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix, ProfileChoice
@@ -272,6 +273,7 @@ class Engine:
     report: Callable[[Diagnosis, ReportFormat], str] = report_of
     commands: Callable[[Diagnosis], list[str]] = commands_of
     save: Callable[[Path, str], None] = save_text
+    remember: Callable[[Diagnosis], CareError | None] = remember_triage
 
 
 def exit_code(diagnosis: Diagnosis) -> ExitCode:

@@ -37,10 +37,14 @@ class LogFile:
     is_recent: bool = False
 
 
-def found_logs(places: Iterable[Path]) -> list[LogFile]:
-    """Logs of these folders and those opened before, the newest first. What cannot be looked at is left out."""
+def found_logs(places: Iterable[Path], opened: Path | None = None) -> list[LogFile]:
+    """Logs of these folders, those opened before and the open one, the newest first.
+
+    What cannot be looked at is left out.
+    """
     recent = recent_logs()
     files = [path for place in places if place.is_dir() for path in logs_in(place)]
+    files += [] if opened is None else [opened]
     unique = {path.absolute(): path.absolute() in recent for path in (*files, *recent)}
     logs = [log for path, is_recent in unique.items() if (log := _look(path, is_recent)) is not None]
     return sorted(logs, key=lambda log: -log.modified_s)
@@ -57,13 +61,15 @@ def logs_in(folder: Path, deep: int = DEEP) -> Iterator[Path]:
     for path in inside:
         if is_log(path) or (path.is_dir() and is_recording(path)):
             yield path
-        elif path.is_dir() and deep > 1 and not path.is_symlink() and _may_hold_logs(folder, path):
-            yield from logs_in(path, deep - 1)
+        elif path.is_dir() and deep > 1 and not path.is_symlink():
+            # The working folder may be anything: what lies in its folders counts only where a recorder made it.
+            inside_it = logs_in(path, deep - 1 if folder != Path() else 1)
+            yield from (log for log in inside_it if folder != Path() or log.is_dir() or _is_recorded(path))
 
 
-def _may_hold_logs(folder: Path, path: Path) -> bool:
-    """The working folder may be anything, so only what a recorder may have made in it is looked into."""
-    return folder != Path() or path.name.startswith("rosbag2_")
+def _is_recorded(folder: Path) -> bool:
+    """Whether a ROS 2 recorder named this folder, though it was stopped before it wrote what is in it."""
+    return folder.name.startswith("rosbag2_")
 
 
 def files_of(path: Path) -> list[Path]:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from care_core.errors import CareError
 from care_tui.jobs import Case
+
+if TYPE_CHECKING:
+    from care_core.history.store import Triaged
 
 TEXTS = {
     "MSG": ("Message",),
@@ -20,8 +22,43 @@ TEXTS = {
 }
 """Channels that hold what the robot's software said, and their fields."""
 
+EVENTS = {
+    10: "armed",
+    11: "disarmed",
+    15: "armed by the autopilot",
+    17: "may have landed",
+    18: "landed",
+    19: "lost GPS",
+    25: "home set",
+    28: "flies",
+    54: "motors stopped in an emergency",
+    56: "motor interlock off",
+    57: "motor interlock on",
+    62: "EKF reset its yaw",
+}
+"""Events of an ArduPilot EV record that operators ask for; the others keep their number."""
+
+SUBSYSTEMS = {
+    2: "radio",
+    3: "compass",
+    11: "GPS",
+    15: "parachute",
+    18: "barometer",
+    19: "processor",
+    21: "terrain data",
+    22: "navigation",
+    30: "internal error",
+}
+"""Subsystems of an ERR record that are no failure of a flight by themselves."""
+_MODE_CHANGE = 10
+"""The one whose code is the flight mode that was refused."""
+
 LEVELS = {1: "debug", 2: "info", 4: "WARN", 8: "ERROR", 16: "FATAL", 10: "debug", 20: "info", 30: "WARN", 40: "ERROR"}
 """Levels of ROS 1 and ROS 2 log messages."""
+
+
+SELECTORS = {"Inst", "Instance", "I", "C"}
+"""Fields that say which of several sensors a value is from: no signals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +71,7 @@ class LogMessage:
 
 
 def messages_of(case: Case) -> list[LogMessage]:
-    """Everything that the log holds in words, in time order."""
+    """Everything that the log holds in words, and what was found in its numbers, in time order."""
     from care_core.logs import open_log
 
     tables = open_log(case.diagnosis.run.log.path).read(TEXTS)
@@ -45,6 +82,9 @@ def messages_of(case: Case) -> list[LogMessage]:
         fields = [table.columns[field] for field in TEXTS[name] if field in table.columns]
         for time_s, *values in zip(table.t, *fields, strict=True):
             found.append(LogMessage(float(time_s), *_worded(name, values)))
+    said = {message.text for message in found}
+    evidence = case.diagnosis.run.evidence
+    found += [LogMessage(part.time_s, part.kind, part.text) for part in evidence if part.text not in said]
     return sorted(found, key=lambda message: message.time_s)
 
 
@@ -53,10 +93,22 @@ def _worded(channel: str, values: list[object]) -> tuple[str, str]:
         level, name, text = (*values, "", "")[:3]
         return LEVELS.get(int(float(str(level))), "?"), f"{name}: {text}"
     if channel == "ERR":
-        return "ERR", f"subsystem {values[0]:g}, code {values[1]:g}" if len(values) == 2 else str(values)
+        return _error(*(int(float(str(value))) for value in values)) if len(values) == 2 else ("ERR", str(values))
     if channel == "EV":
-        return "event", f"event {values[0]:g}" if values else ""
+        number = int(float(str(values[0]))) if values else -1
+        return "event", EVENTS.get(number, f"number {number}")
     return "message", str(values[0]) if values else ""
+
+
+def _error(subsystem: int, code: int) -> tuple[str, str]:
+    """An ERR record in words; code 0 says that the trouble is over."""
+    from care_core.extract.ardupilot import ERR_SUBSYSTEMS
+
+    if subsystem == _MODE_CHANGE:
+        return "ERR", f"flight mode {code} was refused"
+    named = ERR_SUBSYSTEMS.get(subsystem, (SUBSYSTEMS.get(subsystem, f"subsystem {subsystem}"),))
+    name = ": ".join(dict.fromkeys(named))
+    return ("over", name) if code == 0 else ("ERR", f"{name}, code {code}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,12 +151,16 @@ def signals_of(case: Case) -> list[Signal]:
         needs = find_extractor(variable.extract.kind).needs(variable.extract.args)
         for channel, fields in needs.items():
             for field in fields:
-                if channel in present and channel not in TEXTS:
+                if channel in present and channel not in TEXTS and field not in SELECTORS:
                     users.setdefault((channel, field), []).append(variable.name)
     matters = {result.variable.name for result in case.diagnosis.objectives}
     matters |= {node.name for fault in case.diagnosis.faults for cause in fault.causes for node in cause.path}
-    signals = [Signal(channel, field, tuple(names)) for (channel, field), names in users.items()]
-    return sorted(signals, key=lambda signal: -len(matters & set(signal.used_by)))
+    signals = [
+        Signal(channel, field, tuple(sorted(names, key=lambda name: name not in matters)))
+        for (channel, field), names in users.items()
+    ]
+    # What every variable needs, such as to find the mission, tells least about any of them.
+    return sorted(signals, key=lambda signal: -len(matters & set(signal.used_by)) / len(signal.used_by))
 
 
 def trace_of(case: Case, signal: Signal, columns: int) -> Trace:
@@ -165,6 +221,7 @@ class Past:
 
     at: str
     log: str
+    mission: int
     profile: str
     verdict: str
     cause: str
@@ -179,34 +236,22 @@ def past_runs() -> list[Past]:
     path = history_path()
     if path is None or not path.is_file():
         return []
-    return [_past(triaged.at, triaged.document) for triaged in History(path).triages()]
+    return [_past(triaged) for triaged in History(path).triages()]
 
 
-def _past(at: str, document: Mapping[str, Any]) -> Past:
+def _past(triaged: Triaged) -> Past:
+    document = triaged.document
     broken = [entry["name"] for entry in document["objectives"] if entry["status"] == "fault"]
     unknown = [entry["name"] for entry in document["objectives"] if entry["status"] == "not_evaluated"]
     verdict = f"FAULT {', '.join(broken)}" if broken else "NOT ALL EVALUATED" if unknown else "OK"
     causes = [cause["option"] for fault in document["faults"] for cause in fault["causes"]]
     return Past(
-        at=at,
+        at=triaged.at,
         log=document["log"]["path"],
+        mission=triaged.mission,
         profile=document["profile"]["name"],
         verdict=verdict,
         cause=causes[0] if causes else "",
         values={entry["name"]: entry["value"] for entry in document["objectives"]},
         config=document["config"],
     )
-
-
-def remember_run(case: Case) -> None:
-    """Put a diagnosis into the local history. One that cannot be used is no reason to stop."""
-    from care_core.history import History, HistoryError, history_path
-    from care_core.report import build_document, published
-
-    path = history_path()
-    if path is None or case.question is None:
-        return
-    try:
-        History(path).add_triage(published(build_document(case.diagnosis)), case.diagnosis.run.mission.index)
-    except HistoryError as err:
-        logging.getLogger(__name__).warning("not remembered: %s", err)

@@ -46,6 +46,11 @@ class Session:
         return "empty" if self.path is None else "loading"
 
     @property
+    def is_readable(self) -> bool:
+        """Whether there is a log to look into, though it may have no diagnosis."""
+        return self.path is not None and self.state != "loading" and self.path.exists()
+
+    @property
     def diagnosis(self) -> Diagnosis:
         """The diagnosis; only asked for in the state `data`."""
         assert self.case is not None
@@ -73,10 +78,12 @@ class Session:
                     values.setdefault(cause.option.name, cause.suggested)
         return values
 
-    def alone(self) -> dict[str, float]:
-        """Odds of keeping all thresholds with one option changed as suggested for it."""
-        causes = (cause for fault in self.diagnosis.faults for cause in fault.causes)
-        return {cause.option.name: cause.p_fixed for cause in causes if cause.p_fixed is not None}
+    def alone(self) -> dict[tuple[str, float], float]:
+        """Odds of keeping all thresholds with one option alone at a value: the one suggested for it as a cause."""
+        causes = [cause for fault in self.diagnosis.faults for cause in fault.causes]
+        return {
+            (c.option.name, c.suggested): c.p_fixed for c in causes if not (c.suggested is None or c.p_fixed is None)
+        }
 
     @property
     def result(self) -> ObjectiveResult | None:

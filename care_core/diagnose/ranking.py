@@ -118,6 +118,13 @@ def not_ruled_out(
     return tuple(Suspect(name, 0.0, CausalPath((name, objective), 0.0), None) for name in others)
 
 
+def unidentified(world: World, objective: str, reference: Config) -> tuple[str, ...]:
+    """Options off their reference whose effect on the objective the training runs cannot tell: neither ranked nor ruled
+    out."""
+    effects = {name: world.model.effects.get((name, objective)) for name in deviating(world.config, reference)}
+    return tuple(name for name, effect in effects.items() if effect is not None and not effect.identified)
+
+
 def best_paths(model: Model, objective: str, options: Sequence[str]) -> dict[str, CausalPath]:
     """Per option the directed path to the objective with the largest mean of effect times support.
 

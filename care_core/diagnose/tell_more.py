@@ -11,6 +11,7 @@ import numpy as np
 from care_core.causal.counterfactual import Config, World
 from care_core.causal.mechanisms import FloatArray
 from care_core.diagnose.fixes import candidate_values
+from care_core.diagnose.ranking import unidentified
 from care_core.diagnose.records import Experiment, Fault
 from care_core.run import Run, Unavailable
 from care_core.variables import Variable
@@ -31,6 +32,13 @@ def tell_more(
     """Sentences for an operator, the most useful first; empty where nothing would help."""
     advice = list(_unrecorded(faults, run))
     for fault in faults:
+        objective = fault.objective.variable.name
+        advice += [
+            f"change only {name} to {options[name].show(reference[name])} and run again: the training runs cannot tell "
+            f"what it does to {objective}"
+            for name in unidentified(world, objective, reference)
+            if name not in keep
+        ]
         found = experiment(world, fault, options, reference, keep)
         if found is not None:
             advice.append(str(found))

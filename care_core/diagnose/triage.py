@@ -29,6 +29,7 @@ from care_core.diagnose.ranking import (
     deviating,
     not_ruled_out,
     suspects,
+    unidentified,
 )
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
 from care_core.diagnose.since import compare, with_evidence
@@ -158,7 +159,7 @@ def diagnose(
         fix=None if abstained else fixes[0],
         alternatives=() if abstained else tuple(fixes[1:]),
         abstained=abstained,
-        notes=_notes(case),
+        notes=_notes(case, broken),
         rivals=circumstances(run, world, schema) if unsure else (),
         tell_more=tell_more(world, faults, run, schema.variables, reference, keep) if unsure else (),
     )
@@ -208,7 +209,8 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
 
 
 def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float) -> Confidence:
-    """High where the option explains most of the fault and nearly every resample gives it a path there.
+    """High where the option explains most of the fault, nearly every resample gives it a path there, and no option
+    that the training runs cannot judge is off its reference too.
 
     A check that refused this run and reads the option's value is worth more than a doubt about the model.
     """
@@ -216,7 +218,8 @@ def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float)
     doubtful = not in_support or bool(case.choice.warnings) or not case.run.mission.fits
     if doubtful or support < LOW_SUPPORT or contribution < UNSURE:
         return "medium" if suspect.option in refused_by(case.run) else "low"
-    if support >= HIGH_SUPPORT and contribution >= SURE:
+    is_rivalled = bool(unidentified(case.world, suspect.path.nodes[-1], case.reference))
+    if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled:
         return "high"
     return "medium"
 
@@ -315,8 +318,12 @@ def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
     )
 
 
-def _notes(case: _Case) -> tuple[str, ...]:
+def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
     notes = list(case.choice.warnings)
+    for name in (result.variable.name for result in broken):
+        unknown = unidentified(case.world, name, case.reference)
+        if unknown:
+            notes.append(f"not ranked, as the training runs cannot tell their effect on {name}: {', '.join(unknown)}")
     if not case.run.mission.fits:
         notes.append(case.run.mission.mismatch)
     if case.assumed:

@@ -34,7 +34,7 @@ _PHASE_ARGS = {
 }
 
 # Subsystems of an ERR record by the kind of event; code 0 means that the fault went away.
-_ERR_SUBSYSTEMS: dict[int, tuple[str, str]] = {
+ERR_SUBSYSTEMS: dict[int, tuple[str, str]] = {
     5: ("failsafe", "radio"), 6: ("failsafe", "battery"), 8: ("failsafe", "ground station"),
     9: ("failsafe", "fence"), 12: ("crash", "crash check"), 16: ("ekf", "EKF check"),
     17: ("failsafe", "EKF"), 20: ("failsafe", "ADSB"), 23: ("failsafe", "terrain"), 24: ("ekf", "EKF primary changed"),
@@ -90,7 +90,7 @@ class ArduPilotFlight(MissionKind):
         found = [Evidence(t, text, kind) for t, text, kind in _telling(mission)]
         spoken = {one.kind for one in found}
         for t, subsystem, code in _errors(mission):
-            kind, what = _ERR_SUBSYSTEMS.get(subsystem, ("", ""))
+            kind, what = ERR_SUBSYSTEMS.get(subsystem, ("", ""))
             if kind and code and kind not in spoken:
                 found.append(Evidence(t, f"ERR {what}, code {code}", kind))
         if _forced(mission):
@@ -190,7 +190,7 @@ def _has_event(mission: Mission, kind: str, about: str = "") -> float:
         return 0.0
     word = about.casefold()
     for _, subsystem, code in _errors(mission):
-        err_kind, what = _ERR_SUBSYSTEMS.get(subsystem, ("", ""))
+        err_kind, what = ERR_SUBSYSTEMS.get(subsystem, ("", ""))
         if code and err_kind == kind and word in what.casefold():
             return 1.0
     return float(any(known == kind and word in text.casefold() for _, text, known in _telling(mission)))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from care_core.profile.model import EffectRecord, Model
+from care_core.profile.model import EffectRecord, Model, SkillRecord
 from care_core.profile.schema import Schema
 
 TOP = 10
+BAR = 20
 OBJECTIVE_WORDS = {"all": "all objectives together"}
 
 
@@ -79,17 +80,29 @@ def _skill(model: Model) -> str:
     rows = [
         (
             OBJECTIVE_WORDS.get(name, name),
-            f"{s['runs']:.0f}",
-            f"{s['base_rate']:.2f}",
-            f"{s['log_loss']:.3f}",
-            f"{s['auc']:.3f}" if "auc" in s else "none: one outcome only",
-            f"{s['calibration_error']:.3f}",
+            f"{s.runs}",
+            f"{s.base_rate:.2f}",
+            f"{s.log_loss:.3f}",
+            "none: one outcome only" if s.auc is None else f"{s.auc:.3f}",
+            f"{s.calibration_error:.3f}",
         )
         for name, s in model.skill.items()
-        if s["runs"]
     ]
     header = ("odds of keeping the threshold of", "runs", "met", "log loss", "AUC", "calibration error")
-    return "## Skill on runs it has not seen (cross-validation)\n\n" + _table(header, rows)
+    text = "## Skill on runs it has not seen (cross-validation)\n\n" + _table(header, rows)
+    return text + (_curve(model.skill["all"]) if "all" in model.skill else "")
+
+
+def _curve(skill: SkillRecord) -> str:
+    """The calibration curve as a table with bars."""
+    rows = ((f"{p:.2f}", f"{met:.2f}", f"{n}", f"`{_bar(p)}`<br>`{_bar(met)}`") for p, met, n in skill.curve)
+    header = ("predicted", "met", "runs", "predicted above, met below")
+    return "\n\nCalibration of the odds of all objectives together:\n\n" + _table(header, rows)
+
+
+def _bar(share: float) -> str:
+    full = round(share * BAR)
+    return "#" * full + "." * (BAR - full)
 
 
 def _effects(model: Model) -> str:

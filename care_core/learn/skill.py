@@ -15,7 +15,7 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
-from care_core.profile.model import Model, Training
+from care_core.profile.model import Model, SkillRecord, Training
 from care_core.profile.schema import Schema
 
 BINS = 10
@@ -25,7 +25,7 @@ FOLD = Effort(points=400, iterations=30)
 
 def cross_validated_skill(
     frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, folds: int, n_jobs: int = 1
-) -> dict[str, dict[str, float]]:
+) -> dict[str, SkillRecord]:
     """Per objective, and for `all` of them, skill of the odds on held-out runs. The graph is kept.
 
     Args:
@@ -37,7 +37,8 @@ def cross_validated_skill(
     odds = held_out_odds(frame, schema, lambda _runs, _rng: graph, rng, folds=folds, n_jobs=n_jobs)
     truth: dict[str, FloatArray] = {objective.name: met(objective, frame) for objective in schema.objectives}
     truth["all"] = all_met(frame, schema)
-    return {name: score(odds[name], truth[name]) for name in odds}
+    found = {name: score(odds[name], truth[name]) for name in odds}
+    return {name: skill for name, skill in found.items() if skill is not None}
 
 
 Learn = Callable[[pd.DataFrame, np.random.Generator], CausalGraph]
@@ -96,25 +97,22 @@ def _odds(
     return odds
 
 
-def score(odds: FloatArray, truth: FloatArray) -> dict[str, float]:
-    """Log loss, Brier score, AUC, calibration error and the base rate, over the runs that have a truth.
-
-    Where all met or all missed the threshold there is no AUC.
-    """
+def score(odds: FloatArray, truth: FloatArray) -> SkillRecord | None:
+    """Log loss, Brier score, AUC, calibration and the base rate over the runs that have a truth; None without any."""
     known = np.isfinite(odds) & np.isfinite(truth)
     p, y = odds[known], truth[known]
     if not len(y):
-        return {"runs": 0.0}
+        return None
     clipped = np.clip(p, 1e-3, 1 - 1e-3)
-    auc = {} if y.min() == y.max() else {"auc": _auc(p, y == 1.0)}
-    return {
-        "runs": float(len(y)),
-        "base_rate": float(y.mean()),
-        "log_loss": float(-(y * np.log(clipped) + (1 - y) * np.log(1 - clipped)).mean()),
-        "brier": float(((p - y) ** 2).mean()),
-        **auc,
-        "calibration_error": calibration_error(p, y),
-    }
+    return SkillRecord(
+        runs=len(y),
+        base_rate=float(y.mean()),
+        log_loss=float(-(y * np.log(clipped) + (1 - y) * np.log(1 - clipped)).mean()),
+        brier=float(((p - y) ** 2).mean()),
+        calibration_error=calibration_error(p, y),
+        auc=None if y.min() == y.max() else _auc(p, y == 1.0),
+        curve=tuple(reliability(p, y)),
+    )
 
 
 def _auc(p: FloatArray, positive: NDArray[np.bool_]) -> float:

@@ -114,6 +114,20 @@ class OutcomeRecord(_Record):
     mechanism: str = ""
 
 
+class SkillRecord(_Record):
+    """How well an objective's odds predict runs that were held out."""
+
+    runs: int
+    base_rate: float
+    log_loss: float
+    brier: float
+    calibration_error: float
+    auc: float | None = None
+    """None where all runs met the threshold, or none did."""
+    curve: tuple[tuple[float, float, int], ...] = ()
+    """Calibration: mean predicted odds, share that met the threshold, runs; a row a tenth of the odds that has any."""
+
+
 class Training(_Record):
     """Where the model came from."""
 
@@ -149,7 +163,7 @@ class _ModelFile(_Record):
     outcomes: tuple[OutcomeRecord, ...]
     summaries: dict[str, Summary]
     witnesses: dict[str, dict[str, float]] = Field(default_factory=dict)
-    skill: dict[str, dict[str, float]]
+    skill: dict[str, SkillRecord]
     training: Training
     mechanisms: dict[str, _MechanismRecord]
 
@@ -167,7 +181,8 @@ class Model:
     paths: Mapping[str, tuple[PathRecord, ...]]
     outcomes: Mapping[str, OutcomeRecord]
     summaries: Mapping[str, Summary]
-    skill: Mapping[str, Mapping[str, float]]
+    skill: Mapping[str, SkillRecord]
+    """By objective, and for `all` of them together."""
     training: Training
     mechanisms: Mapping[str, Mechanism] = field(default_factory=dict)
     witnesses: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -192,7 +207,7 @@ def write_model(model: Model, folder: Path) -> None:
         outcomes=tuple(model.outcomes.values()),
         summaries=dict(model.summaries),
         witnesses={name: dict(found) for name, found in model.witnesses.items()},
-        skill={name: dict(values) for name, values in model.skill.items()},
+        skill=dict(model.skill),
         training=model.training,
         mechanisms={key: _mechanism_record(key, m) for key, m in stored.items()},
     )

@@ -10,9 +10,10 @@ import typer
 from care_core.errors import UsageError
 from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds, is_json
 from care_tui.commands.diagnosing import bounds
-from care_tui.commands.past import NoHistory, remember
+from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit
 from care_tui.jobs import Request, open_and_choose, question_of
+from care_tui.remembering import remember
 
 app = typer.Typer()
 
@@ -65,6 +66,7 @@ def verify(
         opened, chosen, _ = open_and_choose(log, profile or promised.profile.name)
         document = verify_log(promised, opened, chosen, mission)
     if not no_history:
-        remember(lambda history: history.add_verification(document.model_dump(by_alias=True, mode="json")))
+        verified = document.model_dump(by_alias=True, mode="json")
+        mention(remember(lambda history: history.add_verification(verified)))
     emit((verify_json if json or is_json(out) else verify_text)(document), out)
     raise typer.Exit(EXIT_CODES[document.verdict])

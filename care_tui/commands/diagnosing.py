@@ -11,9 +11,10 @@ import typer
 
 from care_core.errors import LogError, UsageError
 from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds
-from care_tui.commands.past import NoHistory, remember
+from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit, painted
 from care_tui.jobs import Request, diagnose_log, exit_code
+from care_tui.remembering import remember_triage
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis
@@ -60,7 +61,7 @@ def triage(
     with Progress() as progress:
         diagnosis = diagnose_log(request, progress)
     if not no_history:
-        remember_triage(diagnosis)
+        mention(remember_triage(diagnosis))
     emit(_written(diagnosis, formats[0] if formats else _format_of(out), to_file=out is not None), out)
     raise typer.Exit(exit_code(diagnosis))
 
@@ -77,13 +78,6 @@ def demo() -> None:
         diagnosis = diagnose_log(Request(path), progress)
     emit(_written(diagnosis, None, to_file=False))
     raise typer.Exit(exit_code(diagnosis))
-
-
-def remember_triage(diagnosis: Diagnosis) -> None:
-    """Put the triage into the history."""
-    from care_core.report import build_document, published
-
-    remember(lambda history: history.add_triage(published(build_document(diagnosis)), diagnosis.run.mission.index))
 
 
 def bounds(texts: Iterable[str]) -> dict[str, float]:

@@ -1,36 +1,25 @@
-"""`care history`, and remembering what was triaged and verified."""
+"""`care history`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from care_core.errors import UsageError
+from care_core.errors import CareError, UsageError
 from care_tui.commands.arguments import AsJson, Out, is_json
 from care_tui.console import emit, say
-
-if TYPE_CHECKING:
-    from care_core.history import History
 
 app = typer.Typer()
 
 NoHistory = Annotated[bool, typer.Option("--no-history", help="Do not remember this in the history.")]
 
 
-def remember(record: Callable[[History], None]) -> None:
-    """Put something into the history. One that cannot be used costs a sentence, never the work."""
-    from care_core.history import History, HistoryError, history_path
-
-    path = history_path()
-    if path is None:
-        return
-    try:
-        record(History(path))
-    except HistoryError as err:
-        say(f"care: {err}")
+def mention(problem: CareError | None) -> None:
+    """Say why something was not remembered. A history that cannot be used costs a sentence, never the work."""
+    if problem is not None:
+        say(f"care: {problem}")
 
 
 @app.command()

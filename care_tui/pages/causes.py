@@ -22,13 +22,15 @@ class CausesPage(DiagnosisPage):
         "the cursor. Enter goes to the fix. d sets a cause aside with a reason that goes into the report, or takes it "
         "back. o turns to the next fault."
     )
+    ENTER = "Fix"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"dismiss", "next_fault"})
 
     def view_of_diagnosis(self) -> View:
         causes, glyphs, dismissed = self.session.causes, self.glyphs, self.session.dismissed
+        evidence = self.session.diagnosis.run.evidence
         listing = Listing(
             len(causes),
-            lambda i, _width: cause_item(causes[i], dismissed.get(causes[i].option.name), glyphs),
+            lambda i, _width: cause_item(causes[i], dismissed.get(causes[i].option.name), evidence, glyphs),
             lambda i: causes[i].option.name,
             height=2,
         )
@@ -39,6 +41,8 @@ class CausesPage(DiagnosisPage):
         if result is None:
             return Content("No objective")
         title = Content.assemble("Causes of ", (clean(result.variable.name), "bold"))
+        if fault is not None and fault.causes and all(cause.is_lead for cause in fault.causes):
+            title += Content(f": none found, {len(fault.causes)} not ruled out")
         if fault is None or len(faults) < 2:
             return title
         return title + Content.styled(f"  ({faults.index(fault) + 1} of {len(faults)} faults, o: next)", "dim")

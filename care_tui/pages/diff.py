@@ -11,12 +11,12 @@ from care_tui.jobs import DiffSide
 from care_tui.pages.page import View, sentence
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.fix import no_fix_rows
-from care_tui.render.rows import diff_rows, error_rows
+from care_tui.render.rows import Rows, command_rows, diff_rows, error_rows
 
 SIDES: dict[DiffSide, str] = {
-    "driven": "as driven (-) against suggested (+)",
-    "file": "your file (-) against suggested (+)",
-    "changed": "as driven (-) against your file (+)",
+    "driven": "As driven (-) against suggested (+)",
+    "file": "Your file (-) against suggested (+)",
+    "changed": "As driven (-) against your file (+)",
 }
 
 
@@ -26,29 +26,35 @@ class DiffPage(DiagnosisPage):
         "Lines with - are what is, lines with + what is suggested. f compares with the file given by --config instead. "
         "c copies the diff. Enter goes to the report. Nothing is written to the robot."
     )
+    ENTER = "Report"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"other_side", "copy_diff"})
     side: DiffSide = "driven"
 
     def enter(self) -> None:
         if self.session.state == "data":
             self._text: str | CareError | None = None
+            self._commands: list[str] = []
             fix, case, side = self.session.fix, self.session.case, self.side
             if case is not None and fix is not None and (fix.changes or side == "changed"):
-                self.screen.fetch("diff", lambda _job: self.walk.engine.diff(case, fix, side), self._received)
+                engine, decided = self.walk.engine, self.session.decided()
+                commands = engine.commands if side == "driven" else lambda _diagnosis: []
+                self.screen.fetch(
+                    "diff", lambda _job: (engine.diff(case, fix, side), commands(decided)), self._received
+                )
 
-    def _received(self, text: str | CareError) -> None:
-        self._text = text
+    def _received(self, answer: tuple[str, list[str]] | CareError) -> None:
+        self._text, self._commands = (answer, []) if isinstance(answer, CareError) else answer
         if self.screen.page is self:
             self.screen.draw()
 
     def view_of_diagnosis(self) -> View:
-        title = Content(f"Configuration {SIDES[self.side]}")
         session, text = self.session, self._text
+        title = Content("Nothing changes" if text is None and not session.basket.ticked else SIDES[self.side])
         if isinstance(text, CareError):
             return View(title, lambda _: error_rows(text))
         if text is not None:
             shown = text or "No difference.\n"
-            return View(title, lambda _: diff_rows(shown))
+            return View(title, lambda _: Rows([*diff_rows(shown).rows, *command_rows(self._commands)]))
         if session.basket.ticked and session.fix_error is not None:
             error = session.fix_error
             return View(title, lambda _: error_rows(error))

@@ -27,6 +27,7 @@ class FixPage(DiagnosisPage):
         "alternative, s the suggestion, u takes the last change back. Every option of the profile is here: / finds "
         "it. Enter shows the diff. Nothing is written to the robot."
     )
+    ENTER = "Diff"
     ACTIONS: ClassVar[frozenset[str]] = frozenset(
         {"toggle", "nudge_up", "nudge_down", "type_value", "alternative", "suggestion", "undo"}
     )
@@ -43,7 +44,7 @@ class FixPage(DiagnosisPage):
         def item(index: int, _width: int) -> tuple[Content]:
             option = options[index]
             value = basket.values.get(option.name)
-            odds = alone.get(option.name)
+            odds = None if value is None else alone.get((option.name, value))
             shown = "" if odds is None else f"alone {percent(odds)}"
             ticked = option.name in basket.ticked
             return (option_item(option, session.current(option), value, ticked, shown, width, glyphs),)
@@ -61,9 +62,11 @@ class FixPage(DiagnosisPage):
         if session.fix_error is not None:
             return Content("No prediction")
         count = len(session.basket.ticked)
-        changes = f"{count} change{'' if count == 1 else 's'}" if count else "nothing ticked"
         shown = session.fix if count else session.unchanged
         odds = "..." if shown is None else percent(shown.p_fixed)
+        if not count:
+            return Content.assemble("Odds of no fault ", (odds, "bold"), " as driven", ("  nothing ticked", "dim"))
+        changes = f"{count} change{'' if count == 1 else 's'}"
         now = "" if session.unchanged is None else f"  (as driven {percent(session.unchanged.p_fixed)})"
         return Content.assemble("Odds of no fault ", (odds, "bold"), now, (f"  {changes}", "dim"))
 
@@ -72,16 +75,15 @@ class FixPage(DiagnosisPage):
         if session.fix_error is not None:
             return error_rows(session.fix_error)
         rows: list[Row] = []
-        shown = session.fix if session.basket.ticked else session.unchanged
-        if shown is None and not session.basket.ticked:
+        ticked = session.basket.ticked
+        if session.diagnosis.fix is None:
             rows += no_fix_rows(session.diagnosis).rows
-        elif shown is not None:
-            rows += [
-                heading("Predicted, 80 % interval"),
-                *outcome_rows(shown, session.diagnosis.objectives, self.glyphs),
-            ]
-            if not session.diagnosis.fix:
-                rows += no_fix_rows(session.diagnosis).rows
+        shown = session.fix if ticked else session.unchanged
+        if shown is not None:
+            if rows:
+                rows.append(Row(Content()))
+            rows.append(heading(f"Predicted {'with what is ticked' if ticked else 'as driven'}, 80 % interval"))
+            rows += outcome_rows(shown, session.diagnosis.objectives, self.glyphs)
         if option is not None:
             rows += [Row(Content()), *option_rows(option, self._caveats(option), self.glyphs)]
         return Rows(rows)

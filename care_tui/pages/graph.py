@@ -36,6 +36,7 @@ class GraphPage(Page):
         "The causal model around one variable, with the effect of every edge and how many resamples hold it. Enter "
         "goes to the neighbour under the cursor, h goes back, Esc leaves."
     )
+    ENTER = "Go there"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"step_back"})
 
     def __init__(self, screen: PanesScreen, case: Case, node: str | None) -> None:
@@ -54,7 +55,9 @@ class GraphPage(Page):
     @staticmethod
     def _counts(links: list[Link]) -> str:
         kinds = [link.kind for link in links]
-        return f"causes {kinds.count('cause')}, effects {kinds.count('effect')}, confounded {kinds.count('confounded')}"
+        counts = [(kinds.count(kind), kind) for kind in ("cause", "effect", "confounded")]
+        words = (f"{n} {kind if n == 1 or kind == 'confounded' else f'{kind}s'}" for n, kind in counts if n)
+        return ", ".join(words) or "no edge"
 
     def _links(self, node: str) -> list[Link]:
         model = self._case.model
@@ -72,9 +75,9 @@ class GraphPage(Page):
         glyphs = self.glyphs
         sign = {"cause": f"{glyphs.to} it", "effect": f"it {glyphs.to}", "confounded": f"{glyphs.root} both"}[link.kind]
         effect = "" if link.effect is None else f"{link.effect:+.2f}"
-        support = "" if link.support is None else percent(link.support)
+        held = "" if link.support is None else f"in {percent(link.support):>5} of resamples"
         few = "  ! few" if link.support is not None and link.support < FEW else ""
-        return Content.assemble(f"{sign:<7} ", padded(link.name, 30, "bold"), f" {effect:>6}  {support:>5}{few}")
+        return Content.assemble(f"{sign:<7} ", padded(link.name, 26, "bold"), f" {effect:>6}  {held}{few}")
 
     def _detail(self, node: str, link: Link | None) -> Rows:
         rows = self._about(node)

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.text import clean
 from care_tui.pages.page import Fetch, Page, View, sentence
 from care_tui.reading import Past, past_runs
-from care_tui.render.rows import ASCII, Row, Rows, heading, labelled, padded, text
+from care_tui.render.rows import ASCII, Row, Rows, labelled, padded, text
 from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
+
+NAME_WIDTH, VALUE_WIDTH = 18, 16
+TREND = 24
+"""Newest runs that a trend shows."""
 
 
 class HistoryPage(Page):
     name = "History"
     HELP = (
-        "Runs that were triaged before, the newest first, with the trend of every objective. x marks a run to compare "
-        "the one under the cursor with. / filters, Esc leaves."
+        "Runs that were triaged before, the newest first, with the trend of every objective up to the one under the "
+        "cursor. x marks a run; then every other is compared with it. / filters, Esc leaves."
     )
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"mark"})
 
@@ -33,6 +39,9 @@ class HistoryPage(Page):
     def view(self) -> View:
         return self._found.view("History", self._show)
 
+    def works(self, action: str) -> bool:
+        return super().works(action) and bool(self._found.answer)
+
     def _show(self, runs: list[Past]) -> View:
         if not runs:
             nothing = "No run was triaged before: 'care triage' and this app remember those they judge."
@@ -40,45 +49,39 @@ class HistoryPage(Page):
         listing = Listing(
             len(runs),
             lambda i, _width: (self._item(runs[i]),),
-            lambda i: f"{runs[i].log} {runs[i].profile} {runs[i].verdict}",
+            lambda i: f"{runs[i].log} {runs[i].profile} {runs[i].verdict} {runs[i].cause}",
         )
-        marked = "" if self._marked is None else f"  compared with {Path(self._marked.log).name}"
-        return View(
-            Content(f"History  {len(runs)} runs") + text(marked, "bold"),
-            lambda i: Rows([]) if i is None else self._detail(runs[i], runs),
-            listing,
-        )
+        count = f"{len(runs)} run{'' if len(runs) == 1 else 's'}"
+        title = Content.assemble(f"History  {count}", ("  x marks one to compare with", "dim"))
+        if self._marked is not None:
+            title = Content.assemble("History  against ", (_named(self._marked), "bold"), ("  x on it: no more", "dim"))
+        return View(title, lambda i: Rows([]) if i is None else Rows(self._detail(i, runs)), listing)
 
     def _item(self, past: Past) -> Content:
         mark = "*" if past == self._marked else " "
         line = Content(f"{mark} {past.at[:16].replace('T', ' ')}  ")
-        return line + padded(Path(past.log).name, 26, "bold") + text(f" {past.verdict}")
+        return line + padded(_named(past), 26, "bold") + text(f" {past.verdict}")
 
-    def _detail(self, past: Past, runs: list[Past]) -> Rows:
+    def _detail(self, index: int, runs: list[Past]) -> list[Row]:
+        past, other = runs[index], self._marked
+        if other is not None and other != past:
+            return comparison(past, other)
         rows = [labelled("Log", past.log), labelled("Profile", past.profile), labelled("Verdict", past.verdict)]
         if past.cause:
             rows.append(labelled("First cause", past.cause))
-        other = self._marked if self._marked is not None and self._marked != past else None
-        rows += [Row(Content()), heading("Objectives" if other is None else f"Against {Path(other.log).name}")]
+        until = [run for run in reversed(runs[index:]) if run.profile == past.profile]
+        rows += [Row(Content()), _columns("Objective", "this run", f"{len(until)} runs up to it", "bold")]
         for name, value in past.values.items():
-            rows.append(labelled(name, self._line(name, value, past, other, runs)))
-        if other is not None:
-            rows += [Row(Content()), heading("Options that differ"), *_differences(past, other)]
-        return Rows(rows)
+            rows.append(_columns(name, _shown(value), self._trend([run.values.get(name) for run in until])))
+        return rows
 
-    def _line(self, name: str, value: float | None, past: Past, other: Past | None, runs: list[Past]) -> str:
-        shown = "not evaluated" if value is None else f"{value:.4g}"
-        if other is not None:
-            before = other.values.get(name)
-            return f"{shown}  (there {'not evaluated' if before is None else f'{before:.4g}'})"
-        alike = [run.values.get(name) for run in reversed(runs) if run.profile == past.profile]
-        known = [number for number in alike if number is not None]
-        return f"{shown:<14} {self._spark(known)}"
-
-    def _spark(self, values: list[float]) -> str:
+    def _trend(self, values: Sequence[float | None]) -> str:
         from care_core.history import sparkline
 
-        return sparkline(values[-40:], ascii=self.glyphs is ASCII) if len(values) > 1 else ""
+        known = [value for value in values if value is not None][-TREND:]
+        if len(known) < 2:
+            return ""
+        return f"{sparkline(known, ascii=self.glyphs is ASCII)}  {min(known):.4g} to {max(known):.4g}"
 
     def mark(self) -> None:
         """Mark the run under the cursor to compare others with, or take the mark away."""
@@ -86,14 +89,34 @@ class HistoryPage(Page):
         if isinstance(runs, list) and index is not None:
             self._marked = None if runs[index] == self._marked else runs[index]
             self.screen.draw()
+            if self._marked is not None and len(runs) > 1:
+                self.screen.say("Marked: go to another run to compare it with this one.")
 
 
-def _differences(past: Past, other: Past) -> list[Row]:
+def comparison(past: Past, other: Past) -> list[Row]:
+    """Two runs side by side: objectives, then the options that differ."""
+    rows = [_columns("Objective", "this run", _named(other), "bold")]
+    rows += [_columns(name, _shown(value), _shown(other.values.get(name))) for name, value in past.values.items()]
     names = [name for name in past.config if past.config[name] != other.config.get(name)]
+    rows += [Row(Content()), _columns("Option", "this run", _named(other), "bold")]
     if not names:
-        return [Row(Content("  none"))]
-    return [labelled(name, f"{past.config[name]:g}  (there {_known(other.config.get(name))})") for name in names]
+        rows.append(Row(Content("all options are alike")))
+    return rows + [_columns(name, f"{past.config[name]:.6g}", _known(other.config.get(name))) for name in names]
+
+
+def _columns(name: str, here: str, there: str, style: str = "") -> Row:
+    line = padded(name, NAME_WIDTH, style or "bold") + Content(" ") + padded(here, VALUE_WIDTH, style)
+    return Row(line + text(f" {there}", style), NAME_WIDTH + VALUE_WIDTH + 2)
+
+
+def _named(past: Past) -> str:
+    mission = f" #{past.mission}" if past.mission > 1 else ""
+    return f"{clean(Path(past.log).name)}{mission}"
+
+
+def _shown(value: float | None) -> str:
+    return "not evaluated" if value is None else f"{value:.4g}"
 
 
 def _known(value: float | None) -> str:
-    return "not known" if value is None else f"{value:g}"
+    return "not known" if value is None else f"{value:.6g}"

@@ -11,12 +11,16 @@ from textual.content import Content
 from care_core.errors import CareError
 from care_core.text import clean
 from care_tui.pages.page import Fetch, View
-from care_tui.pages.step import StepPage
+from care_tui.pages.step import StepPage, failure_rows
 from care_tui.places import LogFile, found_logs
 from care_tui.render.objectives import run_rows
-from care_tui.render.rows import Row, Rows, error_rows, labelled, padded, progress_bar, text
+from care_tui.render.rows import Row, Rows, error_rows, labelled, padded, progress_bar
 from care_tui.screens.open_log import OpenLogDialog
+from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
+
+SHORTEST_FOLDER = 10
+"""Cells below which the end of a path tells nothing."""
 
 
 class LogPage(StepPage):
@@ -25,12 +29,19 @@ class LogPage(StepPage):
         "Logs of the usual places, newest first. Enter opens one, o asks for any other (or drop a file on the "
         "terminal). While a log is read, Esc stops it. Nothing is ever written to a log."
     )
+    ENTER = "Open"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"pick", "again", "rescan"})
 
+    def __init__(self, screen: PanesScreen) -> None:
+        super().__init__(screen)
+        self._found: Fetch[list[LogFile]] = Fetch(screen, "logs")
+
     def enter(self) -> None:
-        self._found: Fetch[list[LogFile]] = getattr(self, "_found", None) or Fetch(self.screen, "logs")
+        places, opened, found = self.walk.settings.places, self.session.path, self._found.answer
+        if isinstance(found, list) and opened is not None and opened not in [log.path for log in found]:
+            self._found.forget()
         # After the first frame, as the reading of the log.
-        self.screen.call_after_refresh(self._found.start, lambda: found_logs(self.walk.settings.places))
+        self.screen.call_after_refresh(self._found.start, lambda: found_logs(places, opened))
 
     def view(self) -> View:
         found = self._found.answer
@@ -38,7 +49,9 @@ class LogPage(StepPage):
         now = time.time()
         places = [log.path for log in logs]
         listing = Listing(
-            len(logs), lambda i, _width: (self._item(logs[i], now),), lambda i: f"{logs[i].path.name} {logs[i].path}"
+            len(logs),
+            lambda i, width: (self._item(logs[i], now, width),),
+            lambda i: f"{logs[i].path.name} {logs[i].path}",
         )
         opened = self.session.path
         index = places.index(opened) if opened in places else None
@@ -50,31 +63,33 @@ class LogPage(StepPage):
         return {
             "empty": Content("Open a log: Enter, or o for one that is not listed"),
             "loading": Content.assemble("Reading ", (name, "bold"), "  (Esc stops)"),
-            "data": Content.assemble("Open is ", (name, "bold"), "  (Enter opens another)"),
-            "error": Content.assemble("No diagnosis of ", (name, "bold"), "  (r tries again, o opens another)"),
+            "data": Content.assemble("Open is ", (name, "bold"), "  (Enter on another opens it)"),
+            "error": Content.assemble("No diagnosis of ", (name, "bold"), "  (r: again, o: other log)"),
         }[state]
 
-    def _item(self, log: LogFile, now: float) -> Content:
+    def _item(self, log: LogFile, now: float, width: int) -> Content:
         mark = self.glyphs.here if log.path == self.session.path else " "
-        line = Content.assemble(
-            f"{mark} ",
-            padded(log.path.name, 28, "bold"),
-            f" {age(now - log.modified_s):>9}  {size(log.size):>8}  ",
-            "recent  " if log.is_recent else "        ",
-        )
-        return line + text(str(log.path.parent), "dim")
+        opened = "opened" if log.is_recent else ""
+        about = f" {age(now - log.modified_s):>10}  {size(log.size):>8}  {opened:<6}  "
+        line = Content.assemble(f"{mark} ", padded(log.path.name, 24, "bold"), about)
+        # Of a long path the end tells more than the beginning.
+        folder, room = clean(str(log.path.parent)), width - line.cell_length
+        if len(folder) > room:
+            folder = self.glyphs.more + folder[len(folder) - room + 1 :] if room > SHORTEST_FOLDER else ""
+        return line + Content.styled(folder, "dim")
 
     def _detail(self, log: LogFile | None) -> Rows:
         session = self.session
         if session.state == "loading" and session.progress is not None:
             step, fraction = session.progress
             return Rows([labelled("Doing", step), labelled("Done", progress_bar(fraction, self.glyphs))])
-        if session.error is not None:
-            return error_rows(session.error)
+        if session.error is not None and (log is None or log.path == session.path):
+            return failure_rows(session)
         if session.case is not None and (log is None or log.path == session.path):
             return run_rows(session.diagnosis)
         if log is not None:
-            return Rows([labelled("Log", str(log.path)), labelled("Size", size(log.size))])
+            when = time.strftime("%Y-%m-%d %H:%M", time.localtime(log.modified_s))
+            return Rows([labelled("Log", str(log.path)), labelled("Written", when), labelled("Size", size(log.size))])
         if isinstance(self._found.answer, CareError):
             return error_rows(self._found.answer)
         if self._found.answer is None:

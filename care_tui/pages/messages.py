@@ -9,6 +9,7 @@ from textual.content import Content
 from care_tui.jobs import Case
 from care_tui.pages.page import Fetch, Page, View, sentence
 from care_tui.reading import LogMessage, messages_of
+from care_tui.render.objectives import meaning
 from care_tui.render.rows import Row, Rows, labelled, text
 from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
@@ -39,9 +40,9 @@ class MessagesPage(Page):
         return self._found.view("Messages of the log", self._show)
 
     def _show(self, messages: list[LogMessage]) -> View:
-        title = Content(f"Messages of the log  {len(messages)}, mission {self._span()}")
+        title = Content.assemble("Messages of the log", (f"  {len(messages)}; mission {self._span()}", "dim"))
         if not messages:
-            return View(title, lambda _: sentence("The log holds no message in words."))
+            return View(Content("Messages of the log"), lambda _: sentence("The log holds no message in words."))
         listing = Listing(
             len(messages),
             lambda i, _width: (self._item(messages[i]),),
@@ -76,9 +77,9 @@ class MessagesPage(Page):
             return Rows([])
         rows = [labelled(f"{message.time_s:.2f} s", message.text)]
         for part in self._case.diagnosis.run.evidence:
-            if abs(part.time_s - message.time_s) < NEAR_S:
+            if abs(part.time_s - message.time_s) < NEAR_S and part.text in message.text:
                 points = f", points at {', '.join(part.options)}" if part.options else ""
-                rows.append(Row(text(f"Evidence: {part.kind}{points}", "bold")))
+                rows.append(Row(text(f"Evidence: {part.kind}{points}{meaning(part)}", "bold"), 2))
         return Rows(rows)
 
     def next_marked(self) -> None:

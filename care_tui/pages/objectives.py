@@ -15,6 +15,7 @@ NAME_WIDTH = 18
 class ObjectivesPage(DiagnosisPage):
     name = "Objectives"
     HELP = "What the mission is judged by. Enter on an objective shows what caused its fault."
+    ENTER = "Causes"
 
     def view_of_diagnosis(self) -> View:
         diagnosis, glyphs = self.session.diagnosis, self.glyphs

@@ -38,6 +38,8 @@ class Page:
 
     name: ClassVar[str]
     HELP: ClassVar[str]
+    ENTER: ClassVar[str] = ""
+    """Where Enter leads, in a word for the line of keys; empty where it does nothing."""
     ACTIONS: ClassVar[frozenset[str]] = frozenset()
 
     def __init__(self, screen: PanesScreen) -> None:
@@ -53,6 +55,10 @@ class Page:
 
     def enter(self) -> None:
         """The page comes into view."""
+
+    def works(self, action: str) -> bool:
+        """Whether a key of this page can do something now."""
+        return action in self.ACTIONS
 
     def moved(self, index: int) -> None:
         """The cursor came to an item."""

@@ -16,12 +16,13 @@ from care_tui.render.rows import error_rows, plain_rows
 from care_tui.screens.export import ExportDialog
 from care_tui.session import FORMATS
 
-LABELS = {"yaml": "YAML", "markdown": "Markdown", "html": "HTML", "json": "JSON", "patch": "patch"}
+LABELS = {"yaml": "YAML", "markdown": "Markdown", "html": "HTML, its text here", "json": "JSON", "patch": "patch"}
 
 
 class ReportPage(DiagnosisPage):
     name = "Report"
     HELP = "The report as it will be written. f changes the format, Enter writes it to a file, c copies the commands."
+    ENTER = "Export"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"next_format", "export", "copy_commands"})
     _text: str | CareError | None = None
     _written = ""
@@ -29,7 +30,8 @@ class ReportPage(DiagnosisPage):
     def enter(self) -> None:
         if self.session.state == "data":
             self._text = None
-            diagnosis, format = self.session.decided(), self.session.format
+            diagnosis = self.session.decided()
+            format = "markdown" if self.session.format == "html" else self.session.format
             self.screen.fetch("report", lambda _job: self.walk.engine.report(diagnosis, format), self._received)
 
     def _received(self, text: str | CareError) -> None:
@@ -67,7 +69,8 @@ class ReportPage(DiagnosisPage):
 
     def _exported(self, path: str | None) -> None:
         if path is not None:
-            self._written = path
+            written = Path(path)
+            self._written = str(written.relative_to(Path.cwd()) if written.is_relative_to(Path.cwd()) else written)
             self.screen.draw()
 
     def copy_commands(self) -> None:

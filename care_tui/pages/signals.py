@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 from textual.content import Content
@@ -65,7 +66,7 @@ class SignalsPage(Page):
             return error_rows(trace)
         height = max(min(self.screen.text.size.height - 3, 16), 3)
         lines = plot(trace.columns, trace.low, trace.high, height, ascii=ascii)
-        labels = {0: f"{trace.high:.4g}", height - 1: f"{trace.low:.4g}"}
+        labels = {0: told(trace.high, trace), height - 1: told(trace.low, trace)}
         rows = [Row(text(f"{signal.name}  {trace.count} values", "bold"))]
         rows += [Row(Content(f"{labels.get(i, ''):>{AXIS}} {line}")) for i, line in enumerate(lines)]
         end = f"{trace.end_s:.0f} s"
@@ -75,3 +76,10 @@ class SignalsPage(Page):
     def _drawn(self, signal: Signal, columns: int, answer: Trace | CareError) -> None:
         self._traces[signal, columns] = answer
         self.screen.draw()
+
+
+def told(value: float, trace: Trace) -> str:
+    """An end of the axis with as many digits as tell it from the other end."""
+    span = trace.high - trace.low
+    digits = 4 if span <= 0 else 2 + math.ceil(math.log10(max(abs(trace.high), abs(trace.low), span) / span))
+    return f"{value:.{min(max(digits, 4), AXIS - 2)}g}"

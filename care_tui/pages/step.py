@@ -29,14 +29,16 @@ class StepPage(Page):
 class DiagnosisPage(StepPage):
     """A step that needs a diagnosis: says so while there is none."""
 
+    def works(self, action: str) -> bool:
+        return super().works(action) and self.session.state == "data"
+
     def view(self) -> View:
         session = self.session
         if session.state == "data":
             return self.view_of_diagnosis()
         title = Content.styled(self.name, "bold")
         if session.error is not None:
-            error = session.error
-            return View(title, lambda _: error_rows(error))
+            return View(title, lambda _: failure_rows(session))
         if session.state == "empty":
             return View(title, lambda _: sentence("No log is open. 1 leads to the logs."))
         step, fraction = session.progress or ("starting", 0.0)
@@ -46,3 +48,11 @@ class DiagnosisPage(StepPage):
     def view_of_diagnosis(self) -> View:
         """What to show once there is one."""
         raise NotImplementedError
+
+
+def failure_rows(session: Session) -> Rows:
+    """Why there is no diagnosis, and what can still be looked at."""
+    if session.error is None:
+        return Rows([])
+    rows = error_rows(session.error).rows
+    return Rows([*rows, labelled("", "v shows what the log holds")] if session.is_readable else rows)

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 from textual.content import Content
 
 from care_core.diagnose.records import Cause, Diagnosis, ObjectiveResult, PathNode
+from care_core.run import Evidence
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.render.fix import prediction
-from care_tui.render.objectives import evidence_row
+from care_tui.render.objectives import evidence_row, meaning
 from care_tui.render.rows import (
     Glyphs,
     Row,
@@ -35,7 +36,9 @@ FEW_RESAMPLES = 0.5
 """Edges that fewer bootstrap resamples hold are flagged."""
 
 
-def cause_item(cause: Cause, dismissed: str | None, glyphs: Glyphs) -> tuple[Content, Content]:
+def cause_item(
+    cause: Cause, dismissed: str | None, evidence: Sequence[Evidence], glyphs: Glyphs
+) -> tuple[Content, Content]:
     """One cause of the ranked list: the option with its change, then what it is worth, with its caveats beside it."""
     option = cause.option
     head = Content.assemble(
@@ -46,19 +49,23 @@ def cause_item(cause: Cause, dismissed: str | None, glyphs: Glyphs) -> tuple[Con
     )
     if dismissed is not None:
         return head, Content("   set aside: " + clean(dismissed))
-    worth = [f"{cause.confidence} confidence"]
-    worth.append("not ruled out" if cause.is_lead else f"costs {percent(cause.contribution)}")
+    worth = ["not ruled out" if cause.is_lead else f"{cause.confidence} confidence"]
     if cause.p_fixed is not None:
-        worth.append(f"changed alone {percent(cause.p_fixed)}")
-    caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
+        worth.append(f"{percent(cause.p_fixed)} odds if changed alone")
+    if cause.is_lead:  # its one caveat is that it is no more than a lead
+        return head, Content("   " + ", ".join(worth))
+    worth.append(f"costs {percent(cause.contribution)}")
+    caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause, evidence))
     return head, Content("   " + ", ".join(worth) + caveats)
 
 
-def caveats_of(cause: Cause) -> tuple[str, ...]:
-    """What weakens a cause; a value outside the training support is always said."""
-    if cause.in_support or any("support" in note for note in cause.notes):
-        return cause.notes
-    return ("outside the training support", *cause.notes)
+def caveats_of(cause: Cause, evidence: Sequence[Evidence]) -> tuple[str, ...]:
+    """What weakens a cause; a value outside the training support is always said, what the log says stands apart."""
+    said = [part.text for part in evidence if cause.option.name in part.options]
+    notes = tuple(note for note in cause.notes if not any(text in note for text in said))
+    if cause.in_support or any("support" in note for note in notes):
+        return notes
+    return ("outside the training support", *notes)
 
 
 def path_rows(cause: Cause, objective: ObjectiveResult, glyphs: Glyphs) -> list[Row]:
@@ -103,28 +110,40 @@ def cause_detail(
     dismissed: Mapping[str, str],
     glyphs: Glyphs,
 ) -> Rows:
-    """Everything about one cause: its path, what it is worth, its caveats, the runner-up, what the log says."""
-    option = cause.option
-    rows = [*path_rows(cause, objective, glyphs), Row(Content())]
+    """Everything about one cause: its path, what the log says, what it is worth, its caveats, the runner-up.
+
+    Where it is no more than a lead, the answer is that no cause was found: that, and what would tell more, come first.
+    """
+    option, evidence = cause.option, diagnosis.run.evidence
+    doubt = doubt_rows(diagnosis)
+    rows = [*doubt, Row(Content())] if cause.is_lead and doubt else []
+    rows += [*path_rows(cause, objective, glyphs), Row(Content())]
     if option.name in dismissed:
         rows.append(warning("Set aside", dismissed[option.name]))
-    gain = "" if cause.p_fixed is None else f", odds that it alone keeps all thresholds {percent(cause.p_fixed)}"
+    gain = "" if cause.p_fixed is None else f", {percent(cause.p_fixed)} odds of no fault if it alone is changed"
     rows.append(labelled("Confidence", f"{cause.confidence}{gain}"))
-    rows += [warning("Caveat", note) for note in caveats_of(cause)]
-    rows.append(labelled("Contribution", f"costs {percent(cause.contribution)} of this run's odds of no fault"))
-    rows += _runner_up(cause, rivals)
+    said = [part.text + meaning(part) for part in evidence if option.name in part.options]
+    rows += [labelled("" if place else "The log says", line) for place, line in enumerate(said)]
+    rows += [warning("Caveat", note) for note in caveats_of(cause, evidence)]
+    if not cause.is_lead:
+        rows.append(labelled("Contribution", f"costs {percent(cause.contribution)} of this run's odds of no fault"))
+        rows += _runner_up(cause, rivals)
     if cause.predicted is not None and cause.suggested is not None:
         change = change_text(option, cause.current, cause.suggested, glyphs)
         rows.append(labelled("With", change + Content(": ") + prediction(objective.variable, cause.predicted, glyphs)))
-    rows.append(labelled("Effect", _effect(cause, effect)))
+    rows.append(labelled("Usual effect", _effect(cause, effect)))
     if option.parameters and option.parameters != (option.name,):
         rows.append(labelled("Parameter", ", ".join(option.parameters)))
     if option.doc:
         rows.append(labelled("About", option.doc))
-    rows += doubt_rows(diagnosis)
-    evidence = diagnosis.run.evidence
+    if not cause.is_lead and doubt:
+        rows += [Row(Content()), *doubt]
     if evidence:
-        rows += [Row(Content()), heading("The log says"), *(evidence_row(part, option.name) for part in evidence)]
+        rows += [
+            Row(Content()),
+            heading("Messages of this run"),
+            *(evidence_row(part, option.name) for part in evidence),
+        ]
     return Rows(rows)
 
 
@@ -138,7 +157,7 @@ def _runner_up(cause: Cause, rivals: Sequence[Cause]) -> list[Row]:
 
 def _effect(cause: Cause, effect: EffectRecord | None) -> str:
     interval = "" if effect is None else f" ({effect.low:.2f} to {effect.high:.2f})"
-    return f"{cause.total_effect:.2f}{interval} in all, path {cause.path_ace:.2f}, scaled, over the platform"
+    return f"{cause.total_effect:.2f}{interval} spreads over all runs, {cause.path_ace:.2f} along this path"
 
 
 def no_cause_rows(diagnosis: Diagnosis, objective: ObjectiveResult | None) -> Rows:
@@ -149,12 +168,19 @@ def no_cause_rows(diagnosis: Diagnosis, objective: ObjectiveResult | None) -> Ro
         return Rows([Row(Content("Within its threshold: there is nothing to explain."))])
     if objective.status == "not_evaluated":
         return Rows([Row(Content("Not evaluated, so no cause is known.")), warning("Reason", objective.reason)])
-    reason = diagnosis.abstained or "no option of the profile explains this objective"
-    head = [Row(Content("Outside its threshold, but no cause is named.")), warning("Reason", reason)]
-    return Rows([*head, *doubt_rows(diagnosis)])
+    head = Row(Content("Outside its threshold, but no cause is named."))
+    return Rows(
+        [head, *(doubt_rows(diagnosis) or [warning("Reason", "no option of the profile explains this objective")])]
+    )
 
 
 def doubt_rows(diagnosis: Diagnosis) -> list[Row]:
-    """What the run met that may be the cause instead, and what would tell more."""
-    rows = [warning("Perhaps", f"{rival.name}: {rival.text}") for rival in diagnosis.rivals]
-    return rows + [labelled("Would tell", advice) for advice in diagnosis.tell_more]
+    """Why there is no answer, what the run met that may be the cause instead, and what would tell more."""
+    rows = [] if diagnosis.abstained is None else [warning("No answer", diagnosis.abstained)]
+    for title, lines in (
+        ("It may be no parameter", [f"{rival.name}: {rival.text}" for rival in diagnosis.rivals]),
+        ("What would tell more", diagnosis.tell_more),
+    ):
+        if lines:
+            rows += [heading(title), *(Row(text(f"- {line}"), 2) for line in lines)]
+    return rows

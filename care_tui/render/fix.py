@@ -15,7 +15,6 @@ from care_tui.render.rows import (
     Row,
     Rows,
     change_text,
-    labelled,
     measure,
     padded,
     percent,
@@ -58,10 +57,10 @@ def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs
 
 def option_rows(option: Variable, notes: Sequence[str], glyphs: Glyphs) -> list[Row]:
     """What an operator has to know about the option under the cursor."""
-    rows = [labelled(option.name, option.doc or "the profile says nothing about it")]
-    rows.append(labelled("", acceptable(option)))
+    head = Content.assemble(text(option.name, "bold"), "  ", text(option.doc or "the profile says nothing about it"))
+    rows = [Row(head, 2), Row(text(f"  {acceptable(option)}"), 2)]
     if option.parameters and option.parameters != (option.name,):
-        rows.append(labelled("", "sets " + ", ".join(option.parameters)))
+        rows.append(Row(text(f"  sets {', '.join(option.parameters)}"), 4))
     return rows + [warning("Caveat", note) for note in notes]
 
 

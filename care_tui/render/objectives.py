@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # reading models is not needed for the first frame
 
 STATUS_WIDTH = 17
 VALUE_WIDTH = 11
+BOUND_WIDTH = 12
 STRIP_WIDTH = 42
 
 
@@ -48,7 +49,8 @@ def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Conte
         status(result.status, glyphs).pad_right(STATUS_WIDTH - len(WORDS[result.status]) - 2),
         padded(variable.name, width + 2, "bold"),
         padded("" if result.value is None else measure(result.value, variable.unit), VALUE_WIDTH),
-        text("no threshold" if bound is None else f"{bound} {variable.unit}".rstrip()),
+        padded("no threshold" if bound is None else f"{bound} {variable.unit}".rstrip(), BOUND_WIDTH),
+        text(result.reason, "dim"),
     )
 
 
@@ -104,7 +106,7 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
         labelled("", profile.reason),
     ]
     if diagnosis.abstained:
-        rows.append(warning("No cause", diagnosis.abstained))
+        rows.append(warning("No answer", diagnosis.abstained))
     if not mission.ended:
         rows.append(warning("Mission", "the log stops before the mission does"))
     if mission.mismatch:
@@ -112,12 +114,12 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
     rows += [warning("Profile", line) for line in profile.warnings]
     rows += [warning("Damage", damage(part)) for part in log.damage]
     rows += [warning("Note", line) for line in diagnosis.notes]
-    rows += [labelled(key.capitalize(), value) for key, value in log.facts.items()]
+    rows += [labelled("ROS" if key == "ros" else key.capitalize(), value) for key, value in log.facts.items()]
     context = {name: value for name, value in diagnosis.run.context.items() if is_known(value)}
     if context:
         rows.append(labelled("Met", ", ".join(f"{name} {value:.4g}" for name, value in context.items())))
     if diagnosis.run.evidence:
-        rows += [heading("The log says"), *(evidence_row(part) for part in diagnosis.run.evidence)]
+        rows += [heading("Messages of this run"), *(evidence_row(part) for part in diagnosis.run.evidence)]
     return Rows(rows)
 
 
@@ -132,4 +134,9 @@ def evidence_row(part: Evidence, option: str = "") -> Row:
     points = option and option in part.options
     head = f"{part.time_s:8.1f} s  {clean(part.kind):<9} "
     tail = "  (points at this option)" if points else ""
-    return Row(Content.assemble(head, text(part.text), (tail, "bold")), len(head))
+    return Row(Content.assemble(head, text(part.text + meaning(part)), (tail, "bold")), len(head))
+
+
+def meaning(part: Evidence) -> str:
+    """What the profile says that a message means."""
+    return f" ({part.says})" if part.says else ""

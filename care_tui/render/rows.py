@@ -7,7 +7,7 @@ Colours are theme variables and always come with a word or a sign.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -209,6 +209,13 @@ _DIFF_STYLES = {"+": "$text-success", "-": "$text-error", "@": "$text-accent"}
 def diff_rows(diff: str) -> Rows:
     """A unified diff, line by line; the signs stay, the colours come on top."""
     return Rows(Row(text(line, _DIFF_STYLES.get(line[:1], "")), 2) for line in diff.splitlines())
+
+
+def command_rows(commands: Sequence[str]) -> list[Row]:
+    """The commands that make a change."""
+    if not commands:
+        return []
+    return [Row(Content()), heading("Commands that do it"), *(Row(text(f"  {command}"), 4) for command in commands)]
 
 
 def plain_rows(document: str) -> Rows:

@@ -35,6 +35,10 @@ class CareScreen(Screen[None]):
         """The screen's own widgets."""
         raise NotImplementedError
 
+    def described(self, binding: Binding) -> str:
+        """What a key does here, in a word or two."""
+        return binding.description
+
     def help_text(self) -> str:
         """One or two sentences for the help screen on what can be done here."""
         raise NotImplementedError

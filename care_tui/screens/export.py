@@ -68,6 +68,8 @@ class ExportDialog(ModalScreen[str | None]):
     async def _export(self, path: Path) -> None:
         if path.suffix.lower() not in SUFFIXES:
             self._say(UsageError(f"The file name must end in {NAMES}."))
+        elif path.is_dir():
+            self._say(UsageError("This is a folder.", hint="Name a file in it."))
         elif not path.exists() or await self.app.push_screen_wait(OverwriteDialog(path)):
             error = await self._write(path).wait()
             if error is None:

@@ -81,10 +81,11 @@ class PanesScreen(CareScreen):
             index = choices.highlighted if view.index is None else view.index
         with self.app.batch_update():
             self.query_one(".title", Static).update(view.title, layout=False)
+            appears = view.listing.count > 0 and not choices.display
             choices.display = view.listing.count > 0
             choices.show(view.listing, index)
             self.text.show(view.detail(choices.highlighted))
-            if self.focused is None or not self.focused.display:
+            if self.focused is None or not self.focused.display or (appears and self.focused is self.text):
                 self.take_focus()
             self.refresh_bindings()
 
@@ -124,7 +125,13 @@ class PanesScreen(CareScreen):
     # Keys
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        return str(parameters[0]) in self.page.ACTIONS if action == "do" else True
+        if action == "open":
+            return bool(self.page.ENTER)
+        return self.page.works(str(parameters[0])) if action == "do" else True
+
+    def described(self, binding: Binding) -> str:
+        """What a key does here, in a word or two."""
+        return self.page.ENTER if binding.action == "open" else binding.description
 
     def action_do(self, name: str) -> None:
         """Call an action of the page; keys of another page do nothing here."""

@@ -20,6 +20,7 @@ from care_tui.clipboard import fits, osc52
 from care_tui.jobs import CAUSES, Case, Engine, Job, Request
 from care_tui.messages import Progressed, StepChosen
 from care_tui.pages.causes import CausesPage
+from care_tui.pages.contents import ContentsPage
 from care_tui.pages.diff import DiffPage
 from care_tui.pages.fix import FixPage
 from care_tui.pages.graph import GraphPage
@@ -33,7 +34,6 @@ from care_tui.pages.report import ReportPage
 from care_tui.pages.signals import SignalsPage
 from care_tui.pages.step import StepPage
 from care_tui.places import remember
-from care_tui.reading import remember_run
 from care_tui.render.rows import Glyphs
 from care_tui.screens.panes import PanesScreen
 from care_tui.screens.view import ViewScreen
@@ -49,6 +49,7 @@ VIEWS = {
     "signals": "Plots of the signals behind the metrics",
     "history": "Past runs with trends, two side by side",
     "profiles": "The installed profiles and their model cards",
+    "contents": "What the log holds: channels, parameters, damage",
 }
 
 
@@ -65,6 +66,7 @@ class WalkScreen(PanesScreen):
         Binding("f4,p", "view('signals')", "Plots of signals", show=False, id="view.signals"),
         Binding("f5,y", "view('history')", "History", show=False, id="view.history"),
         Binding("f6,b", "view('profiles')", "Profiles", show=False, id="view.profiles"),
+        Binding("f7,v", "view('contents')", "Contents of the log", show=False, id="view.contents"),
         Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),
         Binding("left,h", "move(-1)", "Previous step", show=False, id="step.previous"),
         Binding("o", "do('pick')", "Other log", id="log.pick"),
@@ -75,14 +77,14 @@ class WalkScreen(PanesScreen):
         Binding("space", "do('toggle')", "Tick", key_display="space", id="fix.toggle", priority=True),
         Binding("plus,right_square_bracket", "do('nudge_up')", "More", key_display="+", id="fix.more"),
         Binding("minus,left_square_bracket", "do('nudge_down')", "Less", key_display="-", id="fix.less"),
-        Binding("equals_sign,i", "do('type_value')", "Type value", key_display="=", id="fix.value"),
+        Binding("equals_sign,i", "do('type_value')", "Value", key_display="=", id="fix.value"),
         Binding("a", "do('alternative')", "Alternative", id="fix.alternative"),
         Binding("s", "do('suggestion')", "Suggestion", show=False, id="fix.suggestion"),
         Binding("u", "do('undo')", "Undo", show=False, id="fix.undo"),
         Binding("f", "do('other_side')", "Compare with file", id="diff.side"),
         Binding("c", "do('copy_diff')", "Copy", id="diff.copy"),
         Binding("f", "do('next_format')", "Format", id="report.format"),
-        Binding("e", "do('export')", "Export", id="report.export"),
+        Binding("e", "do('export')", "Export", show=False, id="report.export"),
         Binding("c", "do('copy_commands')", "Copy commands", id="report.copy"),
     ]
 
@@ -158,8 +160,16 @@ class WalkScreen(PanesScreen):
             self._open(lambda screen: ProfilesPage(screen, used))
         elif name == "history":
             self._open(HistoryPage)
+        elif name == "contents" and self.session.is_readable:
+            log = self.session.path
+            assert log is not None
+            self._open(lambda screen: ContentsPage(screen, log))
         elif case is None:
-            self.say("Open a log first: 1 leads to them.")
+            self.say(
+                "This log has no diagnosis; v shows what it holds."
+                if self.session.is_readable
+                else "Open a log first: 1 leads to them."
+            )
         elif name == "graph":
             self._open(lambda screen: GraphPage(screen, case, self._subject()))
         elif name == "messages":
@@ -194,10 +204,10 @@ class WalkScreen(PanesScreen):
         self._visited.clear()
         self._show(LOG)
         # After the first frame, which the imports of the work would hold up.
-        self.call_after_refresh(self.fetch, "diagnose", partial(self._diagnose, request), self._diagnosed)
+        self.call_after_refresh(self.fetch, "diagnose", partial(self._diagnose, request), self._opened)
 
-    def _diagnose(self, request: Request, job: Job) -> Case:
-        """In the thread of the job."""
+    def _diagnose(self, request: Request, job: Job) -> tuple[Case, CareError | None]:
+        """In the thread of the job: the answer, and why it could not be put into the history."""
 
         def report(step: str, fraction: float) -> None:
             job.check()
@@ -205,8 +215,7 @@ class WalkScreen(PanesScreen):
 
         case = self.engine.diagnose(request, report)
         remember(request.log)
-        remember_run(case)
-        return case
+        return case, self.engine.remember(case.diagnosis)
 
     @on(Progressed)
     def _show_progress(self, event: Progressed) -> None:
@@ -214,6 +223,12 @@ class WalkScreen(PanesScreen):
         if self.session.state == "loading":
             self.session.progress = (event.step, event.fraction)
             self.draw()
+
+    def _opened(self, answer: tuple[Case, CareError | None] | CareError) -> None:
+        case, problem = (answer, None) if isinstance(answer, CareError) else answer
+        self._diagnosed(case)
+        if problem is not None:
+            self.say(problem.message)
 
     def _diagnosed(self, answer: Case | CareError) -> None:
         self.app.note(answer)

@@ -135,7 +135,9 @@ class Choices(LineView):
     def _bring_into_view(self) -> None:
         height, top = self._listing.height, self.scroll_offset.y
         first = self._cursor * height
-        visible = self.scrollable_content_region.height
+        width, visible = self.scrollable_content_region.size
+        if visible:
+            self._fit(Size(width, max(self.line_count, visible)))  # before it is known, nothing can be scrolled to
         # Half a page at a time: every line moves, which a slow link should not pay for at every key.
         if visible and not top <= first <= top + visible - height:
             self.scroll_to(y=max(first - visible // (2 * height) * height, 0), animate=False)

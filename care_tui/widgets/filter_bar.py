@@ -10,6 +10,8 @@ from textual.binding import Binding, BindingType
 from textual.message import Message
 from textual.widgets import Input
 
+PLACEHOLDER = "type to filter; Enter keeps it, Esc clears it"
+
 
 class FilterBar(Input):
     """Enter keeps the filter and goes back to the pane; Esc clears it."""
@@ -29,7 +31,12 @@ class FilterBar(Input):
         """The operator is done typing."""
 
     def __init__(self) -> None:
-        super().__init__(placeholder="filter", select_on_focus=False, compact=True, id="filter")
+        super().__init__(
+            placeholder=PLACEHOLDER,
+            select_on_focus=False,
+            compact=True,
+            id="filter",
+        )
         self.cursor_blink = False
         self.display = False
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from textual.binding import Binding
 from textual.content import Content
 from textual.screen import Screen
 from textual.widgets import Static
 
 from care_core.text import clean
+from care_tui.screens.base import CareScreen
 
 
 class KeyHints(Static):
@@ -31,22 +33,22 @@ class KeyHints(Static):
         self._draw()
 
     def _follow(self, screen: Screen[object]) -> None:
-        hints: dict[str, tuple[bool, Content]] = {}
+        here: dict[str, Binding] = {}
+        everywhere: dict[str, Binding] = {}
         for active in screen.active_bindings.values():
-            binding = active.binding
-            if active.enabled and binding.show:
-                key = self.app.get_key_display(binding)
-                everywhere = active.node is self.app
-                hints.setdefault(
-                    binding.action, (everywhere, Content.assemble((key, "bold"), f" {binding.description}"))
-                )
+            if active.enabled and active.binding.show:
+                (everywhere if active.node is self.app else here).setdefault(active.binding.action, active.binding)
+        self._here = [self._hint(binding) for binding in sorted(here.values(), key=_order)]
         palette = screen.active_bindings.get(self.app.COMMAND_PALETTE_BINDING)
         if palette is not None:
-            key = self.app.get_key_display(palette.binding)
-            hints[palette.binding.action] = True, Content.assemble((key, "bold"), " Commands")
-        self._here = [hint for everywhere, hint in hints.values() if not everywhere]
-        self._everywhere = [hint for everywhere, hint in hints.values() if everywhere]
+            self._here.append(Content.assemble((self.app.get_key_display(palette.binding), "bold"), " Commands"))
+        self._everywhere = [self._hint(binding) for binding in everywhere.values()]
         self._draw()
+
+    def _hint(self, binding: Binding) -> Content:
+        screen = self.screen
+        does = screen.described(binding) if isinstance(screen, CareScreen) else binding.description
+        return Content.assemble((self.app.get_key_display(binding), "bold"), f" {does}")
 
     def _draw(self) -> None:
         line = Content.styled(self._notice, "bold") if self._notice else self._keys()
@@ -60,3 +62,10 @@ class KeyHints(Static):
             shown.pop()
             line = gap.join([*shown, *self._everywhere])
         return line
+
+
+def _order(binding: Binding) -> int:
+    """The way on comes first, then what only this page can do: the end of the line is what a narrow one leaves out."""
+    if binding.action == "open":
+        return 0
+    return 1 if binding.action.startswith("do(") else 2

@@ -54,18 +54,23 @@ class LineView(ScrollView, can_focus=True, inherit_bindings=False):
         width, height = self.scrollable_content_region.size
         if width <= 2 * MARGIN or height <= 0:
             return
-        # Assigned as usual, a new size makes Textual lay out and repaint the screen; only the scroll bar depends on it.
-        size = Size(width, max(self.line_count, height))
-        if size != self.virtual_size:
-            self.set_reactive(LineView.virtual_size, size)
-            self._scroll_update(size)
-            self._refresh_scrollbars()
+        self._fit(Size(width, max(self.line_count, height)))
         before, self._drawn = self._drawn, self._visible(height)
         before += [Content()] * (height - len(before))
         for row, (old, new) in enumerate(zip(before, self._drawn, strict=False)):
             if not old.is_same(new):
                 self._changed[row] = first, last = changed_cells(old, new)
                 self.refresh(Region(first, row, last - first, 1))
+
+    def _fit(self, size: Size) -> None:
+        """Make the scroll bar, and how far there is to scroll, follow the number of lines.
+
+        Assigned as usual, a new size makes Textual lay out and repaint the screen; only the scroll bar depends on it.
+        """
+        if size != self.virtual_size:
+            self.set_reactive(LineView.virtual_size, size)
+            self._scroll_update(size)
+            self._refresh_scrollbars()
 
     def _visible(self, height: int) -> list[Content]:
         top, count = self.scroll_offset.y, self.line_count

@@ -42,6 +42,29 @@ def repaired(diagnosis: Diagnosis, noise: Mapping[str, float] = CALM) -> bool:
     return all(o.threshold is not None and o.threshold.met(outcome[o.name]) for o in SCHEMA.objectives)
 
 
+def test_what_the_training_runs_cannot_tell_is_said_and_never_ranked(planted: Profile, tmp_path: Path) -> None:
+    effects = dict(planted.model.effects)
+    effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
+    write_model(replace(planted.model, effects=effects), tmp_path)
+    blind = Profile(tmp_path, planted.schema)
+    told = "not ranked, as the training runs cannot tell their effect on time: speed"
+
+    alone = diagnosed(planted_run(speed=1.5), blind)
+    assert alone.abstained is not None
+    assert told in alone.notes
+    assert any(advice.startswith("change only speed to") for advice in alone.tell_more)
+
+    seen, rivalled = (
+        diagnosed(planted_run(planner=2), blind),
+        diagnosed(planted_run(planner=2, speed=DEFAULTS["speed"] + 0.01), blind),
+    )
+    for diagnosis, confidence in ((seen, "high"), (rivalled, "medium")):
+        (cause, *_) = diagnosis.faults[0].causes
+        assert (cause.option.name, cause.confidence) == ("planner", confidence)
+    assert told in rivalled.notes
+    assert told not in seen.notes
+
+
 @pytest.mark.parametrize(("option", "value", "objective"), CASES)
 def test_the_planted_option_is_named_and_its_fix_works(
     planted: Profile, option: str, value: float, objective: str

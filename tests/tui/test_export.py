@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -20,26 +21,26 @@ def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("formats", "name", "start"),
+    ("formats", "name", "format", "shown"),
     [
-        ([], "00000042.care.yaml", "report: yaml"),
-        (["f"], "00000042.care.md", "report: markdown"),
-        (["f", "f"], "00000042.care.html", "report: html"),
-        (["f", "f", "f"], "00000042.care.json", "report: json"),
-        (["f", "f", "f", "f"], "00000042.care.patch", "report: patch"),
+        ([], "00000042.care.yaml", "yaml", "yaml"),
+        (["f"], "00000042.care.md", "markdown", "markdown"),
+        (["f", "f"], "00000042.care.html", "html", "markdown"),
+        (["f", "f", "f"], "00000042.care.json", "json", "json"),
+        (["f", "f", "f", "f"], "00000042.care.patch", "patch", "patch"),
     ],
 )
 async def test_export_writes_the_format_in_view_beside_the_operator(
-    make_app: MakeApp, tmp_path: Path, formats: list[str], name: str, start: str
+    make_app: MakeApp, tmp_path: Path, formats: list[str], name: str, format: str, shown: str
 ) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(120, 24)) as pilot:
         await settle(pilot, "6", *formats)
-        assert app.screen.query_one("#text", Lines).plain.startswith(start)
+        assert app.screen.query_one("#text", Lines).plain.startswith(f"report: {shown}")
         await settle(pilot, "e", "enter")
         assert isinstance(app.screen, WalkScreen)
-        assert (tmp_path / name).read_text().startswith(start)
-        assert str(tmp_path / name) in str(app.screen.query_one(".title", Static).content)
+        assert (tmp_path / name).read_text().startswith(f"report: {format}")
+        assert f"written to {name}" in str(app.screen.query_one(".title", Static).content)
 
 
 @pytest.mark.parametrize(("answer", "replaced"), [("y", True), ("n", False), ("escape", False)])
@@ -83,3 +84,29 @@ async def test_escape_leaves_without_writing(make_app: MakeApp, tmp_path: Path) 
         await settle(pilot, "6", "e", "escape")
         assert isinstance(app.screen, WalkScreen)
     assert not [path for path in tmp_path.iterdir() if path.is_file()]
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
+async def test_a_folder_without_permission_is_said_and_another_can_be_given(make_app: MakeApp, tmp_path: Path) -> None:
+    closed = tmp_path / "closed"
+    closed.mkdir(mode=0o555)
+    await _write_to(make_app, tmp_path, closed / "mine.yaml", "Permission denied")
+
+
+async def test_a_folder_that_refuses_is_said_and_another_can_be_given(make_app: MakeApp, tmp_path: Path) -> None:
+    (tmp_path / "folder.yaml").mkdir()
+    await _write_to(make_app, tmp_path, tmp_path / "folder.yaml", "This is a folder")
+
+
+async def _write_to(make_app: MakeApp, tmp_path: Path, target: Path, problem: str) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "6", "e")
+        box = app.screen.query_one(Input)
+        box.value = str(target)
+        await settle(pilot, "enter")
+        assert isinstance(app.screen, ExportDialog)
+        assert problem in str(app.screen.query_one(".error", Static).content)
+        box.value = str(tmp_path / "mine.yaml")
+        await settle(pilot, "enter")
+        assert (tmp_path / "mine.yaml").read_text().startswith("report: yaml")

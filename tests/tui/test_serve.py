@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import base64
 import shutil
 import socket
 import subprocess
@@ -12,6 +14,7 @@ import urllib.request
 from collections.abc import Iterator
 from http.cookiejar import CookieJar
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -61,8 +64,6 @@ def test_only_who_has_the_token_is_let_in(address: str) -> None:
 
 def test_the_app_runs_behind_the_socket(address: str) -> None:
     """Connects as the page does, turns to the causes, and reads what is drawn."""
-    import asyncio
-
     import aiohttp
 
     async def walk() -> bytes:
@@ -87,14 +88,75 @@ def test_the_app_runs_behind_the_socket(address: str) -> None:
     assert b"LAND_SPEED" in asyncio.run(in_time())
 
 
-def test_a_browser_shows_the_causes(address: str, tmp_path: Path) -> None:
+class Browser:
+    """A headless Chromium, driven through its debugging socket."""
+
+    def __init__(self, socket: Any) -> None:
+        self._socket = socket
+        self._asked = 0
+        self.received = b""
+        """What the page got through its own sockets."""
+
+    async def ask(self, method: str, session: str | None = None, **params: object) -> Any:
+        """Call a method of the debugging protocol and wait for its answer."""
+        self._asked += 1
+        asked = {"id": self._asked, "method": method, "params": params}
+        await self._socket.send_json(asked if session is None else {**asked, "sessionId": session})
+        while True:
+            event = await self._next()
+            if event.get("id") == asked["id"]:
+                assert "result" in event, event
+                return event["result"]
+
+    async def wait_for(self, text: bytes) -> None:
+        """Wait until the page has got this text."""
+        while text not in self.received:
+            await self._next()
+
+    async def _next(self) -> dict[str, Any]:
+        event: dict[str, Any] = await self._socket.receive_json()
+        if event.get("method") == "Network.webSocketFrameReceived":
+            frame = event["params"]["response"]
+            data = frame["payloadData"]
+            self.received += base64.b64decode(data) if frame["opcode"] == 2 else data.encode()
+        return event
+
+
+def test_a_browser_walks_to_the_causes(address: str, tmp_path: Path) -> None:
     chromium = shutil.which("chromium") or shutil.which("chromium-browser")
     if chromium is None:
         pytest.skip("needs Debian's chromium")
-    picture = tmp_path / "causes.png"
-    subprocess.run(
-        [chromium, "--headless", "--no-sandbox", "--virtual-time-budget=20000", "--window-size=1000,700",
-         f"--screenshot={picture}", address],
-        check=True, timeout=90, capture_output=True,
-    )  # fmt: skip
-    assert picture.stat().st_size > 5000
+    command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0",
+               f"--user-data-dir={tmp_path / 'browser'}", "--window-size=1000,700", "about:blank"]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stderr is not None
+            said = next(line for line in process.stderr if "DevTools listening on" in line)
+            picture = asyncio.run(asyncio.wait_for(_causes_in(said.split()[-1], address), 90))
+        finally:
+            process.terminate()
+    (tmp_path / "causes.png").write_bytes(picture)
+    assert picture.startswith(b"\x89PNG")
+    assert len(picture) > 20_000, "more than an empty page"
+
+
+async def _causes_in(socket_address: str, address: str) -> bytes:
+    """Open the page, turn to the causes with a key, and take a picture."""
+    import aiohttp
+
+    async with aiohttp.ClientSession() as http, http.ws_connect(socket_address, max_msg_size=0) as socket:
+        browser = Browser(socket)
+        page = (await browser.ask("Target.createTarget", url="about:blank"))["targetId"]
+        session = (await browser.ask("Target.attachToTarget", targetId=page, flatten=True))["sessionId"]
+        await browser.ask("Network.enable", session)
+        await browser.ask("Page.enable", session)
+        await browser.ask("Page.navigate", session, url=address)
+        await browser.wait_for(b"mission_time")
+        for kind in ("mousePressed", "mouseReleased"):  # a page gets keys once it was clicked on
+            await browser.ask("Input.dispatchMouseEvent", session, type=kind, x=700, y=500, button="left", clickCount=1)
+        for kind in ("keyDown", "keyUp"):
+            await browser.ask("Input.dispatchKeyEvent", session, type=kind, key="3", text="3" * (kind == "keyDown"))
+        await browser.wait_for(b"touchdown_time")
+        await asyncio.sleep(0.5)  # for the page to draw what it got
+        taken = await browser.ask("Page.captureScreenshot", session, format="png")
+        return base64.b64decode(taken["data"])

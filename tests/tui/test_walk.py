@@ -144,7 +144,8 @@ async def test_the_boxes_decide_the_odds_and_what_diff_and_report_hold(make_app:
         assert "45 %" in title(app)
         assert "! reboot" in items(app)
         await settle(pilot, "5")
-        assert text(app) == "--- driven\n+++ suggested\n-WPNAV_SPEED 1000\n+WPNAV_SPEED 1400"
+        assert text(app).startswith("--- driven\n+++ suggested\n-WPNAV_SPEED 1000\n+WPNAV_SPEED 1400\n")
+        assert "param set WPNAV_SPEED 1400" in text(app)
         await settle(pilot, "6")
         assert text(app) == "report: yaml\n  WPNAV_SPEED: 1400"
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from care_core.causal.graph import CausalGraph
 from care_core.learn.card import model_card
+from care_core.profile.model import SkillRecord
 from care_core.profile.store import Profile
 from tests.planted import SCHEMA
 
@@ -54,7 +55,7 @@ def test_what_the_model_cannot_say_is_said(planted: Profile) -> None:
         graph=CausalGraph(model.graph.nodes, frozenset(e for e in model.graph.directed if e[0] != "inert")),
         effects=effects,
         training=training,
-        skill={"time": {"runs": 0.0}, "all": score_of_one()},
+        skill={"all": score_of_one()},
     )
     card = model_card(replace(SCHEMA, observational=True), bare)
     assert "No option was found to move: energy" in card
@@ -63,10 +64,10 @@ def test_what_the_model_cannot_say_is_said(planted: Profile) -> None:
     assert "| planner | time | 1e-05 |" in card
     assert "- 'filter' never varies in the table." in card
     assert "observational" in card
-    assert "| time | 0 |" not in card
     assert "one outcome only" in card
+    assert "| 0.90 | 1.00 | 9 | `##################..`<br>`####################` |" in card
 
 
-def score_of_one() -> dict[str, float]:
+def score_of_one() -> SkillRecord:
     """Skill where every run met its thresholds: there is no AUC."""
-    return {"runs": 9.0, "base_rate": 1.0, "log_loss": 0.1, "brier": 0.0, "calibration_error": 0.0}
+    return SkillRecord(runs=9, base_rate=1.0, log_loss=0.1, brier=0.0, calibration_error=0.1, curve=((0.9, 1.0, 9),))

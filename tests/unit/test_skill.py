@@ -17,16 +17,14 @@ PAIRS = st.lists(st.tuples(st.floats(0.01, 0.99), st.booleans()), min_size=4, ma
 def test_scores_are_those_of_the_field(pairs: list[tuple[float, bool]]) -> None:
     p, y = np.array([a for a, _ in pairs]), np.array([float(b) for _, b in pairs])
     found = score(p, y)
-    assert found["runs"] == len(pairs)
-    assert found["base_rate"] == pytest.approx(y.mean())
-    assert found["log_loss"] == pytest.approx(log_loss(y, p, labels=[0, 1]))
-    assert found["brier"] == pytest.approx(brier_score_loss(y, p))
-    if 0 < y.mean() < 1:
-        assert found["auc"] == pytest.approx(roc_auc_score(y, p))
-    else:
-        assert "auc" not in found
-    assert 0 <= found["calibration_error"] <= 1
-    assert all(np.isfinite(value) for value in found.values())
+    assert found is not None
+    assert found.runs == len(pairs)
+    assert found.base_rate == pytest.approx(y.mean())
+    assert found.log_loss == pytest.approx(log_loss(y, p, labels=[0, 1]))
+    assert found.brier == pytest.approx(brier_score_loss(y, p))
+    assert found.auc == (pytest.approx(roc_auc_score(y, p)) if 0 < y.mean() < 1 else None)
+    assert 0 <= found.calibration_error <= 1
+    assert found.curve == tuple(reliability(p, y))
 
 
 @given(PAIRS)
@@ -44,18 +42,21 @@ def test_calibration_error_is_the_mean_distance() -> None:
 
 
 def test_what_has_no_truth_or_no_odds_does_not_count() -> None:
-    assert score(np.array([0.5, np.nan, 0.5]), np.array([1.0, 1.0, np.nan]))["runs"] == 1
-    assert score(np.array([np.nan]), np.array([1.0])) == {"runs": 0.0}
+    found = score(np.array([0.5, np.nan, 0.5]), np.array([1.0, 1.0, np.nan]))
+    assert found is not None
+    assert found.runs == 1
+    assert score(np.array([np.nan]), np.array([1.0])) is None
 
 
 def test_the_planted_robot_is_predicted_on_runs_it_has_not_seen(planted: Profile) -> None:
     skill = planted.model.skill
     assert set(skill) == {"success", "time", "energy", "all"}
     for name, found in skill.items():
-        base = found["base_rate"]
-        assert found["log_loss"] < 0.7 * -(base * np.log(base) + (1 - base) * np.log(1 - base)), name
-        assert found["auc"] > 0.9, name
-        assert found["calibration_error"] < 0.1, name
+        base = found.base_rate
+        assert found.log_loss < 0.7 * -(base * np.log(base) + (1 - base) * np.log(1 - base)), name
+        assert found.auc is not None
+        assert found.auc > 0.9, name
+        assert found.calibration_error < 0.1, name
 
 
 def test_folds_are_the_same_on_any_number_of_processes(planted: Profile) -> None:

@@ -1,0 +1,34 @@
+"""Putting what was triaged and verified into the local history. One that cannot be used never stops the work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from care_core.errors import CareError
+
+if TYPE_CHECKING:
+    from care_core.diagnose.records import Diagnosis
+    from care_core.history import History
+
+
+def remember(record: Callable[[History], None]) -> CareError | None:
+    """Put something into the history, unless that is switched off; answers what was in the way."""
+    from care_core.history import History, HistoryError, history_path
+
+    path = history_path()
+    if path is None:
+        return None
+    try:
+        record(History(path))
+    except HistoryError as err:
+        return err
+    return None
+
+
+def remember_triage(diagnosis: Diagnosis) -> CareError | None:
+    """Put a triage into the history; answers what was in the way."""
+    from care_core.report import build_document, published
+
+    document = published(build_document(diagnosis))
+    return remember(lambda history: history.add_triage(document, diagnosis.run.mission.index))

@@ -1,0 +1,103 @@
+"""Every key on every page: it does what it says, or nothing; it never fails, and Esc and q always lead out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from textual.binding import Binding, BindingType
+from textual.pilot import Pilot
+from textual.screen import ModalScreen
+
+from care_tui.app import CareApp
+from care_tui.screens.base import CareScreen
+from care_tui.screens.panes import PanesScreen
+from care_tui.screens.view import ViewScreen
+from care_tui.screens.walk import WalkScreen
+from care_tui.settings import Settings
+from care_tui.widgets.choices import Choices
+from care_tui.widgets.filter_bar import FilterBar
+from tests.tui import sample_diagnosis as sample
+from tests.tui.conftest import MakeApp, quiet, settle
+
+LEADS_OUT = {"q", "ctrl+c"}
+VIEWS = ("w", "m", "p", "y", "b", "v")
+STEPS = ("1", "2", "3", "4", "5", "6")
+APP_MD = Path(__file__).parents[2] / "docs" / "app.md"
+
+
+def keys_of(*bindings: Iterable[BindingType]) -> list[str]:
+    """A key for each of these bindings, each once."""
+    keys = [binding.key.split(",")[-1] for part in bindings for binding in part if isinstance(binding, Binding)]
+    return [key for key in dict.fromkeys(keys) if key not in LEADS_OUT]
+
+
+HERE = (CareApp.BINDINGS, PanesScreen.BINDINGS)
+DOES = [binding for binding in WalkScreen.BINDINGS if isinstance(binding, Binding) and binding.action.startswith("do(")]
+"""What the keys of single steps do; on every other step they have to do nothing."""
+
+
+async def leave_dialogs(pilot: Pilot[int]) -> None:
+    while isinstance(pilot.app.screen, ModalScreen) or isinstance(pilot.app.focused, FilterBar):
+        await pilot.press("escape")
+
+
+@pytest.mark.parametrize(
+    ("step", "verdict"), [*((step, "faulty") for step in STEPS), ("3", "abstaining"), ("4", "all_ok")]
+)
+async def test_no_key_fails_on_a_step(make_app: MakeApp, step: str, verdict: str) -> None:
+    app = make_app(getattr(sample, verdict)())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, step)
+        for key in keys_of(*HERE, DOES):
+            await pilot.press(key)
+            await leave_dialogs(pilot)
+            if not isinstance(app.screen, WalkScreen):
+                await pilot.press("escape")
+            assert isinstance(app.screen, WalkScreen), f"{key}, then Esc"
+            if app.screen.step != int(step):
+                await pilot.press(step)
+        await quiet(pilot)
+        await settle(pilot, "q")
+    assert app.return_value is not None
+
+
+@pytest.mark.parametrize("view", VIEWS)
+async def test_no_key_fails_on_a_view(make_app: MakeApp, view: str) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        for key in keys_of(*HERE, CareScreen.BINDINGS, ViewScreen.BINDINGS, Choices.BINDINGS):
+            await leave_dialogs(pilot)
+            if isinstance(app.screen, WalkScreen):
+                await settle(pilot, view)
+            await pilot.press(key)
+        await leave_dialogs(pilot)
+        await settle(pilot, "q")
+    assert app.return_value is not None
+
+
+@pytest.mark.parametrize("step", ["1", "4"])
+async def test_no_key_fails_without_a_log(step: str) -> None:
+    app = CareApp(settings=Settings(places=()))
+    async with app.run_test(size=(60, 20)) as pilot:
+        await settle(pilot, step)
+        for key in keys_of(WalkScreen.BINDINGS):
+            await pilot.press(key)
+            await leave_dialogs(pilot)
+            while not isinstance(app.screen, WalkScreen):
+                await pilot.press("escape")
+            await pilot.press(step)
+
+
+def test_the_documentation_names_every_key_of_the_walk_and_the_views() -> None:
+    table = APP_MD.read_text(encoding="utf-8")
+    written = set(re.findall(r"`([^`]+)`", table)) | set(re.findall(r"F\d", table))
+    signs = {"plus": "+", "minus": "-", "equals_sign": "="}
+    for binding in (*WalkScreen.BINDINGS, *ViewScreen.BINDINGS):
+        assert isinstance(binding, Binding)
+        names = [signs.get(key, key.upper() if re.fullmatch(r"f\d", key) else key) for key in binding.key.split(",")]
+        assert written & {*names} or {"space", "left", "right"} & {*names} or str(binding.id).startswith("step."), (
+            binding
+        )
