@@ -10,6 +10,7 @@ import numpy as np
 
 from care_core.errors import ConfigError
 from care_core.run import Setting
+from care_core.text import clean
 from care_core.variables import Variable
 
 FLAGS = frozenset({"@READONLY"})
@@ -55,10 +56,23 @@ def find(files: Sequence[Mapping[str, Setting]], parameter: str) -> Setting | No
     return next((settings[parameter] for settings in reversed(files) if parameter in settings), None)
 
 
+def is_name(name: str) -> bool:
+    """Whether a vehicle can have such a parameter; damage makes names of anything, a line of its own included."""
+    return re.fullmatch(r"\w+", name, re.ASCII) is not None
+
+
+def not_a_name(name: str) -> str:
+    """The comment that stands in the place of a parameter of which no file can hold the name."""
+    return f"# left out, the log is damaged here: {clean(name)}"
+
+
 def write(settings: Mapping[str, Setting], remarks: Mapping[str, str] | None = None) -> str:
     """One `NAME,value` a line, in alphabetical order, with the remark of the name as a comment."""
     lines = []
     for name in sorted(settings):
+        if not is_name(name):
+            lines.append(f"{not_a_name(name)}\n")
+            continue
         remark = f"  # {remarks[name]}" if remarks and remarks.get(name) else ""
         lines.append(f"{name},{plain(settings[name].value)}{remark}\n")
     return "".join(lines)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from care_core.configs.ardupilot_param import commands, find, line_of, plain, text_of
+from care_core.configs.ardupilot_param import commands, find, is_name, line_of, not_a_name, plain, text_of
 from care_core.errors import ConfigError
 from care_core.run import Setting
 
@@ -58,6 +58,9 @@ def write(settings: Mapping[str, Setting], remarks: Mapping[str, str] | None = N
     """One row a parameter of vehicle 1, component 1, in alphabetical order; a remark stands in a line before."""
     lines = [HEADER]
     for name in sorted(settings):
+        if not is_name(name):
+            lines.append(not_a_name(name))
+            continue
         value = settings[name].value
         if remarks and remarks.get(name):
             lines.append(f"# {name}: {remarks[name]}")

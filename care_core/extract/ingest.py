@@ -47,6 +47,10 @@ class Ingested:
     resumed: int = 0
 
 
+_PACE_LOGS = 5
+"""So many logs say how long the rest will take."""
+
+
 def journal_of(out: Path) -> Path:
     """Where the journal of a table lies."""
     return out.with_name(f"{out.name}.part")
@@ -72,7 +76,7 @@ def ingest(
     keys = {path: _key(path) for path in paths}
     done: dict[Path, list[Row] | Failed] = {path: known[key] for path, key in keys.items() if key in known}
     resumed, left = len(done), [path for path in paths if path not in done]
-    started = time.monotonic()
+    since = 0.0  # when the first answer came: until then the processes were started
     answers = each(partial(_read_one, schema=schema, read=read), left, workers=workers, limit_s=limit_s)
     with _writing(journal_of(out), _purpose(schema), known) as journal, closing(answers):
         for place, answer in answers:
@@ -81,7 +85,9 @@ def ingest(
             if not isinstance(answer, Failed) or answer.is_final:
                 journal.write(_line(keys[path], answer))
                 journal.flush()
-            progress(_said(done, len(paths), len(done) - resumed, time.monotonic() - started), len(done) / len(paths))
+            since = since or time.monotonic()
+            pace_s = (time.monotonic() - since) / max(len(done) - resumed - 1, 1)
+            progress(_said(done, len(paths), len(done) - resumed, pace_s), len(done) / len(paths))
     return _collected(paths, done, resumed)
 
 
@@ -115,11 +121,14 @@ def _collected(paths: Sequence[Path], done: Mapping[Path, list[Row] | Failed], r
     return found
 
 
-def _said(done: Mapping[Path, list[Row] | Failed], count: int, now: int, seconds: float) -> str:
+def _said(done: Mapping[Path, list[Row] | Failed], count: int, now: int, pace_s: float) -> str:
     failed = sum(isinstance(answer, Failed) for answer in done.values())
-    left_s = seconds / now * (count - len(done))
+    read = f"read {len(done)} of {count} logs, {failed} failed"
+    if now < _PACE_LOGS:
+        return read
+    left_s = pace_s * (count - len(done))
     left = f"{left_s / 60:.0f} min" if left_s >= 90 else f"{left_s:.0f} s"
-    return f"read {len(done)} of {count} logs, {failed} failed, about {left} left"
+    return f"{read}, about {left} left"
 
 
 def _purpose(schema: Schema) -> dict[str, str]:

@@ -5,6 +5,7 @@ Everything a profile asks of a log is merged into one reading plan, so the log i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
@@ -116,10 +117,12 @@ class _Source:
         plan = reading_plan(schema)
         tables = as_dataflash(log).read(plan)
         settings = log.settings()
-        missions = kind.missions(tables, log.duration_s, schema.mission)
+        found = kind.missions(tables, log.duration_s, schema.mission)
+        missions = tuple(one for one in found if math.isfinite(one.start_s) and math.isfinite(one.end_s))
         if not missions:
+            nothing = f"The log holds no mission that profile '{schema.name}' can read."
             raise ProfileError(
-                f"The log holds no mission that profile '{schema.name}' can read.",
+                "No message of the log has a time stamp, so nothing of a mission can be judged." if found else nothing,
                 hint="Look at what was recorded with 'care inspect'.",
                 where=str(log.path),
             )

@@ -116,6 +116,9 @@ def check_table_path(path: Path) -> None:
     """Refuse, before any log is read, a table that could not be written. Raises UsageError."""
     if path.suffix.lower() not in (".csv", ".parquet"):
         raise UsageError("A table of runs ends in .csv or .parquet.", hint="Rename it.", where=str(path))
+    from care_core.report.writers import refuse_recording
+
+    refuse_recording(path)
     if not path.parent.is_dir():
         raise UsageError("The folder does not exist.", hint="Make it first.", where=str(path.parent))
     if path.suffix.lower() == ".parquet":

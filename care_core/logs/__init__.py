@@ -44,6 +44,7 @@ UNREADABLE_MAGIC = (
 )
 """Formats that are recognised but not read: how the file begins, what it is, what to do."""
 
+_CONFIGURATION = (".yaml", ".yml", ".param", ".params", ".parm")
 _SNIFF_BYTES = 4096
 _ZSTD_BYTES = 1 << 18
 """Enough for the first block of a zstd file, which unpacks as a whole."""
@@ -86,7 +87,16 @@ def sniff(path: Path) -> LogFormat:
     is_lone_packet = len(head) > 8 and head[0] == 0 and head[8] in _MAVLINK_MARKERS
     if is_lone_packet or any(_frame_is_followed(head, at + 8) for at in range(len(head) - 8) if head[at] == 0):
         return LogFormat.MAVLINK_TLOG
-    raise LogError("Not a log of a known format.", hint=f"Readable are {READABLE}.", where=str(path))
+    raise LogError("Not a log of a known format.", hint=_what_then(path), where=str(path))
+
+
+def _what_then(path: Path) -> str:
+    """What to do with a file that is no log."""
+    if path.name == "metadata.yaml":
+        return "Name the folder of the bag instead."
+    if path.suffix.lower() in _CONFIGURATION:
+        return "A configuration file goes with a log: --config FILE."
+    return f"Readable are {READABLE}."
 
 
 def is_recording(path: Path) -> bool:

@@ -132,7 +132,8 @@ class MavlinkLog:
         """What the vehicle said its parameters are. A PARAM_SET is only a wish: no proof that it was obeyed."""
         names = ("PARAM_VALUE", f"PARAM_VALUE@{self.vehicle.system}.{_STATION_COMPONENT}")
         tables = self.read(dict.fromkeys(names, ("param_id", "param_value", "param_type")))
-        rows = sorted(chain.from_iterable(_parameters(table, self._autopilot) for table in tables.values()))
+        as_bytes = self._autopilot == _AUTOPILOT_PX4 or any(map(_has_bytes, tables.values()))
+        rows = sorted(chain.from_iterable(_parameters(table, as_bytes=as_bytes) for table in tables.values()))
         return history(((t, name, value, None) for t, name, value in rows if name), "PARAM_VALUE")
 
     @cached_property
@@ -272,10 +273,17 @@ def _senders(packets: Packets) -> Iterator[Sender]:
     return map(Sender, packets.system.tolist(), packets.component.tolist())
 
 
-def _parameters(table: Table, autopilot: int) -> Iterable[tuple[float, str, float]]:
-    """Time, name and value. PX4 puts the bytes of whole numbers where others write them as a fraction."""
+def _has_bytes(table: Table) -> bool:
+    """Whether whole numbers have values that no whole number has: the sender put their bytes there."""
+    whole = np.isin(table["param_type"], list(_PARAM_INTEGERS))
+    size = np.abs(table["param_value"])
+    return bool(np.any(whole & (size > 0) & (size < np.finfo(np.float32).tiny)))
+
+
+def _parameters(table: Table, *, as_bytes: bool) -> Iterable[tuple[float, str, float]]:
+    """Time, name and value. PX4 and others put the bytes of whole numbers where ArduPilot writes them as a fraction."""
     for t, name, value, kind in zip(table.t, table["param_id"], table["param_value"], table["param_type"], strict=True):
-        code = _PARAM_INTEGERS.get(int(kind)) if autopilot == _AUTOPILOT_PX4 else None
+        code = _PARAM_INTEGERS.get(int(kind)) if as_bytes else None
         if code is not None:
             raw = np.array([value], dtype="<f4").view(np.uint8)
             yield float(t), name, float(raw[: np.dtype(code).itemsize].view(code)[0])

@@ -298,8 +298,10 @@ def read_model(folder: Path) -> Model:
             f"'{key}': {first['msg']}.", hint="Train the profile again with 'care train'.", where=str(path)
         ) from err
     except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as err:
+        # numpy's advice on a file that is no archive is to load it unsafely.
+        what = "its arrays cannot be read" if "pickle" in str(err) else str(err).rstrip(".")
         raise ProfileError(
-            f"The model is damaged: {err}.", hint="Train the profile again with 'care train'.", where=str(folder)
+            f"The model is damaged: {what}.", hint="Train the profile again with 'care train'.", where=str(folder)
         ) from err
     return _to_model(record, graph, mechanisms)
 

@@ -54,7 +54,7 @@ def verify(
     out: Out = None,
     no_history: NoHistory = False,
 ) -> None:
-    """Did the fix of a report do what it promised? Ends with 0 recovered, 1 still a fault, 3 cannot tell."""
+    """Tell whether a fix did what it promised. Ends with 0 recovered, 1 still a fault, 3 cannot tell."""
     from care_core.report import read_report, verify_json, verify_log, verify_text
     from care_core.report.verification import EXIT_CODES
 

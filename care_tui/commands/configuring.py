@@ -29,7 +29,7 @@ def diff(
     b: Annotated[str, typer.Argument(metavar="B", help="Likewise.", show_default=False)],
     everything: Annotated[bool, typer.Option("--all", help="Calibration and statistics too.")] = False,
 ) -> None:
-    """Compare two configurations by parameter: - only in A, + only in B, ! changed. Ends with 0 same, 1 different."""
+    """Compare two configurations by parameter. - only in A, + only in B, ! changed. Ends with 0 same, 1 different."""
     from care_core.configs.compare import compare
 
     one, other = _side(a), _side(b)
@@ -102,7 +102,7 @@ def apply(
     in_place: Annotated[bool, typer.Option("--in-place", help="Change the files, each kept as FILE.bak.")] = False,
     alternative: Annotated[int, typer.Option("--alternative", min=0, help="Another of the report's fixes.")] = 0,
 ) -> None:
-    """Put a report's fix into configuration files; comments and order stay. Without -o, print the patch."""
+    """Put a report's fix into configuration files. Comments and order stay. Without -o, print the patch."""
     from care_core.configs.edit import apply_changes
     from care_core.report import read_report
 

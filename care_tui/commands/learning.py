@@ -55,7 +55,7 @@ def evaluate(
     ] = None,
     json: AsJson = False,
 ) -> None:
-    """Compare a profile's causes with the true ones: accuracy, precision, recall, F1, RMSE, and baselines beside it."""
+    """Compare a profile's causes with the true ones. Accuracy, precision, recall, F1, RMSE, and baselines beside it."""
     from care_tui.training import evaluate_profile, evaluation_as_json, evaluation_as_text
 
     evaluation = evaluate_profile(profile, faults, truth or ())

@@ -33,7 +33,7 @@ def history(
     ] = None,
     out: Out = None,
 ) -> None:
-    """List past triages with the trend of each objective, and whether fixes worked as often as promised."""
+    """List past triages and verified fixes. With the trend of each objective, and how often fixes worked."""
     from care_core.history import SWITCH, History, history_path, track_record
     from care_core.history.card import update_card
     from care_core.history.listing import history_document, history_json, history_text

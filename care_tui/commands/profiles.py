@@ -39,7 +39,7 @@ def list_profiles() -> None:
 
 @app.command("show")
 def show(name: Annotated[str, typer.Argument(metavar="PROFILE")]) -> None:
-    """Show what a profile knows: its variables, ranges and thresholds, and which effects its runs cannot tell."""
+    """Show what a profile knows. Its variables, ranges and thresholds, and which effects its runs cannot tell."""
     from care_core.profile.store import load_profile
 
     profile = load_profile(name)
@@ -104,7 +104,7 @@ def _described(variable: Variable) -> str:
 
 @app.command("check")
 def check(name: Annotated[str | None, typer.Argument(metavar="[PROFILE]")] = None) -> None:
-    """Check that profiles are sound, by recomputing from their files what can be recomputed."""
+    """Check that profiles are sound. What can be recomputed from their files is."""
     from care_core.extract.read import reading_plan
     from care_core.profile.check import problems
     from care_core.profile.store import available_profiles, load_profile

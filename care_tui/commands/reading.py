@@ -23,7 +23,7 @@ MOST_FAILURES = 20
 
 @app.command()
 def inspect(log: LogPath, json: AsJson = False) -> None:
-    """Show what a log holds: span, channels, parameters, damage, missions, and what each profile would miss."""
+    """Show what a log holds. Span, channels, parameters, damage, missions, and what each profile would miss."""
     from care_core.logs import open_log
     from care_core.report.inspection import inspection_json
     from care_tui.inspection import as_text, inspect_log
@@ -46,7 +46,7 @@ def params(
     sources: Annotated[bool, typer.Option("--sources", help="Say of each value where it came from.")] = False,
     out: Out = None,
 ) -> None:
-    """Print the configuration as driven, as a file that the robot's software reads."""
+    """Print the configuration as driven. It is a file that the robot's software reads."""
     from care_core.configs import format_for, write_params
     from care_core.extract.settings import differing, remark
     from care_core.logs import open_log
@@ -76,7 +76,7 @@ def ingest(
     limit: Annotated[float, typer.Option("--limit", min=0.1, help="Seconds that one log may take.")] = 600.0,
     failures: Annotated[Path | None, typer.Option("--failures", help="Write logs that failed to this .csv.")] = None,
 ) -> None:
-    """Read many logs into a table of runs, one row a mission, for 'care train'.
+    """Read many logs into a table of runs. It has one row a mission and is for 'care train'.
 
     What is interrupted goes on where it was when the command is given again. Ends with 0 all read, 3 some failed,
     4 none could be read.

@@ -166,3 +166,15 @@ def test_every_json_is_as_published(care: Care, log: Path, tmp_path: Path) -> No
     for name, outcome in printed.items():
         document = json.loads(outcome.stdout, parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
         jsonschema.validate(document, json.loads(care("schema", name).stdout))
+
+
+def test_ingest_does_not_overwrite_a_log(care: Care, log: Path, tmp_path: Path) -> None:
+    table = Path(shutil.copy(SAMPLE, tmp_path / "runs.csv"))
+    refused(care, 2, "logs are never overwritten", "ingest", log, "--profile", "arducopter", "--out", table)
+    assert table.read_bytes() == SAMPLE.read_bytes()
+
+
+def test_summaries_of_commands_are_whole_sentences(care: Care) -> None:
+    listing = care("--help").stdout.partition("Commands:")[2]
+    assert "..." not in listing
+    assert all(line.endswith(".") for line in listing.strip().splitlines())

@@ -389,3 +389,13 @@ def test_every_recorded_configuration_is_read_and_written_back(
         again = read_back(tmp_path_factory.mktemp("again"), values(file.settings), file.format)
         assert again.keys() == file.settings.keys()
         assert all(again[name] == pytest.approx(value, rel=1e-6) for name, value in values(file.settings).items())
+
+
+@pytest.mark.parametrize("format", [ConfigFormat.ARDUPILOT_PARAM, ConfigFormat.QGC_PARAMS])
+def test_a_damaged_name_forges_no_line(tmp_path: Path, format: ConfigFormat) -> None:
+    names = ("A", "B,1\nFENCE_ENABLE", "\x1b[31mC", "D\t9", "")
+    text = write_params({name: Setting(name, 2.0, "PARM") for name in names}, format)
+    assert "\x1b" not in text
+    path = tmp_path / "a.param"
+    path.write_text(text)
+    assert {name: setting.value for name, setting in read_config(path).items()} == {"A": 2.0}

@@ -11,7 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from care_core.errors import ProfileError
+from care_core.extract.read import read_run
 from care_core.logs import open_log
+from care_core.profile.store import load_profile
 from tests.rewritten import write_text
 
 SAMPLE = Path(__file__).parents[2] / "samples" / "arducopter_failed.BIN"
@@ -79,6 +82,14 @@ def test_broken_lines_are_damage(tmp_path: Path) -> None:
     ]
     assert log.duration_s == 1.0
     assert log.damage[-1].byte == path.read_text().rindex("ATT")
+
+
+def test_without_stamps_there_is_no_mission_to_judge(tmp_path: Path) -> None:
+    path = tmp_path / "a.log"
+    head = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\nFMT, 13, 4, EV, B, Id\nFMT, 1, 19, ATT, cc, Roll,Pitch\n"
+    path.write_text(head + "EV, 10\nATT, 1, 2\nEV, 11\n")
+    with pytest.raises(ProfileError, match="No message of the log has a time stamp"):
+        read_run(open_log(path), load_profile("arducopter").schema)
 
 
 @pytest.mark.parametrize(

@@ -114,6 +114,14 @@ def test_px4_sends_whole_numbers_as_their_bytes(tmp_path: Path) -> None:
     assert log.facts["stack"] == "PX4"
 
 
+@pytest.mark.parametrize(("autopilot", "sent"), [(0, 2**-149), (3, 1.0)])
+def test_others_that_do_are_told_by_their_values(tmp_path: Path, autopilot: int, sent: float) -> None:
+    station = Station().hear(heartbeat(autopilot=autopilot)).hear(parameter("RCMAP_ROLL", sent, 2))
+    station.hear(parameter("RCMAP_GAIN", 0.5, 9))
+    settings = MavlinkLog(station.write(tmp_path / "a.tlog")).settings()
+    assert (settings["RCMAP_ROLL"][0].value, settings["RCMAP_GAIN"][0].value) == (1.0, 0.5)
+
+
 def test_noise_between_packets_is_reported_and_skipped(tmp_path: Path) -> None:
     station = flight()
     station.parts.insert(5, b"\xfd\x09noise\xfe" * 7)

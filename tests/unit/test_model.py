@@ -95,6 +95,7 @@ def test_a_damaged_file_is_a_profile_error(folder: Path, name: str, damage: Call
         read_model(folder)
     assert str(folder) in caught.value.where
     assert "care train" in caught.value.hint
+    assert "unsafe" not in str(caught.value)
 
 
 @pytest.mark.parametrize("cut", range(0, 100, 7))

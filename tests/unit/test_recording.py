@@ -145,7 +145,7 @@ def test_misconfigured_and_healthy_robot_tell_their_parameters(recorded: Path) -
     healthy = open_log(folder / "tb3_gazebo_param_events")
     settings = healthy.settings()
     before, after = settings["/turtlebot3_imu.use_sim_time"]
-    assert (before.value, before.changed_at_s, after.value) == (0.0, None, 1.0)
+    assert (before.value, before.changed_at_s, after.value) == ("false", None, "true")
     assert after.changed_at_s == pytest.approx(4.034, abs=1e-3)
     assert len(settings) > 40
     counts = {channel.name: channel.count for channel in open_log(folder / "tb3_gazebo_scan_qos_mismatch").channels()}
