@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.diagnose.records import Fault
 from care_core.text import clean
 from care_tui.pages.page import View
 from care_tui.pages.step import DiagnosisPage
@@ -40,12 +41,24 @@ class CausesPage(DiagnosisPage):
         result, faults, fault = self.session.result, self.session.diagnosis.faults, self.session.fault
         if result is None:
             return Content("No objective")
-        title = Content.assemble("Causes of ", (clean(result.variable.name), "bold"))
+        title = Content.assemble("Causes of ", (clean(result.variable.name), "bold"), self._alike(fault))
         if fault is not None and fault.causes and all(cause.is_lead for cause in fault.causes):
             title += Content(f": none found, {len(fault.causes)} not ruled out")
         if fault is None or len(faults) < 2:
             return title
         return title + Content.styled(f"  ({faults.index(fault) + 1} of {len(faults)} faults, o: next)", "dim")
+
+    def _alike(self, fault: Fault | None) -> str:
+        """The other faults with the same causes, as the report puts them together."""
+        if fault is None:
+            return ""
+        from care_core.report.together import together
+
+        groups = together(
+            self.session.diagnosis.faults, lambda one: [[node.name for node in c.path] for c in one.causes]
+        )
+        others = [one for group in groups if fault in group for one in group if one is not fault]
+        return "".join(f" and {clean(one.objective.variable.name)}" for one in others)
 
     def _detail(self, index: int | None) -> Rows:
         session, result = self.session, self.session.result
