@@ -48,7 +48,7 @@ class Session:
     @property
     def is_readable(self) -> bool:
         """Whether there is a log to look into, though it may have no diagnosis."""
-        return self.path is not None and self.state != "loading" and self.path.exists()
+        return self.case is not None or (self.state == "error" and self.path is not None and self.path.exists())
 
     @property
     def diagnosis(self) -> Diagnosis:

@@ -168,6 +168,9 @@ class FixPage(DiagnosisPage):
         place = (found.index(ticked) + 1) % len(found) if ticked in found else 0
         self.session.basket.load(found[place])
         self.walk.basket_changed()
+        if len(found) == 1:
+            self.screen.say("This is the suggestion; the engine found no alternative.")
+            return
         what = "the suggestion" if place == 0 else f"alternative {place} of {len(found) - 1}"
         self.screen.say(f"This is {what}.")
 

@@ -18,6 +18,9 @@ if TYPE_CHECKING:  # reading models is not needed for the first frame
     from care_core.profile.model import EdgeRecord
 
 FEW = 0.5
+"""Edges that fewer bootstrap resamples hold are flagged."""
+NARROW = 66
+"""Cells that the words of a neighbour need."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +52,7 @@ class GraphPage(Page):
             return View(Content("Causal model"), lambda _: sentence("The profile has no model of this."))
         node, links = self._trail[-1], self._links(self._trail[-1])
         title = Content.assemble("Around ", (node, "bold"), f"  {self._counts(links)}")
-        listing = Listing(len(links), lambda i, _width: (self._item(links[i]),), lambda i: links[i].name)
+        listing = Listing(len(links), lambda i, width: (self._item(links[i], width),), lambda i: links[i].name)
         return View(title, lambda i: self._detail(node, None if i is None else links[i]), listing)
 
     @staticmethod
@@ -71,13 +74,15 @@ class GraphPage(Page):
         order = {"cause": 0, "effect": 1, "confounded": 2}
         return sorted(links, key=lambda link: (order[link.kind], -abs(link.effect or 0.0), link.name))
 
-    def _item(self, link: Link) -> Content:
+    def _item(self, link: Link, width: int) -> Content:
         glyphs = self.glyphs
         sign = {"cause": f"{glyphs.to} it", "effect": f"it {glyphs.to}", "confounded": f"{glyphs.root} both"}[link.kind]
         effect = "" if link.effect is None else f"{link.effect:+.2f}"
-        held = "" if link.support is None else f"in {percent(link.support):>5} of resamples"
+        held = (
+            "" if link.support is None else f"in {percent(link.support):>5}{' of resamples' if width > NARROW else ''}"
+        )
         few = "  ! few" if link.support is not None and link.support < FEW else ""
-        return Content.assemble(f"{sign:<7} ", padded(link.name, 26, "bold"), f" {effect:>6}  {held}{few}")
+        return Content.assemble(f"{sign:<7} ", padded(link.name, 24, "bold"), f" {effect:>6}  {held}{few}")
 
     def _detail(self, node: str, link: Link | None) -> Rows:
         rows = self._about(node)

@@ -55,15 +55,15 @@ class LogPage(StepPage):
         )
         opened = self.session.path
         index = places.index(opened) if opened in places else None
-        return View(self._title(), lambda i: self._detail(None if i is None else logs[i]), listing, index)
+        return View(self._title(len(logs)), lambda i: self._detail(None if i is None else logs[i]), listing, index)
 
-    def _title(self) -> Content:
+    def _title(self, count: int) -> Content:
         state, path = self.session.state, self.session.path
         name = "" if path is None else clean(path.name)
         return {
             "empty": Content("Open a log: Enter, or o for one that is not listed"),
             "loading": Content.assemble("Reading ", (name, "bold"), "  (Esc stops)"),
-            "data": Content.assemble("Open is ", (name, "bold"), "  (Enter on another opens it)"),
+            "data": Content.assemble("Open is ", (name, "bold"), "  (Enter on another opens it)" if count > 1 else ""),
             "error": Content.assemble("No diagnosis of ", (name, "bold"), "  (r: again, o: other log)"),
         }[state]
 
@@ -73,7 +73,7 @@ class LogPage(StepPage):
         about = f" {age(now - log.modified_s):>10}  {size(log.size):>8}  {opened:<6}  "
         line = Content.assemble(f"{mark} ", padded(log.path.name, 24, "bold"), about)
         # Of a long path the end tells more than the beginning.
-        folder, room = clean(str(log.path.parent)), width - line.cell_length
+        folder, room = clean(short(log.path.parent)), width - line.cell_length
         if len(folder) > room:
             folder = self.glyphs.more + folder[len(folder) - room + 1 :] if room > SHORTEST_FOLDER else ""
         return line + Content.styled(folder, "dim")
@@ -132,6 +132,14 @@ def age(seconds: float) -> str:
         if seconds >= length:
             return f"{seconds // length:.0f} {unit} ago"
     return "just now"
+
+
+def short(folder: Path) -> str:
+    """A folder as the operator says it: from here, or from home."""
+    for start, name in ((Path.cwd(), ""), (Path.home(), "~/")):
+        if folder.is_relative_to(start):
+            return f"{name}{folder.relative_to(start)}"
+    return str(folder)
 
 
 def size(count: int) -> str:

@@ -138,7 +138,7 @@ def _breaks(plain: str, first_width: int, width: int) -> list[int]:
     for word in _WORD.finditer(plain):
         if cell_len(plain[start : word.end()].rstrip()) <= room:
             continue
-        if word.start() > start:
+        if word.start() > start and cell_len(word[0].rstrip()) <= width:
             start, room = word.start(), width
             breaks.append(start)
         while cell_len(plain[start : word.end()].rstrip()) > room:

@@ -37,7 +37,7 @@ class PanesScreen(CareScreen):
     AUTO_FOCUS = ""
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("enter", "open", "Open", key_display="enter", id="page.open"),
-        Binding("escape", "back", "Back", id="page.back"),
+        Binding("escape", "back", "Back", key_display="esc", id="page.back"),
         Binding("slash", "filter", "Filter", key_display="/", id="page.filter"),
     ]
     app: CareApp

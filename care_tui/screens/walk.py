@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,18 +19,12 @@ from care_tui.clipboard import fits, osc52
 from care_tui.jobs import CAUSES, Case, Engine, Job, Request
 from care_tui.messages import Progressed, StepChosen
 from care_tui.pages.causes import CausesPage
-from care_tui.pages.contents import ContentsPage
 from care_tui.pages.diff import DiffPage
 from care_tui.pages.fix import FixPage
-from care_tui.pages.graph import GraphPage
-from care_tui.pages.history import HistoryPage
 from care_tui.pages.log import LogPage
-from care_tui.pages.messages import MessagesPage
 from care_tui.pages.objectives import ObjectivesPage
 from care_tui.pages.page import Page
-from care_tui.pages.profiles import ProfilesPage
 from care_tui.pages.report import ReportPage
-from care_tui.pages.signals import SignalsPage
 from care_tui.pages.step import StepPage
 from care_tui.places import remember
 from care_tui.render.rows import Glyphs
@@ -51,6 +44,9 @@ VIEWS = {
     "profiles": "The installed profiles and their model cards",
     "contents": "What the log holds: channels, parameters, damage",
 }
+
+NEED_A_DIAGNOSIS = {"graph", "messages", "signals"}
+NEED_A_LOG = {*NEED_A_DIAGNOSIS, "contents"}
 
 
 class WalkScreen(PanesScreen):
@@ -154,35 +150,21 @@ class WalkScreen(PanesScreen):
 
     def action_view(self, name: str) -> None:
         """Open a page beside the walk."""
-        case = self.session.case
-        if name == "profiles":
-            used = None if case is None else case.diagnosis.profile.name
-            self._open(lambda screen: ProfilesPage(screen, used))
-        elif name == "history":
-            self._open(HistoryPage)
-        elif name == "contents" and self.session.is_readable:
-            log = self.session.path
-            assert log is not None
-            self._open(lambda screen: ContentsPage(screen, log))
-        elif case is None:
-            self.say(
-                "This log has no diagnosis; v shows what it holds."
-                if self.session.is_readable
-                else "Open a log first: 1 leads to them."
-            )
-        elif name == "graph":
-            self._open(lambda screen: GraphPage(screen, case, self._subject()))
-        elif name == "messages":
-            self._open(lambda screen: MessagesPage(screen, case))
-        else:
-            self._open(lambda screen: SignalsPage(screen, case))
+        from care_tui.pages.views import view_of
 
-    def _open(self, make: Callable[[PanesScreen], Page]) -> None:
-        self.app.push_screen(ViewScreen(self.glyphs, make))
+        session, subject = self.session, self._subject()
+        if name in NEED_A_LOG and not session.is_readable:
+            self.say("Open a log first: 1 leads to them.")
+        elif name in NEED_A_DIAGNOSIS and session.case is None:
+            self.say("This log has no diagnosis; v shows what it holds.")
+        else:
+            self.app.push_screen(ViewScreen(self.glyphs, lambda screen: view_of(name, screen, session, subject)))
 
     def _subject(self) -> str | None:
         """The variable that the operator is looking at: the cause under the cursor, else the objective."""
         session, index = self.session, self.choices.highlighted
+        if session.case is None:
+            return None
         if self.step == CAUSES_STEP and index is not None:
             return session.causes[index].option.name
         return None if session.result is None else session.result.variable.name

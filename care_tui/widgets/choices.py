@@ -129,7 +129,8 @@ class Choices(LineView):
         line = content.pad_left(MARGIN)
         if place != self._cursor:
             return line
-        # Reversed, for status colours stay legible and a terminal without colours shows it too.
+        # Reversed, for status colours stay legible and a terminal without colours shows it too; dim is a grey patch.
+        line = Content(line.plain, [span for span in line.spans if span.style != "dim"])
         return line.pad_right(width + MARGIN - line.cell_length).stylize("bold reverse" if self.has_focus else "bold")
 
     def _bring_into_view(self) -> None:

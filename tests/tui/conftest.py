@@ -88,6 +88,7 @@ def make_app() -> MakeApp:
 
 async def settle(pilot: Pilot[int], *keys: str) -> None:
     """Press keys one by one, each after the work of the one before is shown."""
+    await pilot.pause()
     await quiet(pilot)
     for key in keys:
         await pilot.press(key)
@@ -96,7 +97,6 @@ async def settle(pilot: Pilot[int], *keys: str) -> None:
 
 async def quiet(pilot: Pilot[int]) -> None:
     """Wait for the workers of every screen, and for what they bring to be shown."""
-    await pilot.pause()
     await pilot.app.workers.wait_for_complete()
     while any(isinstance(screen, PanesScreen) and screen.is_busy for screen in pilot.app.screen_stack):
         await pilot.pause(0.005)

@@ -216,6 +216,23 @@ def test_found_logs_are_the_newest_first_with_those_opened_before(tmp_path: Path
     ]
 
 
+def test_recordings_are_one_log_each_wherever_the_operator_keeps_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    split, alone = tmp_path / "split", tmp_path / "bags" / "monday"
+    for folder, parts in ((split, 3), (alone, 1)):
+        folder.mkdir(parents=True)
+        (folder / "metadata.yaml").write_text("rosbag2_bagfile_information:\n")
+        for part in range(parts):
+            (folder / f"run_{part}.db3").write_bytes(b"x" * 100)
+    (tmp_path / "bags" / "stray.BIN").write_bytes(b"x")
+    monkeypatch.chdir(tmp_path)
+    found = {log.path.name: log.size for log in found_logs([Path()])}
+    assert set(found) == {"split", "monday"}, "of the working folder's folders only what a recorder made"
+    assert found["split"] > 300, "all of its files count"
+    assert {log.path.name for log in found_logs([tmp_path / "bags"])} == {"monday", "stray.BIN"}
+
+
 def test_a_job_that_is_cancelled_ends_at_its_next_check_and_its_answer_is_dropped() -> None:
     ended: list[str] = []
     started, go_on, over = threading.Event(), threading.Event(), threading.Event()

@@ -15,6 +15,7 @@ from care_tui.render.plot import dots_across, plot
 from care_tui.screens.view import ViewScreen
 from care_tui.screens.walk import WalkScreen
 from care_tui.settings import Settings
+from care_tui.widgets.choices import Choices
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, settle
 from tests.tui.test_walk import hints, items, text, title, walk
@@ -40,6 +41,11 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         assert title(app).startswith("Around mission_time")
         await settle(pilot, "escape", "m")
         assert "ArduCopter V4.5.4" in items(app)
+        choices = app.screen.query_one("#list", Choices)
+        assert choices.has_focus, "the list takes the focus when it appears"
+        assert choices.highlighted is not None
+        assert choices.highlighted > 1000
+        assert choices.scroll_offset.y > 0, "the moment of failure is in view"
         await settle(pilot, "n", "slash", *"arming")
         assert "arming" in items(app).casefold()
         await settle(pilot, "escape", "escape", "p")
@@ -54,7 +60,9 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         assert "LAND_SPEED" in text(app)
         await settle(pilot, "x", "x", "escape")
         assert isinstance(app.screen, WalkScreen)
-        await settle(pilot, "3", "f2")
+        await settle(pilot, "v")
+        assert "Parameters  1002" in text(app)
+        await settle(pilot, "escape", "3", "f2")
         assert title(app).startswith("Around LAND_SPEED"), "the graph starts at the cause under the cursor"
         await settle(pilot, "1", "question_mark", "escape", "escape")
         assert isinstance(app.screen, WalkScreen)
@@ -85,7 +93,9 @@ async def test_the_file_on_disk_is_patched_with_its_comments_kept(tmp_path: Path
     async with app.run_test(size=(120, 40)) as pilot:
         await settle(pilot, "5", "f")
         assert "-LAND_SPEED,20  # slow" in text(app)
-        assert "+LAND_SPEED,40  # slow" in text(app)
+        fix = walk(app).session.fix
+        assert fix is not None
+        assert f"+LAND_SPEED,{fix.changes[0].suggested:g}  # slow" in text(app)
         await settle(pilot, "f")
         assert "! LAND_SPEED  16 -> 20" in text(app)
     assert "LAND_SPEED,20" in file.read_text(), "nothing is written"
@@ -103,6 +113,20 @@ async def test_views_of_a_log_need_one_and_the_others_do_not(make_app: MakeApp) 
         assert "No run was triaged before" in text(app)
         await settle(pilot, "escape", "f6")
         assert "arducopter" in items(app)
+
+
+async def test_a_log_without_a_diagnosis_can_still_be_looked_into(tmp_path: Path) -> None:
+    log = tmp_path / "cut.BIN"
+    log.write_bytes(SAMPLE.read_bytes()[:60_000])
+    app = CareApp(Request(log), settings=Settings(places=()))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        assert "Problem" in text(app)
+        assert "v shows what the log holds" in text(app)
+        await settle(pilot, "m")
+        assert "no diagnosis" in hints(app)
+        await settle(pilot, "v")
+        assert "Format      dataflash-bin" in text(app)
 
 
 async def test_a_view_that_cannot_read_the_log_says_so(make_app: MakeApp) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from care_core.diagnose.records import Diagnosis
+from care_core.diagnose.records import Circumstance, Diagnosis, Fault
 from care_core.errors import ExitCode
 from care_tui.app import CareApp
 from care_tui.screens.export import ExportDialog, OverwriteDialog
@@ -246,6 +247,31 @@ async def test_an_objective_that_was_not_evaluated_has_no_causes_but_a_reason(ma
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "G", "enter")
         assert "LOG_BITMASK" in text(app)
+
+
+async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app: MakeApp) -> None:
+    lead = replace(sample.FLIES_SLOWLY, rank=1, is_lead=True, contribution=0.0)
+    wind = Circumstance("wind", "wind_proxy", 9.0, "m/s", 0.0, 6.0, 0.01, "stronger than in 99 % of the training runs")
+    diagnosis = replace(
+        sample.abstaining(),
+        faults=(Fault(sample.SLOW, (lead,)),),
+        rivals=(wind,),
+        tell_more=("run the same configuration again",),
+    )
+    app = make_app(diagnosis)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3")
+        assert "none found, 1 not ruled out" in title(app)
+        assert "not ruled out, 2 % odds if changed alone" in items(app)
+        assert "costs" not in text(app)
+        lines = text(app).splitlines()
+        assert "No answer" in lines[0]
+        assert lines[1:5] == [
+            "It may be no parameter",
+            "- wind: stronger than in 99 % of the training runs",
+            "What would tell more",
+            "- run the same configuration again",
+        ]
 
 
 async def test_f_turns_the_diff_to_the_file_on_disk(make_app: MakeApp) -> None:
