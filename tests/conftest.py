@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
+from hypothesis import settings
 
 if TYPE_CHECKING:
     from care_core.profile.store import Profile
@@ -22,6 +23,10 @@ class Outcome(NamedTuple):
 
 
 Care = Callable[..., Outcome]
+
+# How long an example takes says more of the machine's other work than of the code.
+settings.register_profile("care", deadline=None)
+settings.load_profile("care")
 
 
 @pytest.fixture(autouse=True)
