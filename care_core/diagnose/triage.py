@@ -40,7 +40,7 @@ from care_core.extract.settings import readable
 from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
 from care_core.profile.store import Profile
-from care_core.run import Run
+from care_core.run import Run, is_known
 
 MIN_CONTRIBUTION = 0.02
 """Odds an option must cost before it is called a cause of this run."""
@@ -142,13 +142,15 @@ def diagnose(
         result.variable.name: suspects(world, schema, result.variable.name, reference, run.evidence)
         for result in broken
     }
+    unheard = {result.variable.name: _out_of_reach(case, result) for result in broken}
     faults = tuple(
-        Fault(result, () if _out_of_reach(case, result) else _causes(case, result, found[result.variable.name], top))
-        for result in broken
+        Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
+        for name, result in ((result.variable.name, result) for result in broken)
     )
     report("searching for a fix", 0.85)
     fixes = _fixes(case, {s.option for group in found.values() for s in group})
-    abstained = _abstains(case, faults, fixes)
+    out_of_reach = next(filter(None, unheard.values()), None)
+    abstained = out_of_reach or _abstains(case, faults, fixes)
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     report("done", 1.0)
     return Diagnosis(
@@ -161,7 +163,9 @@ def diagnose(
         abstained=abstained,
         notes=_notes(case, broken),
         rivals=circumstances(run, world, schema) if unsure else (),
-        tell_more=tell_more(world, faults, run, schema.variables, reference, keep) if unsure else (),
+        tell_more=tell_more(world, faults, run, schema.variables, reference, keep)
+        if unsure and not out_of_reach
+        else (),
     )
 
 
@@ -204,7 +208,7 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         confidence=_confidence(case, suspect, in_support, support),
         in_support=in_support,
         notes=_cause_notes(case, suspect, in_support, support),
-        is_lead=suspect.contribution < MIN_CONTRIBUTION and name not in refused_by(case.run),
+        is_lead=suspect.weight < MIN_CONTRIBUTION and name not in refused_by(case.run),
     )
 
 
@@ -278,9 +282,6 @@ def _has_effect(case: _Case, option: str) -> bool:
 
 
 def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str | None:
-    out_of_reach = next(filter(None, (_out_of_reach(case, fault.objective) for fault in faults)), None)
-    if out_of_reach is not None:
-        return out_of_reach
     names = [fault.objective.variable.name for fault in faults]
     unknown = [name for name in names if name not in case.world.model.outcomes]
     if unknown:
@@ -304,10 +305,12 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str |
 
 
 def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
-    """Said of a threshold that no training run came near: no option can be blamed for missing it."""
+    """Said of what no training run came near, a threshold or a way to fail: no option can be blamed for it."""
+    if result.variable.kind == "functional":
+        return _new_way_to_fail(case)
     name, bound = result.variable.name, result.threshold
     summary = case.world.model.summaries.get(name)
-    if bound is None or summary is None or result.variable.kind == "functional":
+    if bound is None or summary is None:
         return None
     best = summary.low if bound.op in ("<=", "<") else summary.high
     if bound.op == "==" or bound.met(best):
@@ -316,6 +319,17 @@ def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
     return (
         f"no run of the profile's training met {name} {bound}{unit} (the best: {best:g}{unit}): no option explains it"
     )
+
+
+def _new_way_to_fail(case: _Case) -> str | None:
+    for variable in case.profile.schema.metrics:
+        summary, value = case.world.model.summaries.get(variable.name), case.run.metrics.get(variable.name)
+        if variable.type != "bool" or summary is None or not is_known(value):
+            continue
+        if summary.low == summary.high != value:
+            what = variable.doc or f"{variable.name} is {value:g}"
+            return f"{what}, as in no training mission of the profile: it knows nothing of what leads to that"
+    return None
 
 
 def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:

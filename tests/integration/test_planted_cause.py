@@ -42,6 +42,16 @@ def repaired(diagnosis: Diagnosis, noise: Mapping[str, float] = CALM) -> bool:
     return all(o.threshold is not None and o.threshold.met(outcome[o.name]) for o in SCHEMA.objectives)
 
 
+def test_a_way_to_fail_that_training_never_met_has_no_answer(planted: Profile, tmp_path: Path) -> None:
+    summaries = dict(planted.model.summaries)
+    summaries["armed"] = summaries["armed"].model_copy(update={"quantiles": (1.0, 1.0)})
+    write_model(replace(planted.model, summaries=summaries), tmp_path)
+    diagnosis = diagnosed(planted_run(min_sats=13), Profile(tmp_path, planted.schema))
+    assert diagnosis.abstained is not None
+    assert diagnosis.abstained.startswith("armed is 0, as in no training mission")
+    assert (diagnosis.faults[0].causes, diagnosis.fix, diagnosis.tell_more) == ((), None, ())
+
+
 def test_what_the_training_runs_cannot_tell_is_said_and_never_ranked(planted: Profile, tmp_path: Path) -> None:
     effects = dict(planted.model.effects)
     effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
