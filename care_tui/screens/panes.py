@@ -55,7 +55,7 @@ class PanesScreen(CareScreen):
     def compose_body(self) -> ComposeResult:
         yield Static(classes="title", markup=False)
         with Container(id="panes"):
-            yield Choices(self.glyphs.more, id="list")
+            yield Choices(self.glyphs.more, moved=self._show_detail, id="list")
             yield Lines(id="text")
         yield FilterBar()
         yield KeyHints()
@@ -103,11 +103,9 @@ class PanesScreen(CareScreen):
         """Focus the list where there is one, else the text."""
         (self.choices if self.choices.display else self.text).focus(scroll_visible=False)
 
-    @on(Choices.Highlighted)
-    def _show_detail(self, event: Choices.Highlighted) -> None:
-        event.stop()
+    def _show_detail(self) -> None:
+        """The cursor came to another item."""
         self.say("")
-        # Read now: since the message was sent, the list may have come to hold something else.
         index = self.choices.highlighted
         if index is not None:
             self.page.moved(index)
@@ -147,7 +145,14 @@ class PanesScreen(CareScreen):
     @on(FilterBar.Typed)
     def _apply_filter(self, event: FilterBar.Typed) -> None:
         event.stop()
-        (self.choices if self.choices.display else self.text).filter(event.words)
+        self._filter(event.words)
+
+    def _filter(self, words: str) -> None:
+        if self.choices.display:
+            self.choices.filter(words)
+            self._show_detail()
+        else:
+            self.text.filter(words)
 
     @on(FilterBar.Closed)
     def _leave_filter(self, event: FilterBar.Closed) -> None:
@@ -158,8 +163,7 @@ class PanesScreen(CareScreen):
         bar = self.query_one(FilterBar)
         if bar.words:
             bar.close()
-            self.choices.filter("")
-            self.text.filter("")
+            self._filter("")
         else:
             self.leave()
 

@@ -43,20 +43,16 @@ class Choices(LineView):
     ]
 
     @dataclass
-    class Highlighted(Message):
-        """The cursor came to an item, counted from 0 before filtering; None where nothing is left."""
-
-        index: int | None
-
-    @dataclass
     class Chosen(Message):
         """An item was clicked while it was highlighted."""
 
         index: int
 
-    def __init__(self, more: str, *, id: str | None = None) -> None:
+    def __init__(self, more: str, *, moved: Callable[[], None] = lambda: None, id: str | None = None) -> None:
+        """`moved` is called when the cursor came to another item. No message: it would cost a frame of its own."""
         super().__init__(id=id)
         self._more = more
+        self._moved = moved
         self._listing = NOTHING
         self._kept: range | list[int] = range(0)
         self._filter = ""
@@ -96,14 +92,13 @@ class Choices(LineView):
         self.sync()
 
     def filter(self, words: str) -> None:
-        """Show only the items that hold these words; all of them when empty."""
+        """Show only the items that hold these words; all of them when empty. `moved` is not called."""
         if words.casefold() == self._filter:
             return
         here = self.highlighted
         self._filter = words.casefold()
         self._keep()
         self.put(here)
-        self.post_message(self.Highlighted(self.highlighted))
 
     def _keep(self) -> None:
         count, words = self._listing.count, self._listing.words
@@ -158,7 +153,7 @@ class Choices(LineView):
         if self._cursor != before:
             self._bring_into_view()
             self.sync()
-            self.post_message(self.Highlighted(self.highlighted))
+            self._moved()
 
     def action_page_down(self) -> None:
         self.action_move(self._page())

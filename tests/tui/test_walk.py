@@ -274,6 +274,19 @@ async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app
         ]
 
 
+async def test_faults_with_the_same_causes_are_named_together(make_app: MakeApp) -> None:
+    drained = replace(
+        sample.LANDS_SLOWLY, path=(*sample.LANDS_SLOWLY.path, replace(sample.LANDS_SLOWLY.path[-1], name="energy"))
+    )
+    both = (Fault(sample.SLOW, (sample.LANDS_SLOWLY,)), Fault(sample.HUNGRY, (drained,)))
+    app = make_app(replace(sample.faulty(), faults=both))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3")
+        assert "Causes of mission_time and energy  (1 of 2 faults" in title(app)
+        await settle(pilot, "o")
+        assert "Causes of energy and mission_time  (2 of 2 faults" in title(app)
+
+
 async def test_f_turns_the_diff_to_the_file_on_disk(make_app: MakeApp) -> None:
     app = make_app(sample.faulty(), configs=(Path("robot.param"),))
     async with app.run_test(size=(80, 24)) as pilot:
