@@ -8,7 +8,8 @@ runs a robot: does the reset of the first-ranked option really help (odds of mee
 best single reset gives, at least 0.1), and how far are the predicted odds of every single reset from the true ones
 (1000 simulated missions each, the option set by intervention)? A reset is named only where its predicted odds reach
 those below which `care` abstains; "wrong" ones would have cost a field day, "fooled" are those of them that the wind
-chose. "said no" counts options that were not ranked because their effect is not identified.
+chose. Where an option whose effect is not identified is as likely a cause, `care` names none and asks for a run with it
+changed: "asks well" counts those that really help.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -45,10 +47,18 @@ class Score:
     right: int = 0
     wrong: int = 0
     fooled: int = 0
+    asked_well: int = 0
     misses: list[float] = field(default_factory=list)
     swayed_misses: list[float] = field(default_factory=list)
     """Errors of the odds, over the options that followed the wind."""
-    refused: int = 0
+
+
+class Answer(NamedTuple):
+    """Options, the likeliest cause first, the odds of resetting each, and the option that a run would have to tell."""
+
+    ranking: list[str]
+    odds: dict[str, float]
+    asks: str | None = None
 
 
 class _Care:
@@ -58,7 +68,7 @@ class _Care:
         self.bounds = {o.name: o.threshold for o in schema.objectives if o.threshold is not None}
         self.refused = {option for (option, objective), effect in self.model.effects.items() if not effect.identified}
 
-    def answer(self, row: Mapping[str, float], reference: Mapping[str, float]) -> tuple[list[str], dict[str, float]]:
+    def answer(self, row: Mapping[str, float], reference: Mapping[str, float]) -> Answer:
         config = {**reference, **{v.name: row[v.name] for v in (*self.schema.options, *self.schema.contexts)}}
         here = {**reference, **{c.name: row[c.name] for c in self.schema.contexts}}
         seen = {
@@ -66,14 +76,19 @@ class _Care:
         }
         world = World(self.model, config, seen, self.bounds)
         best: dict[str, float] = {}
+        unknown: dict[str, float] = {}
         for objective in self.bounds:
             for suspect in suspects(world, self.schema, objective, here):
                 if suspect.contribution > 0:
-                    best[suspect.option] = max(best.get(suspect.option, 0.0), suspect.contribution)
+                    kind = best if suspect.is_identified else unknown
+                    kind[suspect.option] = max(kind.get(suspect.option, 0.0), suspect.contribution)
         fresh = World(self.model, config, {}, self.bounds)
         asked = [name for name in deviating(config, here) if name not in self.refused]
         odds = fresh.odds([{**config, name: here[name]} for name in asked]) if asked else np.zeros(0)
-        return sorted(best, key=lambda name: -best[name]), dict(zip(asked, odds.tolist(), strict=True))
+        asks = max(unknown, key=unknown.__getitem__, default=None)
+        asks = asks if asks is not None and unknown[asks] > max(best.values(), default=0.0) else None
+        ranking = [] if asks else sorted(best, key=lambda name: -best[name])
+        return Answer(ranking, dict(zip(asked, odds.tolist(), strict=True)), asks)
 
 
 def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
@@ -97,8 +112,9 @@ def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
         helps = {name for name in off if truth[name] - _true_odds(robot, config, run) >= max(WORTH, worth / 2)}
         answers = {name: engine.answer(run, reference) for name, engine in engines.items()}
         predicted = plain.odds([{**config, name: reference[name]} for name in off])
-        answers[METHODS[2]] = (plain.rank(config, reference, off), dict(zip(off, predicted.tolist(), strict=True)))
-        for name, (ranking, odds) in answers.items():
+        odds_of = dict(zip(off, predicted.tolist(), strict=True))
+        answers[METHODS[2]] = Answer(plain.rank(config, reference, off), odds_of)
+        for name, (ranking, odds, asks) in answers.items():
             score = scores[name]
             score.misses += [abs(odds[option] - truth[option]) for option in odds]
             score.swayed_misses += [abs(odds[o] - truth[o]) for o in odds if o in robot.swayed]
@@ -107,9 +123,8 @@ def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
                 score.asked += 1
                 score.right += named in helps
                 score.wrong += named is not None and named not in helps
+                score.asked_well += asks in helps
                 score.fooled += named is not None and named not in helps and named in robot.swayed
-    for name, engine in engines.items():
-        scores[name].refused = len(engine.refused)
     return scores
 
 
@@ -122,17 +137,17 @@ def _true_odds(robot: Robot, config: Mapping[str, float], run: Mapping[str, floa
 def show(title: str, parts: list[dict[str, Score]]) -> None:
     print(f"\n{title}")
     print(f"  {'method':30s} {'faults':>6s} {'right':>6s} {'wrong':>6s} {'fooled':>7s} {'no answer':>10s} "
-          f"{'odds error':>11s} {'swayed':>7s} {'said no':>8s}")  # fmt: skip
+          f"{'asks well':>10s} {'odds error':>11s} {'swayed':>7s}")  # fmt: skip
     for name in METHODS:
         mine = [part[name] for part in parts]
-        asked, right, wrong, fooled, refused = (
-            sum(getattr(s, key) for s in mine) for key in ("asked", "right", "wrong", "fooled", "refused")
+        asked, right, wrong, fooled, well = (
+            sum(getattr(s, key) for s in mine) for key in ("asked", "right", "wrong", "fooled", "asked_well")
         )
         misses = [m for s in mine for m in s.misses]
         swayed = [m for s in mine for m in s.swayed_misses]
         far = f"{np.mean(swayed):.3f}" if swayed else "none"
         print(f"  {name:30s} {asked:>6d} {right:>6d} {wrong:>6d} {fooled:>7d} {asked - right - wrong:>10d} "
-              f"{np.mean(misses):>11.3f} {far:>7s} {refused:>8d}")  # fmt: skip
+              f"{well:>10d} {np.mean(misses):>11.3f} {far:>7s}")  # fmt: skip
 
 
 def main() -> None:

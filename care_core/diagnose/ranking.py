@@ -37,6 +37,11 @@ class Suspect:
     """The metric of this run that points at the option most."""
 
     @property
+    def is_identified(self) -> bool:
+        """Whether the training runs can tell what the option does: if not, what it costs may be another's doing."""
+        return self.effect is None or self.effect.identified
+
+    @property
     def total_effect(self) -> float:
         return 0.0 if self.effect is None else self.effect.effect
 
@@ -74,11 +79,14 @@ def suspects(
     rise when the option goes back to its reference, averaged over the orders in which the others may go back, so an
     interaction is shared by those who take part in it and the contributions add up to the whole change. What they
     leave unexplained, much where training runs were few, is laid to the options that this run's symptoms point at.
+
+    Options whose effect is not identified are among them, to be told and not to be ranked (`is_identified`): theirs is
+    an association.
     """
     off = deviating(world.config, reference)
     paths = best_paths(world.model, objective, off)
     effects = {name: world.model.effects.get((name, objective)) for name in paths}
-    names = [name for name, effect in effects.items() if effect is None or effect.identified]
+    names = list(paths)
     learned = [name for name in names if effects[name] is not None and objective in world.model.outcomes]
     shares = _shapley(
         learned, lambda sets: world.predict(objective, [_reset(world.config, reference, s) for s in sets]).p_ok
@@ -105,8 +113,7 @@ def not_ruled_out(
 ) -> tuple[Suspect, ...]:
     """Other options off their reference, the farthest first: a few hundred runs do not show every effect.
 
-    Options whose effect is not identified are left out; the rest have no path in the graph, and get a direct one of no
-    effect.
+    They have no path in the graph, and get a direct one of no effect.
     """
     named = {suspect.option for suspect in found}
     others = [
@@ -116,13 +123,6 @@ def not_ruled_out(
     ]
     others.sort(key=lambda name: -schema.variables[name].distance(world.config[name], reference[name]))
     return tuple(Suspect(name, 0.0, CausalPath((name, objective), 0.0), None) for name in others)
-
-
-def unidentified(world: World, objective: str, reference: Config) -> tuple[str, ...]:
-    """Options off their reference whose effect on the objective the training runs cannot tell: neither ranked nor ruled
-    out."""
-    effects = {name: world.model.effects.get((name, objective)) for name in deviating(world.config, reference)}
-    return tuple(name for name, effect in effects.items() if effect is not None and not effect.identified)
 
 
 def best_paths(model: Model, objective: str, options: Sequence[str]) -> dict[str, CausalPath]:

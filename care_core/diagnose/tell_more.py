@@ -11,7 +11,7 @@ import numpy as np
 from care_core.causal.counterfactual import Config, World
 from care_core.causal.mechanisms import FloatArray
 from care_core.diagnose.fixes import candidate_values
-from care_core.diagnose.ranking import unidentified
+from care_core.diagnose.ranking import Suspect
 from care_core.diagnose.records import Experiment, Fault
 from care_core.run import Run, Unavailable
 from care_core.variables import Variable
@@ -27,16 +27,20 @@ MET = "what this run met"
 
 def tell_more(
     world: World, faults: Sequence[Fault], run: Run, options: Mapping[str, Variable], reference: Config,
-    keep: Collection[str],
+    keep: Collection[str], unranked: Mapping[str, Sequence[Suspect]],
 ) -> tuple[str, ...]:  # fmt: skip
-    """Sentences for an operator, the most useful first; empty where nothing would help."""
+    """Sentences for an operator, the most useful first; empty where nothing would help.
+
+    Args:
+        unranked: per objective the options whose effect the training runs cannot tell, the likeliest first.
+    """
     advice = list(_unrecorded(faults, run))
     for fault in faults:
         objective = fault.objective.variable.name
         advice += [
             f"change only {name} to {options[name].show(reference[name])} and run again: the training runs cannot tell "
             f"what it does to {objective}"
-            for name in unidentified(world, objective, reference)
+            for name in [suspect.option for suspect in unranked[objective]][:HYPOTHESES]
             if name not in keep
         ]
         found = experiment(world, fault, options, reference, keep)

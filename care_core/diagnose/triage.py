@@ -29,7 +29,6 @@ from care_core.diagnose.ranking import (
     deviating,
     not_ruled_out,
     suspects,
-    unidentified,
 )
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
 from care_core.diagnose.since import compare, with_evidence
@@ -65,6 +64,8 @@ class _Case:
     world: World
     reference: Config
     keep: Collection[str]
+    unranked: Mapping[str, tuple[Suspect, ...]]
+    """Per objective the options off their reference whose effect the training runs cannot tell, the likeliest first."""
     assumed: frozenset[str]
     """Options that no source holds: taken to be at their reference."""
 
@@ -135,13 +136,14 @@ def diagnose(
     report("ranking the causes", 0.7)
     reference = reference_of(run, profile)
     world = world_of(run, profile, bounds)
-    case = _Case(
-        profile, choice, run, world, reference, keep, frozenset(v.name for v in schema.options) - frozenset(run.config)
-    )
-    found = {
+    weighed = {
         result.variable.name: suspects(world, schema, result.variable.name, reference, run.evidence)
         for result in broken
     }
+    found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
+    unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
+    assumed = frozenset(v.name for v in schema.options) - frozenset(run.config)
+    case = _Case(profile, choice, run, world, reference, keep, unranked, assumed)
     unheard = {result.variable.name: _out_of_reach(case, result) for result in broken}
     faults = tuple(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
@@ -163,7 +165,7 @@ def diagnose(
         abstained=abstained,
         notes=_notes(case, broken),
         rivals=circumstances(run, world, schema) if unsure else (),
-        tell_more=tell_more(world, faults, run, schema.variables, reference, keep)
+        tell_more=tell_more(world, faults, run, schema.variables, reference, keep, unranked)
         if unsure and not out_of_reach
         else (),
     )
@@ -222,7 +224,7 @@ def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float)
     doubtful = not in_support or bool(case.choice.warnings) or not case.run.mission.fits
     if doubtful or support < LOW_SUPPORT or contribution < UNSURE:
         return "medium" if suspect.option in refused_by(case.run) else "low"
-    is_rivalled = bool(unidentified(case.world, suspect.path.nodes[-1], case.reference))
+    is_rivalled = bool(case.unranked[suspect.path.nodes[-1]])
     if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled:
         return "high"
     return "medium"
@@ -286,6 +288,10 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str |
     unknown = [name for name in names if name not in case.world.model.outcomes]
     if unknown:
         return f"too few training missions to predict {', '.join(unknown)}: the causes are named, no change is promised"
+    for fault in faults:
+        rival = next(iter(case.unranked[fault.objective.variable.name]), None)
+        if rival is not None and rival.weight > max((cause.contribution for cause in fault.causes), default=0.0):
+            return f"'{rival.option}' is as likely a cause, and the training runs cannot tell what it does"
     now = float(case.world.odds([case.world.config])[0])
     enough = max(MIN_ODDS, now + MIN_CONTRIBUTION)
     has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
@@ -335,9 +341,9 @@ def _new_way_to_fail(case: _Case) -> str | None:
 def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
     notes = list(case.choice.warnings)
     for name in (result.variable.name for result in broken):
-        unknown = unidentified(case.world, name, case.reference)
+        unknown = ", ".join(suspect.option for suspect in case.unranked[name])
         if unknown:
-            notes.append(f"not ranked, as the training runs cannot tell their effect on {name}: {', '.join(unknown)}")
+            notes.append(f"not ranked, as the training runs cannot tell their effect on {name}: {unknown}")
     if not case.run.mission.fits:
         notes.append(case.run.mission.mismatch)
     if case.assumed:
