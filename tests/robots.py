@@ -155,7 +155,8 @@ def random_robot(
         return Law(shapes[int(rng.integers(len(shapes)))], float(rng.choice([-1, 1]) * rng.uniform(0.5, 0.9)))
 
     for i, name in enumerate(names):
-        for m in {flight[i % metrics], *([flight[int(rng.integers(metrics))]] if rng.random() < 0.4 else [])}:
+        second = flight[int(rng.integers(metrics))] if rng.random() < 0.4 else flight[i % metrics]
+        for m in dict.fromkeys((flight[i % metrics], second)):
             laws[name, m] = law()
     for j, m in enumerate(flight):
         laws |= {(before, m): law(("line", "bend")) for before in flight[:j] if rng.random() < 1 / metrics}
