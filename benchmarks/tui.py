@@ -31,7 +31,8 @@ from care_core.variables import Role, Threshold, Variable
 OPTIONS, PATHS = 600, 200
 QUIET_S = 0.12
 """Nothing written for so long: the repaint is over."""
-SAMPLE = Path(__file__).parent.parent / "samples" / "arducopter_failed.BIN"
+ROOT = Path(__file__).parent.parent
+SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
 
 
 def made(options: int = OPTIONS, paths: int = PATHS) -> tuple[Diagnosis, tuple[Variable, ...]]:
@@ -104,8 +105,9 @@ class Terminal:
     def start(cls, command: Sequence[str], width: int, height: int) -> Terminal:
         ours, theirs = pty.openpty()
         ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", height, width, 0, 0))
-        env = {**os.environ, "TERM": "xterm-256color", "COLORTERM": "truecolor", "CARE_BENCHMARK": "1"}
-        env |= {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+        # As installed: compiled, and found at once.
+        env = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+        env |= {"TERM": "xterm-256color", "COLORTERM": "truecolor", "CARE_BENCHMARK": "1", "PYTHONPATH": str(ROOT)}
         started = time.perf_counter()
         process = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, env=env, start_new_session=True)
         os.close(theirs)
