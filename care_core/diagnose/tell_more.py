@@ -61,10 +61,11 @@ def _unrecorded(faults: Sequence[Fault], run: Run) -> Iterator[str]:
         if len(paths) < 2:
             continue
         separating = [name for name in run.metrics if 0 < sum(name in path for path in paths) < len(paths)]
-        missing = [(name, value) for name in separating if isinstance(value := run.metrics[name], Unavailable)]
-        for name, value in missing[:MOST_METRICS]:
-            hint = f" ({value.hint})" if value.hint else ""
-            yield f"{name} would tell the causes of {fault.objective.variable.name} apart: {value.reason}{hint}"
+        unknown = [(name, value) for name in separating if isinstance(value := run.metrics[name], Unavailable)]
+        # Without a hint nobody could have recorded it: the flight did not come so far.
+        for name, value in [(name, value) for name, value in unknown if value.hint][:MOST_METRICS]:
+            told = f"{name} would tell the causes of {fault.objective.variable.name} apart"
+            yield f"{told}: {value.reason} ({value.hint})"
 
 
 def experiment(

@@ -179,7 +179,7 @@ def _negative_log_posterior(
 
 def leave_one_out(kernel: Kernel, points: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Leave-one-out errors and their predicted spreads (Rasmussen and Williams 2006, Eq. 5.12)."""
-    covariance = kernel(points, points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
+    covariance = kernel.among(points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
     inverse = np.linalg.inv(covariance)
     diagonal = np.diag(inverse)
     return (inverse @ targets) / diagonal, 1.0 / np.sqrt(diagonal)

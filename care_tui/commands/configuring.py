@@ -36,7 +36,8 @@ def diff(
     found = compare(one, other, everything=everything)
     emit("".join(f"{clean(str(difference))}\n" for difference in found))
     shared = len(found) - sum(difference.a is None or difference.b is None for difference in found)
-    say(f"{len(found)} parameters differ, {shared} of them in value: {one.name} (-) against {other.name} (+)")
+    differ = f"{len(found)} {'parameter differs' if len(found) == 1 else 'parameters differ'}"
+    say(f"{differ}, {shared} in value: {one.name} (-) against {other.name} (+)")
     raise typer.Exit(ExitCode.FAULT if found else ExitCode.OK)
 
 

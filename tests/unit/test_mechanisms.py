@@ -117,3 +117,10 @@ def test_columns_follow_the_names() -> None:
     rows = [{"a": 1.0, "b": 2.0, "c": 3.0}, {"c": 6.0, "b": 5.0, "a": 4.0}]
     assert columns(rows, ["c", "a"]).tolist() == [[3.0, 1.0], [6.0, 4.0]]
     assert columns([], ["c", "a"]).shape == (0, 2)
+
+
+@pytest.mark.parametrize("n", [1, 63, 64, 130])
+def test_points_among_themselves_are_the_same_numbers(n: int) -> None:
+    points = np.random.default_rng(n).normal(size=(n, 5))
+    kernel = Kernel(np.array([0.1, 0.5, 1.0, 2.0, 0.0]), 0.7, 0.4, 0.1)
+    np.testing.assert_array_equal(kernel.among(points), kernel(points, points))
