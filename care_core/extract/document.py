@@ -39,7 +39,7 @@ def _lines() -> Iterator[str]:
     yield _HEAD
     yield ""
     yield "## Missions"
-    for name, kind in MISSION_KINDS.items():
+    for name, kind in sorted(MISSION_KINDS.items()):
         yield ""
         yield f"### `{name}`"
         yield ""
@@ -77,7 +77,7 @@ def _extractor(extractor: Extractor) -> Iterator[str]:
 
 
 def _reads(needs: Wanted) -> Iterator[str]:
-    same = next((name for name, kind in MISSION_KINDS.items() if needs and kind.needs({"kind": name}) == needs), None)
+    same = next((name for name, kind in sorted(MISSION_KINDS.items()) if needs and kind.needs({"kind": name}) == needs), None)
     if needs:
         parts = (f"`{channel}` ({', '.join(f'`{field}`' for field in fields)})" for channel, fields in needs.items())
         yield ""
