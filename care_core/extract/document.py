@@ -77,7 +77,8 @@ def _extractor(extractor: Extractor) -> Iterator[str]:
 
 
 def _reads(needs: Wanted) -> Iterator[str]:
-    same = next((name for name, kind in sorted(MISSION_KINDS.items()) if needs and kind.needs({"kind": name}) == needs), None)
+    kinds = sorted(MISSION_KINDS.items())
+    same = next((name for name, kind in kinds if needs and kind.needs({"kind": name}) == needs), None)
     if needs:
         parts = (f"`{channel}` ({', '.join(f'`{field}`' for field in fields)})" for channel, fields in needs.items())
         yield ""
