@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_core.causal.counterfactual import Config, World
+from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, columns
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.diagnose.records import PathNode
@@ -16,6 +17,8 @@ from care_core.profile.model import EffectRecord, Model
 from care_core.profile.schema import Schema
 from care_core.run import Evidence, Run, is_known
 
+FELT = 0.05
+"""Effect times support, in spreads, from which an edge is taken to carry something of this run."""
 PERMUTATIONS = 12
 """Orders of reset per Shapley estimate, each also taken backwards."""
 SAME = 1e-6
@@ -129,12 +132,15 @@ def best_paths(model: Model, objective: str, options: Sequence[str]) -> dict[str
     """Per option the directed path to the objective with the largest mean of effect times support.
 
     The path ACE that is reported is Eq. 2 of that path; an edge seen in few resamples only counts less in the choice,
-    since metrics that repeat each other offer many paths.
+    since metrics that repeat each other offer many paths. A path with an edge that hardly carries anything is taken
+    only where there is no other: in a mean, a strong last edge hides it.
     """
     weight = {edge: record.effect * record.support for edge, record in model.edges.items()}
+    felt = CausalGraph(model.graph.nodes, frozenset(edge for edge in model.graph.directed if weight[edge] >= FELT))
     found: dict[str, CausalPath] = {}
     for option in options:
-        paths = rank_paths(model.graph, objective, [option], weight, top=1)
+        paths = rank_paths(felt, objective, [option], weight, top=1)
+        paths = paths or rank_paths(model.graph, objective, [option], weight, top=1)
         if paths:
             effects = [model.edges[edge].effect for edge in paths[0].edges]
             found[option] = CausalPath(paths[0].nodes, sum(effects) / len(effects))

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from care_core.causal.counterfactual import World
+from care_core.causal.graph import CausalGraph
 from care_core.diagnose.ranking import (
     _shapley,
     best_paths,
@@ -19,6 +20,7 @@ from care_core.diagnose.ranking import (
     reference_config,
     suspects,
 )
+from care_core.profile.model import EdgeRecord
 from care_core.profile.store import Profile
 from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run, with_variable
 
@@ -138,3 +140,21 @@ def test_a_refused_mission_has_unknown_values_on_the_path(planted: Profile) -> N
         best_paths(planted.model, "success", [o.name for o in OPTIONS])["radius"], here, SCHEMA, run, DEFAULTS
     )
     assert [node.value for node in path] == [0.5, None, 0.0]
+
+
+def test_a_path_is_not_led_over_an_edge_that_carries_nothing(planted: Profile) -> None:
+    edges = dict(planted.model.edges)
+    direct, around = ("speed", "time"), (("speed", "mean_speed"), ("mean_speed", "time"))
+    some = next(iter(edges.values()))
+
+    def edge(pair: tuple[str, str], effect: float) -> EdgeRecord:
+        return some.model_copy(update={"source": pair[0], "target": pair[1], "effect": effect, "support": 1.0})
+
+    strong_last = ("tracking_error", "time")
+    made = {around[0]: 0.3, around[1]: 0.3, ("speed", "tracking_error"): 0.0, strong_last: 1.5}
+    graph = CausalGraph(planted.model.graph.nodes, frozenset(made))
+    model = replace(planted.model, graph=graph, edges={pair: edge(pair, effect) for pair, effect in made.items()})
+    assert best_paths(model, "time", ["speed"])["speed"].nodes == ("speed", "mean_speed", "time")
+
+    lone = replace(model, graph=CausalGraph(graph.nodes, frozenset({direct})), edges={direct: edge(direct, 0.0)})
+    assert best_paths(lone, "time", ["speed"])["speed"].nodes == direct
