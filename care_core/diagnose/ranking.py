@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,7 +87,7 @@ def suspects(
     an association.
     """
     off = deviating(world.config, reference)
-    paths = best_paths(world.model, objective, off)
+    paths = best_paths(world.model, objective, off, _carriers(world, schema))
     effects = {name: world.model.effects.get((name, objective)) for name in paths}
     names = list(paths)
     learned = [name for name in names if effects[name] is not None and objective in world.model.outcomes]
@@ -128,23 +128,41 @@ def not_ruled_out(
     return tuple(Suspect(name, 0.0, CausalPath((name, objective), 0.0), None) for name in others)
 
 
-def best_paths(model: Model, objective: str, options: Sequence[str]) -> dict[str, CausalPath]:
+def best_paths(
+    model: Model, objective: str, options: Sequence[str], carriers: Collection[str] | None = None
+) -> dict[str, CausalPath]:
     """Per option the directed path to the objective with the largest mean of effect times support.
 
     The path ACE that is reported is Eq. 2 of that path; an edge seen in few resamples only counts less in the choice,
-    since metrics that repeat each other offer many paths. A path with an edge that hardly carries anything is taken
-    only where there is no other: in a mean, a strong last edge hides it.
+    since metrics that repeat each other offer many paths. Where there is another way, none leads over what did not
+    carry this fault, nor over an edge that hardly carries anything: in a mean, a strong last edge hides it.
+
+    Args:
+        carriers: metrics that may have carried this run's fault; all when None.
     """
     weight = {edge: record.effect * record.support for edge, record in model.edges.items()}
-    felt = CausalGraph(model.graph.nodes, frozenset(edge for edge in model.graph.directed if weight[edge] >= FELT))
+    whole = model.graph.directed
+    met = frozenset(edge for edge in whole if carriers is None or edge[1] in carriers or edge[1] == objective)
+    felt = frozenset(edge for edge in whole if weight[edge] >= FELT)
+    graphs = [CausalGraph(model.graph.nodes, edges) for edges in (met & felt, met, felt, whole)]
     found: dict[str, CausalPath] = {}
     for option in options:
-        paths = rank_paths(felt, objective, [option], weight, top=1)
-        paths = paths or rank_paths(model.graph, objective, [option], weight, top=1)
+        paths = next(filter(None, (rank_paths(graph, objective, [option], weight, top=1) for graph in graphs)), None)
         if paths:
             effects = [model.edges[edge].effect for edge in paths[0].edges]
             found[option] = CausalPath(paths[0].nodes, sum(effects) / len(effects))
     return found
+
+
+def _carriers(world: World, schema: Schema) -> frozenset[str]:
+    """Metrics that may have carried this run's fault: known, and no event that stayed away as it usually does."""
+    found = set()
+    for variable in schema.metrics:
+        value, summary = world.observed.get(variable.name), world.model.summaries.get(variable.name)
+        is_usual = variable.type == "bool" and summary is not None and value == round(summary.quantile(0.5))
+        if isinstance(value, (int, float)) and not is_usual:
+            found.add(variable.name)
+    return frozenset(found)
 
 
 def _reset(config: Config, reference: Config, names: frozenset[str]) -> dict[str, float]:

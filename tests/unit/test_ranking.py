@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
 from care_core.diagnose.ranking import (
+    _carriers,
     _shapley,
     best_paths,
     describe_path,
@@ -155,6 +156,17 @@ def test_a_path_is_not_led_over_an_edge_that_carries_nothing(planted: Profile) -
     graph = CausalGraph(planted.model.graph.nodes, frozenset(made))
     model = replace(planted.model, graph=graph, edges={pair: edge(pair, effect) for pair, effect in made.items()})
     assert best_paths(model, "time", ["speed"])["speed"].nodes == ("speed", "mean_speed", "time")
+    assert best_paths(model, "time", ["speed"], {"tracking_error"})["speed"].nodes == (
+        "speed",
+        "tracking_error",
+        "time",
+    )
 
     lone = replace(model, graph=CausalGraph(graph.nodes, frozenset({direct})), edges={direct: edge(direct, 0.0)})
     assert best_paths(lone, "time", ["speed"])["speed"].nodes == direct
+
+
+def test_a_check_that_did_not_act_carried_nothing(planted: Profile) -> None:
+    assert "armed" not in _carriers(world(planted, speed=1.4), SCHEMA)
+    refused = world(planted, min_sats=13)
+    assert _carriers(refused, SCHEMA) == {"armed"}
