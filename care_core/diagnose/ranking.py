@@ -155,9 +155,9 @@ def best_paths(
 
 
 def _carriers(world: World, schema: Schema) -> frozenset[str]:
-    """Metrics that may have carried this run's fault: known, and no event that stayed away as it usually does."""
+    """Metrics and objectives that may have carried this run's fault: known, and no event that stayed away as usual."""
     found = set()
-    for variable in schema.metrics:
+    for variable in (*schema.metrics, *schema.objectives):
         value, summary = world.observed.get(variable.name), world.model.summaries.get(variable.name)
         is_usual = variable.type == "bool" and summary is not None and value == round(summary.quantile(0.5))
         if isinstance(value, (int, float)) and not is_usual:

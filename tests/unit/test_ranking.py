@@ -169,4 +169,5 @@ def test_a_path_is_not_led_over_an_edge_that_carries_nothing(planted: Profile) -
 def test_a_check_that_did_not_act_carried_nothing(planted: Profile) -> None:
     assert "armed" not in _carriers(world(planted, speed=1.4), SCHEMA)
     refused = world(planted, min_sats=13)
-    assert _carriers(refused, SCHEMA) == {"armed"}
+    assert _carriers(refused, SCHEMA) == {"armed", "success"}
+    assert "time" in _carriers(world(planted, speed=1.4), SCHEMA)  # it may have cost energy
