@@ -107,7 +107,7 @@ class Case:
     name: str
     make: Callable[[Path], None]
     decode_all: str
-    library: str
+    decoder: str
     bar_s: float
 
 
@@ -331,7 +331,7 @@ def report(case: Case, found: Measured, start: Cost) -> None:
             found.ratio >= LEAST_RATIO,
         ),
     )
-    costs = {"care triage": triage, "its reading": found.read, f"{case.library}, all": found.decode, "cat": found.cat}
+    costs = {"care triage": triage, "its reading": found.read, f"{case.decoder}, all": found.decode, "cat": found.cat}
     print(f"{case.name}, {found.size_mb:.1f} MB")
     for name, cost in costs.items():
         times = f"{cost.seconds / triage.seconds:7.2f}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import threading
 from collections.abc import Iterable
 from pathlib import Path
 from typing import ClassVar
@@ -79,13 +80,9 @@ class CareApp(App[int], inherit_bindings=False):
     def _end_on_signals(self) -> None:
         """A lost connection or a polite kill ends the app as `q` does, so the terminal is given back as it was."""
         loop = asyncio.get_running_loop()
-        for name in ("SIGHUP", "SIGTERM"):
-            number = getattr(signal, name, None)
-            if number is not None:
-                try:
-                    loop.add_signal_handler(number, self.action_interrupt)
-                except (NotImplementedError, RuntimeError, ValueError):  # Windows, or not the main thread
-                    return
+        if threading.current_thread() is threading.main_thread():  # no other thread may be told of signals
+            for number in (signal.SIGHUP, signal.SIGTERM):
+                loop.add_signal_handler(number, self.action_interrupt)
 
     def note(self, answer: Case | CareError) -> None:
         """Remember what the last diagnosis means for the exit code."""

@@ -84,7 +84,7 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
     """The source's `profile.yaml` for the other robot, its comments kept."""
     from ruamel.yaml import YAML
 
-    yaml = YAML()
+    yaml = YAML(typ="rt")  # keeps comments; like `safe` it builds no object that a tag names
     yaml.width = 120
     data: Any = yaml.load(text)
     source = data["name"]

@@ -6,6 +6,7 @@ never raises on poor data. New platforms are YAML files that combine these, not 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
@@ -67,27 +68,27 @@ class Extractor:
     """What it reads of the channels that the mission section names, beside `needs`: `odometry`, `battery`, ..."""
 
 
-class MissionKind:
+class MissionKind(ABC):
     """How missions are found in a log, one subclass an ecosystem (see `ardupilot` and `navigation`)."""
 
     name: str
     args: Mapping[str, str]
 
+    @abstractmethod
     def needs(self, spec: Args) -> Wanted:
         """The channels and fields that `missions`, `fit` and `evidence` read."""
-        raise NotImplementedError
 
+    @abstractmethod
     def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
         """Every mission of the log, in time order; empty when the log holds none."""
-        raise NotImplementedError
 
+    @abstractmethod
     def mismatch(self, mission: Mission) -> str:
         """Why this is not the mission that the profile's thresholds belong to, one sentence; '' when it is."""
-        raise NotImplementedError
 
+    @abstractmethod
     def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
         """Messages that speak about a failure of this mission, in time order."""
-        raise NotImplementedError
 
 
 EXTRACTORS: dict[str, Extractor] = {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime, timedelta, timezone
 
 import numpy as np
@@ -23,6 +23,9 @@ GPS_TIME = tuple(name for pair in _GPS_FIELDS for name in pair)
 """Fields of a GPS message that tell the wall clock, week and milliseconds of it: names of firmware 3.2, older ones."""
 
 
+PARM_FIELDS = ("Name", "Value", "Default")
+
+
 def history(rows: Iterable[tuple[float, str, float, float | None]], source: str) -> dict[str, tuple[Setting, ...]]:
     """Per parameter its values in time order, out of (time, name, value, default); a value said again is no change."""
     known: dict[str, list[Setting]] = {}
@@ -31,6 +34,16 @@ def history(rows: Iterable[tuple[float, str, float, float | None]], source: str)
         if not values or values[-1].value != value:
             values.append(Setting(name, value, source, default=default, changed_at_s=t if values else None))
     return {name: tuple(values) for name, values in known.items()}
+
+
+def parameters_of(table: Table | None, number: Callable[[float], float]) -> dict[str, tuple[Setting, ...]]:
+    """The history that PARM records tell (None: there are none); `number` makes the value that was set of a recorded one."""
+    if table is None or not {"Name", "Value"} <= table.columns.keys():
+        return {}
+    defaults = table.columns.get("Default", np.full(len(table), np.nan)).tolist()
+    references = [number(default) if np.isfinite(default) else None for default in defaults]
+    rows = zip(table.t.tolist(), table["Name"].tolist(), map(number, table["Value"].tolist()), references, strict=True)
+    return history(rows, "PARM")
 
 
 def shortest(value: float) -> float:

@@ -39,6 +39,11 @@ class Channel:
     count: int
     rate_hz: float | None = None
 
+    @classmethod
+    def over(cls, name: str, type: str, count: int, span_s: float) -> Channel:
+        """A channel whose first and last of `count` messages are `span_s` apart."""
+        return cls(name, type, count, (count - 1) / span_s if count > 1 and span_s > 0 else None)
+
 
 @runtime_checkable
 class LazyColumns(Protocol):

@@ -25,6 +25,7 @@ from care_core.logs.ros_message import (
     Types,
     compile_decoder,
     read_elements,
+    read_numbers,
 )
 
 HEADER_SIZE = 4
@@ -173,12 +174,7 @@ class _Cdr:
             pos, size = self._counted(buffer, pos, count)
             if size:
                 pos = (pos + mask) & ~mask
-            after = pos + size * dtype.itemsize
-            if after > end:
-                raise MalformedMessageError("an array reaches beyond the message")
-            if keep:
-                values.append(np.frombuffer(buffer[pos:after], dtype))
-            return after
+            return read_numbers(dtype, buffer, pos, end, size, values if keep else None)
 
         return numbers
 

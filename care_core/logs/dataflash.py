@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
-from care_core.logs.ardupilot import GPS_TIME, facts_of, history, shortest, wall_clock
+from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, shortest, wall_clock
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.clock import Clock, find_clock
 from care_core.logs.damage import summarised
+from care_core.logs.mapped import Bytes, MappedFile
 from care_core.run import Damage, Setting
 
-Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.integer[Any]]
 
 _FMT, _FMT_LENGTH = 0x80, 89
@@ -121,7 +121,8 @@ class DataFlashLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        data = self._bytes()
+        self._file = MappedFile(path)
+        data = self._file.bytes()
         starts = _find_headers(data)
         formats, redefined = _read_formats(data, starts)
         starts, gaps = _follow_records(data, starts, formats)
@@ -141,19 +142,17 @@ class DataFlashLog:
 
     @cached_property
     def _channels(self) -> tuple[Channel, ...]:
-        data = self._bytes()
+        data = self._file.bytes()
         found = []
         for name in sorted(self._formats):
             t = self._times(data, name)
             count = len(t)
             if count:
-                span = float(t[-1] - t[0])
-                rate = (count - 1) / span if count > 1 and span > 0 else None
-                found.append(Channel(name, self._formats[name][-1].code, count, rate))
+                found.append(Channel.over(name, self._formats[name][-1].code, count, float(t[-1] - t[0])))
         return tuple(found)
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        data = self._bytes()
+        data = self._file.bytes()
         return {
             name: Table(self._times(data, name), self._columns(data, name, fields))
             for name, fields in wanted.items()
@@ -165,13 +164,7 @@ class DataFlashLog:
 
     @cached_property
     def _settings(self) -> Mapping[str, tuple[Setting, ...]]:
-        table = self.read({"PARM": ("Name", "Value", "Default")}).get("PARM")
-        if table is None or not {"Name", "Value"} <= table.columns.keys():
-            return {}
-        values, defaults = table["Value"], table.columns.get("Default", np.full(len(table), np.nan))
-        references = [shortest(default) if np.isfinite(default) else None for default in defaults.tolist()]
-        rows = zip(table.t.tolist(), table["Name"].tolist(), map(shortest, values), references, strict=True)
-        return history(rows, "PARM")
+        return parameters_of(self.read({"PARM": PARM_FIELDS}).get("PARM"), shortest)
 
     @cached_property
     def facts(self) -> Mapping[str, str]:
@@ -183,20 +176,6 @@ class DataFlashLog:
     def start(self) -> str | None:
         """Wall clock of the first timestamp (UTC), from the first GPS record that knows its week."""
         return wall_clock(self.read({"GPS": GPS_TIME}))
-
-    def _bytes(self) -> Bytes:
-        """The file as an array of bytes, mapped and not copied. Raises LogError where it has become shorter since."""
-        try:
-            data, size = self._mapped, self.path.stat().st_size
-        except (OSError, ValueError) as err:
-            raise LogError(f"Cannot read the file: {err}.", where=str(self.path)) from err
-        if size < len(data):  # touching a byte that is gone ends the process
-            raise LogError("The file was cut while it was read.", hint="Try again.", where=str(self.path))
-        return data
-
-    @cached_property
-    def _mapped(self) -> Bytes:
-        return np.asarray(np.memmap(self.path, dtype=np.uint8, mode="r"))
 
     def _count(self, name: str) -> int:
         return sum(len(self._offsets[number]) for number in self._types(name))
@@ -218,7 +197,7 @@ class DataFlashLog:
         known = [field for field in fields if any(field in form.fields for form, _ in parts)]
         if len(parts) == 1:
             form, offsets = parts[0]
-            return _RecordColumns(self._bytes, {field: form.fields[field] for field in known}, offsets)
+            return _RecordColumns(self._file.bytes, {field: form.fields[field] for field in known}, offsets)
         return {
             field: np.concatenate([
                 _decode(data, offsets, form.fields[field]) if field in form.fields else np.full(len(offsets), np.nan)
@@ -246,7 +225,7 @@ class DataFlashLog:
 
     @cached_property
     def _timeline(self) -> tuple[Offsets, NDArray[np.float64]]:
-        data = self._bytes()
+        data = self._file.bytes()
         starts = np.sort(np.concatenate(list(self._offsets.values())))
         places, stamps = self._stamped(data, starts)
         return places, self._clock.seconds(stamps, places)
@@ -284,7 +263,7 @@ class DataFlashLog:
                     return float(self._clock.seconds(_stamps(data, place, form), place)[0])
             return None
 
-        found = [Damage(_gap_text(low, high, len(self._mapped)), low, time_at(low)) for low, high in gaps]
+        found = [Damage(_gap_text(low, high, len(data)), low, time_at(low)) for low, high in gaps]
         return summarised(found, "damaged places")
 
 

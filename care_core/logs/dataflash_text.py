@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
-from care_core.logs.ardupilot import GPS_TIME, facts_of, history, wall_clock
+from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, wall_clock
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
 from care_core.logs.dataflash import time_field
+from care_core.logs.mapped import MappedFile
 from care_core.run import Damage, Setting
 
 Floats = NDArray[np.float64]
@@ -49,7 +50,7 @@ class DataFlashTextLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._data = self._bytes()
+        self._data = MappedFile(path).bytes()
         self._formats: dict[str, Columns] = {}
         self._lines = self._index()
         self._read_formats()
@@ -66,8 +67,7 @@ class DataFlashTextLog:
         found = []
         for name in sorted(name for name, places in self._lines.items() if len(places)):
             t = self._times(name)
-            span = float(t[-1] - t[0]) if len(t) > 1 else 0.0
-            found.append(Channel(name, self._formats[name].codes, len(t), (len(t) - 1) / span if span > 0 else None))
+            found.append(Channel.over(name, self._formats[name].codes, len(t), float(t[-1] - t[0])))
         return tuple(found)
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
@@ -82,13 +82,10 @@ class DataFlashTextLog:
 
     @cached_property
     def _settings(self) -> Mapping[str, tuple[Setting, ...]]:
-        table = self.read({"PARM": ("Name", "Value", "Default")}).get("PARM")
-        if table is None or not {"Name", "Value"} <= table.columns.keys():
-            return {}
-        values, defaults = table["Value"], table.columns.get("Default", np.full(len(table), np.nan))
-        references = [default if np.isfinite(default) else None for default in defaults.tolist()]
-        rows = zip(table.t.tolist(), table["Name"].tolist(), values.tolist(), references, strict=True)
-        return history((row for row in rows if np.isfinite(row[2])), "PARM")
+        table = self.read({"PARM": PARM_FIELDS}).get("PARM")
+        if table is not None and "Value" in table.columns:
+            table = table.where(np.isfinite(table["Value"]))
+        return parameters_of(table, float)
 
     @cached_property
     def facts(self) -> Mapping[str, str]:
@@ -102,12 +99,6 @@ class DataFlashTextLog:
     def start(self) -> str | None:
         """Wall clock of the first timestamp (UTC), from the first GPS line that knows its week."""
         return wall_clock(self.read({"GPS": GPS_TIME}))
-
-    def _bytes(self) -> NDArray[np.uint8]:
-        try:
-            return np.asarray(np.memmap(self.path, dtype=np.uint8, mode="r"))
-        except (OSError, ValueError) as err:
-            raise LogError(f"Cannot read the file: {err}.", where=str(self.path)) from err
 
     def _index(self) -> dict[str, Offsets]:
         """Message name -> the first bytes of its lines. What does not begin like a message is under ''."""

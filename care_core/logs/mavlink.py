@@ -22,6 +22,7 @@ from care_core.logs.ardupilot import facts_of, history, shortest
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
+from care_core.logs.mapped import Bytes, MappedFile
 from care_core.logs.mavlink_packets import (
     STAMP_BYTES,
     V1,
@@ -37,7 +38,6 @@ from care_core.logs.mavlink_packets import (
 )
 from care_core.run import Damage, Setting
 
-Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.int64]
 
 _HEARTBEAT, _PARAM_VALUE, _STATUSTEXT, _AUTOPILOT_VERSION = 0, 22, 253, 148
@@ -79,8 +79,8 @@ class MavlinkLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        data = self._bytes()
-        self._size = len(data)
+        self._file = MappedFile(path)
+        data = self._file.bytes()
         packets = find_packets(data)
         if not len(packets):
             raise LogError("The log holds no sound MAVLink packet.", hint="Copy it again.", where=str(path))
@@ -102,19 +102,16 @@ class MavlinkLog:
         )
 
     def channels(self) -> tuple[Channel, ...]:
-        data = self._bytes()
+        data = self._file.bytes()
         found = []
         for name, (_, start) in sorted(chain(self._starts.items(), self._unknown.items())):
             t = self._times(data, start)
-            span = float(t[-1] - t[0])
-            rate = (len(t) - 1) / span if len(t) > 1 and span > 0 else None
-            found.append(
-                Channel(name, "MAVLink" if name in self._starts else "MAVLink of another definition", len(t), rate)
-            )
+            kind = "MAVLink" if name in self._starts else "MAVLink of another definition"
+            found.append(Channel.over(name, kind, len(t), float(t[-1] - t[0])))
         return tuple(found)
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        data = self._bytes()
+        data = self._file.bytes()
         tables = {}
         for name, fields in wanted.items():
             if name in self._starts:
@@ -162,16 +159,6 @@ class MavlinkLog:
         if not _EARLIEST_S < self._first_stamp_s < 1e11:
             return None
         return datetime.fromtimestamp(self._first_stamp_s, timezone.utc).isoformat(timespec="seconds")
-
-    def _bytes(self) -> Bytes:
-        """The file as an array of bytes, mapped and not copied."""
-        try:
-            data = np.asarray(np.memmap(self.path, dtype=np.uint8, mode="r"))
-        except (OSError, ValueError) as err:
-            raise LogError(f"Cannot read the file: {err}.", where=str(self.path)) from err
-        if len(data) < getattr(self, "_size", 0):
-            raise LogError("The file was cut while it was read.", hint="Try again.", where=str(self.path))
-        return data
 
     def _times(self, data: Bytes, start: Offsets) -> NDArray[np.float64]:
         return self._clock.seconds(stamps(data, start), start)

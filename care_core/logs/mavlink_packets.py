@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Bytes = NDArray[np.uint8]
+from care_core.logs.mapped import Bytes
+
 Offsets = NDArray[np.int64]
 
 STAMP_BYTES = 8

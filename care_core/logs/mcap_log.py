@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from care_core.logs.base import LogFormat
 from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, unpack
 from care_core.logs.mapped import mapped
-from care_core.logs.mcap_records import MAGIC, BrokenRecordError, Chunk, Contents, locate, read_contents
+from care_core.logs.mcap_records import MAGIC, Chunk, Contents, locate, read_contents
 from care_core.logs.recording import recording_at
-from care_core.logs.ros_log import Connection, Flaw, Message, RosLog, timed
+from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Message, RosLog, timed
 from care_core.logs.ros_message import Buffer
 from care_core.logs.ros_metadata import Metadata, parse_metadata
 

@@ -23,7 +23,7 @@ from mcap.records import Channel, Header, Metadata, Schema, Statistics
 from numpy.typing import NDArray
 
 from care_core.logs.compression import CannotUnpackError, unpack
-from care_core.logs.ros_log import Connection, Flaw
+from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw
 from care_core.logs.ros_message import Buffer
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -40,10 +40,6 @@ _SIZE = struct.Struct("<Q")
 _INDEX = struct.Struct("<HI")
 _TEXT_SIZE = struct.Struct("<I")
 _LONGEST_NAME = 64
-
-
-class BrokenRecordError(Exception):
-    """Bytes that are no record. Stays inside the reader."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

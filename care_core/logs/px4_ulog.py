@@ -62,9 +62,8 @@ class Px4Log:
     def channels(self) -> tuple[Channel, ...]:
         found = []
         for name, t in (*self._channels.items(), (MESSAGES, self._words.t)):
-            span = float(t[-1] - t[0]) if len(t) else 0.0
             if len(t):
-                found.append(Channel(name, name.partition("#")[0], len(t), (len(t) - 1) / span if span > 0 else None))
+                found.append(Channel.over(name, name.partition("#")[0], len(t), float(t[-1] - t[0])))
         return tuple(sorted(found, key=lambda channel: channel.name))
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:

@@ -14,8 +14,8 @@ from care_core.errors import LogError
 from care_core.logs.base import LogFormat
 from care_core.logs.mapped import mapped
 from care_core.logs.recording import recording_at
-from care_core.logs.ros1_records import MAGIC, BrokenRecordError, Chunk, Contents, locate, read_contents
-from care_core.logs.ros_log import Connection, Flaw, Message, RosLog, timed
+from care_core.logs.ros1_records import MAGIC, Chunk, Contents, locate, read_contents
+from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Message, RosLog, timed
 from care_core.logs.ros_metadata import Metadata
 
 _MOST_PAUSE_NS = 60_000_000_000

@@ -23,6 +23,7 @@ from care_core.logs.ros_message import (
     compile_decoder,
     parse_definition,
     read_elements,
+    read_numbers,
 )
 
 _COUNT = struct.Struct("<I")
@@ -76,12 +77,7 @@ class _Ros1:
 
         def numbers(buffer: Buffer, pos: int, end: int, values: list[Any]) -> int:
             pos, size = _counted(buffer, pos, count)
-            after = pos + size * dtype.itemsize
-            if after > end:
-                raise MalformedMessageError("an array reaches beyond the message")
-            if keep:
-                values.append(np.frombuffer(buffer[pos:after], dtype))
-            return after
+            return read_numbers(dtype, buffer, pos, end, size, values if keep else None)
 
         return numbers
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.logs.compression import CannotUnpackError, unpack
-from care_core.logs.ros_log import Connection, Flaw
+from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw
 from care_core.logs.ros_message import Buffer
 
 MAGIC = b"#ROSBAG V2.0\n"
@@ -29,10 +29,6 @@ _MESSAGE, _BAG, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = range(2, 8)
 _SIZE = struct.Struct("<I")
 _TIME = struct.Struct("<II")
 _IS_MESSAGE = b"\x04\x00\x00\x00op=\x02"
-
-
-class BrokenRecordError(Exception):
-    """Bytes that are no record. Stays inside the reader."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

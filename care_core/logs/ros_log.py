@@ -69,6 +69,10 @@ class Flaw:
     cuts: bool = False
 
 
+class BrokenRecordError(Exception):
+    """Bytes that are no record. Stays inside the reader of a container."""
+
+
 class Part(Protocol):
     """One file of a recording."""
 
@@ -413,12 +417,8 @@ def _believable(every: Sequence[NDArray[np.int64]]) -> tuple[int, int, int]:
 
 def _channel(topic: str, types: Mapping[str, None], recorded: Sequence[NDArray[np.int64]]) -> Channel:
     count = sum(len(times) for times in recorded)
-    rate_hz = None
-    if count > 1:
-        times = np.concatenate(recorded)
-        span_s = (int(times.max()) - int(times.min())) / 1e9
-        rate_hz = (count - 1) / span_s if span_s > 0 else None
-    return Channel(topic, ", ".join(types), count, rate_hz)
+    times = np.concatenate(recorded) if count else np.zeros(1, dtype=np.int64)
+    return Channel.over(topic, ", ".join(types), count, (int(times.max()) - int(times.min())) / 1e9)
 
 
 def _clock_text(seconds: float) -> str:

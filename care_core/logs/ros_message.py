@@ -15,6 +15,8 @@ from itertools import count
 from mmap import mmap
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 Buffer = bytes | mmap
 Step = Callable[[Buffer, int, int, list[Any]], int]
 """Reads at a position of a buffer, not beyond `end`, appends what is wanted, and returns the next position."""
@@ -269,6 +271,16 @@ class _Plan:
         if any(one.wanted for one in self.pending):
             self.last_useful = len(self.steps)
         self.pending = []
+
+
+def read_numbers(dtype: np.dtype[Any], buffer: Buffer, pos: int, end: int, size: int, values: list[Any] | None) -> int:
+    """Read `size` numbers from `pos`: appends them to `values` unless that is None, returns the next position."""
+    after = pos + size * dtype.itemsize
+    if after > end:
+        raise MalformedMessageError("an array reaches beyond the message")
+    if values is not None:
+        values.append(np.frombuffer(buffer[pos:after], dtype))
+    return after
 
 
 def read_elements(each: MessageDecoder, buffer: Buffer, pos: int, end: int, size: int, values: list[Any]) -> int:

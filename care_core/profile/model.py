@@ -24,6 +24,7 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Kernel, Mechanism, Transform
 from care_core.errors import ProfileError
 
+ARCHIVE = b"PK\x03\x04"
 PRIOR = "prior:"
 """Begins the key of a mechanism that belongs to the platform a profile was carried over from."""
 
@@ -298,18 +299,20 @@ def read_model(folder: Path) -> Model:
             f"'{key}': {first['msg']}.", hint="Train the profile again with 'care train'.", where=str(path)
         ) from err
     except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as err:
-        # numpy's advice on a file that is no archive is to load it unsafely.
-        what = "its arrays cannot be read" if "pickle" in str(err) else str(err).rstrip(".")
         raise ProfileError(
-            f"The model is damaged: {what}.", hint="Train the profile again with 'care train'.", where=str(folder)
+            f"The model is damaged: {str(err).rstrip('.')}.",
+            hint="Train the profile again with 'care train'.",
+            where=str(folder),
         ) from err
     return _to_model(record, graph, mechanisms)
 
 
 def _open_arrays(path: Path) -> NpzFile:
-    arrays = np.load(path, allow_pickle=False)
-    if not isinstance(arrays, NpzFile):
-        raise ValueError(f"{path.name} is not an archive of arrays")
+    # Asked first: numpy's advice on a file that is no archive is to load it unsafely.
+    with path.open("rb") as stream:
+        if stream.read(len(ARCHIVE)) != ARCHIVE:
+            raise ValueError(f"{path.name} is not an archive of arrays")
+    arrays: NpzFile = np.load(path, allow_pickle=False)
     return arrays
 
 
@@ -359,7 +362,10 @@ def _mechanisms(records: Mapping[str, _MechanismRecord], arrays: Mapping[str, Fl
 
 def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArray]) -> Mechanism:
     def floats(name: str) -> FloatArray:
-        array = np.asarray(arrays[f"{key}/{name}"], dtype=np.float64)
+        try:
+            array = np.asarray(arrays[f"{key}/{name}"], dtype=np.float64)
+        except ValueError as err:  # objects, which are never unpacked
+            raise ValueError(f"{key}/{name} holds no numbers") from err
         if not np.isfinite(array).all():
             raise ValueError(f"{key}/{name} holds values that are not finite")
         return array
