@@ -1,0 +1,89 @@
+"""What a look at any log answers: moments and findings. Plain values, made by the checks and read by reports and app."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+Severity = Literal["info", "warning", "critical"]
+FindingKind = Literal[
+    "motor",
+    "thrust",
+    "vibration",
+    "gps",
+    "compass",
+    "estimator",
+    "barometer",
+    "imu",
+    "battery",
+    "radio",
+    "attitude",
+    "tuning",
+    "takeoff",
+    "crash",
+    "prearm",
+    "cpu",
+    "log",
+    "laser",
+    "localisation",
+    "drive",
+    "blocked",
+    "planner",
+    "control",
+    "tf",
+    "commands",
+    "topics",
+    "software",
+]
+FINDING_KINDS: tuple[FindingKind, ...] = get_args(FindingKind)
+
+Suspect = Literal["hardware", "world", "parameter", "operation"]
+"""What a finding speaks of: a part that failed, what the robot met, how it was set, what its operator did."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """One line of the account: what happened at `time_s` seconds from the start of the log, and where it says so."""
+
+    time_s: float
+    kind: str
+    """`vehicle`, `mode`, `arming`, `message`, `error`, `parameter`, `goal`, ...: what sort of thing happened."""
+    text: str
+    source: str
+    """The message type or topic that tells it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something that was not as it should be."""
+
+    kind: FindingKind
+    title: str
+    """What is wrong, in one clause an operator reads aloud: "motor 2 lost thrust"."""
+    onset_s: float
+    """Seconds from the start of the log at which it begins."""
+    end_s: float
+    severity: Severity
+    evidence: str
+    """The numbers that show it, beside the limits that they broke."""
+    source: str
+    """What of the log shows it, and where its limit comes from (documentation, source line)."""
+    suspect: Suspect = "hardware"
+    probability: float = 0.5
+    """How likely it is, seeing this, that the thing named really failed (0 to 1); measured on flights and drives whose
+    truth is known where there are any."""
+    after_impact: bool = False
+    consequences: tuple[Finding, ...] = ()
+    """Later findings that this one explains."""
+
+
+@dataclass(frozen=True, slots=True)
+class Health:
+    """What happened in a log. `findings` stand in the order told, the first cause first."""
+
+    robot: str
+    """What it is, in a few words: "ArduCopter V4.5.4, quad X"; "ROS 1 robot with move_base"."""
+    account: tuple[Moment, ...]
+    findings: tuple[Finding, ...]
+    is_readable: bool = True
+    """False where the log holds too little to say what happened."""

@@ -1,0 +1,55 @@
+"""In which order findings are told: the earliest before the impact that explains the later ones leads them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from care_core.health.records import Finding, FindingKind
+
+Leads = Mapping[FindingKind, frozenset[FindingKind]]
+"""Per kind of finding the kinds that it can bring about."""
+
+SLACK_S = 1.5
+"""Onsets are told this exactly: a consequence may be seen so much before its cause is."""
+_SEVERITY = {"critical": 0, "warning": 1, "info": 2}
+
+
+def told(findings: Iterable[Finding], leads: Leads, impact_s: float | None = None) -> tuple[Finding, ...]:
+    """Findings in the order told: causes first, what each explains folded under it, what comes after the impact last.
+
+    A finding is explained by an earlier one that is as severe or worse and whose kind can lead to its kind, directly or
+    by others.
+
+    Args:
+        leads: which kind can bring about which.
+        impact_s: when the vehicle hit the ground, None where it did not.
+    """
+    marked = [replace(f, after_impact=impact_s is not None and f.onset_s > impact_s) for f in findings]
+    reach = _closure(leads)
+    roots: list[tuple[Finding, list[Finding]]] = []
+    for finding in sorted(marked, key=_by_cause):
+        cause = next((entry for entry in roots if _explains(entry[0], finding, reach)), None)
+        if cause is None:
+            roots.append((finding, []))
+        else:
+            cause[1].append(finding)
+    return tuple(replace(root, consequences=tuple(sorted(below, key=lambda f: f.onset_s))) for root, below in roots)
+
+
+def _by_cause(finding: Finding) -> tuple[bool, int, float]:
+    return finding.after_impact, _SEVERITY[finding.severity], finding.onset_s
+
+
+def _explains(cause: Finding, finding: Finding, reach: Leads) -> bool:
+    return finding.kind in reach.get(cause.kind, frozenset()) and cause.onset_s <= finding.onset_s + SLACK_S
+
+
+def _closure(leads: Leads) -> dict[FindingKind, frozenset[FindingKind]]:
+    """Every kind with all that it leads to by any number of steps."""
+    reach = {kind: set(after) for kind, after in leads.items()}
+    while True:
+        grown = {kind: after.union(*(reach.get(one, set()) for one in after)) for kind, after in reach.items()}
+        if grown == reach:
+            return {kind: frozenset(after) for kind, after in reach.items()}
+        reach = grown
