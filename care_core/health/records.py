@@ -1,4 +1,4 @@
-"""What a look at any log answers: moments and findings. Plain values, made by the checks and read by reports and app."""
+"""What a look at any log answers: moments and findings. Plain values, read by reports and the app."""
 
 from __future__ import annotations
 

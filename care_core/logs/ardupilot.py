@@ -37,7 +37,7 @@ def history(rows: Iterable[tuple[float, str, float, float | None]], source: str)
 
 
 def parameters_of(table: Table | None, number: Callable[[float], float]) -> dict[str, tuple[Setting, ...]]:
-    """The history that PARM records tell (None: there are none); `number` makes of a recorded value the one that was set."""
+    """The history of PARM records (None: there are none); `number` makes the value that was set of a recorded one."""
     if table is None or not {"Name", "Value"} <= table.columns.keys():
         return {}
     defaults = table.columns.get("Default", np.full(len(table), np.nan)).tolist()
