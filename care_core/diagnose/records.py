@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from care_core.health.records import NOTHING_SEEN, Health
 from care_core.run import Run, shown
 from care_core.variables import Threshold, Variable
 
 Status = Literal["ok", "fault", "not_evaluated"]
 Confidence = Literal["high", "medium", "low"]
+FitVerdict = Literal["fits", "partly", "no"]
+What = Literal["parameter", "hardware", "world", "chance"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +158,32 @@ class ProfileChoice:
 
 
 @dataclass(frozen=True, slots=True)
+class Fit:
+    """How well a profile fits a log: "partly" caps every confidence at low, with "no" nothing is advised."""
+
+    verdict: FitVerdict
+    reasons: tuple[str, ...] = ()
+    """What is missing or differs, one clause each; empty where it fits."""
+
+    def __str__(self) -> str:
+        said = {"fits": "fits", "partly": "fits in part", "no": "does not fit"}[self.verdict]
+        return f"{said}: {'; '.join(self.reasons)}" if self.reasons else said
+
+
+FITS = Fit("fits")
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """One explanation of the failure; those of a diagnosis add up to 1."""
+
+    what: What
+    name: str
+    """The option, or the finding's title; empty for chance, and for a part or circumstance that left no signal."""
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
 class ParameterChange:
     """A parameter with another value than in the good run; None where that log does not hold it."""
 
@@ -205,3 +234,7 @@ class Diagnosis:
     tell_more: tuple[str, ...] = ()
     """What would tell more: a metric to record, an experiment; only where no cause is sure."""
     dismissed: tuple[Dismissal, ...] = ()
+    fit: Fit = FITS
+    health: Health = NOTHING_SEEN
+    hypotheses: tuple[Hypothesis, ...] = ()
+    """What explains the failure, the likeliest first; empty where nothing failed."""

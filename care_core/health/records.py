@@ -87,3 +87,6 @@ class Health:
     findings: tuple[Finding, ...]
     is_readable: bool = True
     """False where the log holds too little to say what happened."""
+
+
+NOTHING_SEEN = Health("", (), ())

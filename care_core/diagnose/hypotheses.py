@@ -1,0 +1,80 @@
+"""What explains this failure: a parameter, a part that failed, what the robot met, or chance, in one ranking.
+
+All compete on one scale, the odds against "nothing failed and the configuration is innocent" (the likelihood of this
+run's signals under that cancels out):
+
+- a parameter weighs what it adds to the probability of this failure, over what the reference configuration has;
+- a part, or what was met, weighs the odds that it really failed, seeing this run's signals, times the probability that a
+  mission fails with it;
+- chance weighs the probability that the reference configuration fails as well;
+- what no signal shows can still have failed: a rest, larger where the profile fits in part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from care_core.diagnose.records import FitVerdict, Hypothesis
+from care_core.health.records import Finding, Suspect
+
+MISSION_LOST: Mapping[str, float] = {"critical": 0.9, "warning": 0.5, "info": 0.05}
+"""Probability that a mission fails with what a finding shows, by how severe it is."""
+SURE = 0.98
+"""No finding is believed more than this: signals are second-hand."""
+UNSEEN = 0.05
+"""Weight of a failed part, and of something met, that left no signal: of the training flights with a failing part, a few
+failed without any finding."""
+DOUBT: Mapping[FitVerdict, float] = {"fits": 1.0, "partly": 0.5, "no": 0.0}
+"""Share of what the model says that is believed."""
+LEAST = 0.005
+"""Hypotheses less likely than this are told together with chance."""
+_WHAT: Mapping[Suspect, str] = {"hardware": "hardware", "world": "world", "operation": "world"}
+
+
+def weigh(
+    options: Mapping[str, float],
+    chance: float,
+    findings: Iterable[Finding],
+    verdict: FitVerdict,
+) -> tuple[Hypothesis, ...]:
+    """Every explanation with its probability, the likeliest first; they add up to 1.
+
+    Args:
+        options: per option how much it adds to the probability of this failure (0 to 1).
+        chance: probability that the reference configuration fails in this way as well.
+        findings: what the log shows, in the order told; what came after the impact explains nothing.
+        verdict: how well the profile fits the log.
+    """
+    trust = DOUBT[verdict]
+    weights: dict[tuple[str, str], float] = {("chance", ""): max(chance * trust, UNSEEN)}
+    for what in ("hardware", "world"):
+        weights[what, ""] = UNSEEN * (1.0 if verdict == "fits" else 3.0)
+    for option, share in options.items():
+        if share * trust > 0:
+            weights["parameter", option] = share * trust
+    for finding in findings:
+        key = _named(finding)
+        if key is not None:
+            weights[key] = max(weights.get(key, 0.0), _odds(finding))
+    return _normalised(weights)
+
+
+def _named(finding: Finding) -> tuple[str, str] | None:
+    if finding.after_impact or finding.severity == "info" or finding.suspect not in _WHAT:
+        return None
+    return _WHAT[finding.suspect], finding.title
+
+
+def _odds(finding: Finding) -> float:
+    sure = min(finding.probability, SURE)
+    return sure / (1.0 - sure) * MISSION_LOST[finding.severity]
+
+
+def _normalised(weights: Mapping[tuple[str, str], float]) -> tuple[Hypothesis, ...]:
+    total = sum(weights.values())
+    shares = {key: weight / total for key, weight in weights.items()}
+    rest = sum(share for key, share in shares.items() if share < LEAST and key != ("chance", ""))
+    shares = {key: share for key, share in shares.items() if share >= LEAST or key == ("chance", "")}
+    shares["chance", ""] += rest
+    ranked = sorted(shares.items(), key=lambda entry: (-entry[1], entry[0]))
+    return tuple(Hypothesis(what, name, share) for (what, name), share in ranked)  # type: ignore[arg-type]

@@ -1,0 +1,68 @@
+"""Parameters, hardware, what was met and chance in one ranking that adds up to 1."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_core.diagnose.hypotheses import weigh
+from care_core.diagnose.records import Hypothesis
+from care_core.health.records import Finding, Severity, Suspect
+
+
+def finding(
+    probability: float, severity: Severity = "critical", suspect: Suspect = "hardware", *, after_impact: bool = False
+) -> Finding:
+    return Finding(
+        "motor",
+        "motor 2 lost thrust",
+        61.0,
+        70.0,
+        severity,
+        "",
+        "RCOU",
+        suspect,
+        probability,
+        after_impact=after_impact,
+    )
+
+
+def lead(found: tuple[Hypothesis, ...]) -> tuple[str, str]:
+    return found[0].what, found[0].name
+
+
+@given(
+    st.dictionaries(st.sampled_from(["a", "b", "c"]), st.floats(0, 1)),
+    st.floats(0, 1),
+    st.lists(st.builds(finding, st.floats(0, 1), st.sampled_from(["info", "warning", "critical"]))),
+    st.sampled_from(["fits", "partly", "no"]),
+)
+def test_probabilities_add_up_to_one(options: dict[str, float], chance: float, findings: list[Finding], v: str) -> None:
+    found = weigh(options, chance, findings, v)  # type: ignore[arg-type]
+    assert sum(one.probability for one in found) == pytest.approx(1.0)
+    assert [one.probability for one in found] == sorted((one.probability for one in found), reverse=True)
+
+
+def test_a_configuration_that_fails_leads_where_no_part_speaks() -> None:
+    assert lead(weigh({"LAND_SPEED": 0.9, "RTL_ALT": 0.05}, 0.02, [], "fits")) == ("parameter", "LAND_SPEED")
+
+
+def test_a_part_that_surely_failed_leads_over_a_doubtful_parameter() -> None:
+    found = weigh({"LAND_SPEED": 0.3}, 0.02, [finding(0.9)], "fits")
+    assert lead(found) == ("hardware", "motor 2 lost thrust")
+    assert found[0].probability > 0.8
+
+
+def test_what_comes_after_the_impact_explains_nothing() -> None:
+    assert lead(weigh({"LAND_SPEED": 0.6}, 0.02, [finding(0.95, after_impact=True)], "fits"))[0] == "parameter"
+
+
+def test_where_no_profile_fits_no_parameter_is_named() -> None:
+    found = weigh({"LAND_SPEED": 0.9}, 0.1, [finding(0.6)], "no")
+    assert not [one for one in found if one.what == "parameter"]
+    assert lead(found)[0] == "hardware"
+
+
+def test_what_the_operator_did_counts_as_met() -> None:
+    assert lead(weigh({}, 0.0, [finding(0.9, suspect="operation")], "no"))[0] == "world"
