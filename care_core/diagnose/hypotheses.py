@@ -4,8 +4,8 @@ All compete on one scale, the odds against "nothing failed and the configuration
 run's signals under that cancels out):
 
 - a parameter weighs what it adds to the probability of this failure, over what the reference configuration has;
-- a part, or what was met, weighs the odds that it really failed, seeing this run's signals, times the probability that a
-  mission fails with it;
+- a part, or what was met, weighs the odds that it really failed, seeing this run's signals, times the probability that
+  a mission fails with it;
 - chance weighs the probability that the reference configuration fails as well;
 - what no signal shows can still have failed: a rest, larger where the profile fits in part.
 """
@@ -22,8 +22,7 @@ MISSION_LOST: Mapping[str, float] = {"critical": 0.9, "warning": 0.5, "info": 0.
 SURE = 0.98
 """No finding is believed more than this: signals are second-hand."""
 UNSEEN = 0.05
-"""Weight of a failed part, and of something met, that left no signal: of the training flights with a failing part, a few
-failed without any finding."""
+"""Weight of a failed part, and of something met, that left no signal."""
 DOUBT: Mapping[FitVerdict, float] = {"fits": 1.0, "partly": 0.5, "no": 0.0}
 """Share of what the model says that is believed."""
 LEAST = 0.005
