@@ -1,0 +1,187 @@
+"""What happened, in documents and in text: the account, the findings, the fit of the profile, and the hypotheses.
+
+The entries are parts of `care.triage/1` and `care.inspect/1`, alike in both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from pydantic import BaseModel, ConfigDict
+
+from care_core.diagnose.records import Fit, FitVerdict, Hypothesis, What
+from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
+from care_core.text import clean, wrapped
+
+MOMENTS_SHOWN = 24
+"""Lines of the account in text; the document holds all."""
+LED_TO_SHOWN = 4
+HYPOTHESES_SHOWN = 4
+SEVERITY_WORDS: dict[Severity, str] = {"critical": "CRITICAL", "warning": "WARNING", "info": "note"}
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class FitEntry(_Entry):
+    """How well the profile fits the log; `reasons` say what is missing or differs."""
+
+    verdict: FitVerdict
+    reasons: list[str]
+
+
+class MomentEntry(_Entry):
+    """A line of the account; `time_s` counts from the start of the log, null where its source has no time."""
+
+    time_s: float | None
+    kind: str
+    text: str
+    source: str
+
+
+class ConsequenceEntry(_Entry):
+    """A later finding that an earlier one explains."""
+
+    kind: FindingKind
+    title: str
+    onset_s: float | None
+    severity: Severity
+
+
+class FindingEntry(_Entry):
+    """Something that was not as it should be; what it explains is folded under it."""
+
+    kind: FindingKind
+    title: str
+    onset_s: float | None
+    end_s: float | None
+    severity: Severity
+    after_impact: bool
+    evidence: str
+    source: str
+    consequences: list[ConsequenceEntry]
+
+
+class HypothesisEntry(_Entry):
+    """One explanation of the failure; their probabilities add up to 1. A parameter is named by its option."""
+
+    what: What
+    name: str
+    probability: float
+
+
+def fit_entry(fit: Fit) -> FitEntry:
+    return FitEntry(verdict=fit.verdict, reasons=[clean(reason) for reason in fit.reasons])
+
+
+def account_entries(health: Health) -> list[MomentEntry]:
+    return [
+        MomentEntry(time_s=_finite(one.time_s), kind=one.kind, text=clean(one.text), source=clean(one.source))
+        for one in health.account
+    ]
+
+
+def finding_entries(health: Health) -> list[FindingEntry]:
+    return [
+        FindingEntry(
+            kind=one.kind,
+            title=clean(one.title),
+            onset_s=_finite(one.onset_s),
+            end_s=_finite(one.end_s),
+            severity=one.severity,
+            after_impact=one.after_impact,
+            evidence=clean(one.evidence),
+            source=clean(one.source),
+            consequences=[_consequence(below) for below in one.consequences],
+        )
+        for one in health.findings
+    ]
+
+
+def hypothesis_entries(hypotheses: Sequence[Hypothesis]) -> list[HypothesisEntry]:
+    return [HypothesisEntry(what=h.what, name=clean(h.name), probability=h.probability) for h in hypotheses]
+
+
+def _consequence(finding: Finding) -> ConsequenceEntry:
+    onset_s = _finite(finding.onset_s)
+    return ConsequenceEntry(kind=finding.kind, title=clean(finding.title), onset_s=onset_s, severity=finding.severity)
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def clock(time_s: float) -> str:
+    """Seconds of a log as an operator reads them: 61.3 s, from ten minutes on 12:05."""
+    if not math.isfinite(time_s):
+        return "?"
+    return f"{time_s:.1f} s" if abs(time_s) < 600 else f"{int(time_s // 60)}:{int(time_s % 60):02d}"
+
+
+def account_lines(health: Health, most: int = MOMENTS_SHOWN) -> Iterator[str]:
+    """The account as text; of a long one the lines that say most about a failure."""
+    if not health.account:
+        return
+    yield from wrapped(f"What happened{f' ({health.robot})' if health.robot else ''}")
+    told = telling(health.account, most)
+    for moment in told:
+        yield from wrapped(moment.text, f"  {clock(moment.time_s):>9}  ")
+    if len(told) < len(health.account):
+        yield f"  and {len(health.account) - len(told)} more: 'care inspect' tells all"
+
+
+_TELLING = ("crash", "failsafe", "error", "arming", "goal", "damage", "mode", "recovery", "message")
+
+
+def telling(account: Sequence[Moment], most: int) -> list[Moment]:
+    """At most so many moments, in order of time: those of the kinds that say most about a failure stay."""
+    if len(account) <= most:
+        return list(account)
+    order = {kind: place for place, kind in enumerate(_TELLING)}
+    ranked = sorted(range(len(account)), key=lambda i: (order.get(account[i].kind, len(order)), i))
+    return [account[i] for i in sorted(ranked[:most])]
+
+
+def finding_lines(health: Health) -> Iterator[str]:
+    """The findings as text, consequences under what explains them."""
+    if not health.account and not health.findings:
+        return
+    if not health.findings:
+        yield "Findings: nothing out of the ordinary was found by the checks that this log allows"
+        return
+    yield "Findings, the first cause first"
+    for finding in health.findings:
+        late = ", after the impact" if finding.after_impact else ""
+        head = f"  {SEVERITY_WORDS[finding.severity]:<8}  "
+        yield from wrapped(f"{finding.title}, at {clock(finding.onset_s)}{late}", head)
+        if finding.evidence:
+            yield from wrapped(finding.evidence, " " * len(head))
+        yield from _led_to(finding, " " * len(head))
+
+
+def _led_to(finding: Finding, indent: str) -> Iterator[str]:
+    titles = list(dict.fromkeys(f"{one.title} ({clock(one.onset_s)})" for one in finding.consequences))
+    if titles:
+        more = f" and {len(titles) - LED_TO_SHOWN} more" if len(titles) > LED_TO_SHOWN else ""
+        yield from wrapped(f"led to: {'; '.join(titles[:LED_TO_SHOWN])}{more}", indent)
+
+
+def hypothesis_text(one: Hypothesis) -> str:
+    """An explanation in a clause."""
+    if one.what == "parameter":
+        return f"the parameter {one.name}"
+    if one.name:
+        return one.name
+    unnamed = {"hardware": "a part whose failure left no trace in this log", "world": "something the robot met"}
+    return unnamed.get(one.what, "chance: the reference configuration fails like this as well")
+
+
+def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> Iterator[str]:
+    """What explains the failure, the likeliest first."""
+    if not hypotheses:
+        return
+    yield "What explains it"
+    for one in hypotheses[:HYPOTHESES_SHOWN]:
+        yield from wrapped(hypothesis_text(one), f"  {one.probability:>4.0%}  ")
