@@ -25,7 +25,7 @@ check: $(DEV)
 	$(BIN)/lint-imports
 
 docs: $(BASE)
-	$(BIN)/python -m care_core.extract.document docs/extractors.md
+	$(BIN)/python -m care_core.report.extractors docs/extractors.md
 
 profiles: $(DEV)
 	$(BIN)/python -m benchmarks.train_profiles

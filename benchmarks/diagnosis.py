@@ -27,13 +27,13 @@ from care_core.diagnose.faults import thresholds_in_force
 from care_core.diagnose.ranking import deviating, reference_config
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.triage import triage
+from care_core.extract.select import describe_fit
 from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
 from care_core.learn.skill import all_met, calibration_error, held_out_odds, reliability
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
-from care_core.logs import open_log
+from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
-from care_core.profile.select import describe_fit
 from care_core.profile.store import Profile, load_profile
 
 PLATFORMS = ("arducopter", "move_base")

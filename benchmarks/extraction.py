@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from care_core.extract import ardupilot, navigation  # noqa: F401  they register their extractors
 from care_core.extract.registry import MISSION_KINDS, Mission, find_extractor, merge_needs
-from care_core.logs import open_log
+from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema, read_schema
 from care_core.run import Value, is_known
 

@@ -17,12 +17,12 @@ from pathlib import Path
 import numpy as np
 
 from care_core.causal.counterfactual import PERSISTENCE
-from care_core.diagnose.records import ProfileChoice
 from care_core.diagnose.triage import diagnose
 from care_core.learn.skill import calibration_error, reliability
 from care_core.learn.train import train
 from care_core.profile.model import write_model
 from care_core.profile.store import Profile
+from care_core.run import ProfileChoice
 from tests.planted import DEFAULTS, SCHEMA, SETTINGS, draw_config, draw_noise, fly, fly_many, run_of
 
 CHOICE = ProfileChoice("planted", "1", "Simulated robot", "named by the benchmark")

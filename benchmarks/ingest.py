@@ -33,7 +33,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from care_core.resources import bundled
+from care_core.files import bundled
 
 MB = 1e6
 GOOD_BAG = Path(__file__).parents[1] / "tests" / "data" / "move_base_good.bag"

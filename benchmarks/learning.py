@@ -30,13 +30,13 @@ from threadpoolctl import threadpool_limits
 
 from care_core.causal.graph import CausalGraph
 from care_core.causal.paths import rank_paths
+from care_core.files import bundled
 from care_core.learn.bootstrap import support
 from care_core.learn.constraints import ALWAYS
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
 from care_core.learn.train import Settings, train
 from care_core.profile.schema import Schema, read_schema
-from care_core.resources import bundled
 from tests.simulated import simulate
 
 PUBLISHED_ALPHA = 0.8

@@ -24,12 +24,12 @@ import pandas as pd
 from joblib import Parallel, delayed
 
 from care_core.causal.counterfactual import World
+from care_core.causal.model import Model
 from care_core.diagnose.ranking import deviating, reference_config, suspects
 from care_core.diagnose.triage import MIN_ODDS
 from care_core.learn.baselines import PlainClassifier
 from care_core.learn.outcomes import met
 from care_core.learn.train import Settings, train
-from care_core.profile.model import Model
 from care_core.profile.schema import Schema
 from tests.robots import Chosen, Robot, declared_random, random_robot
 

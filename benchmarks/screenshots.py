@@ -11,8 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from care_core.report import write_atomically
-from care_core.resources import bundled
+from care_core.files import bundled, write_atomically
 from care_tui.app import CareApp
 from care_tui.jobs import Request
 from care_tui.screens.walk import WalkScreen

@@ -15,14 +15,15 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from care_core.extract.ingest import ingest, journal_of
-from care_core.extract.table import find_logs, write_table
+from care_core.files import bundled
 from care_core.learn.card import model_card
 from care_core.learn.table import read_table
 from care_core.learn.train import Settings, train
+from care_core.logs.finding import find_logs
 from care_core.profile.model import write_model
 from care_core.profile.schema import Schema, read_schema
-from care_core.resources import bundled
+from care_core.tables.ingest import ingest, journal_of
+from care_core.tables.rows import write_table
 
 RESAMPLES = 50
 

@@ -23,10 +23,10 @@ from dataclasses import dataclass, replace
 from fcntl import ioctl
 from pathlib import Path
 
-from care_core.diagnose.records import Cause, Change, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
-from care_core.diagnose.records import ProfileChoice as Choice
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
 from care_core.run import LogInfo, MissionInfo, Run
-from care_core.variables import Role, Threshold, Variable
+from care_core.run import ProfileChoice as Choice
+from care_core.variables import Change, Role, Threshold, Variable
 
 OPTIONS, PATHS = 600, 200
 QUIET_S = 0.12

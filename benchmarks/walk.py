@@ -15,8 +15,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from care_core.report import write_atomically
-from care_core.resources import bundled
+from care_core.files import bundled, write_atomically
 
 SAMPLE = "arducopter_failed.BIN"
 WIDTH, HEIGHT = 80, 24

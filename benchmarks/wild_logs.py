@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from care_core.errors import CareError
-from care_core.extract.table import is_recording
-from care_core.logs import open_log
+from care_core.logs.finding import is_recorder_folder as is_recording
+from care_core.logs.opening import open_log
 from care_tui.inspection import inspect_log
 from care_tui.jobs import Request, diagnose_log, exit_code
 

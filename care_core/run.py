@@ -84,6 +84,18 @@ class LogInfo:
 
 
 @dataclass(frozen=True, slots=True)
+class ProfileChoice:
+    """The profile that was used, and how it was chosen."""
+
+    name: str
+    version: str
+    platform: str
+    reason: str
+    warnings: tuple[str, ...] = ()
+    """What of the log differs from the profile: firmware, frame, distro, mission."""
+
+
+@dataclass(frozen=True, slots=True)
 class MissionInfo:
     """Which mission of the log this is. `index` counts from 1; `fits` says whether it is the profile's mission."""
 

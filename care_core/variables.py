@@ -116,3 +116,13 @@ class Variable:
         if self.type == "bool":
             return "true" if value else "false"
         return f"{value:.6g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One option to change, in the option's unit."""
+
+    option: Variable
+    current: float
+    suggested: float
+    notes: tuple[str, ...] = ()

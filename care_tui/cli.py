@@ -22,10 +22,10 @@ from care_tui.commands import (
     diagnosing,
     formats,
     learning,
+    logs,
     opening,
     past,
     profiles,
-    reading,
     serving,
 )
 from care_tui.commands.opening import OPEN
@@ -69,7 +69,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Which parameter made the run fail, along which path, and what to change. 'care LOG' opens the terminal app.",
 )
-for commands in (opening, serving, diagnosing, asking, configuring, past, reading, learning):
+for commands in (opening, serving, diagnosing, asking, configuring, past, logs, learning):
     app.add_typer(commands.app)
 app.add_typer(profiles.app, name="profiles", invoke_without_command=True)
 app.add_typer(formats.app, name="schema")

@@ -26,7 +26,7 @@ _RESET = "\x1b[0m"
 def emit(text: str, out: Path | None = None) -> None:
     """Write data: to the file `out`, whole or not at all, else to stdout."""
     if out is not None:
-        from care_core.report.writers import write_atomically
+        from care_core.files import write_atomically
 
         write_atomically(out, text)
         say(f"wrote {out}")
@@ -46,7 +46,7 @@ def emit(text: str, out: Path | None = None) -> None:
 
 def check_writable(out: Path) -> None:
     """Refuse, before any work is done, a file that could not be written. Raises UsageError."""
-    from care_core.report.writers import refuse_recording
+    from care_core.files import refuse_recording
 
     refuse_recording(out)
     if out.is_dir():

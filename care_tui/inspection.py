@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 
-from care_core.extract.coverage import cover
+from care_core.extract.coverage import try_on
 from care_core.logs.base import Log
 from care_core.profile.store import available_profiles, load_profile
 from care_core.report.inspection import (
@@ -27,7 +27,7 @@ _NUMBER = re.compile(r"\d+")
 
 def inspect_log(log: Log) -> InspectDocument:
     """Look into a log without judging it, with every installed profile."""
-    return build_inspection(log, [cover(log, load_profile(path).schema) for path in available_profiles()])
+    return build_inspection(log, [try_on(log, load_profile(path).schema) for path in available_profiles()])
 
 
 def as_text(document: InspectDocument) -> str:

@@ -13,13 +13,14 @@ from care_core.errors import CareError, ExitCode
 from care_tui.remembering import remember_triage
 
 if TYPE_CHECKING:
-    from care_core.diagnose.records import Diagnosis, Fix, ProfileChoice
+    from care_core.causal.model import Model
+    from care_core.diagnose.records import Diagnosis, Fix
     from care_core.diagnose.whatif import Question
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
-    from care_core.profile.model import Model
     from care_core.profile.schema import Schema
     from care_core.profile.store import Profile
+    from care_core.run import ProfileChoice
     from care_core.variables import Variable
 
 T = TypeVar("T")
@@ -126,8 +127,8 @@ def open_case(request: Request, progress: Progress) -> Case:
 
 def _answer(request: Request, progress: Progress) -> tuple[Diagnosis, Profile, ProfileChoice]:
     """The whole line from a log file to its diagnosis."""
-    from care_core.logs import sniff
     from care_core.logs.digest import hashing
+    from care_core.logs.opening import sniff
 
     sniff(request.log)
     # Begun before anything else is imported: of a large log it takes as long as all the rest.
@@ -136,9 +137,9 @@ def _answer(request: Request, progress: Progress) -> tuple[Diagnosis, Profile, P
 
 
 def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> tuple[Diagnosis, Profile, ProfileChoice]:
-    from care_core.configs import read_configs
+    from care_core.configs.loading import read_configs
     from care_core.diagnose.triage import triage
-    from care_core.logs import open_log
+    from care_core.logs.opening import open_log
 
     configs = read_configs(request.configs)
     progress("opening the log", 0.0)
@@ -161,8 +162,8 @@ def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> tuple[Dia
 
 def open_and_choose(path: Path, profile: str | None) -> tuple[Log, Profile, ProfileChoice]:
     """A log with the profile that fits it, or the one that was named. Raises CareError."""
-    from care_core.logs import open_log
-    from care_core.profile.select import choose_profile
+    from care_core.extract.select import choose_profile
+    from care_core.logs.opening import open_log
     from care_core.profile.store import available_profiles, load_profile
 
     log = open_log(path)
@@ -172,7 +173,7 @@ def open_and_choose(path: Path, profile: str | None) -> tuple[Log, Profile, Prof
 
 def question_of(request: Request, progress: Progress) -> Question:
     """A run ready to be asked what other options would have done. Raises CareError."""
-    from care_core.configs import read_configs
+    from care_core.configs.loading import read_configs
     from care_core.diagnose.whatif import question_of_log
 
     configs = read_configs(request.configs)
@@ -196,10 +197,10 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
 
 def diff_of(case: Case, fix: Fix, side: DiffSide) -> str:
     """A unified diff: what was driven, or the operator's files, against the suggestion; or one against the other."""
-    from care_core.configs import unified_diff
+    from care_core.configs.changes import unified_diff
 
     if side == "driven":
-        return unified_diff(case.diagnosis.run, fix)
+        return unified_diff(case.diagnosis.run, fix.changes)
     if side == "file":
         return _patch_of(case, fix)
     return _file_against_driven(case)
@@ -209,8 +210,8 @@ def _patch_of(case: Case, fix: Fix) -> str:
     """The operator's files with the fix put in, comments and order kept."""
     from difflib import unified_diff
 
+    from care_core.configs.driven import readable
     from care_core.configs.edit import Wanted, apply_changes
-    from care_core.extract.settings import readable
 
     wanted = [
         Wanted(change.option, parameter, change.suggested)
@@ -226,8 +227,8 @@ def _patch_of(case: Case, fix: Fix) -> str:
 
 def _file_against_driven(case: Case) -> str:
     """What the files hold otherwise than the robot drove."""
-    from care_core.configs import read_configs, resolve
     from care_core.configs.compare import Side, compare
+    from care_core.configs.loading import read_configs, resolve
 
     settings = case.diagnosis.run.settings
     held = resolve(read_configs(case.configs), settings)
@@ -238,7 +239,9 @@ def _file_against_driven(case: Case) -> str:
 
 def report_of(diagnosis: Diagnosis, format: ReportFormat) -> str:
     """The fix report in one of its formats."""
-    from care_core.report import build_document, to_html, to_json, to_markdown, to_yaml
+    from care_core.report.document import build_document
+    from care_core.report.html import to_html
+    from care_core.report.writers import to_json, to_markdown, to_yaml
 
     document = build_document(diagnosis)
     if format == "patch":
@@ -249,7 +252,8 @@ def report_of(diagnosis: Diagnosis, format: ReportFormat) -> str:
 
 def commands_of(diagnosis: Diagnosis) -> list[str]:
     """The shell or ground station commands that make the changes of the fix."""
-    from care_core.configs import apply_commands, format_for
+    from care_core.configs.changes import apply_commands
+    from care_core.configs.formats import format_for
 
     if diagnosis.fix is None:
         return []
@@ -258,7 +262,7 @@ def commands_of(diagnosis: Diagnosis) -> list[str]:
 
 def save_text(path: Path, text: str) -> None:
     """Write a file; it is whole or not there at all."""
-    from care_core.report import write_atomically
+    from care_core.files import write_atomically
 
     write_atomically(path, text)
 

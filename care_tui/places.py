@@ -52,14 +52,14 @@ def found_logs(places: Iterable[Path], opened: Path | None = None) -> list[LogFi
 
 def logs_in(folder: Path, deep: int = DEEP) -> Iterator[Path]:
     """The logs and recordings in a folder, and in those so deep below it."""
-    from care_core.extract.table import is_log, is_recording
+    from care_core.logs.finding import is_log, is_recorder_folder
 
     try:
         inside = list(folder.iterdir())
     except OSError:  # not ours to look into
         return
     for path in inside:
-        if is_log(path) or (path.is_dir() and is_recording(path)):
+        if is_log(path) or (path.is_dir() and is_recorder_folder(path)):
             yield path
         elif path.is_dir() and deep > 1 and not path.is_symlink():
             # The working folder may be anything: what lies in its folders counts only where a recorder made it.
@@ -101,7 +101,7 @@ def recent_logs() -> list[Path]:
 def remember(path: Path) -> None:
     """Put a log at the head of the recent ones. A disk that cannot be written to is no reason to stop."""
     from care_core.errors import CareError
-    from care_core.report import write_atomically
+    from care_core.files import write_atomically
 
     path = path.absolute()
     recent = [path, *(other for other in recent_logs() if other != path)][:RECENT]
@@ -151,6 +151,6 @@ def entries(typed: str) -> list[Path]:
 
 def is_openable(path: Path) -> bool:
     """Whether this may be a log, or a recording that is a folder."""
-    from care_core.extract.table import is_log, is_recording
+    from care_core.logs.finding import is_log, is_recorder_folder
 
-    return is_log(path) or (path.is_dir() and is_recording(path))
+    return is_log(path) or (path.is_dir() and is_recorder_folder(path))

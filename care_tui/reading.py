@@ -72,7 +72,7 @@ class LogMessage:
 
 def messages_of(case: Case) -> list[LogMessage]:
     """Everything that the log holds in words, and what was found in its numbers, in time order."""
-    from care_core.logs import open_log
+    from care_core.logs.opening import open_log
 
     tables = open_log(case.diagnosis.run.log.path).read(TEXTS)
     if "/rosout" in tables:
@@ -139,7 +139,7 @@ class Trace:
 def signals_of(case: Case) -> list[Signal]:
     """The signals that the profile reads from this log, those of objectives and of causal paths first."""
     from care_core.extract.registry import find_extractor
-    from care_core.logs import open_log
+    from care_core.logs.opening import open_log
 
     if case.schema is None:
         return []
@@ -171,7 +171,7 @@ def trace_of(case: Case, signal: Signal, columns: int) -> Trace:
     """
     import numpy as np
 
-    from care_core.logs import open_log
+    from care_core.logs.opening import open_log
 
     run = case.diagnosis.run
     table = open_log(run.log.path).read({signal.channel: (signal.field,)}).get(signal.channel)
@@ -231,7 +231,7 @@ class Past:
 
 def past_runs() -> list[Past]:
     """What the local history holds, the newest first; nothing where it is switched off."""
-    from care_core.history import History, history_path
+    from care_core.history.store import History, history_path
 
     path = history_path()
     if path is None or not path.is_file():

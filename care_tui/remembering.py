@@ -9,12 +9,12 @@ from care_core.errors import CareError
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis
-    from care_core.history import History
+    from care_core.history.store import History
 
 
 def remember(record: Callable[[History], None]) -> CareError | None:
     """Put something into the history, unless that is switched off; answers what was in the way."""
-    from care_core.history import History, HistoryError, history_path
+    from care_core.history.store import History, HistoryError, history_path
 
     path = history_path()
     if path is None:
@@ -28,7 +28,8 @@ def remember(record: Callable[[History], None]) -> CareError | None:
 
 def remember_triage(diagnosis: Diagnosis) -> CareError | None:
     """Put a triage into the history; answers what was in the way."""
-    from care_core.report import build_document, published
+    from care_core.report.document import build_document
+    from care_core.report.writers import published
 
     document = published(build_document(diagnosis))
     return remember(lambda history: history.add_triage(document, diagnosis.run.mission.index))

@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from care_core.errors import UsageError
-from care_core.extract.table import INSTALL_LEARN
 from care_core.profile.model import write_model
 from care_core.profile.schema import parse_schema, read_schema
 from care_core.profile.store import PROFILE_FILE, load_profile
+from care_core.tables.rows import INSTALL_LEARN
 
 if TYPE_CHECKING:
+    from care_core.causal.model import Model
     from care_core.learn.evaluation import Evaluation
     from care_core.learn.transfer import OutOfSupport
-    from care_core.profile.model import Model
     from care_core.profile.schema import Schema
     from care_core.profile.store import Profile
 
@@ -104,9 +104,9 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
 
 
 def _write(out: Path, schema: Schema, model: Model, schema_text: str) -> None:
+    from care_core.files import write_atomically
     from care_core.learn.card import model_card
     from care_core.learn.recheck import CARD_FILE
-    from care_core.report.writers import write_atomically
 
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from care_core.logs import open_log
 from care_core.logs.base import Table
+from care_core.logs.opening import open_log
 
 START_US = 1_700_000_000_000_000
 LISTENS_ON_S = 5.0

@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
-from care_core.diagnose.records import (
-    Cause,
-    Change,
-    Diagnosis,
-    Fault,
-    Fix,
-    ObjectiveResult,
-    PathNode,
-    Prediction,
-    ProfileChoice,
-)
-from care_core.run import Damage, Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable
-from care_core.variables import Role, Threshold, Variable
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
+from care_core.run import Damage, Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Setting, Unavailable
+from care_core.variables import Change, Role, Threshold, Variable
 
 HOSTILE = "Arm: \x1b[31m[bold]|red|\x1b]0;title\x07 \u202eback"
 DRIVEN = 16.0

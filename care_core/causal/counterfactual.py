@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_core.causal.mechanisms import LEAST, TAIL, FloatArray, Mechanism, columns, restored, transformed
-from care_core.profile.model import Model, OutcomeRecord, StageRecord
+from care_core.causal.model import Model, OutcomeRecord, StageRecord
 from care_core.run import is_known
 from care_core.variables import Threshold
 

@@ -6,8 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from care_core.configs import ConfigFile, ConfigFormat, resolve, yaml_tree
-from care_core.extract.self_written import is_self_written
+from care_core.configs import yaml_tree
+from care_core.configs.formats import ConfigFormat
+from care_core.configs.loading import ConfigFile, resolve
+from care_core.configs.self_written import is_self_written
 from care_core.run import Setting, shown
 
 FLOAT32 = 1e-6

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from care_core.configs import ConfigFile, ConfigFormat, guesses, read_configs, read_text, resolve, split_name, text_for
+from care_core.configs.formats import ConfigFormat, text_for
+from care_core.configs.loading import ConfigFile, guesses, read_configs, read_text, resolve, split_name
 from care_core.errors import ConfigError
 from care_core.run import Setting, shown
 from care_core.variables import Variable

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import columns
+from care_core.causal.model import Summary
 from care_core.diagnose.records import Circumstance
-from care_core.profile.model import Summary
 from care_core.profile.schema import Schema, Side
 from care_core.run import Run, is_known
 from care_core.variables import Role, Variable

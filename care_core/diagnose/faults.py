@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from care_core.causal.model import Summary
 from care_core.diagnose.records import ObjectiveResult, Status
 from care_core.errors import UsageError, nearest
-from care_core.profile.model import Summary
 from care_core.profile.schema import Schema
 from care_core.run import Run, Unavailable
 from care_core.variables import Threshold, Variable

@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 
 from care_core.causal.counterfactual import Config, World
-from care_core.diagnose.records import Change, Fix, Prediction
-from care_core.profile.model import Model
-from care_core.variables import Variable
+from care_core.causal.model import Model
+from care_core.diagnose.records import Fix, Prediction
+from care_core.variables import Change, Variable
 
 MAX_CHANGES = 4
 STEPS = 5

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from care_core.configs import ConfigFile, guesses, resolve
-from care_core.extract.settings import clock, disagreements, readable
+from care_core.configs.driven import clock, disagreements, readable
+from care_core.configs.loading import ConfigFile, guesses, resolve
 from care_core.profile.schema import Schema
 from care_core.run import Run, Setting, shown
 
@@ -22,7 +22,7 @@ def notes(schema: Schema, run: Run, files: Sequence[ConfigFile], given: Mapping[
     return (
         *_changed_on_the_way(schema, run),
         *_from_files(schema, run, files),
-        *disagreements(schema, run.settings, given),
+        *disagreements(schema.options, run.settings, given),
         *_useless(schema, files),
         *_guessed(files, given),
     )

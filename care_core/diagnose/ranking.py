@@ -10,10 +10,10 @@ import numpy as np
 from care_core.causal.counterfactual import Config, World
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, columns
+from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.diagnose.records import PathNode
 from care_core.diagnose.symptoms import pointers
-from care_core.profile.model import EffectRecord, Model
 from care_core.profile.schema import Schema
 from care_core.run import Evidence, Run, is_known
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from care_core.health.records import NOTHING_SEEN, Health
-from care_core.run import Run, shown
-from care_core.variables import Threshold, Variable
+from care_core.run import ProfileChoice, Run, shown
+from care_core.variables import Change, Threshold, Variable
 
 Status = Literal["ok", "fault", "not_evaluated"]
 Confidence = Literal["high", "medium", "low"]
@@ -93,16 +93,6 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
-    """One option to change, in the option's unit."""
-
-    option: Variable
-    current: float
-    suggested: float
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
 class Fix:
     """A set of changes with its predicted outcome. `p_fixed`: odds that all objectives keep their thresholds."""
 
@@ -143,18 +133,6 @@ class Experiment:
         change = f"change only {self.option.name} to {self.option.show(self.value)} and run again"
         odds = ", ".join(f"{p:.0%} if the cause is {name}" for name, p in self.if_cause)
         return f"{change}: odds of a good {self.objective} are {odds}"
-
-
-@dataclass(frozen=True, slots=True)
-class ProfileChoice:
-    """The profile that was used, and how it was chosen."""
-
-    name: str
-    version: str
-    platform: str
-    reason: str
-    warnings: tuple[str, ...] = ()
-    """What of the log differs from the profile: firmware, frame, distro, mission."""
 
 
 @dataclass(frozen=True, slots=True)

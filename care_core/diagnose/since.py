@@ -7,14 +7,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from care_core.configs.driven import readable
+from care_core.configs.self_written import is_self_written
 from care_core.diagnose.faults import judge
 from care_core.diagnose.records import Cause, Diagnosis, ParameterChange, Since
 from care_core.errors import CareError
 from care_core.extract.read import log_info, read_run
-from care_core.extract.self_written import is_self_written
-from care_core.extract.settings import readable
-from care_core.logs import log_digest
 from care_core.logs.base import Log
+from care_core.logs.digest import log_digest
 from care_core.profile.store import Profile
 from care_core.run import LogInfo, Run, Setting
 from care_core.variables import Threshold, Variable

@@ -6,7 +6,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import Config, World
-from care_core.configs import ConfigFile, resolve
+from care_core.configs.driven import readable
+from care_core.configs.loading import ConfigFile, resolve
 from care_core.diagnose import provenance
 from care_core.diagnose.circumstances import circumstances
 from care_core.diagnose.evidence import refused_by, said
@@ -30,16 +31,15 @@ from care_core.diagnose.ranking import (
     not_ruled_out,
     suspects,
 )
-from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult, ProfileChoice
+from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
 from care_core.diagnose.worlds import reference_of, world_of
 from care_core.extract.read import read_run
-from care_core.extract.settings import readable
 from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
 from care_core.profile.store import Profile
-from care_core.run import Run, is_known
+from care_core.run import ProfileChoice, Run, is_known
 
 MIN_CONTRIBUTION = 0.02
 """Odds an option must cost before it is called a cause of this run."""

@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from care_core.configs.driven import option_value, readable
 from care_core.diagnose.records import ObjectiveResult, Status
-from care_core.extract.settings import option_value, readable
 from care_core.profile.schema import Schema
 from care_core.run import Run
 from care_core.variables import Threshold, Variable

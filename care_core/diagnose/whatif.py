@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from care_core.causal.counterfactual import Config, World
-from care_core.configs import ConfigFile, resolve
+from care_core.configs.driven import option_value, readable
+from care_core.configs.loading import ConfigFile, resolve
 from care_core.diagnose.faults import check_wishes, judge, thresholds_in_force
 from care_core.diagnose.fixes import change_notes, prediction
-from care_core.diagnose.records import Change, ObjectiveResult, Prediction, ProfileChoice
+from care_core.diagnose.records import ObjectiveResult, Prediction
 from care_core.diagnose.worlds import reference_of, world_of
 from care_core.errors import UsageError, nearest
 from care_core.extract.read import read_run
-from care_core.extract.settings import option_value, readable
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
-from care_core.run import Run, Setting
-from care_core.variables import Role, Variable
+from care_core.run import ProfileChoice, Run, Setting
+from care_core.variables import Change, Role, Variable
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,10 +6,10 @@ import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
+from care_core.configs.driven import readable
 from care_core.errors import CareError
 from care_core.extract.read import mission_kind, read_runs, reading_plan
 from care_core.extract.registry import find_extractor
-from care_core.extract.settings import readable
 from care_core.extract.telemetry import as_dataflash
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
@@ -30,15 +30,33 @@ class Missed:
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
-    """A profile and a log. `obstacle` says why the profile cannot use it, empty when it can."""
+    """How much of a profile a log holds: options with a parameter, sources among its channels, matched names."""
 
     schema: Schema
-    obstacle: str
     options: int
     sources: int
     sources_wanted: int
-    missed: tuple[Missed, ...]
-    missions: tuple[MissionInfo, ...]
+    names: int
+
+    @property
+    def found(self) -> int:
+        return self.options + self.sources
+
+    def __str__(self) -> str:
+        return (
+            f"{self.options} of {len(self.schema.options)} options and {self.sources} of {self.sources_wanted}"
+            " sources are in the log"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A profile tried on a log. `obstacle` says why the profile cannot use it, empty when it can."""
+
+    coverage: Coverage
+    obstacle: str
+    missed: tuple[Missed, ...] = ()
+    missions: tuple[MissionInfo, ...] = ()
 
     @property
     def is_usable(self) -> bool:
@@ -46,24 +64,42 @@ class Coverage:
 
 
 def cover(log: Log, schema: Schema) -> Coverage:
+    """Count what a log holds of a profile. A profile of another format, or of a published table, has nothing."""
+    if _wrong_kind(log, schema):
+        return Coverage(schema, 0, 0, 0, 0)
+    settings, plan = log.settings(), reading_plan(schema)
+    return Coverage(
+        schema,
+        options=sum(any(name in settings for name in readable(option)) for option in schema.options),
+        sources=len(_channels(log) & plan.keys()),
+        sources_wanted=len(plan),
+        names=sum(text.casefold() in log.facts.get(key, "").casefold() for key, text in schema.match.items()),
+    )
+
+
+def try_on(log: Log, schema: Schema) -> Trial:
     """Try a profile on a log without judging anything."""
+    coverage = cover(log, schema)
     obstacle = _wrong_kind(log, schema)
     if obstacle:
-        return Coverage(schema, obstacle, 0, 0, 0, (), ())
-    channels = {channel.name for channel in as_dataflash(log).channels() if channel.count}
-    plan = reading_plan(schema)
-    lost_options = _missed_options(log, schema)
-    found, sources = len(schema.options) - len(lost_options), len(channels & plan.keys())
+        return Trial(coverage, obstacle)
+    channels = _channels(log)
     runs: Sequence[Run] = ()
-    if not found and not sources:
+    if not coverage.found:
         obstacle = "none of its parameters or sources are in the log"
     else:
         try:
             runs = read_runs(log, schema)
         except CareError as err:
             obstacle = _no_mission(schema, channels) or err.message
-    missed = (*lost_options, *_missed_values(schema, plan.keys() - channels, runs[-1] if runs else None))
-    return Coverage(schema, obstacle, found, sources, len(plan), missed, tuple(run.mission for run in runs))
+    lost = _missed_values(schema, reading_plan(schema).keys() - channels, runs[-1] if runs else None)
+    missed = (*_missed_options(log, schema), *lost)
+    return Trial(coverage, obstacle, missed, tuple(run.mission for run in runs))
+
+
+def _channels(log: Log) -> set[str]:
+    """The channels that hold anything."""
+    return {channel.name for channel in as_dataflash(log).channels() if channel.count}
 
 
 def _wrong_kind(log: Log, schema: Schema) -> str:

@@ -15,9 +15,9 @@ import care_core.extract.ardupilot
 import care_core.extract.battery
 import care_core.extract.nav2
 import care_core.extract.navigation  # noqa: F401
+from care_core.configs.driven import changes_between, configuration, in_force
 from care_core.errors import ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
-from care_core.extract.settings import changes_between, configuration, in_force
 from care_core.extract.telemetry import as_dataflash, explained
 from care_core.logs.base import Log
 from care_core.logs.digest import Sha256, hashing

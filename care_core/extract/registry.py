@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from care_core.errors import ProfileError, nearest
-from care_core.extract.recording import how_to_record
+from care_core.extract.how_to_record import how_to_record
 from care_core.logs.base import Table, Wanted
 from care_core.run import Evidence, Unavailable, Value
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from care_core.errors import ProfileError
+from care_core.files import write_atomically
 from care_core.history.track_record import TrackRecord
-from care_core.report.writers import write_atomically
 
 CARD = "MODEL_CARD.md"
 _TITLE = "## Verified fixes"

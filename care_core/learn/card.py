@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from care_core.profile.model import EffectRecord, Model, SkillRecord
+from care_core.causal.model import EffectRecord, Model, SkillRecord
 from care_core.profile.schema import Schema
 
 TOP = 10

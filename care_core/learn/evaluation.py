@@ -16,10 +16,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from care_core.causal.model import Model
 from care_core.errors import LearningError
 from care_core.learn.baselines import cooperative_bug_isolation
 from care_core.learn.outcomes import met
-from care_core.profile.model import Model
 from care_core.profile.schema import Schema
 
 CAUSES = 3

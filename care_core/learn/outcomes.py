@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Mechanism, transformed
+from care_core.causal.model import OutcomeRecord, StageRecord
 from care_core.learn.fitting import MIN_ROWS, Effort, Inputs, best_transform, fit_mechanism, left_out_loss
 from care_core.learn.knowledge import with_known
-from care_core.profile.model import OutcomeRecord, StageRecord
 from care_core.profile.schema import Schema
 from care_core.variables import Role, Variable
 

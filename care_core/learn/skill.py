@@ -13,9 +13,9 @@ from threadpoolctl import threadpool_limits
 from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray
+from care_core.causal.model import Model, SkillRecord, Training
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
-from care_core.profile.model import Model, SkillRecord, Training
 from care_core.profile.schema import Schema
 
 BINS = 10

@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 from care_core.causal.effects import Effect, acceptable_values, along, average_causal_effect
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Mechanism, solve, transformed
+from care_core.causal.model import EdgeRecord, EffectRecord, Model, OutcomeRecord, PathRecord, Summary, Training
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.bootstrap import support as measure_support
@@ -24,7 +25,6 @@ from care_core.learn.knowledge import with_known
 from care_core.learn.outcomes import badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
 from care_core.learn.skill import cross_validated_skill
 from care_core.learn.structure import Structure, learn_structure
-from care_core.profile.model import EdgeRecord, EffectRecord, Model, OutcomeRecord, PathRecord, Summary, Training
 from care_core.profile.schema import Schema
 
 Edge = tuple[str, str]

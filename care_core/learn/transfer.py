@@ -18,6 +18,7 @@ from threadpoolctl import threadpool_limits
 
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import LEAST, FloatArray, Mechanism, transformed
+from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.errors import LearningError
 from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.completion import complete
@@ -25,7 +26,6 @@ from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, Effort, Inputs, f
 from care_core.learn.outcomes import causes_of, find_stages, groups_that_move_together, inputs_of
 from care_core.learn.screening import screen_options
 from care_core.learn.train import Learned, Settings, assemble
-from care_core.profile.model import Model, OutcomeRecord, Training
 from care_core.profile.schema import Schema
 from care_core.variables import Role
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from care_core.causal.mechanisms import Mechanism, solve
-from care_core.profile.model import Model
+from care_core.causal.model import Model
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.variables import Role

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from care_core.causal.model import Model
 from care_core.errors import ProfileError, nearest
-from care_core.profile.model import Model, read_model
+from care_core.files import bundled
+from care_core.profile.model import read_model
 from care_core.profile.schema import Schema, read_schema
-from care_core.resources import bundled
 
 PROFILE_FILE = "profile.yaml"
 

@@ -11,23 +11,22 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from care_core.configs import apply_commands, format_for, unified_diff
+from care_core.configs.changes import apply_commands, unified_diff
+from care_core.configs.formats import format_for
 from care_core.diagnose.records import (
     Cause,
-    Change,
     Circumstance,
     Confidence,
     Diagnosis,
     Fix,
     ObjectiveResult,
     Prediction,
-    ProfileChoice,
     Since,
     Status,
 )
-from care_core.run import Evidence, Value, is_known
+from care_core.run import Evidence, ProfileChoice, Value, is_known
 from care_core.text import clean
-from care_core.variables import Kind, Op
+from care_core.variables import Change, Kind, Op
 
 SCHEMA_ID: Final = "care.triage/1"
 
@@ -244,7 +243,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
         rivals=[_circumstance(rival) for rival in diagnosis.rivals],
         tell_more=[clean(advice) for advice in diagnosis.tell_more],
         dismissed=[DismissedEntry(option=d.option, reason=clean(d.reason)) for d in diagnosis.dismissed],
-        diff=unified_diff(run, diagnosis.fix) if diagnosis.fix is not None else "",
+        diff=unified_diff(run, diagnosis.fix.changes) if diagnosis.fix is not None else "",
         apply=apply_commands(diagnosis.fix.changes, format_for(log.format, run.settings))
         if diagnosis.fix is not None
         else [],

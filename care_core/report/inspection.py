@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from care_core.extract.coverage import Coverage, Missed
+from care_core.extract.coverage import Missed, Trial
 from care_core.logs.base import Log
 from care_core.run import Damage, MissionInfo
 from care_core.text import clean
@@ -111,10 +111,10 @@ class InspectDocument(_Model):
     """Those that can use the log first, the best of them before the others."""
 
 
-def build_inspection(log: Log, coverages: Sequence[Coverage]) -> InspectDocument:
+def build_inspection(log: Log, trials: Sequence[Trial]) -> InspectDocument:
     """The document of a log and the installed profiles. Text of the log is made safe to show."""
-    ranked = sorted(coverages, key=lambda c: (not c.is_usable, -(c.options + c.sources), c.schema.name))
-    profiles = [_profile(coverage) for coverage in ranked]
+    ranked = sorted(trials, key=lambda t: (not t.is_usable, -t.coverage.found, t.coverage.schema.name))
+    profiles = [_profile(trial) for trial in ranked]
     channels = [
         ChannelEntry(name=clean(c.name), type=clean(c.type), count=c.count, rate_hz=_finite(c.rate_hz))
         for c in sorted(log.channels(), key=lambda channel: channel.name)
@@ -188,20 +188,20 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def _profile(coverage: Coverage) -> ProfileEntry:
-    schema = coverage.schema
+def _profile(trial: Trial) -> ProfileEntry:
+    coverage, schema = trial.coverage, trial.coverage.schema
     return ProfileEntry(
         name=schema.name,
         version=schema.version,
         platform=schema.platform,
-        usable=coverage.is_usable,
-        reason=coverage.obstacle or None,
+        usable=trial.is_usable,
+        reason=trial.obstacle or None,
         options=coverage.options,
         options_wanted=len(schema.options),
         sources=coverage.sources,
         sources_wanted=coverage.sources_wanted,
-        missions=[_mission(mission) for mission in coverage.missions],
-        missed=[_missed(missed) for missed in coverage.missed],
+        missions=[_mission(mission) for mission in trial.missions],
+        missed=[_missed(missed) for missed in trial.missed],
     )
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from care_core.configs import apply_commands, format_for, unified_diff
+from care_core.configs.changes import apply_commands, unified_diff
+from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
 from care_core.report.together import listed, together
 from care_core.report.writers import STATUS_WORDS
@@ -163,7 +164,7 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     for other in diagnosis.alternatives:
         yield from wrapped(f"or {_changes(other)}: {other.p_fixed:.0%} odds", "  ", "     ")
     yield ""
-    yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix).splitlines())
+    yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix.changes).splitlines())
     yield ""
     yield from (
         f"  {line}"

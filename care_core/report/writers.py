@@ -1,10 +1,8 @@
-"""The report in the formats that files have, and writing it whole or not at all."""
+"""The report in the formats that files have."""
 
 from __future__ import annotations
 
-import os
 import re
-import tempfile
 from collections.abc import Iterable, Iterator
 from io import StringIO
 from pathlib import Path
@@ -13,7 +11,6 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
-from care_core.errors import UsageError
 from care_core.report.document import (
     CauseEntry,
     FixEntry,
@@ -208,49 +205,3 @@ def _code(text: str) -> str:
     fence = "`" * (1 + max(map(len, re.findall("`+", text)), default=0))
     pad = " " if "`" in text else ""
     return f"{fence}{pad}{text}{pad}{fence}"
-
-
-def write_atomically(path: Path, text: str) -> None:
-    """Write a file through a temporary one beside it: a reader sees the old file or the new one, never half.
-
-    What a link leads to is written, and the link stays. A pipe or a device is written to as it is.
-
-    Raises:
-        UsageError: the folder does not exist or may not be written to, or the file is a log.
-    """
-    refuse_recording(path)
-    try:
-        if path.exists() and not path.is_file() and not path.is_dir():
-            path.write_text(text, encoding="utf-8")
-            return
-        path = path.resolve()
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as stream:
-                stream.write(text)
-            Path(temporary).chmod(_mode(path))
-            Path(temporary).replace(path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
-    except OSError as err:
-        raise UsageError(
-            f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
-        ) from err
-
-
-def refuse_recording(path: Path) -> None:
-    """Raise UsageError for a path that holds a log: logs are never written to."""
-    from care_core.logs import is_recording
-
-    if path.is_file() and is_recording(path):
-        raise UsageError("This is a log, and logs are never overwritten.", hint="Name another file.", where=str(path))
-
-
-def _mode(path: Path) -> int:
-    """The mode a plain `open` would give: that of the file it replaces, else what the umask allows."""
-    if path.exists():
-        return path.stat().st_mode & 0o777
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask

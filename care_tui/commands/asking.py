@@ -33,7 +33,7 @@ def whatif(
 ) -> None:
     """Predict what a run would have done with other options. Ends with 0, whatever the odds."""
     from care_core.diagnose.whatif import parse_change
-    from care_core.report import whatif_json, whatif_text
+    from care_core.report.whatif import whatif_json, whatif_text
 
     if not set_:
         raise UsageError("Nothing is asked.", hint="Change an option with --set OPTION=VALUE.", where="--set")
@@ -55,8 +55,8 @@ def verify(
     no_history: NoHistory = False,
 ) -> None:
     """Tell whether a fix did what it promised. Ends with 0 recovered, 1 still a fault, 3 cannot tell."""
-    from care_core.report import read_report, verify_json, verify_log, verify_text
-    from care_core.report.verification import EXIT_CODES
+    from care_core.report.reading import read_report
+    from care_core.report.verification import EXIT_CODES, verify_json, verify_log, verify_text
 
     if out is not None and out.exists() and report.exists() and out.samefile(report):
         raise UsageError("That is the report itself.", hint="Name another file.", where=str(out))

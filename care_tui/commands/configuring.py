@@ -43,10 +43,10 @@ def diff(
 
 def _side(name: str) -> Side:
     """A configuration out of whatever was named, told by its content."""
-    from care_core.configs import read_configs, split_name
     from care_core.configs.compare import Side
-    from care_core.logs import is_recording, open_log
-    from care_core.report import read_report
+    from care_core.configs.loading import read_configs, split_name
+    from care_core.logs.opening import is_recording, open_log
+    from care_core.report.reading import read_report
 
     path, _ = split_name(name)
     head = b"" if path.is_dir() else _head(path)
@@ -79,7 +79,7 @@ def _head(path: Path) -> bytes:
 def _suggested(report: TriageDocument, path: Path) -> Side:
     """The configuration that a report suggests: what was driven, with its fix."""
     from care_core.configs.compare import Side
-    from care_core.extract.settings import readable
+    from care_core.configs.driven import readable
     from care_core.profile.store import load_profile
     from care_core.run import Setting
 
@@ -105,7 +105,7 @@ def apply(
 ) -> None:
     """Put a report's fix into configuration files. Comments and order stay. Without -o, print the patch."""
     from care_core.configs.edit import apply_changes
-    from care_core.report import read_report
+    from care_core.report.reading import read_report
 
     if out is not None and in_place:
         raise UsageError("Either --out or --in-place.", hint="Leave one out.", where="--in-place")
@@ -124,8 +124,8 @@ def apply(
 
 def _wanted(report: TriageDocument, path: Path, alternative: int) -> list[Wanted]:
     """The parameters that the report's fix sets, or one of its alternatives."""
+    from care_core.configs.driven import readable
     from care_core.configs.edit import Wanted
-    from care_core.extract.settings import readable
     from care_core.profile.store import load_profile
 
     if report.fix is None:
@@ -162,7 +162,7 @@ def _patch(file: EditedFile) -> str:
 
 
 def _replace(file: EditedFile) -> None:
-    from care_core.report import write_atomically
+    from care_core.files import write_atomically
 
     backup = next(path for path in _backups(file.path) if not path.exists())
     write_atomically(backup, file.before)
@@ -179,7 +179,7 @@ def _backups(path: Path) -> Iterator[Path]:
 
 
 def _write_to(out: Path, edited: Sequence[EditedFile]) -> None:
-    from care_core.report import write_atomically
+    from care_core.files import write_atomically
 
     targets = [out / file.path.name if len(edited) > 1 or out.is_dir() else out for file in edited]
     if len(set(targets)) < len(targets):

@@ -69,7 +69,7 @@ def triage(
 @app.command()
 def demo() -> None:
     """Triage the failed flight that comes with the program."""
-    from care_core.resources import bundled
+    from care_core.files import bundled
 
     path = bundled("samples", SAMPLE)
     if not path.is_file():
@@ -101,10 +101,12 @@ def _format_of(out: Path | None) -> str | None:
 
 
 def _written(diagnosis: Diagnosis, format: str | None, *, to_file: bool) -> str:
-    from care_core import report
+    from care_core.report.document import build_document
+    from care_core.report.terminal import to_text
+    from care_core.report.writers import to_json, to_markdown, to_yaml
 
     if format is None:
-        text = report.to_text(diagnosis)
+        text = to_text(diagnosis)
         return text if to_file else painted(text)
-    write = {"json": report.to_json, "yaml": report.to_yaml, "markdown": report.to_markdown}[format]
-    return write(report.build_document(diagnosis))
+    write = {"json": to_json, "yaml": to_yaml, "markdown": to_markdown}[format]
+    return write(build_document(diagnosis))

@@ -20,7 +20,7 @@ def _formats() -> None:
 @app.command("history")
 def history() -> None:
     """Print the JSON Schema of 'care history --json'."""
-    from care_core.history.listing import history_schema
+    from care_core.report.history import history_schema
 
     _print(history_schema())
 
@@ -28,7 +28,7 @@ def history() -> None:
 @app.command("triage")
 def triage() -> None:
     """Print the JSON Schema of 'care triage --json'."""
-    from care_core.report import json_schema
+    from care_core.report.document import json_schema
 
     _print(json_schema())
 
@@ -44,7 +44,7 @@ def inspect() -> None:
 @app.command("verify")
 def verify() -> None:
     """Print the JSON Schema of 'care verify --json'."""
-    from care_core.report import verify_schema
+    from care_core.report.verification import verify_schema
 
     _print(verify_schema())
 
@@ -52,7 +52,7 @@ def verify() -> None:
 @app.command("whatif")
 def whatif() -> None:
     """Print the JSON Schema of 'care whatif --json'."""
-    from care_core.report import whatif_schema
+    from care_core.report.whatif import whatif_schema
 
     _print(whatif_schema())
 

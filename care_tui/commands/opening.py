@@ -39,7 +39,7 @@ def open_app(
     settings: Annotated[Path | None, typer.Option("--settings", help="The app's own settings file.")] = None,
 ) -> None:
     """Open a log in the terminal app: the newest one when none is named."""
-    from care_core.logs import sniff
+    from care_core.logs.opening import sniff
     from care_tui.settings import load_settings, prepare_terminal, with_flags
 
     chosen = with_flags(load_settings(settings), ascii=ascii, mouse=not no_mouse, color=color, theme=theme)

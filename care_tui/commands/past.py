@@ -34,10 +34,11 @@ def history(
     out: Out = None,
 ) -> None:
     """List past triages and verified fixes. With the trend of each objective, and how often fixes worked."""
-    from care_core.history import SWITCH, History, history_path, track_record
     from care_core.history.card import update_card
-    from care_core.history.listing import history_document, history_json, history_text
+    from care_core.history.store import SWITCH, History, history_path
+    from care_core.history.track_record import track_record
     from care_core.profile.store import load_profile
+    from care_core.report.history import history_document, history_json, history_text
 
     path = history_path()
     if path is None:

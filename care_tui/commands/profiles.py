@@ -68,8 +68,9 @@ def _identified(profile: Profile) -> list[str]:
 
 def _verified(schema: Schema) -> str:
     """How the fixes of this profile's version held up on this computer; empty where no history is kept."""
-    from care_core.history import History, HistoryError, history_path, track_record
-    from care_core.history.listing import verified_line
+    from care_core.history.store import History, HistoryError, history_path
+    from care_core.history.track_record import track_record
+    from care_core.report.history import verified_line
 
     path = history_path()
     if path is None:

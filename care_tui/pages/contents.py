@@ -27,7 +27,7 @@ class ContentsPage(Page):
         self._found.start(self._inspect)
 
     def _inspect(self) -> Rows:
-        from care_core.logs import open_log
+        from care_core.logs.opening import open_log
         from care_tui.inspection import as_text, inspect_log
 
         return plain_rows(as_text(inspect_log(open_log(self._log))))

@@ -15,7 +15,7 @@ from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
 
 if TYPE_CHECKING:  # reading models is not needed for the first frame
-    from care_core.profile.model import EdgeRecord
+    from care_core.causal.model import EdgeRecord
 
 FEW = 0.5
 """Edges that fewer bootstrap resamples hold are flagged."""

@@ -76,7 +76,7 @@ class HistoryPage(Page):
         return rows
 
     def _trend(self, values: Sequence[float | None]) -> str:
-        from care_core.history import sparkline
+        from care_core.history.track_record import sparkline
 
         known = [value for value in values if value is not None][-TREND:]
         if len(known) < 2:

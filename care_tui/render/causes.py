@@ -30,7 +30,7 @@ from care_tui.render.rows import (
 )
 
 if TYPE_CHECKING:  # reading models is not needed for the first frame
-    from care_core.profile.model import EffectRecord
+    from care_core.causal.model import EffectRecord
 
 FEW_RESAMPLES = 0.5
 """Edges that fewer bootstrap resamples hold are flagged."""

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from textual.content import Content
 
-from care_core.diagnose.records import Change, Diagnosis, Fix, ObjectiveResult, Prediction
+from care_core.diagnose.records import Diagnosis, Fix, ObjectiveResult, Prediction
 from care_core.text import clean
-from care_core.variables import Variable
+from care_core.variables import Change, Variable
 from care_tui.basket import acceptable
 from care_tui.render.rows import (
     Glyphs,

@@ -25,7 +25,7 @@ from care_tui.render.rows import (
 )
 
 if TYPE_CHECKING:  # reading models is not needed for the first frame
-    from care_core.profile.model import Summary
+    from care_core.causal.model import Summary
 
 STATUS_WIDTH = 17
 VALUE_WIDTH = 11

@@ -13,9 +13,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from care_core.configs import read_config
+from care_core.configs.loading import read_config
 from care_core.errors import ConfigError
-from care_core.report.writers import write_atomically
+from care_core.files import write_atomically
 from tests.conftest import Care
 
 ROOT = Path(__file__).parents[2]

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from care_core.diagnose.records import Diagnosis
-from care_core.extract.table import ABOUT
 from care_core.profile.store import load_profile
+from care_core.tables.rows import ABOUT
 from care_tui import __version__, console
 from care_tui.cli import route
 from care_tui.commands import diagnosing
@@ -227,7 +227,7 @@ def test_inspect_shows_what_a_log_holds(care: Care, flights: tuple[Path, ...]) -
 
 
 def test_params_are_a_file_that_can_be_loaded(care: Care, flights: tuple[Path, ...], tmp_path: Path) -> None:
-    from care_core.configs import read_config
+    from care_core.configs.loading import read_config
 
     out = tmp_path / "driven.param"
     assert care("params", flights[0], "--out", out).code == 0

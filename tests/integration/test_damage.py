@@ -19,10 +19,10 @@ import pytest
 from care_core.diagnose.faults import judge, thresholds_in_force
 from care_core.errors import CareError, ExitCode, LogError
 from care_core.extract.read import read_run
-from care_core.logs import open_log
-from care_core.profile.select import choose_profile
+from care_core.extract.select import choose_profile
+from care_core.files import bundled
+from care_core.logs.opening import open_log
 from care_core.profile.store import Profile, load_profile
-from care_core.resources import bundled
 from care_core.run import MissionInfo
 from care_tui.jobs import Request, diagnose_log, exit_code
 from tests import nav2_drive

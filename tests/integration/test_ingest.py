@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from care_core.extract.ingest import by_reason, ingest, journal_of
-from care_core.extract.table import Row
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
+from care_core.tables.ingest import by_reason, ingest, journal_of
+from care_core.tables.rows import Row
 from tests.conftest import Care
 
 ROOT = Path(__file__).parents[2]

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from care_core.diagnose.records import Diagnosis, ProfileChoice
+from care_core.diagnose.records import Diagnosis
 from care_core.diagnose.triage import diagnose
 from care_core.learn.train import train
 from care_core.profile.model import write_model
 from care_core.profile.store import Profile
-from care_core.run import Run, Unavailable
+from care_core.run import ProfileChoice, Run, Unavailable
 from tests.planted import CALM, DEFAULTS, OPTIONS, SCHEMA, SETTINGS, fly, fly_many, planted_run, with_variable
 
 CHOICE = ProfileChoice("planted", "1", "Simulated robot", "named by the test")

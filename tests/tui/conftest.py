@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
-from care_core.diagnose.records import Change, Diagnosis, Fix
+from care_core.diagnose.records import Diagnosis, Fix
+from care_core.variables import Change
 from care_tui.app import CareApp
 from care_tui.jobs import Case, DiffSide, Engine, Progress, ReportFormat, Request
 from care_tui.screens.panes import PanesScreen

@@ -7,19 +7,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from care_core.diagnose.records import (
-    Cause,
-    Change,
-    Diagnosis,
-    Fault,
-    Fix,
-    ObjectiveResult,
-    PathNode,
-    Prediction,
-    ProfileChoice,
-)
-from care_core.run import Damage, Evidence, LogInfo, MissionInfo, Run, Setting
-from care_core.variables import Role, Threshold, Variable
+from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
+from care_core.run import Damage, Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Setting
+from care_core.variables import Change, Role, Threshold, Variable
 
 HOSTILE = "PreArm: [bold]check[/bold] \x1b[31mfences\x1b[0m\u202e"
 

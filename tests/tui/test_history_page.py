@@ -10,7 +10,7 @@ import pytest
 
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError
-from care_core.history import History
+from care_core.history.store import History
 from care_tui.app import CareApp
 from care_tui.jobs import Case, Request
 from care_tui.remembering import remember_triage

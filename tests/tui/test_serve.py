@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from care_core.resources import bundled
+from care_core.files import bundled
 
 pytest.importorskip("textual_serve", reason="needs the extra 'serve'")
 

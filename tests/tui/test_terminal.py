@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from care_core.resources import bundled
+from care_core.files import bundled
 
 pexpect = pytest.importorskip("pexpect", reason="needs a terminal to drive")
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs a POSIX terminal")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from textual.widgets import Static
 
-from care_core.resources import bundled
+from care_core.files import bundled
 from care_tui.app import CareApp
 from care_tui.jobs import Request
 from care_tui.pages.history import HistoryPage

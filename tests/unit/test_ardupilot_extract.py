@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from care_core.extract import ardupilot
 from care_core.extract.flight import analyse, distance_to_legs
 from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Mission, find_extractor, merge_needs
-from care_core.logs import open_log
 from care_core.logs.base import Table
+from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema, read_schema
 from care_core.run import Unavailable, Value, is_known
 from care_core.variables import Role

@@ -13,8 +13,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from care_core.errors import CareError, LogError
 from care_core.extract.read import read_run
-from care_core.logs import open_log
 from care_core.logs.base import Log, LogFormat
+from care_core.logs.opening import open_log
 from care_core.profile.schema import read_schema
 from care_core.run import is_known
 from tests.rewritten import write_text, write_ulog

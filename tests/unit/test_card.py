@@ -3,8 +3,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from care_core.causal.graph import CausalGraph
+from care_core.causal.model import SkillRecord
 from care_core.learn.card import model_card
-from care_core.profile.model import SkillRecord
 from care_core.profile.store import Profile
 from tests.planted import SCHEMA
 

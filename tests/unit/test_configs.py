@@ -10,21 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_core.configs import (
-    ConfigFormat,
-    apply_commands,
-    format_for,
-    guesses,
-    read_config,
-    read_configs,
-    resolve,
-    unified_diff,
-    write_params,
-)
-from care_core.diagnose.records import Change
+from care_core.configs.changes import apply_commands, unified_diff
+from care_core.configs.formats import ConfigFormat, format_for, write_params
+from care_core.configs.loading import guesses, read_config, read_configs, resolve
 from care_core.errors import ConfigError
 from care_core.run import Setting
-from care_core.variables import Role, Variable
+from care_core.variables import Change, Role, Variable
 from tests.made import DRIVEN, LAND_SPEED, made_diagnosis
 
 
@@ -324,7 +315,7 @@ def test_a_remark_stands_by_its_parameter() -> None:
 def test_the_diff_shows_only_what_changes() -> None:
     diagnosis = made_diagnosis()
     assert diagnosis.fix is not None
-    lines = unified_diff(diagnosis.run, diagnosis.fix).splitlines()
+    lines = unified_diff(diagnosis.run, diagnosis.fix.changes).splitlines()
     assert lines[:2] == ["--- as driven", "+++ suggested"]
     assert lines[3:] == ["-LAND_SPEED,16", "+LAND_SPEED,50"]
 
@@ -333,7 +324,7 @@ def test_a_fix_that_changes_nothing_has_no_diff() -> None:
     diagnosis = made_diagnosis()
     assert diagnosis.fix is not None
     fix = replace(diagnosis.fix, changes=(Change(LAND_SPEED, DRIVEN, DRIVEN),))
-    assert unified_diff(diagnosis.run, fix) == ""
+    assert unified_diff(diagnosis.run, fix.changes) == ""
 
 
 def test_commands_of_each_ecosystem() -> None:

@@ -11,8 +11,8 @@ import pytest
 from mcap.writer import CompressionType
 
 from care_core.errors import LogError
-from care_core.logs import open_log
 from care_core.logs.base import Log, Table
+from care_core.logs.opening import open_log
 from tests.ros_samples import WANTED, write_bag, write_db3, write_mcap
 
 _PLACES = 200

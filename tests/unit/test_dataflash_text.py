@@ -13,7 +13,7 @@ import pytest
 
 from care_core.errors import ProfileError
 from care_core.extract.read import read_run
-from care_core.logs import open_log
+from care_core.logs.opening import open_log
 from care_core.profile.store import load_profile
 from tests.rewritten import write_text
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from care_core.configs import read_config
 from care_core.configs.compare import Side, compare, same_value
 from care_core.configs.edit import Wanted, apply_changes
+from care_core.configs.loading import read_config
 from care_core.errors import ConfigError
 from care_core.run import Setting
 from care_core.variables import Role, Variable

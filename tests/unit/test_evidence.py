@@ -11,21 +11,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_core.causal.model import Summary
 from care_core.diagnose.circumstances import circumstances
 from care_core.diagnose.evidence import refused_by
 from care_core.diagnose.faults import thresholds_in_force
-from care_core.diagnose.records import ProfileChoice
 from care_core.diagnose.tell_more import experiment
 from care_core.diagnose.triage import diagnose, triage
 from care_core.diagnose.worlds import reference_of, world_of
 from care_core.errors import ProfileError
-from care_core.logs import open_log
-from care_core.profile.model import Summary
+from care_core.extract.select import describe_fit
+from care_core.logs.opening import open_log
 from care_core.profile.schema import EvidenceRule, Schema, Side, read_schema
-from care_core.profile.select import describe_fit
 from care_core.profile.store import Profile, load_profile
-from care_core.report import build_document, to_markdown, to_text
-from care_core.run import Evidence, Run, Unavailable
+from care_core.report.document import build_document
+from care_core.report.terminal import to_text
+from care_core.report.writers import to_markdown
+from care_core.run import Evidence, ProfileChoice, Run, Unavailable
 from care_core.variables import Role, Threshold, Variable
 from tests.planted import OPTIONS, SCHEMA, planted_run
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from care_core.extract.document import document
-from care_core.extract.recording import how_to_record
+from care_core.extract.how_to_record import how_to_record
 from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Mission
+from care_core.report.extractors import document
 from care_core.run import Unavailable
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extractors.md"

@@ -5,8 +5,8 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_core.causal.model import Summary
 from care_core.diagnose.faults import judge, thresholds_in_force
-from care_core.profile.model import Summary
 from care_core.run import Unavailable
 from care_core.variables import Threshold
 from tests.planted import SCHEMA, TIME, planted_run, with_variable

@@ -15,10 +15,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.errors import CareError
-from care_core.history import History, HistoryError, Verified, history_path, sparkline, track_record, trends
 from care_core.history.card import update_card
-from care_core.history.listing import history_document, history_json, history_schema, history_text
-from care_core.report import build_document
+from care_core.history.store import History, HistoryError, Verified, history_path
+from care_core.history.track_record import sparkline, track_record, trends
+from care_core.report.document import build_document
+from care_core.report.history import history_document, history_json, history_schema, history_text
 from care_core.report.writers import published
 from tests.conftest import Care
 from tests.made import made_diagnosis

@@ -14,8 +14,8 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from care_core.errors import LogError
-from care_core.logs import open_log
 from care_core.logs.mavlink import MavlinkLog
+from care_core.logs.opening import open_log
 
 START_US = 1_700_000_000_000_000
 COPTER = (1, 1)

@@ -11,9 +11,9 @@ from mcap.writer import CompressionType, IndexType
 from rosbags.rosbag2 import StoragePlugin
 
 from care_core.errors import LogError
-from care_core.logs import open_log
 from care_core.logs.base import LogFormat
 from care_core.logs.mcap_log import McapLog
+from care_core.logs.opening import open_log
 from tests.ros_samples import (
     IMU,
     MESSAGES,

@@ -13,8 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_core.causal.model import Summary
 from care_core.errors import ProfileError
-from care_core.profile.model import Summary, read_model, write_model
+from care_core.profile.model import read_model, write_model
 from care_core.profile.store import Profile
 from tests.planted import DEFAULTS
 

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 
-from care_core.configs import format_for, read_configs, resolve, write_params
+from care_core.configs.formats import format_for, write_params
+from care_core.configs.loading import read_configs, resolve
 from care_core.extract.read import read_run
-from care_core.logs import open_log
+from care_core.logs.opening import open_log
 from care_core.run import is_known
 from tests.nav2_drive import MAX_VEL, recorded, schema
 

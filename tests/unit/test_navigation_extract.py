@@ -26,8 +26,8 @@ from care_core.extract.drive import (
 )
 from care_core.extract.read import read_run
 from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Mission, find_extractor
-from care_core.logs import open_log
 from care_core.logs.base import Table
+from care_core.logs.opening import open_log
 from care_core.profile.schema import read_schema
 from care_core.run import Unavailable, Value, is_known
 

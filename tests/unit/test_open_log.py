@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from care_core.errors import ExitCode, LogError
-from care_core.logs import log_digest, open_log, sniff
 from care_core.logs.base import LogFormat
+from care_core.logs.digest import log_digest
+from care_core.logs.opening import open_log, sniff
 
 
 @pytest.mark.parametrize(

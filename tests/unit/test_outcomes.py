@@ -8,6 +8,7 @@ import pytest
 
 from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
+from care_core.causal.model import Model
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import (
     causes_of,
@@ -18,7 +19,6 @@ from care_core.learn.outcomes import (
     groups_that_move_together,
     met,
 )
-from care_core.profile.model import Model
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.variables import Role, Threshold, Variable

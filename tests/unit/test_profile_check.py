@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from care_core.causal.model import Model
 from care_core.profile.check import problems
-from care_core.profile.model import Model
 from care_core.profile.store import Profile, available_profiles, load_profile
 from tests.conftest import Care
 

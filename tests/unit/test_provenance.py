@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from care_core.configs import read_configs, resolve
+from care_core.configs.driven import clock, configuration, differing, remark
+from care_core.configs.loading import read_configs, resolve
+from care_core.configs.self_written import SELF_WRITTEN, is_self_written
 from care_core.diagnose import provenance
 from care_core.diagnose.since import compare
-from care_core.extract.self_written import SELF_WRITTEN, is_self_written
-from care_core.extract.settings import clock, configuration, differing, remark
-from care_core.logs import open_log
 from care_core.logs.base import Log
+from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema, read_schema
 from care_core.profile.store import Profile, load_profile
 from care_core.run import Run, Setting

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from care_core.errors import LogError
-from care_core.logs import open_log
+from care_core.logs.opening import open_log
 from tests.rewritten import write_ulog
 
 pytest.importorskip("pyulog")

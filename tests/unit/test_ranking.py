@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
+from care_core.causal.model import EdgeRecord
 from care_core.diagnose.ranking import (
     _carriers,
     _shapley,
@@ -21,7 +22,6 @@ from care_core.diagnose.ranking import (
     reference_config,
     suspects,
 )
-from care_core.profile.model import EdgeRecord
 from care_core.profile.store import Profile
 from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run, with_variable
 

@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_core.configs.driven import disagreements, in_force, option_value
 from care_core.errors import ProfileError, UsageError
 from care_core.extract.read import read_run, read_runs, reading_plan
 from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Args, Mission, MissionKind, extractor
-from care_core.extract.settings import disagreements, in_force, option_value
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.profile.schema import EvidenceRule, Schema
 from care_core.run import Damage, Evidence, Setting, Unavailable, Value
@@ -190,7 +190,7 @@ def test_a_file_fills_what_the_log_lacks_and_is_contradicted_by_what_it_holds(lo
     run = read_run(log, schema, overrides=overrides)
     assert run.config == {"speed": 3.0, "brake": 1.0}
     assert run.settings["/nav/local/brake"].source == "b.yaml:2"
-    (sentence,) = disagreements(schema, run.settings, overrides)
+    (sentence,) = disagreements(schema.options, run.settings, overrides)
     assert "speed was 3" in sentence
     assert "a.param:4" in sentence
 

@@ -12,9 +12,10 @@ import pytest
 import zstandard
 
 from care_core.errors import LogError
-from care_core.extract.table import find_logs
-from care_core.logs import log_digest, open_log
 from care_core.logs.compression import CannotUnpackError, PlainFile, unpack
+from care_core.logs.digest import log_digest
+from care_core.logs.finding import find_logs
+from care_core.logs.opening import open_log
 from tests.ros_samples import MESSAGES, WANTED, is_same, leaves, value_at, write_bag
 
 

@@ -16,16 +16,11 @@ from ruamel.yaml import YAML
 from care_core.diagnose.records import Fault, ObjectiveResult, ParameterChange, PathNode, Prediction, Since
 from care_core.diagnose.since import with_evidence
 from care_core.errors import UsageError
-from care_core.report import (
-    build_document,
-    json_schema,
-    to_html,
-    to_json,
-    to_markdown,
-    to_text,
-    to_yaml,
-    write_atomically,
-)
+from care_core.files import write_atomically
+from care_core.report.document import build_document, json_schema
+from care_core.report.html import to_html
+from care_core.report.terminal import to_text
+from care_core.report.writers import to_json, to_markdown, to_yaml
 from care_core.run import Damage
 from care_core.text import clean
 from tests.made import DRIVEN, ENERGY, HOSTILE, LAND_SPEED, made_diagnosis

@@ -6,7 +6,9 @@ from dataclasses import replace
 from html.parser import HTMLParser
 
 from care_core.diagnose.records import Circumstance, Dismissal
-from care_core.report import build_document, to_html, to_json, to_markdown
+from care_core.report.document import build_document
+from care_core.report.html import to_html
+from care_core.report.writers import to_json, to_markdown
 from tests.made import made_diagnosis
 
 HOSTILE = '<script>alert("x")</script> & \x1b[31m'

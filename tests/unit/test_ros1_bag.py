@@ -16,7 +16,7 @@ from rosbags.rosbag1 import Reader, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from care_core.errors import LogError
-from care_core.logs import open_log
+from care_core.logs.opening import open_log
 from care_core.logs.ros1_bag import Ros1Bag
 from care_core.logs.ros_message import parse_definition
 

@@ -12,11 +12,13 @@ import pytest
 from rosbags.rosbag2 import CompressionMode
 from ruamel.yaml import YAML
 
-from care_core.configs import ConfigFormat, read_config, write_params
 from care_core.configs.compare import Side, compare
+from care_core.configs.formats import ConfigFormat, write_params
+from care_core.configs.loading import read_config
 from care_core.errors import LogError
-from care_core.logs import log_digest, open_log
 from care_core.logs.base import Log, LogFormat
+from care_core.logs.digest import log_digest
+from care_core.logs.opening import open_log
 from tests.ros_samples import IMU, MESSAGES, ROS2, SECOND_NS, START_NS, TEXT, WANTED, make, recording, stamp, write_db3
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from care_core.errors import ProfileError
+from care_core.extract.coverage import cover
+from care_core.extract.select import choose_profile, describe_fit
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.profile.schema import Schema
-from care_core.profile.select import choose_profile, describe_fit, measure_fit
 from care_core.run import Damage, Setting
 from care_core.variables import Role, Variable
 
@@ -77,7 +78,7 @@ def test_what_differs_is_said() -> None:
 
 def test_sources_count_too() -> None:
     log = NamedLog(sources=("POS", "MODE"))
-    assert measure_fit(log, candidate("copter", "A").schema).sources == 2
+    assert cover(log, candidate("copter", "A").schema).sources == 2
 
 
 def test_nothing_fits() -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from care_core.errors import UsageError
-from care_core.extract.table import ABOUT, check_table_path, find_logs, write_table
+from care_core.logs.finding import find_logs
+from care_core.tables.rows import ABOUT, check_table_path, write_table
 from tests.unit.test_read_run import made_schema
 
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from care_core.extract.coverage import cover
 from care_core.extract.read import read_run
 from care_core.extract.telemetry import as_dataflash
-from care_core.logs import open_log
+from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema, read_schema
-from care_core.profile.select import measure_fit
 from care_core.run import Run, Unavailable, is_known
 from tests.groundstation import write_tlog
 from tests.rewritten import write_text
@@ -70,7 +70,7 @@ def test_metrics_agree_or_say_where_to_find_them(recorded: Run, heard: Run) -> N
 
 def test_the_profile_finds_its_sources_in_telemetry(schema: Schema, tmp_path: Path) -> None:
     log = open_log(write_tlog(tmp_path / "a.tlog", SAMPLE, np.random.default_rng(0)))
-    fit = measure_fit(log, schema)
+    fit = cover(log, schema)
     assert fit.options == len(schema.options)
     assert fit.sources >= 14
     assert {"ATT", "POS", "MSG", "ATTITUDE"} <= {channel.name for channel in as_dataflash(log).channels()}

@@ -15,8 +15,9 @@ from ruamel.yaml import YAML
 from care_core.diagnose.faults import judge, thresholds_in_force
 from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, same, verify
 from care_core.errors import ConfigError
-from care_core.report import read_report, to_json, to_yaml
 from care_core.report.document import build_document
+from care_core.report.reading import read_report
+from care_core.report.writers import to_json, to_yaml
 from care_core.run import Setting, Unavailable
 from tests.conftest import Care
 from tests.made import made_diagnosis

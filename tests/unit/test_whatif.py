@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_core.diagnose.records import ProfileChoice
 from care_core.diagnose.whatif import Question, parse_change, question
 from care_core.errors import UsageError
 from care_core.profile.store import Profile
-from care_core.report import whatif_document, whatif_text
+from care_core.report.whatif import whatif_document, whatif_text
+from care_core.run import ProfileChoice
 from tests.conftest import Care
 from tests.planted import CALM, DEFAULTS, SCHEMA, fly, planted_run
 

@@ -20,12 +20,12 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from care_core.errors import LogError, UsageError
-from care_core.extract.table import Row, rows_of
-from care_core.logs import open_log
+from care_core.extract.select import choose_profile
+from care_core.logs.opening import open_log
 from care_core.parallel import Failed, each
 from care_core.profile.schema import Schema
-from care_core.profile.select import choose_profile
 from care_core.profile.store import available_profiles, load_profile
+from care_core.tables.rows import Row, rows_of
 
 Report = Callable[[str, float], None]
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
-from care_core.diagnose.records import ProfileChoice
 from care_core.errors import LogError, ProfileError
-from care_core.extract.read import reading_plan
-from care_core.extract.settings import readable
-from care_core.extract.telemetry import as_dataflash
+from care_core.extract.coverage import Coverage, cover
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
+from care_core.run import ProfileChoice
 
 NEARLY_AS_WELL = 0.9
 """Another profile is named when it matches at least this share of what the chosen one does."""
@@ -28,40 +25,19 @@ class HasSchema(Protocol):
 P = TypeVar("P", bound=HasSchema)
 
 
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """How much of a profile a log holds: options with a parameter, sources among its channels, matched names."""
-
-    schema: Schema
-    options: int
-    sources: int
-    sources_wanted: int
-    names: int
-
-    @property
-    def found(self) -> int:
-        return self.options + self.sources
-
-    def __str__(self) -> str:
-        return (
-            f"{self.options} of {len(self.schema.options)} options and {self.sources} of {self.sources_wanted}"
-            " sources are in the log"
-        )
-
-
 def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice]:
     """The candidate with most parameters and sources in the log, then with the robot's or firmware's name.
 
     Raises:
         ProfileError: no candidate has anything in common with the log.
     """
-    fits = [measure_fit(log, candidate.schema) for candidate in candidates]
-    order = sorted(range(len(fits)), key=lambda i: (-fits[i].found, -fits[i].names, fits[i].schema.name))
-    usable = [i for i in order if fits[i].found]
+    found = [cover(log, candidate.schema) for candidate in candidates]
+    order = sorted(range(len(found)), key=lambda i: (-found[i].found, -found[i].names, found[i].schema.name))
+    usable = [i for i in order if found[i].found]
     if not usable:
-        raise _nothing_readable(log) or _nothing_fits(log, fits)
-    best = fits[usable[0]]
-    others = [fits[i].schema.name for i in usable[1:] if fits[i].found >= NEARLY_AS_WELL * best.found]
+        raise _nothing_readable(log) or _nothing_fits(log, found)
+    best = found[usable[0]]
+    others = [found[i].schema.name for i in usable[1:] if found[i].found >= NEARLY_AS_WELL * best.found]
     return candidates[usable[0]], _choice(log, best, others)
 
 
@@ -70,30 +46,14 @@ def describe_fit(log: Log, profile: HasSchema) -> ProfileChoice:
     return choose_profile(log, [profile])[1]
 
 
-def _choice(log: Log, fit: Fit, others: Sequence[str]) -> ProfileChoice:
+def _choice(log: Log, coverage: Coverage, others: Sequence[str]) -> ProfileChoice:
     rivals = f"; {', '.join(others)} would fit nearly as well" if others else ""
     return ProfileChoice(
-        name=fit.schema.name,
-        version=fit.schema.version,
-        platform=fit.schema.platform,
-        reason=f"{fit}{rivals}",
-        warnings=differences(log, fit.schema),
-    )
-
-
-def measure_fit(log: Log, schema: Schema) -> Fit:
-    """Count what a log holds of a profile. A profile of another format, or of a published table, has nothing."""
-    if log.format.value not in schema.logs:
-        return Fit(schema, 0, 0, 0, 0)
-    settings = log.settings()
-    channels = {channel.name for channel in as_dataflash(log).channels()}
-    plan = reading_plan(schema)
-    return Fit(
-        schema,
-        options=sum(any(name in settings for name in readable(option)) for option in schema.options),
-        sources=len(channels & plan.keys()),
-        sources_wanted=len(plan),
-        names=sum(text.casefold() in log.facts.get(key, "").casefold() for key, text in schema.match.items()),
+        name=coverage.schema.name,
+        version=coverage.schema.version,
+        platform=coverage.schema.platform,
+        reason=f"{coverage}{rivals}",
+        warnings=differences(log, coverage.schema),
     )
 
 
@@ -117,16 +77,16 @@ def _nothing_readable(log: Log) -> LogError | None:
     )
 
 
-def _nothing_fits(log: Log, fits: Sequence[Fit]) -> ProfileError:
-    if len(fits) == 1:
-        schema = fits[0].schema
+def _nothing_fits(log: Log, found: Sequence[Coverage]) -> ProfileError:
+    if len(found) == 1:
+        schema = found[0].schema
         reads = f"It reads {' or '.join(schema.logs)}" if schema.logs else "It comes from a table and reads no log"
         return ProfileError(
             f"Profile '{schema.name}' does not fit the log: none of its parameters or sources are in it.",
             hint=f"{reads}, this is {log.format.value}; leave --profile out to have one chosen.",
             where=str(log.path),
         )
-    names = ", ".join(fit.schema.name for fit in fits if log.format.value in fit.schema.logs)
+    names = ", ".join(one.schema.name for one in found if log.format.value in one.schema.logs)
     looked = f"Looked for the parameters and sources of {names}" if names else f"None of them reads {log.format.value}"
     return ProfileError(
         "No profile fits the log.",

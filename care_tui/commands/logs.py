@@ -13,7 +13,7 @@ from care_tui.commands.arguments import AsJson, LogPath, Out, ProfileName
 from care_tui.console import Progress, check_writable, emit, say
 
 if TYPE_CHECKING:
-    from care_core.extract.ingest import Failure
+    from care_core.tables.ingest import Failure
 
 app = typer.Typer()
 
@@ -24,7 +24,7 @@ MOST_FAILURES = 20
 @app.command()
 def inspect(log: LogPath, json: AsJson = False) -> None:
     """Show what a log holds. Span, channels, parameters, damage, missions, and what each profile would miss."""
-    from care_core.logs import open_log
+    from care_core.logs.opening import open_log
     from care_core.report.inspection import inspection_json
     from care_tui.inspection import as_text, inspect_log
 
@@ -47,9 +47,9 @@ def params(
     out: Out = None,
 ) -> None:
     """Print the configuration as driven. It is a file that the robot's software reads."""
-    from care_core.configs import format_for, write_params
-    from care_core.extract.settings import differing, remark
-    from care_core.logs import open_log
+    from care_core.configs.driven import differing, remark
+    from care_core.configs.formats import format_for, write_params
+    from care_core.logs.opening import open_log
 
     opened = open_log(log)
     histories = opened.settings()
@@ -81,9 +81,10 @@ def ingest(
     What is interrupted goes on where it was when the command is given again. Ends with 0 all read, 3 some failed,
     4 none could be read.
     """
-    from care_core.extract import ingest as ingesting
-    from care_core.extract.table import check_table_path, find_logs, write_table
+    from care_core.logs.finding import find_logs
     from care_core.profile.store import load_profile
+    from care_core.tables import ingest as ingesting
+    from care_core.tables.rows import check_table_path, write_table
 
     check_table_path(out)
     if failures is not None:
@@ -114,7 +115,7 @@ def ingest(
 
 def _say_failures(failures: Sequence[Failure]) -> None:
     """A line for each log that failed; where they are many, a line for each reason."""
-    from care_core.extract.ingest import by_reason
+    from care_core.tables.ingest import by_reason
 
     if len(failures) <= MOST_FAILURES:
         for failure in failures:

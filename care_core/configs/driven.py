@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from care_core.extract.self_written import is_self_written
-from care_core.profile.schema import Schema
+from care_core.configs.self_written import is_self_written
 from care_core.run import Setting, shown
 from care_core.text import clean
 from care_core.variables import Variable
@@ -116,10 +115,12 @@ def configuration(
     return config, sources, {**overrides, **driven}
 
 
-def disagreements(schema: Schema, driven: Mapping[str, Setting], overrides: Mapping[str, Setting]) -> tuple[str, ...]:
+def disagreements(
+    options: Iterable[Variable], driven: Mapping[str, Setting], overrides: Mapping[str, Setting]
+) -> tuple[str, ...]:
     """One sentence for each parameter of an option whose configuration file says another value than the log drove."""
     sentences = []
-    for option in schema.options:
+    for option in options:
         several = sum(parameter in driven for parameter in option.parameters) > 1
         for parameter in readable(option):
             ours, theirs = driven.get(parameter), overrides.get(parameter)

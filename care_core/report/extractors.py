@@ -1,4 +1,4 @@
-"""The extractor library as a page, generated from the code: `python -m care_core.extract.document FILE` writes it."""
+"""The extractor library as a page, generated from the code: `python -m care_core.report.extractors FILE` writes it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 
 import care_core.extract.read  # noqa: F401  (registers every extractor)
 from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Extractor
+from care_core.files import write_atomically
 from care_core.logs.base import Wanted
-from care_core.report.writers import write_atomically
 
 _HEAD = """\
 # Extractors

@@ -1,81 +1,23 @@
-"""The table of runs: which logs go into it, its rows, and how it is written."""
+"""The table of runs: its rows, and how it is written."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from care_core.errors import LogError, UsageError
+from care_core.errors import UsageError
 from care_core.extract.read import read_runs
-from care_core.logs import open_log, sniff, whole_recording
+from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
 from care_core.run import Run, is_known
 
-LOG_SUFFIXES = (".bin", ".log", ".tlog", ".bag", ".active", ".mcap", ".db3", ".zstd", ".ulg")
-SHARED_SUFFIX = ".log"
-"""An ending that many files have: only those that begin like a log are taken out of a folder."""
 ABOUT = ("log", "mission", "log_format", "log_start", "log_sha256")
 """The columns before the variables."""
 INSTALL_LEARN = "Install what it needs with: pip install 'care-tui[learn]'"
 
 Row = dict[str, str | int | float | None]
-
-
-def find_logs(places: Iterable[Path]) -> tuple[Path, ...]:
-    """The logs named, and every log below the folders named, each once, in a stable order.
-
-    A folder that a ROS 2 recorder made is one log.
-
-    A folder that is one recording of several files counts as one log.
-
-    Raises:
-        UsageError: a place does not exist, or there is no log at all.
-    """
-    found: dict[Path, None] = {}
-    for place in places:
-        if not place.exists():
-            raise UsageError("No such file or folder.", hint="Check the path.", where=str(place))
-        inside = map(whole_recording, logs_below(place)) if place.is_dir() else [place]
-        found.update(dict.fromkeys(inside))
-    if not found:
-        raise UsageError("There is no log there.", hint=f"Logs end in {', '.join(LOG_SUFFIXES)}.")
-    return tuple(found)
-
-
-def logs_below(folder: Path) -> list[Path]:
-    """Every log in a folder and in those below it, by name; the folder itself where it is one recording."""
-    if is_recording(folder):
-        return [folder]
-    found: list[Path] = []
-    for path in sorted(folder.iterdir()):
-        if path.is_dir() and not path.is_symlink():
-            found += logs_below(path)
-        elif is_log(path):
-            found.append(path)
-    return found
-
-
-def is_recording(folder: Path) -> bool:
-    """Whether a ROS 2 recorder made this folder."""
-    return (folder / "metadata.yaml").is_file()
-
-
-def is_log(path: Path) -> bool:
-    """Whether a file in a folder is a log, by its ending, and by its beginning where others end like that too."""
-    suffix = path.suffix.lower()
-    if suffix not in LOG_SUFFIXES or not path.is_file():
-        return False
-    return suffix != SHARED_SUFFIX or _begins_like_a_log(path)
-
-
-def _begins_like_a_log(path: Path) -> bool:
-    try:
-        sniff(path)
-    except LogError:
-        return False
-    return True
 
 
 def rows_of(path: Path, schema: Schema) -> list[Row]:
@@ -103,7 +45,7 @@ def write_table(path: Path, rows: Sequence[Row], schema: Schema) -> None:
     if path.suffix.lower() == ".parquet":
         _write_parquet(path, rows, columns)
         return
-    from care_core.report.writers import write_atomically
+    from care_core.files import write_atomically
 
     stream = io.StringIO()
     writer = csv.DictWriter(stream, columns, lineterminator="\n")
@@ -116,7 +58,7 @@ def check_table_path(path: Path) -> None:
     """Refuse, before any log is read, a table that could not be written. Raises UsageError."""
     if path.suffix.lower() not in (".csv", ".parquet"):
         raise UsageError("A table of runs ends in .csv or .parquet.", hint="Rename it.", where=str(path))
-    from care_core.report.writers import refuse_recording
+    from care_core.files import refuse_recording
 
     refuse_recording(path)
     if not path.parent.is_dir():

@@ -1,0 +1,159 @@
+"""What was learned of a platform: graph, effects, mechanisms, and what the training runs held.
+
+pydantic checks the shape of these records where a file is read; nothing else here knows of files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from care_core.causal.effects import Direction
+from care_core.causal.graph import CausalGraph
+from care_core.causal.mechanisms import Mechanism
+
+
+class Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class EdgeRecord(Record):
+    """An edge with the share of bootstrap resamples that hold it, and its effect (Eq. 1, scaled) with its interval."""
+
+    source: str
+    target: str
+    kind: Literal["directed", "bidirected"]
+    support: float
+    effect: float = 0.0
+    low: float = 0.0
+    high: float = 0.0
+    direction: Direction = "none"
+
+
+class EffectRecord(Record):
+    """Total effect of an option on an objective: identification and Eq. 1 with its bootstrap interval."""
+
+    option: str
+    objective: str
+    identified: bool
+    functional: str
+    adjustment: tuple[str, ...] = ()
+    effect: float
+    low: float
+    high: float
+    direction: Direction
+    support: float | None = None
+    """Share of bootstrap resamples in which the option has a directed path to the objective; None: not measured."""
+
+
+class PathRecord(Record):
+    """A ranked path (Eq. 2) with its bootstrap interval, which way it moves the objective, and each edge's support."""
+
+    objective: str
+    nodes: tuple[str, ...]
+    ace: float
+    low: float
+    high: float
+    direction: Direction = "none"
+    edge_support: tuple[float, ...] = ()
+
+
+class Summary(Record):
+    """What the training runs held of one variable: `quantiles` at 0, 5, ... 100 %."""
+
+    count: int
+    mean: float
+    spread: float
+    quantiles: tuple[float, ...] = Field(min_length=2)
+
+    @property
+    def low(self) -> float:
+        return self.quantiles[0]
+
+    @property
+    def high(self) -> float:
+        return self.quantiles[-1]
+
+    def percentile(self, value: float) -> float:
+        """Share (0 to 1) of the training runs with a smaller value."""
+        return float(np.interp(value, self.quantiles, np.linspace(0, 1, len(self.quantiles))))
+
+    def quantile(self, share: float) -> float:
+        """The value that this share of the training runs stays below."""
+        return float(np.interp(share, np.linspace(0, 1, len(self.quantiles)), self.quantiles))
+
+
+class StageRecord(Record):
+    """One condition on the way to a functional objective: the mission passes when `variable` equals `passes`."""
+
+    variable: str
+    passes: float
+    mechanism: str
+
+
+class OutcomeRecord(Record):
+    """How an objective is predicted: `stages` for a functional one (all must pass, in order), else one mechanism."""
+
+    objective: str
+    stages: tuple[StageRecord, ...] = ()
+    mechanism: str = ""
+
+
+class SkillRecord(Record):
+    """How well an objective's odds predict runs that were held out."""
+
+    runs: int
+    base_rate: float
+    log_loss: float
+    brier: float
+    calibration_error: float
+    auc: float | None = None
+    """None where all runs met the threshold, or none did."""
+    curve: tuple[tuple[float, float, int], ...] = ()
+    """Calibration: mean predicted odds, share that met the threshold, runs; a row a tenth of the odds that has any."""
+
+
+class Training(Record):
+    """Where the model came from."""
+
+    origin: str
+    runs: int
+    seed: int
+    alpha: float
+    resamples: int
+    screened_out: tuple[str, ...] = ()
+    direct_edges: tuple[tuple[str, str, float], ...] = ()
+    """Option -> objective edges that the metrics do not explain, with the p-value that kept them."""
+    moves_together: tuple[tuple[str, ...], ...] = ()
+    """Groups of non-functional objectives that rise and fall together (rank correlation above 0.9)."""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What was learned of a platform. `mechanisms` are keyed by the variable they predict (stages: `stage:NAME`)."""
+
+    schema_digest: str
+    graph: CausalGraph
+    edges: Mapping[tuple[str, str], EdgeRecord]
+    """Directed edges only; confounded pairs are in the graph's bidirected edges."""
+    bidirected: tuple[EdgeRecord, ...]
+    effects: Mapping[tuple[str, str], EffectRecord]
+    paths: Mapping[str, tuple[PathRecord, ...]]
+    outcomes: Mapping[str, OutcomeRecord]
+    summaries: Mapping[str, Summary]
+    skill: Mapping[str, SkillRecord]
+    """By objective, and for `all` of them together."""
+    training: Training
+    mechanisms: Mapping[str, Mechanism] = field(default_factory=dict)
+    witnesses: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Per objective the metrics that go with missing it: correlation over the training runs, on scaled values."""
+
+    def supports(self, option: str, value: float) -> bool:
+        """Whether the training runs reach this value of the option."""
+        summary = self.summaries.get(option)
+        return summary is None or summary.low <= value <= summary.high

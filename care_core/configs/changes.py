@@ -1,0 +1,44 @@
+"""Changes of options in the words of an ecosystem: as a diff of its files, and as commands."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+
+from care_core.configs.driven import option_value, readable
+from care_core.configs.formats import MODULES, ConfigFormat, format_for
+from care_core.run import Run
+from care_core.variables import Change, Variable
+
+
+def unified_diff(run: Run, changes: Sequence[Change]) -> str:
+    """The configuration as driven against the changes, in the ecosystem's own format; only keys that change."""
+    line_of = MODULES[format_for(run.log.format, run.settings)].line_of
+    driven, fixed = {}, {}
+    for option, parameter, suggested in _assignments(changes):
+        change = next(change for change in changes if change.option is option)
+        setting = run.settings.get(parameter)
+        current = None if setting is None else option_value(option, setting)
+        driven[parameter] = line_of(option, parameter, change.current if current is None else current)
+        fixed[parameter] = line_of(option, parameter, suggested)
+    lines = difflib.unified_diff(
+        [driven[parameter] for parameter in sorted(driven)],
+        [fixed[parameter] for parameter in sorted(fixed)],
+        fromfile="as driven",
+        tofile="suggested",
+        n=0,
+        lineterm="",
+    )
+    return "".join(f"{line}\n" for line in lines)
+
+
+def apply_commands(changes: Iterable[Change], format: ConfigFormat) -> list[str]:
+    """Shell or ground station commands that make the changes."""
+    commands: list[str] = MODULES[format].commands(_assignments(changes))
+    return commands
+
+
+def _assignments(changes: Iterable[Change]) -> tuple[tuple[Variable, str, float], ...]:
+    return tuple(
+        (change.option, parameter, change.suggested) for change in changes for parameter in readable(change.option)
+    )

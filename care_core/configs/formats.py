@@ -1,0 +1,84 @@
+"""The formats of configuration files, told apart by content.
+
+One module a format, each with `read`, `find` (the value that loaded files give a parameter), `write`, `text_of`,
+`line_of` and `commands`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from enum import Enum
+from pathlib import Path
+from types import ModuleType
+
+from care_core.configs import ardupilot_param, qgc_params, ros1_yaml, ros2_yaml
+from care_core.run import Setting
+from care_core.variables import Variable
+
+
+class ConfigFormat(str, Enum):
+    """How an ecosystem writes its configuration."""
+
+    ARDUPILOT_PARAM = "ardupilot-param"
+    QGC_PARAMS = "qgc-params"
+    ROS1_YAML = "ros1-yaml"
+    ROS2_YAML = "ros2-yaml"
+
+
+MODULES: dict[ConfigFormat, ModuleType] = {
+    ConfigFormat.ARDUPILOT_PARAM: ardupilot_param,
+    ConfigFormat.QGC_PARAMS: qgc_params,
+    ConfigFormat.ROS1_YAML: ros1_yaml,
+    ConfigFormat.ROS2_YAML: ros2_yaml,
+}
+_OF_LOG = {
+    "ros1": ConfigFormat.ROS1_YAML,
+    "ros2": ConfigFormat.ROS2_YAML,
+    "mcap": ConfigFormat.ROS2_YAML,
+    "px4": ConfigFormat.QGC_PARAMS,
+}
+"""By how the name of a log's format begins; any other is of an ArduPilot vehicle."""
+
+_YAML_SUFFIXES = (".yaml", ".yml")
+_PARAMETER_LINE = re.compile(r"[A-Z][A-Z0-9_]*(\s*,\s*|\s+)[-+.\w]+(\s|$)")
+_YAML_LINE = re.compile(r"---|[%&!{]|[^\s,#]+\s*:(\s|$)")
+_ROS2_KEY = re.compile(rf"^[^#\n]*\b{ros2_yaml.PARAMETERS}['\"]?\s*:", re.MULTILINE)
+
+
+def format_for(log_format: str, parameters: Iterable[str] = ()) -> ConfigFormat:
+    """The configuration format of the ecosystem that records such logs.
+
+    An MCAP may be of either ROS: `parameters` are names of it, which only in ROS 2 have a dot after the node.
+    """
+    family = log_format.partition("-")[0]
+    if family == "mcap" and (names := list(parameters)) and not any("." in name for name in names):
+        return ConfigFormat.ROS1_YAML
+    return _OF_LOG.get(family, ConfigFormat.ARDUPILOT_PARAM)
+
+
+def format_of(text: str, path: Path) -> ConfigFormat:
+    """The format of a file's text, told from its first line that is no comment, or else from its suffix."""
+    lines = (line.rstrip("\r") for line in text.splitlines())
+    first = next((line for line in lines if line.strip() and not line.lstrip().startswith("#")), "")
+    if qgc_params.is_row(first) or (not first and qgc_params.HEADER in text):
+        return ConfigFormat.QGC_PARAMS
+    if _PARAMETER_LINE.match(first.strip()):
+        return ConfigFormat.ARDUPILOT_PARAM
+    if _YAML_LINE.match(first) or path.suffix.lower() in _YAML_SUFFIXES:
+        return ConfigFormat.ROS2_YAML if _ROS2_KEY.search(text) else ConfigFormat.ROS1_YAML
+    return ConfigFormat.ARDUPILOT_PARAM
+
+
+def text_for(format: ConfigFormat, option: Variable, value: float) -> str:
+    """An option's value as a file of that format has it."""
+    text: str = MODULES[format].text_of(option, value)
+    return text
+
+
+def write_params(
+    settings: Mapping[str, Setting], format: ConfigFormat, remarks: Mapping[str, str] | None = None
+) -> str:
+    """The settings as a configuration file of that format, with `remarks` by name as comments."""
+    text: str = MODULES[format].write(settings, remarks)
+    return text

@@ -1,0 +1,111 @@
+"""Configuration files as operators name them: read, and the values that they give the parameters of a log."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from care_core.configs import ros1_yaml
+from care_core.configs.formats import MODULES, ConfigFormat, format_of
+from care_core.errors import ConfigError
+from care_core.run import Setting
+
+_LARGEST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigFile:
+    """A configuration file as it was named, and what it holds; `source` of a setting is file:line."""
+
+    path: str
+    format: ConfigFormat
+    settings: Mapping[str, Setting]
+
+
+def read_config(path: str | Path, namespace: str = "") -> Mapping[str, Setting]:
+    """Settings of a configuration file by name; `source` is file:line.
+
+    Args:
+        namespace: where a ROS file is loaded, as `ns` of `rosparam load` does: it goes before every name.
+
+    Raises:
+        ConfigError: no such file, not text, a line that is no setting, or a namespace for a file that knows none.
+    """
+    return _read(Path(path), namespace).settings
+
+
+def _read(path: Path, namespace: str) -> ConfigFile:
+    return read_text(_text(path), path, namespace)
+
+
+def read_text(text: str, path: Path, namespace: str = "") -> ConfigFile:
+    """A configuration file's text as `read_configs` reads the file. Raises ConfigError."""
+    format = format_of(text, path)
+    if not namespace:
+        return ConfigFile(str(path), format, MODULES[format].read(text, path))
+    if format not in (ConfigFormat.ROS1_YAML, ConfigFormat.ROS2_YAML):
+        raise ConfigError(
+            "Only ROS parameters have namespaces.", hint=f"Leave '{namespace}=' out.", where=f"{namespace}={path}"
+        )
+    return ConfigFile(f"{namespace}={path}", format, MODULES[format].read(text, path, namespace))
+
+
+def _text(path: Path) -> str:
+    try:
+        if path.stat().st_size > _LARGEST_BYTES:
+            raise ConfigError("Too large for a configuration file.", hint="Is it a log?", where=str(path))
+        return path.read_text(encoding="utf-8-sig")
+    except OSError as err:
+        hint = "Check the path."
+        raise ConfigError(f"Cannot read the configuration: {err.strerror}.", hint=hint, where=str(path)) from err
+    except UnicodeDecodeError as err:
+        raise ConfigError("Not a configuration file: it is not text.", hint="Is it a log?", where=str(path)) from err
+
+
+def read_configs(named: Iterable[str | Path]) -> tuple[ConfigFile, ...]:
+    """Files as an operator names them, in the order they are loaded: `FILE` or, for ROS, `NAMESPACE=FILE`.
+
+    Raises:
+        ConfigError: as `read_config`.
+    """
+    return tuple(_read(*split_name(str(name))) for name in named)
+
+
+def split_name(named: str) -> tuple[Path, str]:
+    """The file and the namespace of `FILE` or `NAMESPACE=FILE`. Raises ConfigError."""
+    namespace, equals, path = named.partition("=")
+    if not equals or Path(named).exists():
+        return Path(named), ""
+    if not re.fullmatch(r"[~/\w]+", namespace) or not path:
+        raise ConfigError("No such file.", hint="Write FILE or NAMESPACE=FILE.", where=named)
+    return Path(path), namespace
+
+
+def resolve(files: Sequence[ConfigFile], parameters: Iterable[str]) -> dict[str, Setting]:
+    """The values that files, loaded one after the other, give parameters; by the parameter's name in the log.
+
+    Names in files are shorter (ROS 1 namespaces) or patterns (ROS 2 wildcards): each format knows how they are meant.
+    """
+    loaded: dict[ConfigFormat, list[Mapping[str, Setting]]] = {}
+    for file in files:
+        loaded.setdefault(file.format, []).append(file.settings)
+    found: dict[str, Setting] = {}
+    for parameter in parameters:
+        for format, settings in loaded.items():
+            setting: Setting | None = MODULES[format].find(settings, parameter)
+            if setting is not None:
+                found[parameter] = setting
+    return found
+
+
+def guesses(files: Sequence[ConfigFile], found: Mapping[str, Setting]) -> dict[str, list[str]]:
+    """Per file, the parameters whose value is a bare name of a ROS 1 file that was loaded into no namespace."""
+    named: dict[str, list[str]] = {}
+    for file in files:
+        if file.format is ConfigFormat.ROS1_YAML:
+            own = [p for p, s in found.items() if file.settings.get(s.name) is s and ros1_yaml.is_guess(s.name, p)]
+            if own:
+                named[file.path] = own
+    return named

@@ -1,0 +1,64 @@
+"""Files of the program: where those lie that come with it, and how one is written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import Literal
+
+from care_core.errors import UsageError
+from care_core.logs.opening import is_recording
+
+_PACKAGE = Path(__file__).parent
+
+
+def bundled(kind: Literal["profiles", "samples"], name: str = "") -> Path:
+    """The path of a bundled profile or sample, or of the folder that holds them all; it may not exist."""
+    checkout = _PACKAGE.parent
+    folder = checkout / kind if (checkout / "pyproject.toml").is_file() else _PACKAGE / f"_{kind}"
+    return folder / name if name else folder
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write a file through a temporary one beside it: a reader sees the old file or the new one, never half.
+
+    What a link leads to is written, and the link stays. A pipe or a device is written to as it is.
+
+    Raises:
+        UsageError: the folder does not exist or may not be written to, or the file is a log.
+    """
+    refuse_recording(path)
+    try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            path.write_text(text, encoding="utf-8")
+            return
+        path = path.resolve()
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "w", encoding="utf-8") as stream:
+                stream.write(text)
+            Path(temporary).chmod(_mode(path))
+            Path(temporary).replace(path)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+    except OSError as err:
+        raise UsageError(
+            f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
+        ) from err
+
+
+def refuse_recording(path: Path) -> None:
+    """Raise UsageError for a path that holds a log: logs are never written to."""
+    if path.is_file() and is_recording(path):
+        raise UsageError("This is a log, and logs are never overwritten.", hint="Name another file.", where=str(path))
+
+
+def _mode(path: Path) -> int:
+    """The mode a plain `open` would give: that of the file it replaces, else what the umask allows."""
+    if path.exists():
+        return path.stat().st_mode & 0o777
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask

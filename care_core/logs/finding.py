@@ -1,0 +1,68 @@
+"""The logs in folders, and those named, each once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from care_core.errors import LogError, UsageError
+from care_core.logs.opening import sniff
+
+LOG_SUFFIXES = (".bin", ".log", ".tlog", ".bag", ".active", ".mcap", ".db3", ".zstd", ".ulg")
+SHARED_SUFFIX = ".log"
+"""An ending that many files have: only those that begin like a log are taken out of a folder."""
+
+
+def find_logs(places: Iterable[Path]) -> tuple[Path, ...]:
+    """The logs named, and every log below the folders named, each once, in a stable order.
+
+    A folder that is one recording of several files counts as one log.
+
+    Raises:
+        UsageError: a place does not exist, or there is no log at all.
+    """
+    from care_core.logs.recording import whole_recording  # numpy, which the list of logs in the app does without
+
+    found: dict[Path, None] = {}
+    for place in places:
+        if not place.exists():
+            raise UsageError("No such file or folder.", hint="Check the path.", where=str(place))
+        inside = map(whole_recording, logs_below(place)) if place.is_dir() else [place]
+        found.update(dict.fromkeys(inside))
+    if not found:
+        raise UsageError("There is no log there.", hint=f"Logs end in {', '.join(LOG_SUFFIXES)}.")
+    return tuple(found)
+
+
+def logs_below(folder: Path) -> list[Path]:
+    """Every log in a folder and in those below it, by name; the folder itself where it is one recording."""
+    if is_recorder_folder(folder):
+        return [folder]
+    found: list[Path] = []
+    for path in sorted(folder.iterdir()):
+        if path.is_dir() and not path.is_symlink():
+            found += logs_below(path)
+        elif is_log(path):
+            found.append(path)
+    return found
+
+
+def is_recorder_folder(folder: Path) -> bool:
+    """Whether a ROS 2 recorder made this folder."""
+    return (folder / "metadata.yaml").is_file()
+
+
+def is_log(path: Path) -> bool:
+    """Whether a file in a folder is a log, by its ending, and by its beginning where others end like that too."""
+    suffix = path.suffix.lower()
+    if suffix not in LOG_SUFFIXES or not path.is_file():
+        return False
+    return suffix != SHARED_SUFFIX or _begins_like_a_log(path)
+
+
+def _begins_like_a_log(path: Path) -> bool:
+    try:
+        sniff(path)
+    except LogError:
+        return False
+    return True

@@ -1,0 +1,1 @@
+"""Tables of runs: many logs read into rows, one a mission."""
