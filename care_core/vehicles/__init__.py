@@ -1,0 +1,33 @@
+"""What is known of vehicles before any log is read: their modes, errors, events, motors and the names of parameters.
+
+Facts of ArduPilot's and PX4's source, as tables. Knows nothing of logs.
+"""
+
+from care_core.vehicles.errors import error_kind, error_words, is_over
+from care_core.vehicles.events import event_words
+from care_core.vehicles.modes import Way, mode_name, mode_number, reason_words, way_of
+from care_core.vehicles.motors import Motor, motor_outputs, motors_of
+from care_core.vehicles.parameters import Spelling, renamed, spelled_in, spellings
+from care_core.vehicles.vehicle import Kind, Vehicle, vehicle_of
+
+__all__ = [
+    "Kind",
+    "Motor",
+    "Spelling",
+    "Vehicle",
+    "Way",
+    "error_kind",
+    "error_words",
+    "event_words",
+    "is_over",
+    "mode_name",
+    "mode_number",
+    "motor_outputs",
+    "motors_of",
+    "reason_words",
+    "renamed",
+    "spelled_in",
+    "spellings",
+    "vehicle_of",
+    "way_of",
+]
