@@ -21,7 +21,7 @@ class ContentsPage(Page):
     def __init__(self, screen: PanesScreen, log: Path) -> None:
         super().__init__(screen)
         self._log = log
-        self._found: Fetch[Rows] = Fetch(screen, "contents")
+        self._found: Fetch[Rows] = Fetch(self, "contents")
 
     def enter(self) -> None:
         self._found.start(self._inspect)

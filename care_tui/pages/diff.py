@@ -44,7 +44,7 @@ class DiffPage(DiagnosisPage):
 
     def _received(self, answer: tuple[str, list[str]] | CareError) -> None:
         self._text, self._commands = (answer, []) if isinstance(answer, CareError) else answer
-        if self.screen.page is self:
+        if self.is_shown:
             self.screen.draw()
 
     def view_of_diagnosis(self) -> View:

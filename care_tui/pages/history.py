@@ -30,7 +30,7 @@ class HistoryPage(Page):
 
     def __init__(self, screen: PanesScreen) -> None:
         super().__init__(screen)
-        self._found: Fetch[list[Past]] = Fetch(screen, "history")
+        self._found: Fetch[list[Past]] = Fetch(self, "history")
         self._marked: Past | None = None
 
     def enter(self) -> None:

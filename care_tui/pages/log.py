@@ -34,7 +34,7 @@ class LogPage(StepPage):
 
     def __init__(self, screen: PanesScreen) -> None:
         super().__init__(screen)
-        self._found: Fetch[list[LogFile]] = Fetch(screen, "logs")
+        self._found: Fetch[list[LogFile]] = Fetch(self, "logs")
 
     def enter(self) -> None:
         places, opened, found = self.walk.settings.places, self.session.path, self._found.answer

@@ -30,7 +30,7 @@ class MessagesPage(Page):
     def __init__(self, screen: PanesScreen, case: Case) -> None:
         super().__init__(screen)
         self._case = case
-        self._found: Fetch[list[LogMessage]] = Fetch(screen, "messages")
+        self._found: Fetch[list[LogMessage]] = Fetch(self, "messages")
         self._placed = False
 
     def enter(self) -> None:

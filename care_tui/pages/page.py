@@ -46,6 +46,11 @@ class Page:
         self.screen = screen
 
     @property
+    def is_shown(self) -> bool:
+        """Whether this page is the one in view."""
+        return self.screen.page is self
+
+    @property
     def glyphs(self) -> Glyphs:
         return self.screen.glyphs
 
@@ -66,12 +71,19 @@ class Page:
     def open(self, index: int | None) -> None:
         """Enter was pressed, on an item where there is one."""
 
+    def moment_s(self) -> float | None:
+        """When what is under the cursor happened, seconds from the start of the log; None where it has no time."""
+        return None
+
+    def look_at(self, moment_s: float) -> None:
+        """Show what was at this moment, seconds from the start of the log, where the page has an order of time."""
+
 
 class Fetch(Generic[T]):
-    """Something that a worker fetches once, with the view for each state it can be in."""
+    """Something that a worker fetches once for a page, with the view for each state it can be in."""
 
-    def __init__(self, screen: PanesScreen, key: str) -> None:
-        self._screen = screen
+    def __init__(self, page: Page, key: str) -> None:
+        self._page = page
         self._key = key
         self._asked = False
         self.answer: T | CareError | None = None
@@ -80,11 +92,12 @@ class Fetch(Generic[T]):
         """Fetch it, unless that was done before."""
         if not self._asked:
             self._asked = True
-            self._screen.fetch(self._key, lambda _job: work(), self._receive)
+            self._page.screen.fetch(self._key, lambda _job: work(), self._receive)
 
     def _receive(self, answer: T | CareError) -> None:
         self.answer = answer
-        self._screen.draw()
+        if self._page.is_shown:
+            self._page.screen.draw()
 
     def forget(self) -> None:
         """Fetch it again the next time it is asked for."""

@@ -18,7 +18,7 @@ class ProfilesPage(Page):
     def __init__(self, screen: PanesScreen, used: str | None = None) -> None:
         super().__init__(screen)
         self._used = used
-        self._found: Fetch[list[Installed]] = Fetch(screen, "profiles")
+        self._found: Fetch[list[Installed]] = Fetch(self, "profiles")
         self._placed = False
 
     def enter(self) -> None:

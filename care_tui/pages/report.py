@@ -36,7 +36,7 @@ class ReportPage(DiagnosisPage):
 
     def _received(self, text: str | CareError) -> None:
         self._text = text
-        if self.screen.page is self:
+        if self.is_shown:
             self.screen.draw()
 
     def view_of_diagnosis(self) -> View:

@@ -27,7 +27,7 @@ class SignalsPage(Page):
     def __init__(self, screen: PanesScreen, case: Case) -> None:
         super().__init__(screen)
         self._case = case
-        self._found: Fetch[list[Signal]] = Fetch(screen, "signals")
+        self._found: Fetch[list[Signal]] = Fetch(self, "signals")
         self._traces: dict[tuple[Signal, int], Trace | CareError] = {}
 
     def enter(self) -> None:

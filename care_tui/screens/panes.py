@@ -17,7 +17,7 @@ from textual.widgets import Static
 from care_core.errors import CareError
 from care_tui.jobs import Job
 from care_tui.messages import Fetched
-from care_tui.pages.page import Page
+from care_tui.pages.page import Page, View
 from care_tui.render.rows import Glyphs
 from care_tui.screens.base import CareScreen
 from care_tui.widgets.choices import Choices
@@ -75,10 +75,11 @@ class PanesScreen(CareScreen):
 
     def draw(self, *, index: int | None = None) -> None:
         """Show what the page holds now, with the cursor on `index`, else where the page wants it, else where it was."""
-        view = self.page.view()
+        view, choices = self.page.view(), self.choices
+        self._put(view, next((i for i in (index, view.index) if i is not None), choices.highlighted))
+
+    def _put(self, view: View, index: int | None) -> None:
         choices = self.choices
-        if index is None:
-            index = choices.highlighted if view.index is None else view.index
         with self.app.batch_update():
             self.query_one(".title", Static).update(view.title, layout=False)
             appears = view.listing.count > 0 and not choices.display
@@ -89,14 +90,15 @@ class PanesScreen(CareScreen):
                 self.take_focus()
             self.refresh_bindings()
 
-    def turn_to_page(self) -> None:
-        """Another page comes into view: its own filter, its own cursor."""
+    def turn_to_page(self, index: int | None = None) -> None:
+        """Another page comes into view: its own filter, its own cursor, or the one it had when it was left."""
         self.say("")
         self.query_one(FilterBar).close()
         self.choices.filter("")
         self.text.filter("")
         self.page.enter()
-        self.draw(index=-1 if self.page.view().index is None else None)
+        view = self.page.view()
+        self._put(view, view.index if index is None else index)
         self.take_focus()
 
     def take_focus(self) -> None:
@@ -169,7 +171,7 @@ class PanesScreen(CareScreen):
 
     def leave(self) -> None:
         """Go back to where the operator came from."""
-        self.app.pop_screen()
+        raise NotImplementedError
 
     # Work outside the event loop
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
@@ -29,7 +29,6 @@ from care_tui.pages.step import StepPage
 from care_tui.places import remember
 from care_tui.render.rows import Glyphs
 from care_tui.screens.panes import PanesScreen
-from care_tui.screens.view import ViewScreen
 from care_tui.session import Session
 from care_tui.settings import Settings
 from care_tui.widgets.step_bar import STEPS, StepBar
@@ -47,10 +46,21 @@ VIEWS = {
 
 NEED_A_DIAGNOSIS = {"graph", "messages", "signals"}
 NEED_A_LOG = {*NEED_A_DIAGNOSIS, "contents"}
+FOLLOW = {"graph", "history"}
+"""Made anew each time: one follows what the operator looks at, the other what was remembered since."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where the operator stands: a step, or a view beside it, and the item under the cursor."""
+
+    step: int
+    view: Page | None = None
+    index: int | None = None
 
 
 class WalkScreen(PanesScreen):
-    """Six steps; Enter leads on, Esc leads back, digits jump."""
+    """Six steps, and views beside them. Enter leads on, Esc leads back, one key leads to any of them from anywhere."""
 
     BINDINGS: ClassVar[list[BindingType]] = [
         *(
@@ -63,6 +73,9 @@ class WalkScreen(PanesScreen):
         Binding("f5,y", "view('history')", "History", show=False, id="view.history"),
         Binding("f6,b", "view('profiles')", "Profiles", show=False, id="view.profiles"),
         Binding("f7,v", "view('contents')", "Contents of the log", show=False, id="view.contents"),
+        Binding("left,h,backspace", "do('step_back')", "Back a step", key_display="h", id="graph.back"),
+        Binding("x", "do('mark')", "Compare", id="history.mark"),
+        Binding("n", "do('next_marked')", "Next marked", id="messages.next"),
         Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),
         Binding("left,h", "move(-1)", "Previous step", show=False, id="step.previous"),
         Binding("o", "do('pick')", "Other log", id="log.pick"),
@@ -98,7 +111,10 @@ class WalkScreen(PanesScreen):
         self.session = Session()
         self.step = LOG
         self._pages = tuple(page(self) for page in PAGES)
-        self._visited: list[int] = []
+        self._view: Page | None = None
+        self._views: dict[str, Page] = {}
+        """Views of this log that were opened before: what they read of it is kept."""
+        self._visited: list[Place] = []
         self._request = request
 
     def compose_body(self) -> ComposeResult:
@@ -109,63 +125,78 @@ class WalkScreen(PanesScreen):
         if self._request is not None:
             self._read(self._request)
         else:
-            self._show(LOG)
+            self._show(Place(LOG))
 
     @property
     def page(self) -> Page:
-        return self._pages[self.step - 1]
+        return self._view or self._pages[self.step - 1]
 
-    # Moving through the steps
+    # Moving through the steps and views
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         if action == "move":
-            return LOG <= self.step + int(str(parameters[0])) <= len(STEPS)
+            return self._view is None and LOG <= self.step + int(str(parameters[0])) <= len(STEPS)
         if action == "do" and parameters == ("toggle",):  # a priority key must leave the space bar to what is typed
             return super().check_action(action, parameters) and self.focused is self.choices
         return super().check_action(action, parameters)
 
-    def _show(self, step: int) -> None:
-        self.step = step
+    def _show(self, place: Place) -> None:
+        self.step, self._view = place.step, place.view
         with self.app.batch_update():
             self._mark()
-            self.turn_to_page()
+            self.turn_to_page(place.index)
 
     def _mark(self) -> None:
         path = self.session.path
-        self.query_one(StepBar).mark(self.step, "" if path is None else path.name)
+        self.query_one(StepBar).mark(
+            self.step, "" if path is None else path.name, None if self._view is None else self._view.name
+        )
+
+    def _go(self, place: Place) -> None:
+        """Show another place; Esc leads back to this one, as it is now."""
+        self._visited.append(Place(self.step, self._view, self.choices.highlighted if self.choices.display else None))
+        self._show(place)
 
     def action_go(self, step: int) -> None:
-        if step != self.step:
-            self._visited.append(self.step)
-            self._show(step)
+        if step != self.step or self._view is not None:
+            self._go(Place(step))
 
     def action_move(self, by: int) -> None:
         self.action_go(self.step + by)
 
     def leave(self) -> None:
-        if self.session.state == "loading":
-            self._stop_reading()
-        elif self._visited:
+        if self._visited and (self._view is not None or self.session.state != "loading"):
             self._show(self._visited.pop())
+        elif self.session.state == "loading":
+            self._stop_reading()
 
-    def action_view(self, name: str) -> None:
-        """Open a page beside the walk."""
-        from care_tui.pages.views import view_of
-
-        session, subject = self.session, self._subject()
+    def action_view(self, name: str, moment_s: float | None = None) -> None:
+        """Turn to a page beside the walk, at this moment of the log, else at that of what is under the cursor."""
+        session = self.session
         if name in NEED_A_LOG and not session.is_readable:
             self.say("Open a log first: 1 leads to them.")
         elif name in NEED_A_DIAGNOSIS and session.case is None:
             self.say("This log has no diagnosis; v shows what it holds.")
-        else:
-            self.app.push_screen(ViewScreen(self.glyphs, lambda screen: view_of(name, screen, session, subject)))
+        elif self._view is None or self._view is not self._views.get(name):
+            moment_s = self.page.moment_s() if moment_s is None else moment_s
+            view = self._view_of(name)
+            if moment_s is not None:
+                view.look_at(moment_s)
+            self._go(Place(self.step, view))
+
+    def _view_of(self, name: str) -> Page:
+        from care_tui.pages.views import view_of
+
+        if name not in self._views or name in FOLLOW:
+            self._views[name] = view_of(name, self, self.session, self._subject())
+        return self._views[name]
 
     def _subject(self) -> str | None:
         """The variable that the operator is looking at: the cause under the cursor, else the objective."""
         session, index = self.session, self.choices.highlighted
         if session.case is None:
             return None
-        if self.step == CAUSES_STEP and index is not None:
+        if self._view is None and self.step == CAUSES_STEP and index is not None:
             return session.causes[index].option.name
         return None if session.result is None else session.result.variable.name
 
@@ -184,7 +215,8 @@ class WalkScreen(PanesScreen):
         self._request = request
         self.session = Session(path=request.log.absolute(), progress=("starting", 0.0))
         self._visited.clear()
-        self._show(LOG)
+        self._views.clear()
+        self._show(Place(LOG))
         # After the first frame, which the imports of the work would hold up.
         self.call_after_refresh(self.fetch, "diagnose", partial(self._diagnose, request), self._opened)
 
@@ -219,10 +251,12 @@ class WalkScreen(PanesScreen):
             self.draw()
             return
         self.session.take(answer)
-        if self.step == LOG:
+        if self._view is not None:
+            self.draw()
+        elif self.step == LOG:
             self.action_go(OBJECTIVES)
         else:
-            self._show(self.step)
+            self._show(Place(self.step))
 
     def _stop_reading(self) -> None:
         self.cancel("diagnose")

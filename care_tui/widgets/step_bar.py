@@ -21,26 +21,30 @@ class StepBar(Static):
         self._glyphs = glyphs
         self._step = 1
         self._log_name = ""
+        self._view: str | None = None
 
-    def mark(self, step: int, log_name: str) -> None:
-        """Mark the step (counted from 1) as the operator's place, with a sign beside the style."""
-        self._step, self._log_name = step, clean(log_name)
+    def mark(self, step: int, log_name: str, view: str | None = None) -> None:
+        """Mark the step (counted from 1), or the view beside it, as the operator's place, with a sign and a style."""
+        self._step, self._log_name, self._view = step, clean(log_name), view
         self._draw()
 
     def on_resize(self) -> None:
         self._draw()
 
     def _tabs(self) -> list[str]:
+        here = 0 if self._view else self._step
         return [
-            f"{self._glyphs.here if number == self._step else ' '}{number} {name} "
+            f"{self._glyphs.here if number == here else ' '}{number} {name} "
             for number, name in enumerate(STEPS, start=1)
         ]
 
     def _draw(self) -> None:
-        tabs = self._tabs()
+        here = 0 if self._view else self._step
         line = Content.assemble(
-            *((tab, "bold reverse" if number == self._step else "") for number, tab in enumerate(tabs, start=1))
+            *((tab, "bold reverse" if number == here else "") for number, tab in enumerate(self._tabs(), start=1))
         )
+        if self._view:
+            line += Content.styled(f"{self._glyphs.here}{self._view} ", "bold reverse")
         room = self.size.width - line.cell_length - 2
         name = Content(self._log_name)
         if room >= min(name.cell_length, 12):

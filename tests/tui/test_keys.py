@@ -14,7 +14,6 @@ from textual.screen import ModalScreen
 from care_tui.app import CareApp
 from care_tui.screens.base import CareScreen
 from care_tui.screens.panes import PanesScreen
-from care_tui.screens.view import ViewScreen
 from care_tui.screens.walk import WalkScreen
 from care_tui.settings import Settings
 from care_tui.widgets.choices import Choices
@@ -54,11 +53,9 @@ async def test_no_key_fails_on_a_step(make_app: MakeApp, step: str, verdict: str
         for key in keys_of(*HERE, DOES):
             await pilot.press(key)
             await leave_dialogs(pilot)
-            if not isinstance(app.screen, WalkScreen):
-                await pilot.press("escape")
-            assert isinstance(app.screen, WalkScreen), f"{key}, then Esc"
-            if app.screen.step != int(step):
-                await pilot.press(step)
+            assert isinstance(app.screen, WalkScreen), key
+            await pilot.press(step)
+            assert app.screen.step == int(step)
         await quiet(pilot)
         await settle(pilot, "q")
     assert app.return_value is not None
@@ -68,10 +65,9 @@ async def test_no_key_fails_on_a_step(make_app: MakeApp, step: str, verdict: str
 async def test_no_key_fails_on_a_view(make_app: MakeApp, view: str) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        for key in keys_of(*HERE, CareScreen.BINDINGS, ViewScreen.BINDINGS, Choices.BINDINGS):
+        for key in keys_of(*HERE, CareScreen.BINDINGS, DOES, Choices.BINDINGS):
             await leave_dialogs(pilot)
-            if isinstance(app.screen, WalkScreen):
-                await settle(pilot, view)
+            await settle(pilot, view)
             await pilot.press(key)
         await leave_dialogs(pilot)
         await settle(pilot, "q")
@@ -86,8 +82,7 @@ async def test_no_key_fails_without_a_log(step: str) -> None:
         for key in keys_of(WalkScreen.BINDINGS):
             await pilot.press(key)
             await leave_dialogs(pilot)
-            while not isinstance(app.screen, WalkScreen):
-                await pilot.press("escape")
+            assert isinstance(app.screen, WalkScreen), key
             await pilot.press(step)
 
 
@@ -95,7 +90,7 @@ def test_the_documentation_names_every_key_of_the_walk_and_the_views() -> None:
     table = APP_MD.read_text(encoding="utf-8")
     written = set(re.findall(r"`([^`]+)`", table)) | set(re.findall(r"F\d", table))
     signs = {"plus": "+", "minus": "-", "equals_sign": "="}
-    for binding in (*WalkScreen.BINDINGS, *ViewScreen.BINDINGS):
+    for binding in WalkScreen.BINDINGS:
         assert isinstance(binding, Binding)
         names = [signs.get(key, key.upper() if re.fullmatch(r"f\d", key) else key) for key in binding.key.split(",")]
         assert written & {*names} or {"space", "left", "right"} & {*names} or str(binding.id).startswith("step."), (

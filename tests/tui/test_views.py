@@ -12,7 +12,6 @@ from care_tui.app import CareApp
 from care_tui.jobs import Request
 from care_tui.pages.history import HistoryPage
 from care_tui.render.plot import dots_across, plot
-from care_tui.screens.view import ViewScreen
 from care_tui.screens.walk import WalkScreen
 from care_tui.settings import Settings
 from care_tui.widgets.choices import Choices
@@ -62,7 +61,7 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         assert isinstance(app.screen, WalkScreen)
         await settle(pilot, "v")
         assert "Parameters  1002" in text(app)
-        await settle(pilot, "escape", "3", "f2")
+        await settle(pilot, "3", "f2")
         assert title(app).startswith("Around LAND_SPEED"), "the graph starts at the cause under the cursor"
         await settle(pilot, "1", "question_mark", "escape", "escape")
         assert isinstance(app.screen, WalkScreen)
@@ -101,6 +100,37 @@ async def test_the_file_on_disk_is_patched_with_its_comments_kept(tmp_path: Path
     assert "LAND_SPEED,20" in file.read_text(), "nothing is written"
 
 
+@needs_sample
+async def test_one_key_leads_from_any_view_to_any_other_and_digits_leave_it() -> None:
+    app = real()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3")
+        for key, name in (("m", "Messages"), ("p", "Signals"), ("y", "History"), ("w", "Graph"), ("v", "Contents")):
+            await settle(pilot, key, key)
+            assert walk(app).page.name == name
+            assert f"▸{name} " in str(app.screen.query_one("StepBar").content)  # type: ignore[attr-defined]
+            assert "▸3" not in str(app.screen.query_one("StepBar").content)  # type: ignore[attr-defined]
+        await settle(pilot, "escape", "escape")
+        assert walk(app).page.name == "History", "Esc leads back the way the operator came"
+        for digit, name in (("3", "Causes"), ("5", "Diff")):
+            await settle(pilot, digit)
+            assert walk(app).page.name == name
+            await settle(pilot, "b")
+        await settle(pilot, "escape")
+        assert walk(app).step == 5
+
+
+@needs_sample
+async def test_a_view_keeps_its_place_while_another_is_looked_at() -> None:
+    app = real()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "m", "k", "k", "k")
+        here = walk(app).choices.highlighted
+        await settle(pilot, "v", "escape")
+        assert walk(app).page.name == "Messages"
+        assert walk(app).choices.highlighted == here
+
+
 async def test_views_of_a_log_need_one_and_the_others_do_not(make_app: MakeApp) -> None:
     app = CareApp(settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
@@ -108,8 +138,7 @@ async def test_views_of_a_log_need_one_and_the_others_do_not(make_app: MakeApp) 
             await settle(pilot, key)
             assert "Open a log first" in hints(app)
         await settle(pilot, "f5")
-        assert isinstance(app.screen, ViewScreen)
-        assert isinstance(app.screen.page, HistoryPage)
+        assert isinstance(walk(app).page, HistoryPage)
         assert "No run was triaged before" in text(app)
         await settle(pilot, "escape", "f6")
         assert "arducopter" in items(app)
