@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.extract.flight import NEEDS, Flight, analyse, has, messages, waypoint_offsets
-from care_core.extract.plausible import plausible
 from care_core.extract.registry import MISSION_KINDS, Args, Mission, MissionKind, extractor, merge_needs, missing
 from care_core.logs.base import Table, Wanted
+from care_core.logs.plausible import plausible
 from care_core.run import Evidence, Unavailable, Value, is_known
 
 Floats = NDArray[np.float64]

@@ -10,8 +10,8 @@ from care_core.configs.driven import readable
 from care_core.errors import CareError
 from care_core.extract.read import mission_kind, read_runs, reading_plan
 from care_core.extract.registry import find_extractor
-from care_core.extract.telemetry import as_dataflash
 from care_core.logs.base import Log
+from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
 from care_core.run import MissionInfo, Run, Unavailable
 from care_core.variables import Role, Variable

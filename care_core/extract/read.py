@@ -18,9 +18,9 @@ import care_core.extract.navigation  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
 from care_core.errors import ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
-from care_core.extract.telemetry import as_dataflash, explained
-from care_core.logs.base import Log
+from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import Sha256, hashing
+from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
 from care_core.run import Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable
@@ -159,7 +159,18 @@ class _Source:
 
     def _values(self, role: Role, mission: Mission) -> dict[str, Value]:
         values = {variable.name: _extract(variable, mission) for variable in self.schema.of(role)}
-        return {name: explained(value, self.log.format) for name, value in values.items()}
+        return {name: _explained(value, self.log.format) for name, value in values.items()}
+
+
+_TELEMETRY_ADVICE = "telemetry does not carry it: use the .BIN of the vehicle's memory card"
+
+
+def _explained(value: Value, log_format: str) -> Value:
+    """The value; where telemetry lacks what an extractor needs, the advice names the log that has it."""
+    is_telemetry = log_format == LogFormat.MAVLINK_TLOG.value
+    if isinstance(value, Unavailable) and is_telemetry and value.reason.startswith("no "):
+        return Unavailable(value.reason, _TELEMETRY_ADVICE)
+    return value
 
 
 def _changes(settings: Mapping[str, tuple[Setting, ...]], mission: Mission) -> dict[str, tuple[Setting, ...]]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from care_core.extract.plausible import plausible
 from care_core.logs.base import Table
+from care_core.logs.plausible import plausible
 
 
 def battery(volts: list[float], **more: list[float]) -> dict[str, Table]:

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted
-from care_core.run import Unavailable, Value
 
 Floats = NDArray[np.float64]
 Row = tuple[float, tuple[Any, ...]]
@@ -26,7 +25,6 @@ _FORCED_WITHIN_S = 3.0
 _SAME_EVENT_S = 3.0
 _UNKNOWN_U16 = 65535
 _COPTERS = frozenset((2, 3, 4, 13, 14, 15, 29, 35))
-_ADVICE = "telemetry does not carry it: use the .BIN of the vehicle's memory card"
 
 _Scaled = Mapping[str, tuple[str, float]]
 _AS_SENT: Mapping[str, tuple[str, _Scaled]] = {
@@ -54,14 +52,6 @@ _UNKNOWN: Mapping[str, float] = {"eph": _UNKNOWN_U16, "voltage_battery": _UNKNOW
 def as_dataflash(log: Log) -> Log:
     """The log itself, or for telemetry the DataFlash log that it can stand for."""
     return _Telemetry(log) if log.format is LogFormat.MAVLINK_TLOG else log
-
-
-def explained(value: Value, log_format: str) -> Value:
-    """The value; where telemetry lacks what an extractor needs, the advice names the log that has it."""
-    is_telemetry = log_format == LogFormat.MAVLINK_TLOG.value
-    if isinstance(value, Unavailable) and is_telemetry and value.reason.startswith("no "):
-        return Unavailable(value.reason, _ADVICE)
-    return value
 
 
 @dataclass(frozen=True, eq=False)
