@@ -39,6 +39,14 @@ class CareGroup(TyperGroup):
         own = {name for parameter in self.params for name in (*parameter.opts, "--help")}
         return super().parse_args(ctx, args if ctx.resilient_parsing else route(args, self.commands, own))
 
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """The group's own options, and before them those of `care LOG`, whose command is hidden."""
+        opened = self.commands[OPEN]
+        taken = [record for param in opened.params if (record := param.get_help_record(ctx)) is not None]
+        with formatter.section("Options of 'care [LOG]'"):
+            formatter.write_dl([record for record in taken if record[0].startswith("-")])
+        super().format_options(ctx, formatter)
+
     def main(self, *args: Any, **extra: Any) -> Any:
         try:
             return super().main(*args, **extra)

@@ -35,6 +35,9 @@ class Session:
     unchanged: Fix | None = None
     """What the configuration as driven would bring again."""
     dismissed: dict[str, str] = field(default_factory=dict)
+    """Causes set aside: option to reason."""
+    _left_fix: set[str] = field(default_factory=set)
+    """Options that left the fix when they were set aside."""
     format: ReportFormat = "yaml"
 
     @property
@@ -104,6 +107,23 @@ class Session:
     @property
     def causes(self) -> tuple[Cause, ...]:
         return () if self.fault is None else self.fault.causes
+
+    def set_aside(self, option: str, reason: str) -> bool:
+        """Set a cause aside; True when that took its option out of the fix."""
+        self.dismissed[option] = reason
+        if option not in self.basket.ticked:
+            return False
+        self._left_fix.add(option)
+        self.basket.drop(option)
+        return True
+
+    def take_back(self, option: str) -> bool:
+        """Undo `set_aside`; True when that put the option back into the fix."""
+        del self.dismissed[option]
+        if option not in self._left_fix:
+            return False
+        self._left_fix.remove(option)
+        return option not in self.basket.ticked and self.basket.toggle(option)
 
     def next_fault(self) -> bool:
         """Turn to the next faulty objective, the first after the last; False when there is no other."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
+import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -11,6 +14,8 @@ from typing import Any
 from care_core.errors import ConfigError, UsageError, nearest
 from care_tui.places import PLACES
 
+SIGNS = "▸✓⣿"
+"""What the app draws with where it may."""
 COLORS = ("auto", "truecolor", "256", "16", "none")
 
 
@@ -124,8 +129,27 @@ SSH_FPS = 15
 _TEXTUAL_COLORS = {"truecolor": "truecolor", "256": "256", "16": "standard"}
 
 
+def takes_only_ascii(encoding: str, term: str) -> bool:
+    """Whether the terminal cannot be trusted with more than ASCII: its locale or its name says so, it is not asked.
+
+    Args:
+        encoding: what text is sent in, as the locale has it.
+        term: the terminal's name. A Linux console and the old hardware terminals have no signs for marks and plots.
+    """
+    if term == "linux" or re.match(r"vt\d", term):
+        return True
+    try:
+        SIGNS.encode(encoding)
+    except (UnicodeEncodeError, LookupError):
+        return True
+    return False
+
+
 def prepare_terminal(settings: Settings) -> None:
     """Set what Textual reads from the environment. Call it before Textual is imported; what the user set there wins."""
+    # A sign of a log that the terminal's encoding lacks takes one cell, not the six of its escape.
+    if isinstance(sys.__stderr__, io.TextIOWrapper):
+        sys.__stderr__.reconfigure(errors="replace")
     if settings.color == "none":
         os.environ["NO_COLOR"] = "1"
     elif settings.color != "auto":

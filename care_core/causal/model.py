@@ -33,6 +33,11 @@ class EdgeRecord(Record):
     high: float = 0.0
     direction: Direction = "none"
 
+    @property
+    def signed_effect(self) -> float:
+        """The effect as an operator reads it: negative where more of the source makes less of the target."""
+        return -self.effect if self.direction == "decreasing" else self.effect
+
 
 class EffectRecord(Record):
     """Total effect of an option on an objective: identification and Eq. 1 with its bootstrap interval."""

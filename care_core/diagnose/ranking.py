@@ -192,16 +192,13 @@ def describe_path(path: CausalPath, world: World, schema: Schema, run: Run, refe
     for i, name in enumerate(path.nodes):
         value = run.value(name)
         edge = world.model.edges.get(path.edges[i]) if i < len(path.edges) else None
-        signed = None
-        if edge is not None:
-            signed = -edge.effect if edge.direction == "decreasing" else edge.effect
         nodes.append(
             PathNode(
                 name=name,
                 unit=schema.variables[name].unit,
                 value=value if is_known(value) else None,
                 expected=_expected(name, world, reference),
-                effect=signed,
+                effect=None if edge is None else edge.signed_effect,
                 support=None if i == len(path.edges) else 0.0 if edge is None else edge.support,
             )
         )

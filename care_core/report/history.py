@@ -19,13 +19,14 @@ _SPARKS = 30
 
 
 class PastTriage(Strict):
-    """`options` are those the suggested fix changes, empty where none was suggested."""
+    """`verdict` says in words how the run went; `options` are those the suggested fix changes, none without a fix."""
 
     at: str
     log: str
     mission: int
     profile: str
     faults: list[str]
+    verdict: str
     cause: str | None
     options: list[str]
     p_fixed: float | None
@@ -88,10 +89,25 @@ def _past(triaged: Triaged) -> PastTriage:
         mission=triaged.mission,
         profile=document["profile"]["name"],
         faults=[fault["objective"] for fault in document["faults"]],
+        verdict=verdict_of(document),
         cause=causes[0] if causes else None,
         options=[change["option"] for change in fix["changes"]] if fix else [],
         p_fixed=fix["p_fixed"] if fix else None,
     )
+
+
+def verdict_of(document: Mapping[str, Any]) -> str:
+    """How a remembered run went, in a clause: the first critical finding, the objectives outside their thresholds, and
+    "no fault" only where everything was evaluated and nothing critical was found."""
+    critical = [finding["title"] for finding in document.get("findings", ()) if finding["severity"] == "critical"]
+    broken = [entry["name"] for entry in document["objectives"] if entry["status"] == "fault"]
+    unknown = [entry["name"] for entry in document["objectives"] if entry["status"] == "not_evaluated"]
+    said = [*critical[:1], *([f"FAULT {', '.join(broken)}"] if broken else [])]
+    if said:
+        return clean("; ".join(said))
+    if document.get("fit", {}).get("verdict") == "no":
+        return "no profile fits"
+    return "not all evaluated" if unknown or not document["objectives"] else "no fault"
 
 
 def _record(record: TrackRecord) -> PromiseRecord:
@@ -116,9 +132,8 @@ def _lines(document: HistoryDocument, ascii: bool) -> Iterator[str]:
         yield "No triage is remembered yet."
     for past in document.triages:
         when = past.at[:16].replace("T", " ")
-        fault = "no fault" if not past.faults else ", ".join(past.faults)
         fix = "" if past.p_fixed is None else f"  change {', '.join(past.options)} ({past.p_fixed:.0%})"
-        yield clean(f"{when}  {Path(past.log).name}  {past.profile}  {fault}{fix}")
+        yield clean(f"{when}  {Path(past.log).name}  {past.profile}  {past.verdict}{fix}")
     if document.trends:
         yield ""
         yield "Trends, oldest to newest"

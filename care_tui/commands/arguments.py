@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from care_core.errors import UsageError
 from care_tui.console import check_writable
 
 LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="The log to read.", show_default=False)]
@@ -41,4 +44,25 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Thresholds = Annotated[
     list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")
 ]
+Keep = Annotated[
+    list[str] | None, typer.Option("--keep", metavar="OPTION", help="Never change this option; may be repeated.")
+]
+Since = Annotated[
+    Path | None, typer.Option("--since", metavar="GOOD_LOG", help="List what changed since this good run.")
+]
 Mission = Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last.")]
+
+
+def bounds(texts: Iterable[str]) -> dict[str, float]:
+    """The operator's thresholds out of NAME=VALUE. Raises UsageError for a value that is no number."""
+    found = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        try:
+            bound = float(value)
+        except ValueError:
+            bound = math.nan
+        if not math.isfinite(bound):
+            raise UsageError(f"'{text}' is no bound.", hint=f"Write --threshold {name}=NUMBER.", where="--threshold")
+        found[name.strip()] = bound
+    return found

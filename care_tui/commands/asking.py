@@ -8,8 +8,17 @@ from typing import Annotated
 import typer
 
 from care_core.errors import UsageError
-from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds, is_json
-from care_tui.commands.diagnosing import bounds
+from care_tui.commands.arguments import (
+    AsJson,
+    ConfigPaths,
+    LogPath,
+    Mission,
+    Out,
+    ProfileName,
+    Thresholds,
+    bounds,
+    is_json,
+)
 from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit
 from care_tui.jobs import Request, open_and_choose, question_of

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from care_core.errors import LogError, UsageError
-from care_tui.commands.arguments import AsJson, ConfigPaths, LogPath, Mission, Out, ProfileName, Thresholds
+from care_tui.commands.arguments import (
+    AsJson,
+    ConfigPaths,
+    Keep,
+    LogPath,
+    Mission,
+    Out,
+    ProfileName,
+    Since,
+    Thresholds,
+    bounds,
+)
 from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit, painted
 from care_tui.jobs import Request, diagnose_log, exit_code
@@ -34,14 +43,10 @@ def triage(
     markdown: Annotated[bool, typer.Option("--markdown", help="Print Markdown for a ticket.")] = False,
     out: Out = None,
     top: Annotated[int, typer.Option("--top", min=1, help="How many causes a fault may have.")] = 5,
-    keep: Annotated[
-        list[str] | None, typer.Option("--keep", metavar="OPTION", help="Never change this option.")
-    ] = None,
+    keep: Keep = None,
     threshold: Thresholds = None,
     mission: Mission = None,
-    since: Annotated[
-        Path | None, typer.Option("--since", metavar="GOOD_LOG", help="List what changed since this good run.")
-    ] = None,
+    since: Since = None,
     no_history: NoHistory = False,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
@@ -78,21 +83,6 @@ def demo() -> None:
         diagnosis = diagnose_log(Request(path), progress)
     emit(_written(diagnosis, None, to_file=False))
     raise typer.Exit(exit_code(diagnosis))
-
-
-def bounds(texts: Iterable[str]) -> dict[str, float]:
-    """The operator's thresholds out of NAME=VALUE. Raises UsageError for a value that is no number."""
-    found = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        try:
-            bound = float(value)
-        except ValueError:
-            bound = math.nan
-        if not math.isfinite(bound):
-            raise UsageError(f"'{text}' is no bound.", hint=f"Write --threshold {name}=NUMBER.", where="--threshold")
-        found[name.strip()] = bound
-    return found
 
 
 def _format_of(out: Path | None) -> str | None:

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from care_core.errors import UsageError
-from care_tui.commands.arguments import ConfigPaths, ProfileName
+from care_tui.commands.arguments import ConfigPaths, Keep, Mission, ProfileName, Since, Thresholds, bounds
 from care_tui.console import say
 from care_tui.jobs import CAUSES, Request
 from care_tui.places import files_of, logs_in, written_s
@@ -32,7 +32,11 @@ def open_app(
     log: Annotated[Path | None, typer.Argument(metavar="[LOG]", show_default=False)] = None,
     profile: ProfileName = None,
     config: ConfigPaths = None,
-    ascii: Annotated[bool, typer.Option("--ascii", help="Draw without box characters.")] = False,
+    keep: Keep = None,
+    threshold: Thresholds = None,
+    mission: Mission = None,
+    since: Since = None,
+    ascii: Annotated[bool, typer.Option("--ascii", help="Draw with nothing but ASCII.")] = False,
     no_mouse: Annotated[bool, typer.Option("--no-mouse", help="Leave the mouse to the terminal.")] = False,
     color: Annotated[str | None, typer.Option("--color", help="auto, truecolor, 256, 16 or none.")] = None,
     theme: Annotated[str | None, typer.Option("--theme", help="Such as high-contrast.")] = None,
@@ -40,8 +44,10 @@ def open_app(
 ) -> None:
     """Open a log in the terminal app: the newest one when none is named."""
     from care_core.logs.opening import sniff
-    from care_tui.settings import load_settings, prepare_terminal, with_flags
+    from care_tui.settings import load_settings, prepare_terminal, takes_only_ascii, with_flags
 
+    bound = bounds(threshold or ())
+    ascii = ascii or takes_only_ascii(sys.stderr.encoding, os.environ.get("TERM", ""))
     chosen = with_flags(load_settings(settings), ascii=ascii, mouse=not no_mouse, color=color, theme=theme)
     path = log or newest_log(chosen.places)
     if path is not None:
@@ -53,7 +59,18 @@ def open_app(
     prepare_terminal(chosen)
     from care_tui.app import run
 
-    request = None if path is None else Request(path, profile, tuple(config or ()), top=CAUSES)
+    request = None
+    if path is not None:
+        request = Request(
+            path,
+            profile,
+            tuple(config or ()),
+            keep=tuple(keep or ()),
+            thresholds=bound,
+            top=CAUSES,
+            mission=mission,
+            since=since,
+        )
     raise typer.Exit(run(request, chosen))
 
 

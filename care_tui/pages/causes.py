@@ -20,8 +20,8 @@ class CausesPage(DiagnosisPage):
     name = "Causes"
     HELP = (
         "Options that moved the objective the wrong way in this run, best first, with the causal path of the one under "
-        "the cursor. Enter goes to the fix. d sets a cause aside with a reason that goes into the report, or takes it "
-        "back. o turns to the next fault."
+        "the cursor. Enter goes to the fix. d sets a cause aside with a reason that goes into the report, and undoes "
+        "that. o turns to the next fault."
     )
     ENTER = "Fix"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"dismiss", "next_fault"})
@@ -84,17 +84,19 @@ class CausesPage(DiagnosisPage):
         if index is None:
             return
         option = self.session.causes[index].option.name
-        if self.session.dismissed.pop(option, None) is not None:
-            self.screen.draw()
+        if option in self.session.dismissed:
+            self._redraw(self.session.take_back(option), f"{option} is back in the fix.")
             return
         prompt = Prompt(f"Set {option} aside", hint="Why? It goes into the report. Enter keeps it, Esc cancels.")
         self.screen.app.push_screen(prompt, lambda reason: self._dismissed(option, reason))
 
     def _dismissed(self, option: str, reason: str | None) -> None:
         if reason:
-            self.session.dismissed[option] = reason
+            self._redraw(self.session.set_aside(option, reason), f"{option} was also taken out of the fix.")
+
+    def _redraw(self, has_changed_fix: bool, words: str) -> None:
+        if has_changed_fix:
+            self.walk.basket_changed()
+            self.screen.say(words)
+        else:
             self.screen.draw()
-            if option in self.session.basket.ticked:
-                self.session.basket.drop(option)
-                self.walk.basket_changed()
-                self.screen.say(f"{option} was also taken out of the fix.")

@@ -111,14 +111,14 @@ class GraphPage(Page):
     def open(self, index: int | None) -> None:
         if index is not None:
             self._trail.append(self._links(self._trail[-1])[index].name)
-            self.screen.draw(index=0)
+            self.screen.turn_to_page()
 
     def step_back(self) -> None:
         """Go back to the variable before."""
         if len(self._trail) > 1:
             self._trail.pop()
-            self.screen.draw(index=0)
+            self.screen.turn_to_page()
 
 
 def _link(name: str, kind: str, edge: EdgeRecord | None) -> Link:
-    return Link(name, kind, None, None) if edge is None else Link(name, kind, edge.effect, edge.support)
+    return Link(name, kind, None, None) if edge is None else Link(name, kind, edge.signed_effect, edge.support)

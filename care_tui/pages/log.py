@@ -101,8 +101,11 @@ class LogPage(StepPage):
         found = self._found.answer
         if isinstance(found, list) and index is not None:
             path = found[index].path
-            if path == self.session.path and self.session.case is not None:
+            is_open = path == self.session.path
+            if is_open and self.session.state == "data":
                 self.walk.action_go(2)
+            elif is_open and self.session.state == "loading":
+                self.screen.say("It is being read; Esc stops that.")
             else:
                 self.walk.open_log(path)
 

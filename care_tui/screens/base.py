@@ -10,15 +10,15 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 MIN_WIDTH, MIN_HEIGHT = 60, 20
-WIDE, HUGE = 110, 180
-"""From these widths on, lists and what they explain stand side by side, and the list gets more of the room."""
+WIDE = 160
+"""From this width on, lists and what they explain stand side by side, each with the room of a whole terminal."""
 
 
 class CareScreen(Screen[None]):
     """A screen that says so where the terminal is too small for it, and asks for nothing else there."""
 
     # Textual declares both as instance variables, so they cannot be ClassVar here.
-    HORIZONTAL_BREAKPOINTS = [(0, "-too-narrow"), (MIN_WIDTH, "-narrow"), (WIDE, "-wide"), (HUGE, "-huge")]  # noqa: RUF012
+    HORIZONTAL_BREAKPOINTS = [(0, "-too-narrow"), (MIN_WIDTH, "-narrow"), (WIDE, "-wide")]  # noqa: RUF012
     VERTICAL_BREAKPOINTS = [(0, "-too-low"), (MIN_HEIGHT, "-tall")]  # noqa: RUF012
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("tab", "app.focus_next", "Next pane", show=False, id="screen.next-pane"),

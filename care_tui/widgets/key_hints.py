@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 from textual.binding import Binding
 from textual.content import Content
+from textual.events import Click
 from textual.screen import Screen
 from textual.widgets import Static
 
 from care_core.text import clean
 from care_tui.screens.base import CareScreen
+
+GAP = Content("  ")
+
+
+class Hint(NamedTuple):
+    """A key, and what the line says of it."""
+
+    key: str
+    words: Content
 
 
 class KeyHints(Static):
@@ -16,8 +29,8 @@ class KeyHints(Static):
 
     def __init__(self) -> None:
         super().__init__(markup=False)
-        self._here: list[Content] = []
-        self._everywhere: list[Content] = []
+        self._here: list[Hint] = []
+        self._everywhere: list[Hint] = []
         self._notice = ""
 
     def on_mount(self) -> None:
@@ -33,35 +46,54 @@ class KeyHints(Static):
         self._draw()
 
     def _follow(self, screen: Screen[object]) -> None:
-        here: dict[str, Binding] = {}
-        everywhere: dict[str, Binding] = {}
-        for active in screen.active_bindings.values():
+        here: dict[str, tuple[str, Binding]] = {}
+        everywhere: dict[str, tuple[str, Binding]] = {}
+        for key, active in screen.active_bindings.items():
             if active.enabled and active.binding.show:
-                (everywhere if active.node is self.app else here).setdefault(active.binding.action, active.binding)
-        self._here = [self._hint(binding) for binding in sorted(here.values(), key=_order)]
+                found = everywhere if active.node is self.app else here
+                found.setdefault(active.binding.action, (key, active.binding))
+        self._here = [self._hint(*pair) for pair in sorted(here.values(), key=lambda pair: _order(pair[1]))]
         palette = screen.active_bindings.get(self.app.COMMAND_PALETTE_BINDING)
         if palette is not None:
-            self._here.append(Content.assemble((self.app.get_key_display(palette.binding), "bold"), " Commands"))
-        self._everywhere = [self._hint(binding) for binding in everywhere.values()]
+            shown = Content.assemble((self.app.get_key_display(palette.binding), "bold"), " Commands")
+            self._here.append(Hint(self.app.COMMAND_PALETTE_BINDING, shown))
+        self._everywhere = [self._hint(*pair) for pair in everywhere.values()]
         self._draw()
 
-    def _hint(self, binding: Binding) -> Content:
+    def _hint(self, key: str, binding: Binding) -> Hint:
         screen = self.screen
         does = screen.described(binding) if isinstance(screen, CareScreen) else binding.description
-        return Content.assemble((self.app.get_key_display(binding), "bold"), f" {does}")
+        return Hint(key, Content.assemble((self.app.get_key_display(binding), "bold"), f" {does}"))
 
     def _draw(self) -> None:
-        line = Content.styled(self._notice, "bold") if self._notice else self._keys()
+        line = (
+            Content.styled(self._notice, "bold") if self._notice else GAP.join([hint.words for hint in self._fitting()])
+        )
         if line != self.content:
             self.update(line, layout=False)
 
-    def _keys(self) -> Content:
-        gap, shown = Content("  "), list(self._here)
-        line = gap.join([*shown, *self._everywhere])
-        while shown and line.cell_length > self.content_size.width:
-            shown.pop()
-            line = gap.join([*shown, *self._everywhere])
-        return line
+    def _fitting(self) -> list[Hint]:
+        """The hints that there is room for."""
+        here = list(self._here)
+        while here and _width([*here, *self._everywhere]) > self.content_size.width:
+            here.pop()
+        return [*here, *self._everywhere]
+
+    def on_click(self, event: Click) -> None:
+        """A click on a hint is its key; one on a notice brings the keys back."""
+        if self._notice:
+            self.say("")
+            return
+        x, end = event.get_content_offset_capture(self).x, 0
+        for hint in self._fitting():
+            start, end = end, end + hint.words.cell_length
+            if start <= x < end:
+                self.app.simulate_key(hint.key)
+            end += GAP.cell_length
+
+
+def _width(hints: Sequence[Hint]) -> int:
+    return sum(hint.words.cell_length for hint in hints) + GAP.cell_length * (len(hints) - 1)
 
 
 def _order(binding: Binding) -> int:

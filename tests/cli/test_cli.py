@@ -108,6 +108,27 @@ def test_the_app_asks_for_a_terminal(care: Care, tmp_path: Path) -> None:
     assert "care triage LOG" in outcome.stderr
 
 
+def test_the_app_takes_what_triage_takes_and_the_help_shows_it(care: Care, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Request | None] = []
+
+    def run(request: Request | None, _settings: object) -> int:
+        asked.append(request)
+        return 0
+
+    monkeypatch.setenv("TEXTUAL_DRIVER", "none is started")
+    monkeypatch.setattr("care_tui.app.run", run)
+    words = ("--mission", "2", "--threshold", "energy=9.5", "--keep", "LAND_SPEED", "--keep", "RTL_ALT")
+    assert care(SAMPLE, *words, "--since", SAMPLE).code == 0
+    (request,) = asked
+    assert request is not None
+    assert (request.log, request.mission, request.since) == (SAMPLE, 2, SAMPLE)
+    assert dict(request.thresholds) == {"energy": 9.5}
+    assert request.keep == ("LAND_SPEED", "RTL_ALT")
+    assert care(SAMPLE, "--threshold", "energy=low").code == 2
+    shown = care("--help").stdout
+    assert all(f"--{name} " in shown for name in ("mission", "threshold", "keep", "since", "config", "ascii"))
+
+
 def test_the_newest_log_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "rosbag2_today").mkdir()
     for age, name in enumerate(("old.BIN", "rosbag2_today/metadata.yaml", "new.bag", "newest.txt", "now.bag.active")):

@@ -74,6 +74,30 @@ async def test_escape_stops_work_that_never_reports_and_r_starts_again() -> None
         assert app.code == ExitCode.FAULT
 
 
+async def test_enter_while_reading_does_not_start_the_reading_again(tmp_path: Path) -> None:
+    log, asked = tmp_path / "a.BIN", []
+    log.write_bytes(b"x")
+    slow = SlowEngine()
+
+    def diagnose(request: Request, progress: Progress) -> Case:
+        asked.append(request.log)
+        return slow.diagnose(request, progress)
+
+    app = CareApp(Request(log), engine=fake_engine(diagnose), settings=Settings(places=(tmp_path,)))
+    async with app.run_test(size=(80, 24)) as pilot:
+        slow.reached.wait(5)
+        await pilot.pause(0.1)
+        assert "a.BIN" in items(app)
+        await pilot.press("enter", "enter")
+        await pilot.pause(0.1)
+        assert "25 %" in text(app), "it goes on where it was"
+        assert "being read" in hints(app)
+        slow.go_on.set()
+        await settle(pilot)
+        assert walk(app).step == 2
+    assert asked == [log]
+
+
 @pytest.mark.parametrize("key", ["q", "ctrl+c"])
 async def test_leaving_while_loading_is_an_interruption_and_waits_for_nothing(key: str) -> None:
     app, slow = slow_app()

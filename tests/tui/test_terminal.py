@@ -31,12 +31,13 @@ ALT_SCREEN_OFF, CURSOR_ON, MOUSE_ON, MOUSE_OFF = b"\x1b[?1049l", b"\x1b[?25h", b
 class Terminal:
     """A child in a pseudo-terminal of 80 x 24, with its own home."""
 
-    def __init__(self, folder: Path, *arguments: str, code: str = CODE) -> None:
+    def __init__(self, folder: Path, *arguments: str, code: str = CODE, **variables: str) -> None:
         root = str(Path(__file__).parents[2])
         env = {**os.environ, "TERM": "xterm-256color", "HOME": str(folder), "PYTHONPATH": root}
         env |= {"XDG_CONFIG_HOME": str(folder), "XDG_STATE_HOME": str(folder)}
         for name in ("NO_COLOR", "TMUX", "SSH_CONNECTION"):
             env.pop(name, None)
+        env |= variables
         self.seen = b""
         self.child = pexpect.spawn(
             sys.executable, ["-c", code, *arguments], cwd=str(folder), env=env, dimensions=(24, 80), timeout=60
@@ -113,6 +114,38 @@ def test_ctrl_c_gives_the_terminal_back(tmp_path: Path, sample: str) -> None:
     terminal.expect("Objectives")
     terminal.child.send("\x03")
     assert terminal.end() == 130
+
+
+def test_ctrl_z_gives_the_terminal_to_the_shell_and_fg_brings_the_app_back(tmp_path: Path, sample: str) -> None:
+    terminal = Terminal(tmp_path, sample)
+    terminal.expect("mission_time")
+    terminal.press("\x1a", ALT_SCREEN_OFF.decode())
+    stat = Path(f"/proc/{terminal.child.pid}/stat")
+    deadline = time.monotonic() + 10
+    while stat.read_text().rsplit(")", 1)[1].split()[0] != "T" and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert stat.read_text().rsplit(")", 1)[1].split()[0] == "T", "stopped"
+    terminal.child.kill(signal.SIGCONT)
+    terminal.expect("\x1b[?1049h")
+    terminal.expect("mission_time")  # drawn again, all of it
+    terminal.press("\r", "LAND_SPEED")
+    terminal.child.send("q")
+    assert terminal.end() == 1
+
+
+@pytest.mark.parametrize("variables", [{"PYTHONIOENCODING": "latin-1"}, {"TERM": "linux"}])
+def test_a_terminal_without_the_signs_gets_ascii_and_no_escapes_in_their_place(
+    tmp_path: Path, sample: str, variables: dict[str, str]
+) -> None:
+    named = tmp_path / "f\N{LATIN SMALL LETTER U WITH DIAERESIS}r \N{CJK UNIFIED IDEOGRAPH-4E2D}.BIN"
+    named.write_bytes(Path(sample).read_bytes())
+    terminal = Terminal(tmp_path, str(named), **variables)
+    terminal.expect("x FAULT")
+    terminal.press("1", ">1 Log")
+    terminal.child.send("q")
+    assert terminal.end() == 1
+    assert b"\\u" not in terminal.seen
+    assert "\N{BLACK RIGHT-POINTING SMALL TRIANGLE}".encode() not in terminal.seen
 
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,21 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         assert title(app).startswith("Around LAND_SPEED"), "the graph starts at the cause under the cursor"
         await settle(pilot, "1", "question_mark", "escape", "escape")
         assert isinstance(app.screen, WalkScreen)
+
+
+@needs_sample
+async def test_an_effect_has_the_same_sign_on_its_path_and_in_the_graph() -> None:
+    app = real()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3")
+        path = walk(app).session.causes[0].path
+        assert any(node.effect is not None and node.effect < 0 for node in path)
+        await settle(pilot, "w")
+        for node, after in pairwise(path):
+            assert title(app).startswith(f"Around {node.name}")
+            (line,) = [line for line in items(app).splitlines() if after.name in line.split()]
+            assert f"{node.effect:+.2f}" in line.split()
+            await settle(pilot, "slash", *after.name, "enter", "enter")
 
 
 @needs_sample

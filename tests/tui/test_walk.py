@@ -127,8 +127,21 @@ async def test_a_cause_set_aside_leaves_the_fix_and_its_reason_is_in_the_report(
         assert "taken out of the fix" in hints(app)
         await settle(pilot, "6")
         assert text(app) == "report: yaml\n  aside: LAND_SPEED: slow on purpose"
-        await settle(pilot, "3", "d", "6")
-        assert text(app) == "report: yaml", "d takes it back; the fix stays as the operator left it"
+        await settle(pilot, "3", "d")
+        assert "set aside" not in items(app)
+        assert "back in the fix" in hints(app)
+        await settle(pilot, "6")
+        assert text(app) == "report: yaml\n  LAND_SPEED: 50", "a second d undoes all that the first did"
+
+
+async def test_a_cause_that_was_in_no_fix_comes_back_without_being_ticked(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3", "j", "d", *"as agreed", "enter", "d")
+        assert walk(app).session.dismissed == {}
+        assert walk(app).session.basket.ticked == {"LAND_SPEED": 50.0}
+        await settle(pilot, "k", "d", "x", "enter", "4", "space", "3", "d")
+        assert walk(app).session.basket.ticked == {"LAND_SPEED": 50.0}, "ticked by hand meanwhile: it stays"
 
 
 async def test_the_boxes_decide_the_odds_and_what_diff_and_report_hold(make_app: MakeApp) -> None:
@@ -343,6 +356,27 @@ async def test_the_mouse_opens_steps_and_items(make_app: MakeApp) -> None:
         assert walk(app).step == 4
 
 
+async def test_a_click_on_a_hint_is_its_key(make_app: MakeApp) -> None:
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3")
+        # The line is padded by one cell.
+        await pilot.click("KeyHints", offset=(1 + hints(app).index("Fix"), 0))
+        await settle(pilot)
+        assert walk(app).step == 4
+        await pilot.click("KeyHints", offset=(1 + hints(app).index("enter"), 0))
+        await settle(pilot)
+        assert walk(app).step == 5
+        await settle(pilot, "3")
+        await pilot.click("KeyHints", offset=(1 + hints(app).index("Set aside"), 0))
+        await settle(pilot)
+        assert isinstance(app.screen, Prompt)
+        await settle(pilot, "escape")
+        await pilot.click("KeyHints", offset=(hints(app).index("esc"), 0))
+        await settle(pilot)
+        assert walk(app).step == 3, "between two hints nothing is pressed"
+
+
 @pytest.mark.parametrize(
     ("diagnosis", "code"),
     [
@@ -400,7 +434,8 @@ def test_every_binding_has_an_id_and_leaves_reserved_keys_alone() -> None:
         for binding in owner.BINDINGS:
             assert not isinstance(binding, tuple)
             assert binding.id
-            assert not {f"ctrl+{letter}" for letter in "sqzjimhba"} & set(binding.key.split(","))
+            taken = {f"ctrl+{letter}" for letter in "sqzjimhba"} & set(binding.key.split(","))
+            assert taken == ({"ctrl+z"} if binding.id == "app.suspend" else set())
 
 
 async def test_keys_can_be_remapped_by_id(make_app: MakeApp) -> None:

@@ -14,7 +14,7 @@ from care_core.errors import ConfigError, UsageError
 from care_core.variables import Role, Variable
 from care_tui.basket import Basket, nudged, parsed
 from care_tui.clipboard import MAX_BYTES, fits, osc52
-from care_tui.settings import Settings, load_settings, prepare_terminal, with_flags
+from care_tui.settings import Settings, load_settings, prepare_terminal, takes_only_ascii, with_flags
 
 FLOAT = Variable("gain", Role.OPTION, "float", "", "", (0.01, 10.0), 1.0)
 INT = Variable("speed", Role.OPTION, "int", "cm/s", "", (30, 200), 50)
@@ -126,6 +126,24 @@ def test_a_settings_file_that_is_named_must_exist(tmp_path: Path, monkeypatch: p
         load_settings(tmp_path / "none.yaml")
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     assert load_settings() == Settings()
+
+
+@pytest.mark.parametrize(
+    ("encoding", "term", "only_ascii"),
+    [
+        ("utf-8", "xterm-256color", False),
+        ("UTF8", "tmux-256color", False),
+        ("ascii", "xterm", True),
+        ("iso8859-1", "xterm", True),
+        ("cp437", "xterm", True),
+        ("no-such-encoding", "xterm", True),
+        ("utf-8", "linux", True),
+        ("utf-8", "vt220", True),
+        ("utf-8", "", False),
+    ],
+)
+def test_ascii_is_decided_by_locale_and_name_of_the_terminal(encoding: str, term: str, only_ascii: bool) -> None:
+    assert takes_only_ascii(encoding, term) is only_ascii
 
 
 def test_ssh_gets_fewer_frames_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,6 +8,7 @@ import sqlite3
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -19,7 +20,7 @@ from care_core.history.card import update_card
 from care_core.history.store import History, HistoryError, Verified, history_path
 from care_core.history.track_record import sparkline, track_record, trends
 from care_core.report.document import build_document
-from care_core.report.history import history_document, history_json, history_schema, history_text
+from care_core.report.history import history_document, history_json, history_schema, history_text, verdict_of
 from care_core.report.writers import published
 from tests.conftest import Care
 from tests.made import made_diagnosis
@@ -157,6 +158,28 @@ def test_the_document_fits_its_schema_and_the_text_is_clean(history: History) ->
     assert "\x1b" not in text
     assert "verified fixes: 1, worked 1, promised 0.9" in text
     assert history_text(document, ascii=True).isascii()
+
+
+NAMED = {"kind": "crash", "title": "it hit the \x1bground", "severity": "critical"}
+
+
+@pytest.mark.parametrize(
+    ("statuses", "more", "verdict"),
+    [
+        (["ok", "ok"], {}, "no fault"),
+        (["ok", "ok"], {"findings": [NAMED]}, "it hit the \\x1bground"),
+        (["ok", "fault"], {"findings": [NAMED]}, "it hit the \\x1bground; FAULT o1"),
+        (["ok", "not_evaluated"], {}, "not all evaluated"),
+        ([], {}, "not all evaluated"),
+        (["not_evaluated"], {"fit": {"verdict": "no", "reasons": []}}, "no profile fits"),
+        (["ok"], {"findings": [{**NAMED, "severity": "info"}]}, "no fault"),
+    ],
+)
+def test_only_a_run_without_any_fault_is_told_to_have_none(
+    statuses: list[str], more: dict[str, Any], verdict: str
+) -> None:
+    objectives = [{"name": f"o{place}", "status": status} for place, status in enumerate(statuses)]
+    assert verdict_of({"objectives": objectives, **more}) == verdict
 
 
 def test_a_model_card_keeps_what_it_says_besides(history: History, tmp_path: Path) -> None:
