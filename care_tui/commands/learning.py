@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -11,6 +11,8 @@ from care_tui.commands.arguments import AsJson
 from care_tui.console import Progress, emit, say
 
 app = typer.Typer()
+
+Method = Literal["paper", "engine", "all"]
 
 
 @app.command()
@@ -53,10 +55,11 @@ def evaluate(
     truth: Annotated[
         list[Path] | None, typer.Option("--truth", help="Table of true causes; found beside the faults if absent.")
     ] = None,
+    method: Annotated[Method, typer.Option("--method", help="The paper's rule, the engine of triage, or all.")] = "all",
     json: AsJson = False,
 ) -> None:
     """Compare a profile's causes with the true ones. Accuracy, precision, recall, F1, RMSE, and baselines beside it."""
     from care_tui.training import evaluate_profile, evaluation_as_json, evaluation_as_text
 
-    evaluation = evaluate_profile(profile, faults, truth or ())
+    evaluation = evaluate_profile(profile, faults, truth or (), method)
     emit(evaluation_as_json(evaluation) if json else evaluation_as_text(evaluation))
