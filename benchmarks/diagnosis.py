@@ -27,7 +27,7 @@ from care_core.diagnose.faults import thresholds_in_force
 from care_core.diagnose.ranking import deviating, reference_config
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.triage import triage
-from care_core.extract.select import describe_fit
+from care_core.extract.select import choose_profile
 from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
 from care_core.learn.skill import all_met, calibration_error, held_out_odds, reliability
 from care_core.learn.structure import learn_structure
@@ -161,7 +161,7 @@ def evaluate(profile: Profile, shared: Path, peers: Peers | None, *, verbose: bo
     tally = Tally()
     for truth in truths:
         log = open_log(folder / truth["log"])
-        choice = describe_fit(log, profile)
+        choice = choose_profile(log, [profile])[1]
         diagnosis = triage(log, profile, choice, top=10)
         if not diagnosis.faults:
             # The outside measurement says failed, the log says just inside: the operator lowers the threshold to match.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeGuard
+from typing import Literal, TypeGuard
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,16 +83,40 @@ class LogInfo:
     """What the log says of its robot: firmware, frame, distro."""
 
 
+FitVerdict = Literal["fits", "partly", "no"]
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How well a profile fits a log: "partly" caps every confidence at low, with "no" nothing is advised."""
+
+    verdict: FitVerdict
+    reasons: tuple[str, ...] = ()
+    """What is missing or differs, one clause each; empty where it fits."""
+
+    def __str__(self) -> str:
+        said = {"fits": "fits", "partly": "fits in part", "no": "does not fit"}[self.verdict]
+        return f"{said}: {'; '.join(self.reasons)}" if self.reasons else said
+
+    def but(self, *reasons: str) -> Fit:
+        """The fit with more found that differs: in part at best."""
+        if not reasons:
+            return self
+        return Fit("no" if self.verdict == "no" else "partly", tuple(dict.fromkeys((*self.reasons, *reasons))))
+
+
+FITS = Fit("fits")
+
+
 @dataclass(frozen=True, slots=True)
 class ProfileChoice:
-    """The profile that was used, and how it was chosen."""
+    """The profile that was used, how it was chosen, and how well it fits the log."""
 
     name: str
     version: str
     platform: str
     reason: str
-    warnings: tuple[str, ...] = ()
-    """What of the log differs from the profile: firmware, frame, distro, mission."""
+    fit: Fit = FITS
 
 
 @dataclass(frozen=True, slots=True)

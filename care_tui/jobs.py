@@ -162,13 +162,13 @@ def _diagnose(request: Request, sha256: Sha256, progress: Progress) -> tuple[Dia
 
 def open_and_choose(path: Path, profile: str | None) -> tuple[Log, Profile, ProfileChoice]:
     """A log with the profile that fits it, or the one that was named. Raises CareError."""
-    from care_core.extract.select import choose_profile
+    from care_core.extract.select import fitting_profile
     from care_core.logs.opening import open_log
     from care_core.profile.store import available_profiles, load_profile
 
     log = open_log(path)
     names: list[Path] | list[str] = available_profiles() if profile is None else [profile]
-    return (log, *choose_profile(log, [load_profile(name) for name in names]))
+    return (log, *fitting_profile(log, [load_profile(name) for name in names]))
 
 
 def question_of(request: Request, progress: Progress) -> Question:

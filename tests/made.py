@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
-from care_core.run import Damage, Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Setting, Unavailable
+from care_core.run import Damage, Evidence, Fit, LogInfo, MissionInfo, ProfileChoice, Run, Setting, Unavailable
 from care_core.variables import Change, Role, Threshold, Variable
 
 HOSTILE = "Arm: \x1b[31m[bold]|red|\x1b]0;title\x07 \u202eback"
@@ -66,7 +66,9 @@ def made_diagnosis() -> Diagnosis:
         {"mission_time": Prediction(140.0, 130.0, 149.0, 0.92), "energy": Prediction(float("inf"), 0.0, 1.0)},
     )
     return Diagnosis(
-        profile=ProfileChoice("arducopter", "1.0", "ArduCopter quad", "33 of 33 options", (f"firmware {HOSTILE}",)),
+        profile=ProfileChoice(
+            "arducopter", "1.0", "ArduCopter quad", "33 of 33 options", Fit("partly", (f"firmware {HOSTILE}",))
+        ),
         run=made_run(),
         objectives=(
             ObjectiveResult(SUCCESS, 1.0, SUCCESS.threshold, "ok"),

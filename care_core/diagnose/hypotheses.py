@@ -14,8 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from care_core.diagnose.records import FitVerdict, Hypothesis
+from care_core.diagnose.records import Hypothesis
 from care_core.health.records import Finding, Suspect
+from care_core.run import FitVerdict
 
 MISSION_LOST: Mapping[str, float] = {"critical": 0.9, "warning": 0.5, "info": 0.05}
 """Probability that a mission fails with what a finding shows, by how severe it is."""

@@ -12,7 +12,6 @@ from care_core.variables import Change, Threshold, Variable
 
 Status = Literal["ok", "fault", "not_evaluated"]
 Confidence = Literal["high", "medium", "low"]
-FitVerdict = Literal["fits", "partly", "no"]
 What = Literal["parameter", "hardware", "world", "chance"]
 
 
@@ -136,22 +135,6 @@ class Experiment:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
-    """How well a profile fits a log: "partly" caps every confidence at low, with "no" nothing is advised."""
-
-    verdict: FitVerdict
-    reasons: tuple[str, ...] = ()
-    """What is missing or differs, one clause each; empty where it fits."""
-
-    def __str__(self) -> str:
-        said = {"fits": "fits", "partly": "fits in part", "no": "does not fit"}[self.verdict]
-        return f"{said}: {'; '.join(self.reasons)}" if self.reasons else said
-
-
-FITS = Fit("fits")
-
-
-@dataclass(frozen=True, slots=True)
 class Hypothesis:
     """One explanation of the failure; those of a diagnosis add up to 1."""
 
@@ -212,7 +195,6 @@ class Diagnosis:
     tell_more: tuple[str, ...] = ()
     """What would tell more: a metric to record, an experiment; only where no cause is sure."""
     dismissed: tuple[Dismissal, ...] = ()
-    fit: Fit = FITS
     health: Health = NOTHING_SEEN
     hypotheses: tuple[Hypothesis, ...] = ()
     """What explains the failure, the likeliest first; empty where nothing failed."""

@@ -221,7 +221,7 @@ def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float)
     A check that refused this run and reads the option's value is worth more than a doubt about the model.
     """
     contribution = suspect.contribution
-    doubtful = not in_support or bool(case.choice.warnings) or not case.run.mission.fits
+    doubtful = not in_support or case.choice.fit.verdict != "fits" or not case.run.mission.fits
     if doubtful or support < LOW_SUPPORT or contribution < UNSURE:
         return "medium" if suspect.option in refused_by(case.run) else "low"
     is_rivalled = bool(case.unranked[suspect.path.nodes[-1]])
@@ -339,7 +339,7 @@ def _new_way_to_fail(case: _Case) -> str | None:
 
 
 def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
-    notes = list(case.choice.warnings)
+    notes = list(case.choice.fit.reasons)
     for name in (result.variable.name for result in broken):
         unknown = ", ".join(suspect.option for suspect in case.unranked[name])
         if unknown:

@@ -65,7 +65,7 @@ class Trial:
 
 def cover(log: Log, schema: Schema) -> Coverage:
     """Count what a log holds of a profile. A profile of another format, or of a published table, has nothing."""
-    if _wrong_kind(log, schema):
+    if wrong_kind(log, schema):
         return Coverage(schema, 0, 0, 0, 0)
     settings, plan = log.settings(), reading_plan(schema)
     return Coverage(
@@ -80,7 +80,7 @@ def cover(log: Log, schema: Schema) -> Coverage:
 def try_on(log: Log, schema: Schema) -> Trial:
     """Try a profile on a log without judging anything."""
     coverage = cover(log, schema)
-    obstacle = _wrong_kind(log, schema)
+    obstacle = wrong_kind(log, schema)
     if obstacle:
         return Trial(coverage, obstacle)
     channels = _channels(log)
@@ -102,7 +102,8 @@ def _channels(log: Log) -> set[str]:
     return {channel.name for channel in as_dataflash(log).channels() if channel.count}
 
 
-def _wrong_kind(log: Log, schema: Schema) -> str:
+def wrong_kind(log: Log, schema: Schema) -> str:
+    """Why a profile cannot read logs of this kind; '' when it can."""
     if not schema.logs:
         return "it comes from a table of runs and reads no log"
     if log.format.value not in schema.logs:

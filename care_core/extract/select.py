@@ -1,4 +1,4 @@
-"""Which profile fits a log, and what of the log differs from it."""
+"""Which profile is taken for a log, and how well it fits."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import Protocol, TypeVar
 
 from care_core.errors import LogError, ProfileError
 from care_core.extract.coverage import Coverage, cover
+from care_core.extract.fit import fit_of
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
-from care_core.run import ProfileChoice
+from care_core.run import Fit, ProfileChoice
 
 NEARLY_AS_WELL = 0.9
 """Another profile is named when it matches at least this share of what the chosen one does."""
+_ORDER = {"fits": 0, "partly": 1, "no": 2}
 
 
 class HasSchema(Protocol):
@@ -25,71 +27,64 @@ class HasSchema(Protocol):
 P = TypeVar("P", bound=HasSchema)
 
 
-def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice]:
-    """The candidate with most parameters and sources in the log, then with the robot's or firmware's name.
+def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P | None, ProfileChoice]:
+    """The candidate that fits best: by its verdict, then by the parameters and sources in the log, then by the robot's
+    or firmware's name. None where none fits, with the reasons; a single candidate is still named then.
 
     Raises:
-        ProfileError: no candidate has anything in common with the log.
+        LogError: the log is damaged, and no message of it is left.
     """
-    found = [cover(log, candidate.schema) for candidate in candidates]
-    order = sorted(range(len(found)), key=lambda i: (-found[i].found, -found[i].names, found[i].schema.name))
-    usable = [i for i in order if found[i].found]
+    _refuse_unreadable(log)
+    covered = [cover(log, candidate.schema) for candidate in candidates]
+    fits = [fit_of(log, coverage) for coverage in covered]
+    order = sorted(range(len(fits)), key=lambda i: (_ORDER[fits[i].verdict], *_by_content(covered[i])))
+    usable = [i for i in order if fits[i].verdict != "no"]
     if not usable:
-        raise _nothing_readable(log) or _nothing_fits(log, found)
-    best = found[usable[0]]
-    others = [found[i].schema.name for i in usable[1:] if found[i].found >= NEARLY_AS_WELL * best.found]
-    return candidates[usable[0]], _choice(log, best, others)
+        return None, _none_fits(covered, fits, order)
+    best = usable[0]
+    others = [covered[i].schema.name for i in usable[1:] if covered[i].found >= NEARLY_AS_WELL * covered[best].found]
+    return candidates[best], _choice(covered[best], fits[best], others)
 
 
-def describe_fit(log: Log, profile: HasSchema) -> ProfileChoice:
-    """How a profile that the operator named fits the log. Raises ProfileError when nothing of it is there."""
-    return choose_profile(log, [profile])[1]
+def fitting_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice]:
+    """The candidate that fits best, for those who can do nothing without one.
+
+    Raises:
+        LogError: as `choose_profile`.
+        ProfileError: none fits.
+    """
+    profile, choice = choose_profile(log, candidates)
+    if profile is None:
+        named = f"Profile '{choice.name}' does not fit the log" if choice.name else "No profile fits the log"
+        hint = "Leave --profile out to have one chosen." if choice.name else "'care inspect' shows what the log holds."
+        raise ProfileError(f"{named}: {'; '.join(choice.fit.reasons)}.", hint=hint, where=str(log.path))
+    return profile, choice
 
 
-def _choice(log: Log, coverage: Coverage, others: Sequence[str]) -> ProfileChoice:
+def _by_content(coverage: Coverage) -> tuple[int, int, str]:
+    return -coverage.found, -coverage.names, coverage.schema.name
+
+
+def _choice(coverage: Coverage, fit: Fit, others: Sequence[str] = ()) -> ProfileChoice:
     rivals = f"; {', '.join(others)} would fit nearly as well" if others else ""
-    return ProfileChoice(
-        name=coverage.schema.name,
-        version=coverage.schema.version,
-        platform=coverage.schema.platform,
-        reason=f"{coverage}{rivals}",
-        warnings=differences(log, coverage.schema),
-    )
+    schema = coverage.schema
+    return ProfileChoice(schema.name, schema.version, schema.platform, f"{coverage}{rivals}", fit)
 
 
-def differences(log: Log, schema: Schema) -> tuple[str, ...]:
-    """What the log says of its robot that is not what the profile was learned on, one sentence each."""
-    return tuple(
-        f"the log's {key} is '{log.facts[key]}', the profile is for '{text}'"
-        for key, text in schema.match.items()
-        if log.facts.get(key) and text.casefold() not in log.facts[key].casefold()
-    )
+def _none_fits(covered: Sequence[Coverage], fits: Sequence[Fit], order: Sequence[int]) -> ProfileChoice:
+    """Why, by the profiles that come nearest; of those that read other logs nothing needs to be said."""
+    if len(covered) == 1:
+        return _choice(covered[0], fits[0])
+    near = [i for i in order if covered[i].found] or list(order)
+    reasons = tuple(f"{covered[i].schema.name}: {'; '.join(fits[i].reasons)}" for i in near)
+    return ProfileChoice("", "", "", "", Fit("no", reasons or ("no profile is installed",)))
 
 
-def _nothing_readable(log: Log) -> LogError | None:
+def _refuse_unreadable(log: Log) -> None:
     """A damaged log without a single message left is no question of profiles."""
-    if not log.damage or any(channel.count for channel in log.channels()):
-        return None
-    return LogError(
-        f"No message of the log can be read: {log.damage[-1].what}.",
-        hint="Copy it from the robot again, or use another recording.",
-        where=str(log.path),
-    )
-
-
-def _nothing_fits(log: Log, found: Sequence[Coverage]) -> ProfileError:
-    if len(found) == 1:
-        schema = found[0].schema
-        reads = f"It reads {' or '.join(schema.logs)}" if schema.logs else "It comes from a table and reads no log"
-        return ProfileError(
-            f"Profile '{schema.name}' does not fit the log: none of its parameters or sources are in it.",
-            hint=f"{reads}, this is {log.format.value}; leave --profile out to have one chosen.",
+    if log.damage and not any(channel.count for channel in log.channels()):
+        raise LogError(
+            f"No message of the log can be read: {log.damage[-1].what}.",
+            hint="Copy it from the robot again, or use another recording.",
             where=str(log.path),
         )
-    names = ", ".join(one.schema.name for one in found if log.format.value in one.schema.logs)
-    looked = f"Looked for the parameters and sources of {names}" if names else f"None of them reads {log.format.value}"
-    return ProfileError(
-        "No profile fits the log.",
-        hint=f"{looked}; 'care inspect' shows what the log holds.",
-        where=str(log.path),
-    )

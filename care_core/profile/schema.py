@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from ruamel.yaml import YAML
@@ -18,6 +18,7 @@ from ruamel.yaml.error import YAMLError
 
 from care_core.errors import ProfileError, nearest
 from care_core.variables import Extract, Kind, Op, Role, Threshold, ValueType, Variable
+from care_core.vehicles import Kind as VehicleKind
 
 SCHEMA_VERSION = 1
 
@@ -68,11 +69,27 @@ class _Variable(_Strict):
 
 
 class _Match(_Strict):
-    """What a log must say to be of this platform; each is searched in the log's facts, ignoring case."""
+    """What a log must say to be of this platform; each text is searched in the log's facts, ignoring case."""
 
     firmware: str = ""
     frame: str = ""
     stack: str = ""
+    vehicle: str = ""
+    versions: tuple[str, str] | None = None
+
+    @field_validator("vehicle")
+    @classmethod
+    def _is_a_kind(cls, kind: str) -> str:
+        if kind and kind not in get_args(VehicleKind):
+            raise ValueError(f"there is no vehicle '{kind}'. {nearest(kind, get_args(VehicleKind))}".strip())
+        return kind
+
+    @field_validator("versions")
+    @classmethod
+    def _are_versions(cls, versions: tuple[str, str] | None) -> tuple[str, str] | None:
+        if versions is not None and not all(re.fullmatch(r"\d+(\.\d+)*", version) for version in versions):
+            raise ValueError("'versions' is [first, last], such as ['4.0', '4.7']")
+        return versions
 
 
 class _EvidenceRule(_Strict):
@@ -167,7 +184,7 @@ class Schema:
     platform: str
     doc: str
     match: Mapping[str, str]
-    """What the log's facts should contain: `firmware`, `frame`, `stack` (only those given)."""
+    """What the log's facts should contain: `firmware`, `frame`, `stack`; the kind of `vehicle` (only those given)."""
     logs: tuple[str, ...]
     """Formats this platform records (`dataflash-bin`, `ros1-bag`); empty for a published table."""
     observational: bool
@@ -180,6 +197,8 @@ class Schema:
     """What no parameter sets (wind, battery) -> the contexts and metrics that show it, and their bad side."""
     known: frozenset[tuple[str, str]] = frozenset()
     """(cause, effect): direct effects that people know to be possible. Data say how large they are."""
+    firmware_window: tuple[tuple[int, ...], tuple[int, ...]] | None = None
+    """First and last version of the firmware that the profile is good for, as far as each is written."""
     digest: str = field(default="", compare=False)
     """SHA-256 of the variables' names, roles, types, ranges and extraction: what a model was learned for."""
 
@@ -252,7 +271,7 @@ def _to_schema(data: _Profile) -> Schema:
         version=data.version,
         platform=data.platform,
         doc=data.doc,
-        match={key: text for key, text in data.match.model_dump().items() if text},
+        match={key: text for key, text in data.match.model_dump(exclude={"versions"}).items() if text},
         logs=tuple(data.logs),
         observational=data.observational,
         mission=data.mission,
@@ -260,8 +279,14 @@ def _to_schema(data: _Profile) -> Schema:
         variables=variables,
         circumstances=data.circumstances,
         known=frozenset((a, b) for rule in data.known for a in rule.causes for b in rule.effects),
+        firmware_window=None if data.match.versions is None else _window(*data.match.versions),
         digest=_digest(variables),
     )
+
+
+def _window(first: str, last: str) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    low, high = (tuple(map(int, version.split("."))) for version in (first, last))
+    return low, high
 
 
 def _to_rule(rule: _EvidenceRule) -> EvidenceRule:

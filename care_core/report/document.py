@@ -210,7 +210,7 @@ def json_schema() -> dict[str, Any]:
 def build_document(diagnosis: Diagnosis) -> Report:
     """The document of a diagnosis. Text is cleaned; what is not a finite number becomes null."""
     run, log = diagnosis.run, diagnosis.run.log
-    warnings = tuple(clean(warning) for warning in diagnosis.profile.warnings)
+    warnings = tuple(clean(warning) for warning in diagnosis.profile.fit.reasons)
     return Report(
         profile=profile_entry(diagnosis.profile),
         log=LogEntry(

@@ -10,8 +10,9 @@ from collections.abc import Iterator, Sequence
 
 from pydantic import BaseModel, ConfigDict
 
-from care_core.diagnose.records import Fit, FitVerdict, Hypothesis, What
+from care_core.diagnose.records import Hypothesis, What
 from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
+from care_core.run import Fit, FitVerdict
 from care_core.text import clean, wrapped
 
 MOMENTS_SHOWN = 24

@@ -57,7 +57,7 @@ def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
     confidence = next((cause.confidence for cause in causes if cause.option.name in changed), None)
     changes = _changes(fix)
     sure = f", {confidence} confidence in the cause" if confidence else ""
-    warnings = "".join(f"; {warning}" for warning in diagnosis.profile.warnings)
+    warnings = "".join(f"; {warning}" for warning in diagnosis.profile.fit.reasons)
     return f"Change {changes}: {fix.p_fixed:.0%} odds that all objectives are met{sure}{warnings}"
 
 
@@ -82,7 +82,7 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     duration = f"{run.mission.end_s - run.mission.start_s:.0f} s"
     yield from wrapped(f"{Path(run.log.path).name}, {mission}, {duration}{facts}", "Log      ")
     yield from wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
-    for warning in profile.warnings:
+    for warning in profile.fit.reasons:
         yield from wrapped(warning, "Warning  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
         at = "" if damage.time_s is None else f" at {damage.time_s:.1f} s"

@@ -101,7 +101,7 @@ def whatif_text(question: Question, answer: Answer) -> str:
 def _lines(question: Question, answer: Answer) -> Iterator[str]:
     log = Path(question.run.log.path).name
     yield from wrapped(f"{log}, profile {question.profile.name} {question.profile.version}", "Log  ")
-    for warning in question.profile.warnings:
+    for warning in question.profile.fit.reasons:
         yield from wrapped(warning, "     ! ")
     yield ""
     for change in answer.changes:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
-from care_core.run import Damage, Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Setting
+from care_core.run import Damage, Evidence, Fit, LogInfo, MissionInfo, ProfileChoice, Run, Setting
 from care_core.variables import Change, Role, Threshold, Variable
 
 HOSTILE = "PreArm: [bold]check[/bold] \x1b[31mfences\x1b[0m\u202e"
@@ -152,7 +152,7 @@ def faulty() -> Diagnosis:
             "1.0",
             "ArduCopter SITL quad",
             "most parameters matched (31 of 31)",
-            warnings=("the log is from ArduCopter 4.3.6, the profile was learned on 4.6",),
+            fit=Fit("partly", ("the log is from ArduCopter 4.3.6, the profile was learned on 4.6",)),
         ),
         run=RUN,
         objectives=(OK_SUCCESS, SLOW, HUNGRY, NO_PATH),

@@ -19,7 +19,7 @@ from care_core.diagnose.tell_more import experiment
 from care_core.diagnose.triage import diagnose, triage
 from care_core.diagnose.worlds import reference_of, world_of
 from care_core.errors import ProfileError
-from care_core.extract.select import describe_fit
+from care_core.extract.select import choose_profile
 from care_core.logs.opening import open_log
 from care_core.profile.schema import EvidenceRule, Schema, Side, read_schema
 from care_core.profile.store import Profile, load_profile
@@ -196,7 +196,7 @@ def test_every_recorded_refusal_names_the_option_that_set_its_check_off(recorded
     seen: list[str] = []
     for path in sorted((recorded / "data/arducopter/faults").glob("*.BIN")):
         log = open_log(path)
-        diagnosis = triage(log, profile, describe_fit(log, profile))
+        diagnosis = triage(log, profile, choose_profile(log, [profile])[1])
         refusals = [e for e in diagnosis.run.evidence if e.kind == "refusal"]
         for evidence in refusals:
             check = next(check for check in REFUSED if check in evidence.text)

@@ -10,11 +10,16 @@ import pytest
 
 from care_core.errors import ProfileError
 from care_core.extract.coverage import cover
-from care_core.extract.select import choose_profile, describe_fit
+from care_core.extract.read import reading_plan
+from care_core.extract.select import choose_profile, fitting_profile
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.profile.schema import Schema
-from care_core.run import Damage, Setting
+from care_core.run import FITS, Damage, Fit, Setting
 from care_core.variables import Role, Variable
+
+SOURCES = tuple(
+    reading_plan(Schema("", "", "", "", {}, ("dataflash-bin",), False, {"kind": "ardupilot_flight"}, (), {}))
+)
 
 
 @dataclass
@@ -54,26 +59,63 @@ def candidate(name: str, *parameters: str, match: Mapping[str, str] | None = Non
 
 
 def test_most_parameters_win() -> None:
-    log = NamedLog(("A", "B", "C"))
-    chosen, choice = choose_profile(log, [candidate("few", "A"), candidate("many", "A", "B", "C", "D")])
+    log = NamedLog(("A", "B", "C", "D"), SOURCES)
+    chosen, choice = choose_profile(log, [candidate("few", "A"), candidate("many", "A", "B", "C", "D", "E")])
+    assert chosen is not None
     assert chosen.schema.name == choice.name == "many"
-    assert choice.reason.startswith("3 of 4 options")
+    assert choice.reason.startswith("4 of 5 options")
 
 
 def test_on_a_tie_the_name_decides_and_the_other_is_said() -> None:
-    log = NamedLog(("A",), facts={"firmware": "ArduCopter V4.5"})
-    rover = candidate("a_rover", "A", match={"firmware": "Rover"})
-    copter = candidate("copter", "A", match={"firmware": "arducopter"})
-    chosen, choice = choose_profile(log, [rover, copter])
-    assert chosen is copter
-    assert "a_rover would fit nearly as well" in choice.reason
-    assert choice.warnings == ()
+    log = NamedLog(("A",), SOURCES, {"frame": "QUAD/X"})
+    any_frame = candidate("a_frame", "A")
+    quad = candidate("quad", "A", match={"frame": "quad"})
+    chosen, choice = choose_profile(log, [any_frame, quad])
+    assert chosen is quad
+    assert "a_frame would fit nearly as well" in choice.reason
 
 
-def test_what_differs_is_said() -> None:
-    log = NamedLog(("A",), facts={"firmware": "Rover V4", "frame": "QUAD/X"})
-    copter = candidate("copter", "A", match={"firmware": "ArduCopter", "frame": "QUAD", "stack": "x"})
-    assert describe_fit(log, copter).warnings == ("the log's firmware is 'Rover V4', the profile is for 'ArduCopter'",)
+def test_a_log_that_holds_what_the_profile_reads_fits() -> None:
+    log = NamedLog(("A",), SOURCES, {"firmware": "ArduCopter V4.5.4"})
+    copter = candidate("copter", "A", match={"firmware": "ArduCopter", "vehicle": "copter"})
+    assert choose_profile(log, [copter])[1].fit == FITS
+
+
+def test_what_differs_makes_it_fit_in_part() -> None:
+    log = NamedLog(("A",), SOURCES, {"firmware": "ArduCopter V4.5.4", "frame": "HEXA/X"})
+    quad = candidate("quad", "A", "B", match={"firmware": "ArduCopter", "frame": "QUAD", "stack": "x"})
+    fit = choose_profile(log, [quad])[1].fit
+    assert fit.verdict == "partly"
+    assert fit.reasons == (
+        "the log's frame is 'HEXA/X', the profile is for 'QUAD'",
+        "1 of its 2 options are in the log",
+    )
+
+
+@pytest.mark.parametrize(
+    ("firmware", "verdict"),
+    [
+        ("ArduCopter V4.0.0", "fits"),
+        ("ArduCopter V4.6.3", "fits"),
+        ("ArduCopter V3.6.12", "partly"),
+        ("ArduCopter V4.7.0", "partly"),
+        ("ArduCopter", "partly"),
+    ],
+)
+def test_firmware_outside_the_window_fits_in_part(firmware: str, verdict: str) -> None:
+    copter = candidate("copter", "A", match={"firmware": "ArduCopter"})
+    within = Candidate(replace(copter.schema, firmware_window=((4, 0), (4, 6))))
+    assert choose_profile(NamedLog(("A",), SOURCES, {"firmware": firmware}), [within])[1].fit.verdict == verdict
+
+
+def test_another_vehicle_does_not_fit_however_much_it_has_in_common() -> None:
+    log = NamedLog(("A",), SOURCES, {"firmware": "ArduRover V4.5.4"})
+    copter = candidate("copter", "A", match={"firmware": "ArduCopter", "vehicle": "copter"})
+    chosen, choice = choose_profile(log, [copter])
+    assert chosen is None
+    assert (choice.name, choice.fit) == ("copter", Fit("no", ("it is for a copter, this is a rover",)))
+    with pytest.raises(ProfileError, match="'copter' does not fit the log: it is for a copter, this is a rover"):
+        fitting_profile(log, [copter])
 
 
 def test_sources_count_too() -> None:
@@ -83,12 +125,8 @@ def test_sources_count_too() -> None:
 
 def test_nothing_fits() -> None:
     log = NamedLog(("Z",))
-    with pytest.raises(ProfileError, match=r"No profile fits the log.*one, two"):
-        choose_profile(log, [candidate("one", "A"), candidate("two", "B")])
-    with pytest.raises(ProfileError, match="'one' does not fit the log"):
-        describe_fit(log, candidate("one", "A"))
+    chosen, choice = choose_profile(log, [candidate("one", "A"), candidate("two", "B")])
+    assert (chosen, choice.name, choice.fit.verdict) == (None, "", "no")
     other = replace(candidate("bag", "Z").schema, logs=("ros1-bag",))
-    with pytest.raises(ProfileError, match="It reads ros1-bag"):
-        describe_fit(log, Candidate(other))
-    with pytest.raises(ProfileError, match="None of them reads dataflash-bin"):
-        choose_profile(log, [Candidate(other), Candidate(other)])
+    assert choose_profile(log, [Candidate(other)])[1].fit.reasons == ("it reads ros1-bag, this is dataflash-bin",)
+    assert choose_profile(log, [])[1].fit.reasons == ("no profile is installed",)

@@ -1,0 +1,78 @@
+"""How well a profile fits a log: stack, vehicle, firmware, and how much of its options and sources the log holds.
+
+Asked before anything is judged. What the mission and its conditions add is known once the run is read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from care_core.extract.coverage import Coverage, wrong_kind
+from care_core.logs.base import Log
+from care_core.profile.schema import Schema
+from care_core.run import FITS, Fit
+from care_core.vehicles import Vehicle, vehicle_of
+
+MOST = 0.8
+"""Share of a profile's options, and of its sources, that a log holds when it fits."""
+LEAST = 0.3
+"""Share of the sources below which hardly anything of a run can be seen."""
+_VEHICLES = {"px4": "a PX4 vehicle", "sub": "a submarine", "heli": "a helicopter", "tracker": "an antenna tracker"}
+
+
+def fit_of(log: Log, coverage: Coverage) -> Fit:
+    """How well a profile fits a log, with what is missing or differs."""
+    schema = coverage.schema
+    vehicle = vehicle_of(log.facts, log.settings())
+    obstacles = tuple(_obstacles(log, coverage, vehicle))
+    if obstacles:
+        return Fit("no", obstacles)
+    return FITS.but(*_differences(log, schema, vehicle), *_lacks(coverage))
+
+
+def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle) -> Iterator[str]:
+    """Why nothing that the profile says of this log could be believed."""
+    schema = coverage.schema
+    other = wrong_kind(log, schema)
+    wanted = schema.match.get("vehicle", "")
+    if other:
+        yield other
+    elif wanted and vehicle.kind not in (wanted, "unknown"):
+        yield f"it is for {_a(wanted)}, this is {_a(vehicle.kind)}"
+    elif not coverage.found:
+        yield "none of its parameters or sources are in the log"
+    elif coverage.sources < LEAST * coverage.sources_wanted:
+        yield f"only {coverage.sources} of the {coverage.sources_wanted} messages that it reads are in the log"
+
+
+def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:
+    """What the log says of its robot that is not what the profile was learned on."""
+    for key, text in schema.match.items():
+        if key != "vehicle" and log.facts.get(key) and text.casefold() not in log.facts[key].casefold():
+            yield f"the log's {key} is '{log.facts[key]}', the profile is for '{text}'"
+    if schema.match.get("vehicle") and vehicle.kind == "unknown":
+        yield f"the log does not say what vehicle it is of, the profile is for {_a(schema.match['vehicle'])}"
+    if schema.firmware_window is None:
+        return
+    low, high = schema.firmware_window
+    if vehicle.version is None:
+        yield "the log does not say which firmware flew"
+    elif not low <= vehicle.version[: len(low)] or not vehicle.version[: len(high)] <= high:
+        flown = ".".join(map(str, vehicle.version))
+        yield f"firmware {flown} is outside {_dotted(low)} to {_dotted(high)}, for which the profile was made"
+
+
+def _lacks(coverage: Coverage) -> Iterator[str]:
+    options = len(coverage.schema.options)
+    if coverage.options < MOST * options:
+        yield f"{coverage.options} of its {options} options are in the log"
+    if coverage.sources < MOST * coverage.sources_wanted:
+        yield f"{coverage.sources} of its {coverage.sources_wanted} sources are in the log"
+
+
+def _a(kind: str) -> str:
+    return _VEHICLES.get(kind, f"a {kind}")
+
+
+def _dotted(version: tuple[int, ...]) -> str:
+    return ".".join(map(str, version))
