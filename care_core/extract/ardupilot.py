@@ -13,8 +13,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.extract.flight import NEEDS, Flight, analyse, has, messages, waypoint_offsets
-from care_core.extract.registry import MISSION_KINDS, Args, Mission, MissionKind, extractor, merge_needs, missing
+from care_core.extract.asked import asked
+from care_core.extract.flight import NEEDS, Flight, analyse, messages, waypoint_offsets
+from care_core.extract.registry import MISSION_KINDS, Args, Mission, MissionKind, extractor, has, merge_needs, missing
 from care_core.logs.base import Table, Wanted
 from care_core.logs.plausible import plausible
 from care_core.run import Evidence, Unavailable, Value, is_known
@@ -227,8 +228,8 @@ def _flew_automatically(mission: Mission) -> bool:
 
 @extractor("mission_success", needs=NEEDS, unit="")
 def mission_success(mission: Mission, args: Args) -> Value:
-    """1 when every waypoint was reached, the vehicle landed near home (`tolerance_m` of the mission) and disarmed by
-    itself, with no crash and no failsafe; else 0. A refused arming is 0."""
+    """1 when every waypoint was reached, the vehicle landed where the mission ends (within `tolerance_m` of it) and
+    disarmed by itself, with no crash and no failsafe; else 0. A refused arming is 0."""
     if not _is_armed(mission):
         return 0.0
     if not mission.ended:
@@ -241,6 +242,8 @@ def mission_success(mission: Mission, args: Args) -> Value:
         return unknown
     if flight.reached < len(flight.waypoints):
         return 0.0
+    if flight.end is None:
+        return 1.0
     off_m = landing_error(mission, {})
     if not is_known(off_m):
         return off_m
@@ -311,13 +314,15 @@ def waypoints_reached(mission: Mission, args: Args) -> Value:
 
 @extractor("landing_error", needs=NEEDS, unit="m")
 def landing_error(mission: Mission, args: Args) -> Value:
-    """Horizontal distance from home at the end of the flight."""
+    """Horizontal distance at the end of the flight from where the mission ends: home, or where it lands."""
     flight = _flight(mission)
     if isinstance(flight, Unavailable):
         return flight
     if flight.track is None:
         return missing("POS")
-    return math.hypot(flight.track.north[-1], flight.track.east[-1])
+    if flight.end is None:
+        return Unavailable("the mission does not say where it ends")
+    return math.hypot(flight.track.north[-1] - flight.end[0], flight.track.east[-1] - flight.end[1])
 
 
 @extractor("waypoint_miss", needs=NEEDS, unit="m")
@@ -348,6 +353,23 @@ def phase_time(mission: Mission, args: Args) -> Value:
     return span if isinstance(span, Unavailable) else span[1] - span[0]
 
 
+@extractor("cruise_speed", needs=NEEDS, unit="m/s")
+def cruise_speed(mission: Mission, args: Args) -> Value:
+    """Length of the legs that were completed over the time for them, without the waits at their ends."""
+    flight = _flight(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    given = mission.shared(asked)
+    if isinstance(given, Unavailable):
+        return given
+    done = [i - 1 for name, i in flight.phases if name == "leg"]
+    if not done or len(given.lengths) != len(flight.waypoints):
+        return Unavailable("the flight completed no leg")
+    moving_s = sum(flight.phases["leg", i + 1].duration_s - float(given.holds_s[i]) for i in done)
+    length_m = float(given.lengths[done].sum())
+    return length_m / moving_s if moving_s > 0 and length_m > 0 else Unavailable("the legs have no length")
+
+
 @extractor("return_height", needs=NEEDS, unit="m")
 def return_height(mission: Mission, args: Args) -> Value:
     """The greatest height above home on the way back."""
@@ -374,11 +396,11 @@ def distance(mission: Mission, args: Args) -> Value:
 
 @extractor("path_error", needs=NEEDS, unit="m", args={"stat": "max or mean"})
 def path_error(mission: Mission, args: Args) -> Value:
-    """Horizontal distance from the legs (home, waypoints, home) while airborne."""
+    """Horizontal distance from the legs (home, waypoints, home if it returns) while airborne."""
     flight = _flight(mission)
     if isinstance(flight, Unavailable):
         return flight
-    if flight.track is None or not len(flight.route):
+    if flight.track is None or not len(flight.corners):
         return missing("POS" if flight.track is None else "CMD")
     return _statistic(flight.path_errors(), str(args.get("stat", "max")))
 

@@ -11,24 +11,29 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.extract.registry import Mission
+from care_core.extract.asked import ITEMS, Asked, Item, asked, home_of, items_of
+from care_core.extract.registry import Mission, has, merge_needs
 from care_core.logs.base import Table, Wanted
+from care_core.run import Unavailable
 
-NEEDS: Wanted = {
-    "POS": ("Lat", "Lng", "RelHomeAlt"),
-    "ORGN": ("Type", "Lat", "Lng"),
-    "CMD": ("CNum", "CId", "Lat", "Lng", "Alt"),
-    "MODE": ("ModeNum",),
-    "MSG": ("Message",),
-    "ARM": ("ArmState", "Forced"),
-    "EV": ("Id",),
-    "ERR": ("Subsys", "ECode"),
-}
+NEEDS: Wanted = merge_needs(
+    (
+        ITEMS,
+        {
+            "POS": ("RelHomeAlt",),
+            "MODE": ("ModeNum",),
+            "MSG": ("Message",),
+            "ARM": ("ArmState", "Forced"),
+            "EV": ("Id",),
+            "ERR": ("Subsys", "ECode"),
+        },
+    )
+)
 """What `analyse` and the search for missions read."""
 
 FILL_S = 0.05
@@ -39,9 +44,9 @@ AIRBORNE_M = 2.0
 """Height above home from which a vehicle counts as airborne."""
 
 _METRES_PER_DEGREE = 111_319.49
-_NAV_WAYPOINT, _NAV_RTL, _NAV_LAND = 16, 20, 21
+_NAV_WAYPOINT = 16
+_HOMEWARD = (20, 21)  # MAV_CMD_NAV_RETURN_TO_LAUNCH, MAV_CMD_NAV_LAND
 _MODE_RTL, _MODE_LAND = 6, 9
-_HOME = 1
 _AT_HEIGHT_M = 0.5
 _STARTED = re.compile(r"Mission: (\d+) ")
 _REACHED = re.compile(r"Reached command #(\d+)")
@@ -100,6 +105,10 @@ class Flight:
     """The waypoints of the mission that the vehicle was given."""
     route: Floats
     """Shape (waypoints, 2): north and east of home in metres, the flown order."""
+    corners: Floats
+    """Shape (legs + 1, 2): the way that was asked for, from home through the waypoints to where it ends."""
+    end: tuple[float, float] | None
+    """Where the mission ends, None where it says neither to return nor to land."""
     reached: int
     """How many of the waypoints the autopilot reported as reached."""
     track: Track | None
@@ -107,7 +116,7 @@ class Flight:
     phases: Mapping[tuple[str, int], Phase]
 
     def path_errors(self) -> Floats:
-        """Horizontal distance in metres from the legs (home, waypoints, home) while airborne, along the track as flown.
+        """Horizontal distance in metres from the way that was asked for while airborne, along the track as flown.
 
         A vehicle turns between two positions of a thinned log, so the corners are filled in first.
         """
@@ -116,22 +125,24 @@ class Flight:
         track = self.track.filled_in()
         up = track.height > AIRBORNE_M
         points = np.column_stack((track.north[up], track.east[up]))
-        corners = np.vstack((np.zeros(2), self.route, np.zeros(2)))
-        return distance_to_legs(points, corners)
+        return distance_to_legs(points, self.corners)
 
 
 def analyse(mission: Mission) -> Flight:
     """Work out the flight of a mission; use through `mission.shared`."""
     items = _items(mission)
-    numbers = [number for number, (command, _) in sorted(items.items()) if _is_waypoint(command, items[number][1])]
-    waypoints = tuple(items[number][1] for number in numbers)
-    home = _home(mission)
+    numbers = [number for number, item in items.items() if _is_waypoint(item)]
+    waypoints = tuple(Waypoint(items[n].lat, items[n].lng, items[n].alt_m) for n in numbers)
+    home = home_of(mission)
     track = _track(mission, home)
     started, reached = _milestones(mission)
     route = np.array([_offset(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
+    corners, end = _way(mission.shared(asked))
     return Flight(
         waypoints=waypoints,
         route=route.astype(np.float64),
+        corners=corners,
+        end=end,
         reached=sum(number in reached for number in numbers),
         track=track,
         phases=_phases(mission, track, numbers, started, reached),
@@ -179,43 +190,30 @@ def messages(table: Table | None, start_s: float = -math.inf, end_s: float = mat
     return list(zip(part.t.tolist(), part["Message"].tolist(), strict=True))
 
 
-def has(table: Table | None, *fields: str) -> bool:
-    """Whether a table is there with all these fields and at least one row."""
-    return table is not None and len(table) > 0 and all(field in table.columns for field in fields)
+def _items(mission: Mission) -> dict[int, Item]:
+    return items_of(mission.tables.get("CMD"), mission.end_s)
 
 
-def _items(mission: Mission) -> dict[int, tuple[int, Waypoint]]:
-    """Mission item number -> its command and place, as last loaded before the mission ended."""
-    table = mission.tables.get("CMD")
-    if table is None or not has(table, "CNum", "CId", "Lat", "Lng", "Alt"):
-        return {}
-    part = table.where(table.t <= mission.end_s)
-    rows: Any = zip(*(part[field].tolist() for field in ("CNum", "CId", "Lat", "Lng", "Alt")), strict=True)
-    return {int(number): (int(command), Waypoint(lat, lng, alt)) for number, command, lat, lng, alt in rows}
+def _way(found: Asked | Unavailable) -> tuple[Floats, tuple[float, float] | None]:
+    """The corners of the way that was asked for, from home, and where it ends."""
+    if isinstance(found, Unavailable):
+        return np.empty((0, 2)), None
+    corners = found.points[:, :2]
+    if found.ending == "return":
+        corners = np.vstack((corners, np.zeros(2)))
+    end = (float(corners[-1, 0]), float(corners[-1, 1]))
+    return corners, None if found.ending == "open" else end
 
 
-def _is_waypoint(command: int, place: Waypoint) -> bool:
-    return command == _NAV_WAYPOINT and (place.lat != 0 or place.lng != 0)
+def _is_waypoint(item: Item) -> bool:
+    return item.command == _NAV_WAYPOINT and (item.lat != 0 or item.lng != 0)
 
 
-def _home(mission: Mission) -> tuple[float, float] | None:
-    """Home as set on arming, else the first position of the flight."""
-    table = mission.tables.get("ORGN")
-    if table is not None and has(table, "Type", "Lat", "Lng"):
-        homes = table.where((table["Type"] == _HOME) & (table.t <= mission.start_s + 1.0))
-        if len(homes):
-            return float(homes["Lat"][-1]), float(homes["Lng"][-1])
-    position = mission.table("POS")
-    if position is not None and has(position, "Lat", "Lng"):
-        return float(position["Lat"][0]), float(position["Lng"][0])
-    return None
-
-
-def _offset(home: tuple[float, float], lat: float, lng: float) -> tuple[float, float]:
+def _offset(home: Sequence[float], lat: float, lng: float) -> tuple[float, float]:
     return (lat - home[0]) * _METRES_PER_DEGREE, (lng - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
 
 
-def _track(mission: Mission, home: tuple[float, float] | None) -> Track | None:
+def _track(mission: Mission, home: Sequence[float] | None) -> Track | None:
     position = mission.table("POS")
     if home is None or position is None or not has(position, "Lat", "Lng", "RelHomeAlt"):
         return None
@@ -246,23 +244,26 @@ def _phases(
     for index, number in enumerate(numbers, start=1):
         if number in started and number in reached:
             phases["leg", index] = Phase(started[number], reached[number])
-    homeward = _homeward(mission, started)
+    homeward, way = _homeward(mission, started), mission.shared(asked)
+    returns = isinstance(way, Unavailable) or way.ending == "return"
     if homeward is not None and track is not None:
-        phases.update({(name, 0): phase for name, phase in _return_phases(mission, track, homeward).items()})
+        phases.update(
+            {(name, 0): phase for name, phase in _return_phases(mission, track, homeward, returns=returns).items()}
+        )
     return phases
 
 
 def _homeward(mission: Mission, started: Mapping[int, float]) -> float | None:
     """When the vehicle set out for home: by a mission item, a failsafe or the operator."""
     items = _items(mission)
-    times = [t for number, t in started.items() if items.get(number, (0, None))[0] in (_NAV_RTL, _NAV_LAND)]
+    times = [t for number, t in started.items() if number in items and items[number].command in _HOMEWARD]
     modes = mission.table("MODE")
     if modes is not None and has(modes, "ModeNum"):
         times += modes.t[np.isin(modes["ModeNum"], (_MODE_RTL, _MODE_LAND))].tolist()
     return min(times, default=None)
 
 
-def _return_phases(mission: Mission, track: Track, homeward_s: float) -> dict[str, Phase]:
+def _return_phases(mission: Mission, track: Track, homeward_s: float, *, returns: bool) -> dict[str, Phase]:
     """The way home by height: the climb to the return height, the flight at it, the descent, the last metres."""
     after = track.t >= homeward_s
     t, height = track.t[after], track.height[after]
@@ -274,7 +275,8 @@ def _return_phases(mission: Mission, track: Track, homeward_s: float) -> dict[st
     if height[-1] > AIRBORNE_M:
         return phases
     phases["return_cruise"] = Phase(top_s, leave_s)
-    phases["return"] = Phase(homeward_s, leave_s)
+    if returns:
+        phases["return"] = Phase(homeward_s, leave_s)
     slow_below = _number(mission.settings.get("LAND_ALT_LOW"), 1000.0) / 100
     low = np.flatnonzero((t >= leave_s) & (height <= slow_below))
     slow_s = float(t[low[0]])

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, TypeGuard, TypeVar
 
 from care_core.errors import ProfileError, nearest
 from care_core.extract.how_to_record import how_to_record
@@ -128,6 +128,11 @@ def merge_needs(parts: Iterable[Wanted]) -> dict[str, tuple[str, ...]]:
         for channel, fields in part.items():
             plan.setdefault(channel, {}).update(dict.fromkeys(fields))
     return {channel: tuple(fields) for channel, fields in plan.items()}
+
+
+def has(table: Table | None, *fields: str) -> TypeGuard[Table]:
+    """Whether a table is there with all these fields and at least one row."""
+    return table is not None and len(table) > 0 and all(field in table.columns for field in fields)
 
 
 def missing(channel: str, hint: str = "") -> Unavailable:

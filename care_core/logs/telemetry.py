@@ -160,10 +160,15 @@ def _batteries(log: _Telemetry) -> Table | None:
 
 
 def _home(log: _Telemetry) -> Table | None:
-    table = log.heard("HOME_POSITION", "latitude", "longitude")
+    table = log.heard("HOME_POSITION", "latitude", "longitude", "altitude")
     if table is None:
         return None
-    here = {"Type": np.ones(len(table)), "Lat": table["latitude"] * 1e-7, "Lng": table["longitude"] * 1e-7}
+    here = {
+        "Type": np.ones(len(table)),
+        "Lat": table["latitude"] * 1e-7,
+        "Lng": table["longitude"] * 1e-7,
+        "Alt": table["altitude"] * 1e-3,
+    }
     return Table(table.t, here)
 
 
@@ -234,17 +239,22 @@ def _items(log: _Telemetry) -> Table | None:
     """CMD: the mission as the vehicle or, to the vehicle, a ground station sent it. Item 0 is home, no item."""
     rows: list[Row] = []
     for message, scale in (("MISSION_ITEM_INT", 1e-7), ("MISSION_ITEM", 1.0)):
-        for table in log.exchanged(message, "seq", "command", "x", "y", "z", "mission_type"):
+        for table in log.exchanged(
+            message, "seq", "command", "param1", "param2", "x", "y", "z", "frame", "mission_type"
+        ):
             own = table.where((table["mission_type"] == 0) & (table["seq"] > 0))
-            columns = (own["seq"], own["command"], own["x"] * scale, own["y"] * scale, own["z"])
+            columns = (
+                own["seq"], own["command"], own["param1"], own["param2"], own["x"] * scale, own["y"] * scale, own["z"],
+                own["frame"],
+            )  # fmt: skip
             rows += zip(own.t.tolist(), zip(*(column.tolist() for column in columns), strict=True), strict=True)
     top = max((int(row[0]) for _, row in rows), default=0)
     for table in log.exchanged("MISSION_COUNT", "count", "mission_type"):
         own = table.where(table["mission_type"] == 0)
         for t, count in zip(own.t.tolist(), own["count"].tolist(), strict=True):
             # A shorter mission has no items where the longer one before it had.
-            rows += [(t, (number, 0, 0.0, 0.0, 0.0)) for number in range(max(int(count), 1), top + 1)]
-    return _to_table(rows, ("CNum", "CId", "Lat", "Lng", "Alt"))
+            rows += [(t, (number, *[0.0] * 7)) for number in range(max(int(count), 1), top + 1)]
+    return _to_table(rows, ("CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame"))
 
 
 def _to_table(rows: Iterable[Row], fields: tuple[str, ...]) -> Table | None:

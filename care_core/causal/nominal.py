@@ -1,0 +1,241 @@
+"""What physics says a mission takes: formulas that a profile names for a variable, and a mechanism corrects.
+
+A few hundred missions cannot teach how far it is to every waypoint, but nobody has to learn that: the autopilot's
+speed profile is known. A mechanism then learns what is left, the ratio of the value to its nominal, which is much the
+same on every mission. Arguments are arrays of one value a run, in m, s, m/s, W, degrees and their like.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+Given = Mapping[str, FloatArray]
+"""Arguments of a formula by their names, each of shape (n,)."""
+
+GRAVITY = 9.81
+SCALES = {"cm": 0.01, "cm/s": 0.01, "cm/s/s": 0.01, "cdeg": 0.01, "ms": 0.001}
+"""From a variable's unit to that of a formula's argument."""
+_TINY = 1e-6
+
+# ArduCopter 4.5: seconds between arming and lifting off (ARMING_DELAY_SEC), loiter above home (RTL_LOIT_TIME), height
+# of the last part of a landing (LAND_ALT_LOW), slope of the cone in which a return stays low (RTL_CONE_SLOPE), vertical
+# acceleration and jerk of the way (WPNAV_ACCEL_Z, PSC_JERK_Z), and the landing detector with its disarming.
+_ARMING_S, _LOITER_S, _LAND_LOW_M, _CONE = 2.0, 5.0, 10.0, 3.0
+_RISE_ACCELERATION, _RISE_JERK, _LANDED_S = 1.0, 5.0, 2.0
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A formula and the names of its arguments."""
+
+    arguments: tuple[str, ...]
+    compute: Callable[[Given], FloatArray]
+
+
+FORMULAS: dict[str, Formula] = {}
+
+
+@dataclass(frozen=True)
+class Nominal:
+    """A formula with the variables that are its arguments. `inputs` and `scales` follow the formula's arguments."""
+
+    kind: str
+    inputs: tuple[str, ...]
+    scales: tuple[float, ...]
+
+    def of(self, columns: FloatArray) -> FloatArray:
+        """The nominal value of each run, above 0. columns: shape (n, len(inputs)) in the variables' own units."""
+        formula = FORMULAS[self.kind]
+        scaled = columns * np.array(self.scales)
+        given = dict(zip(formula.arguments, scaled.T, strict=True))
+        with np.errstate(all="ignore"):  # a value out of range gives a nominal that nobody believes, not a warning
+            value = formula.compute(given)
+        return np.asarray(np.maximum(value, _TINY))
+
+
+def nominal(kind: str, given: Mapping[str, str], units: Mapping[str, str]) -> Nominal:
+    """The formula with its arguments found: the variable that is given for it, else the one of its own name.
+
+    Args:
+        given: argument -> variable. units: unit of each variable of the profile.
+
+    Raises:
+        ValueError: no such formula, an argument that it lacks, or a variable that is not there.
+    """
+    if kind not in FORMULAS:
+        raise ValueError(f"there is no formula '{kind}'; known are {', '.join(FORMULAS)}")
+    names = FORMULAS[kind].arguments
+    for name in given:
+        if name not in names:
+            raise ValueError(f"'{kind}' has no argument '{name}'; it has {', '.join(names)}")
+    inputs = tuple(given.get(name, name) for name in names)
+    for name in inputs:
+        if name not in units:
+            raise ValueError(f"'{kind}' needs '{name}', which the profile does not declare")
+    return Nominal(kind, inputs, tuple(SCALES.get(units[name], 1.0) for name in inputs))
+
+
+def formula(*arguments: str) -> Callable[[Callable[[Given], FloatArray]], Callable[[Given], FloatArray]]:
+    """Register a function under its own name."""
+
+    def register(compute: Callable[[Given], FloatArray]) -> Callable[[Given], FloatArray]:
+        FORMULAS[compute.__name__] = Formula(arguments, compute)
+        return compute
+
+    return register
+
+
+# --- multicopters: waypoints flown with speed, acceleration and jerk limits ---------------------------------------
+
+_TAKEOFF = ("takeoff_height", "climb_speed")
+_LEGS = (
+    "path_length", "legs", "leg_variation", "climb", "climbing_legs", "descent", "descending_legs", "flown_corners",
+    "corner_turn", "commanded_speed",
+)  # fmt: skip
+_LIMITS = ("speed", "acceleration", "jerk", "lean_limit", "response")
+_CRUISE = (*_LEGS, *_LIMITS, "radius", "climb_speed", "descent_speed")
+_END = ("returns", "end_height", "return_distance", "return_height")
+_MISSION = tuple(dict.fromkeys((*_CRUISE, "hold_time", *_TAKEOFF, *_END, *_LIMITS, "landing_speed")))
+
+
+@formula(*_TAKEOFF)
+def multicopter_takeoff_time(given: Given) -> FloatArray:
+    """Arming to the first leg."""
+    return _ARMING_S + _rise_time(given["takeoff_height"], given["climb_speed"])
+
+
+@formula(*_CRUISE)
+def multicopter_cruise_time(given: Given) -> FloatArray:
+    """All legs without the waits at their ends.
+
+    Each leg starts and ends at rest. Where nobody waits, the next leg begins before the last one ends: as early as the
+    corner between them stays within the radius (ArduCopter 4.5, SCurve::advance_target_along_track).
+    """
+    speed = np.where(given["commanded_speed"] > 0, given["commanded_speed"], given["speed"])
+    acceleration, jerk = _within_lean(given), given["jerk"]
+    count = np.maximum(given["legs"], 1)
+    length = given["path_length"] / count
+    climbing, descending = given["climbing_legs"], given["descending_legs"]
+    groups = (
+        (count - climbing - descending, np.zeros_like(length), np.full_like(length, np.inf)),
+        (climbing, given["climb"] / np.maximum(climbing, 1), given["climb_speed"]),
+        (descending, given["descent"] / np.maximum(descending, 1), given["descent_speed"]),
+    )
+    time, ramps, top = np.zeros_like(length), np.zeros_like(length), np.zeros_like(length)
+    for legs, rise, limit in groups:
+        for side in (-1, 1):  # two lengths with the mean and the variation of all
+            flat = np.maximum(length * (1 + side * given["leg_variation"]), 1.0)
+            way = np.hypot(flat, rise)
+            fastest = np.minimum(speed * way / flat, limit * way / np.maximum(rise, _TINY))
+            peak, ramp = _ramps(way, fastest, acceleration, jerk, _lag(given))
+            time += legs / 2 * (way / peak + ramp)
+            ramps += legs / 2 * ramp
+            top += legs / 2 * peak
+    overlap = 2 * _blend(given["radius"], given["corner_turn"], top / count, acceleration, jerk)
+    return np.asarray(time - given["flown_corners"] * np.minimum(overlap, ramps / count))
+
+
+@formula(*_CRUISE)
+def multicopter_cruise_speed(given: Given) -> FloatArray:
+    """Length of the legs over the time for them."""
+    return np.asarray(given["path_length"] / np.maximum(multicopter_cruise_time(given), _TINY))
+
+
+@formula(*_END, *_LIMITS, "climb_speed")
+def multicopter_return_time(given: Given) -> FloatArray:
+    """From the last waypoint to above home: up, over, and the wait there. Nothing where the mission ends elsewhere."""
+    way = np.maximum(given["return_distance"], 1.0)
+    peak, ramp = _ramps(way, given["speed"], _within_lean(given), given["jerk"], _lag(given))
+    over = np.where(given["return_distance"] > 1.0, way / peak + ramp, 0.0)
+    up = _rise_time(_return_height(given) - given["end_height"], given["climb_speed"])
+    return np.asarray(given["returns"] * (up + over + _LOITER_S))
+
+
+@formula(*_END, "descent_speed")
+def multicopter_descent_time(given: Given) -> FloatArray:
+    """From the height of the return, or of the last waypoint, to where a landing slows down."""
+    return _rise_time(_return_height(given) - _LAND_LOW_M, given["descent_speed"])
+
+
+@formula(*_END, "landing_speed")
+def multicopter_landing_time(given: Given) -> FloatArray:
+    """The slow last metres, to disarming."""
+    slow = np.minimum(_return_height(given), _LAND_LOW_M)
+    return np.asarray(slow / np.maximum(given["landing_speed"], _TINY) + _LANDED_S)
+
+
+@formula(*_MISSION)
+def multicopter_mission_time(given: Given) -> FloatArray:
+    """Arming to disarming: the phases one after the other."""
+    phases = (
+        multicopter_takeoff_time, multicopter_cruise_time, multicopter_return_time, multicopter_descent_time,
+        multicopter_landing_time,
+    )  # fmt: skip
+    return np.asarray(given["hold_time"] + sum(phase(given) for phase in phases))
+
+
+@formula(*_MISSION, "hover_power")
+def multicopter_energy(given: Given) -> FloatArray:
+    """Wh: the power that keeps the vehicle in the air, all the time."""
+    return np.asarray(given["hover_power"] * multicopter_mission_time(given) / 3600)
+
+
+def _lag(given: Given) -> FloatArray:
+    """What the limit of the jerk's change adds to speeding up and slowing down (WPNav: snap by the response time)."""
+    return np.asarray(2 * np.maximum(given["response"], 0.1))
+
+
+def _within_lean(given: Given) -> FloatArray:
+    """The wanted acceleration, but no more than two thirds of what the largest lean gives: the rest holds the wind."""
+    lean = np.radians(np.clip(given["lean_limit"], 5.0, 60.0))
+    return np.minimum(given["acceleration"], GRAVITY * np.tan(lean) * 2 / 3)
+
+
+def _return_height(given: Given) -> FloatArray:
+    """Height of the way home: no higher than needed near home, never lower than the last waypoint."""
+    last = given["end_height"]
+    high = np.maximum(last, np.minimum(given["return_height"], _CONE * given["return_distance"]))
+    return np.where(given["returns"] > 0, high, last)
+
+
+def _rise_time(height: FloatArray, speed: FloatArray) -> FloatArray:
+    """Time up or down a height from rest to rest; 0 where there is none."""
+    way = np.maximum(height, _TINY)
+    peak, ramp = _ramps(way, speed, np.full_like(way, _RISE_ACCELERATION), np.full_like(way, _RISE_JERK), 0.0)
+    return np.where(height > 0, way / peak + ramp, 0.0)
+
+
+def _ramps(
+    way: FloatArray, speed: FloatArray, acceleration: FloatArray, jerk: FloatArray, lag: FloatArray | float
+) -> tuple[FloatArray, FloatArray]:
+    """Top speed on a way from rest to rest, and the time that speeding up and slowing down add to `way / speed`."""
+    bend = acceleration**2 / jerk  # below this speed the largest acceleration is never reached
+    with_plateau = (-bend + np.sqrt(bend**2 + 4 * acceleration * way)) / 2
+    without = (way * np.sqrt(jerk) / 2) ** (2 / 3)
+    peak = np.maximum(np.minimum(np.where(with_plateau >= bend, with_plateau, without), speed), _TINY)
+    ramp = np.where(peak >= bend, peak / acceleration + acceleration / jerk, 2 * np.sqrt(peak / jerk))
+    return peak, np.asarray(ramp + lag)
+
+
+def _blend(
+    radius: FloatArray, turn_deg: FloatArray, top: FloatArray, acceleration: FloatArray, jerk: FloatArray
+) -> FloatArray:
+    """How long before a corner the next leg may begin, halved: the corner stays within the radius, the vehicle within
+    its speed and twice its acceleration."""
+    aside = np.maximum(2 * np.sin(np.radians(turn_deg) / 2), 0.05)
+    along = np.maximum(2 * np.cos(np.radians(turn_deg) / 2), 0.05)
+    bend = acceleration / jerk  # seconds from rest until the acceleration is at its largest
+    off = radius / aside
+    beyond = off - acceleration**3 / (6 * jerk**2)
+    later = bend + (-bend / 2 + np.sqrt(np.maximum(bend**2 / 4 + 2 * beyond / acceleration, 0.0)))
+    by_radius = np.where(beyond <= 0, np.cbrt(6 * off / jerk), later)
+    by_turn = np.where(acceleration * aside < 2 * acceleration, np.inf, 2 * acceleration / (jerk * aside))
+    slowest = top / along
+    knee = acceleration * bend / 2
+    by_speed = np.where(slowest >= knee, bend + (slowest - knee) / acceleration, np.sqrt(2 * slowest / jerk))
+    return np.asarray(np.minimum(np.minimum(by_radius, by_turn), by_speed))

@@ -1,0 +1,106 @@
+"""The formulas against motion worked out by hand, and against a speed profile that is integrated step by step."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_core.causal.nominal import FORMULAS, nominal
+
+OPTIONS = {
+    "speed": 10.0, "acceleration": 2.5, "jerk": 1000.0, "radius": 0.0, "climb_speed": 2.5, "descent_speed": 1.5,
+    "lean_limit": 45.0, "response": 0.0, "return_height": 15.0, "landing_speed": 0.5,
+}  # fmt: skip
+MISSION = {
+    "path_length": 300.0, "legs": 3.0, "leg_variation": 0.0, "climb": 0.0, "climbing_legs": 0.0, "descent": 0.0,
+    "descending_legs": 0.0, "flown_corners": 0.0, "corner_turn": 0.0, "commanded_speed": 0.0, "hold_time": 0.0,
+    "takeoff_height": 20.0, "end_height": 20.0, "return_distance": 100.0, "returns": 1.0, "hover_power": 360.0,
+}  # fmt: skip
+
+
+def value(kind: str, **changed: float) -> float:
+    given = {**OPTIONS, **MISSION, **changed}
+    return float(nominal(kind, {}, dict.fromkeys(given, "")).of(
+        np.array([[given[name] for name in FORMULAS[kind].arguments]])
+    )[0])  # fmt: skip
+
+
+def test_legs_from_rest_to_rest() -> None:
+    lag = 0.2
+    assert value("multicopter_cruise_time") == pytest.approx(3 * (10 + 4 + lag), abs=0.05)
+    # 10 m are too short for 10 m/s: 5 m to speed up, 5 m to slow down.
+    assert value("multicopter_cruise_time", path_length=30.0) == pytest.approx(
+        3 * (2 * np.sqrt(10 / 2.5) + lag), abs=0.05
+    )
+
+
+def test_a_commanded_speed_beats_the_parameter_but_not_on_the_way_home() -> None:
+    cruise, home = "multicopter_cruise_time", "multicopter_return_time"
+    assert value(cruise, commanded_speed=4.0, speed=2.0) == value(cruise, commanded_speed=4.0, speed=18.0)
+    assert value(home, commanded_speed=4.0, speed=2.0) > value(home, commanded_speed=4.0, speed=18.0)
+
+
+def test_a_leg_is_no_faster_than_its_height_allows() -> None:
+    slow = value("multicopter_cruise_time", climb=150.0, climbing_legs=3.0)
+    assert slow > 3 * 50 / 2.5
+    assert value("multicopter_cruise_time", climb=150.0, climbing_legs=3.0, climb_speed=5.0) < slow
+
+
+@given(st.floats(0.1, 10), st.floats(0, 180), st.floats(0.5, 15))
+def test_corners_flown_through_save_time_but_never_more_than_the_stop_costs(
+    radius: float, turn: float, jerk: float
+) -> None:
+    stopping = value("multicopter_cruise_time", jerk=jerk)
+    passing = value("multicopter_cruise_time", jerk=jerk, flown_corners=2.0, corner_turn=turn, radius=radius)
+    ramp = 10 / 2.5 + 2.5 / jerk + 0.2 if jerk > 2.5**2 / 10 else 2 * np.sqrt(10 / jerk) + 0.2
+    assert stopping - 2 * ramp - 1e-6 <= passing <= stopping
+
+
+def test_a_wider_radius_cuts_more_of_a_corner() -> None:
+    times = [
+        value("multicopter_cruise_time", jerk=1.0, flown_corners=2.0, corner_turn=90.0, radius=r) for r in (1, 2, 5)
+    ]
+    assert times == sorted(times, reverse=True)
+    assert times[0] > times[-1]
+
+
+def test_the_mission_is_its_phases() -> None:
+    names = ("takeoff", "cruise", "return", "descent", "landing")
+    phases = sum(value(f"multicopter_{name}_time") for name in names)
+    assert value("multicopter_mission_time", hold_time=8.0) == pytest.approx(phases + 8)
+    assert value("multicopter_energy") == pytest.approx(360 * phases / 3600)
+
+
+def test_a_mission_that_lands_where_it_ends_has_no_way_home() -> None:
+    assert value("multicopter_return_time", returns=0.0) == pytest.approx(0, abs=1e-5)
+    assert value("multicopter_descent_time", returns=0.0, return_height=60.0) == value("multicopter_descent_time")
+
+
+def test_near_home_a_return_stays_low() -> None:
+    assert value("multicopter_descent_time", return_distance=5.0, return_height=60.0) == value(
+        "multicopter_descent_time"
+    )
+    assert value("multicopter_descent_time", return_height=60.0) > value("multicopter_descent_time")
+
+
+def test_units_of_variables_become_those_of_arguments() -> None:
+    given = nominal(
+        "multicopter_takeoff_time", {"climb_speed": "WPNAV_SPEED_UP"}, {"WPNAV_SPEED_UP": "cm/s", "takeoff_height": "m"}
+    )
+    assert given.of(np.array([[20.0, 250.0]])) == pytest.approx(value("multicopter_takeoff_time"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "says"),
+    [
+        ("multicopter_time", {}, "no formula"),
+        ("multicopter_takeoff_time", {"speed": "climb_speed"}, "no argument 'speed'"),
+        ("multicopter_takeoff_time", {"climb_speed": "vz"}, "needs 'vz'"),
+    ],
+    ids=["kind", "argument", "variable"],
+)
+def test_what_is_wrong_is_named(kind: str, given: dict[str, str], says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        nominal(kind, given, {"takeoff_height": "m", "climb_speed": "m/s"})
