@@ -10,7 +10,7 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check docs profiles screenshots walk clean
+.PHONY: demo test check bench docs profiles screenshots walk clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
@@ -23,6 +23,14 @@ check: $(DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# Planted worlds need nothing; the paper and the recorded faults need CARE_SHARED.
+bench: $(DEV)
+	$(BIN)/python -m benchmarks.planted
+	@if [ -n "$(CARE_SHARED)" ]; then set -e; \
+	$(BIN)/care evaluate husky-care --faults "$(CARE_SHARED)/data/care"; \
+	$(BIN)/python -m benchmarks.artifact --shared "$(CARE_SHARED)"; \
+	$(BIN)/python -m benchmarks.diagnosis --shared "$(CARE_SHARED)"; fi
 
 docs: $(BASE)
 	$(BIN)/python -m care_core.report.extractors docs/extractors.md
