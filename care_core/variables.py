@@ -67,6 +67,8 @@ class Variable:
     default: float | None = None
     labels: tuple[tuple[float, str], ...] = ()
     parameters: tuple[str, ...] = ()
+    scale: float = 1.0
+    """A value under its parameters is this times the option's: firmware that renamed cm/s to m/s counts in 0.01."""
     reboot_required: bool = False
     safety: bool = False
     kind: Kind | None = None

@@ -210,11 +210,11 @@ def _patch_of(case: Case, fix: Fix) -> str:
     """The operator's files with the fix put in, comments and order kept."""
     from difflib import unified_diff
 
-    from care_core.configs.driven import readable
+    from care_core.configs.driven import parameter_value, readable
     from care_core.configs.edit import Wanted, apply_changes
 
     wanted = [
-        Wanted(change.option, parameter, change.suggested)
+        Wanted(change.option, parameter, parameter_value(change.option, change.suggested))
         for change in fix.changes
         for parameter in readable(change.option)
     ]

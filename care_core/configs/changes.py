@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 
-from care_core.configs.driven import option_value, readable
+from care_core.configs.driven import option_value, parameter_value, readable
 from care_core.configs.formats import MODULES, ConfigFormat, format_for
 from care_core.run import Run
 from care_core.variables import Change, Variable
@@ -19,7 +19,8 @@ def unified_diff(run: Run, changes: Sequence[Change]) -> str:
         change = next(change for change in changes if change.option is option)
         setting = run.settings.get(parameter)
         current = None if setting is None else option_value(option, setting)
-        driven[parameter] = line_of(option, parameter, change.current if current is None else current)
+        was = change.current if current is None else current
+        driven[parameter] = line_of(option, parameter, parameter_value(option, was))
         fixed[parameter] = line_of(option, parameter, suggested)
     lines = difflib.unified_diff(
         [driven[parameter] for parameter in sorted(driven)],
@@ -40,5 +41,7 @@ def apply_commands(changes: Iterable[Change], format: ConfigFormat) -> list[str]
 
 def _assignments(changes: Iterable[Change]) -> tuple[tuple[Variable, str, float], ...]:
     return tuple(
-        (change.option, parameter, change.suggested) for change in changes for parameter in readable(change.option)
+        (change.option, parameter, parameter_value(change.option, change.suggested))
+        for change in changes
+        for parameter in readable(change.option)
     )

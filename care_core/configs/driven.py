@@ -65,7 +65,16 @@ def option_value(option: Variable, setting: Setting) -> float | None:
     value = setting.value
     if isinstance(value, str):
         return _number(option, value.strip())
-    return float(value) if math.isfinite(value) else None
+    return _unscaled(option, float(value)) if math.isfinite(value) else None
+
+
+def parameter_value(option: Variable, value: float) -> float:
+    """The option's value as its parameters hold it."""
+    return value if option.scale == 1.0 else float(f"{value * option.scale:.7g}")
+
+
+def _unscaled(option: Variable, value: float) -> float:
+    return value if option.scale == 1.0 else float(f"{value / option.scale:.7g}")
 
 
 def _number(option: Variable, text: str) -> float | None:
@@ -80,7 +89,7 @@ def _number(option: Variable, text: str) -> float | None:
         value = float(text)
     except ValueError:
         return None
-    return value if math.isfinite(value) else None
+    return _unscaled(option, value) if math.isfinite(value) else None
 
 
 def option_setting(option: Variable, settings: Mapping[str, Setting]) -> Setting | None:

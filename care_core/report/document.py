@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from care_core.configs.changes import apply_commands, unified_diff
+from care_core.configs.driven import parameter_value
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import (
     Cause,
@@ -381,7 +382,7 @@ def _change(change: Change) -> ChangeEntry:
     return ChangeEntry(
         option=change.option.name,
         parameter=parameters[0] if len(parameters) == 1 else list(parameters),
-        from_=plain_number(change.current),
-        to=plain_number(change.suggested),
+        from_=plain_number(parameter_value(change.option, change.current)),
+        to=plain_number(parameter_value(change.option, change.suggested)),
         reboot_required=change.option.reboot_required,
     )

@@ -124,7 +124,6 @@ def apply(
 
 def _wanted(report: TriageDocument, path: Path, alternative: int) -> list[Wanted]:
     """The parameters that the report's fix sets, or one of its alternatives."""
-    from care_core.configs.driven import readable
     from care_core.configs.edit import Wanted
     from care_core.profile.store import load_profile
 
@@ -140,7 +139,8 @@ def _wanted(report: TriageDocument, path: Path, alternative: int) -> list[Wanted
         option = variables.get(change.option)
         if option is None:
             raise ConfigError(f"The profile has no option '{clean(change.option)}'.", where=str(path))
-        wanted += [Wanted(option, parameter, float(change.to)) for parameter in readable(option)]
+        named = [change.parameter] if isinstance(change.parameter, str) else change.parameter
+        wanted += [Wanted(option, parameter, float(change.to)) for parameter in named]
     return wanted
 
 
