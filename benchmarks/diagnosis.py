@@ -23,7 +23,7 @@ import pandas as pd
 
 from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import FloatArray
-from care_core.diagnose.faults import thresholds_in_force
+from care_core.diagnose.judging import read_and_judge, thresholds_in_force
 from care_core.diagnose.ranking import deviating, reference_config
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.triage import triage
@@ -162,13 +162,13 @@ def evaluate(profile: Profile, shared: Path, peers: Peers | None, *, verbose: bo
     for truth in truths:
         log = open_log(folder / truth["log"])
         choice = choose_profile(log, [profile])[1]
-        diagnosis = triage(log, profile, choice, top=10)
+        diagnosis = triage(read_and_judge(log, profile), profile, choice, top=10)
         if not diagnosis.faults:
             # The outside measurement says failed, the log says just inside: the operator lowers the threshold to match.
             tally.too_close.append(truth["tag"])
             near = [r for r in diagnosis.objectives if _is_near(r, truth, platform)]
             tightened = {r.variable.name: LOWERED * r.value for r in near if r.value is not None}
-            diagnosis = triage(log, profile, choice, top=10, thresholds=tightened)
+            diagnosis = triage(read_and_judge(log, profile, thresholds=tightened), profile, choice, top=10)
         _count(tally, diagnosis, truth, platform, reference, profile, peers, verbose)
     return tally
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from care_core.causal.counterfactual import PERSISTENCE
+from care_core.diagnose.judging import judge
 from care_core.diagnose.triage import diagnose
 from care_core.learn.skill import calibration_error, reliability
 from care_core.learn.train import train
@@ -53,7 +54,9 @@ def measure(runs: int, faults: int) -> None:
             if meets_all(config, noise):
                 continue
             seen += 1
-            fix = diagnose(run_of(config, fly(config, noise)), profile, CHOICE).fix
+            fix = diagnose(
+                judge(run_of(config, fly(config, noise)), SCHEMA, profile.model.summaries), profile, CHOICE
+            ).fix
             if fix is None:
                 abstained += 1
                 continue

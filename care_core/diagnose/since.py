@@ -9,36 +9,36 @@ from pathlib import Path
 
 from care_core.configs.driven import readable
 from care_core.configs.self_written import is_self_written
-from care_core.diagnose.faults import judge
+from care_core.diagnose.judging import Judged, read_and_judge
 from care_core.diagnose.records import Cause, Diagnosis, ParameterChange, Since
 from care_core.errors import CareError
-from care_core.extract.read import log_info, read_run
+from care_core.extract.read import log_info
 from care_core.logs.base import Log
 from care_core.logs.digest import log_digest
 from care_core.profile.store import Profile
 from care_core.run import LogInfo, Run, Setting
-from care_core.variables import Threshold, Variable
+from care_core.variables import Variable
 
 
-def compare(run: Run, good: Log, profile: Profile, bounds: Mapping[str, Threshold]) -> Since:
+def compare(judged: Judged, good: Log, profile: Profile) -> Since:
     """The parameters that differ between a run and the last mission of a good log.
 
     Parameters that the vehicle writes itself are left out, unless they are options of the profile; those of options
-    come first. A good log without a mission is compared by its last values.
-
-    Args:
-        bounds: thresholds in force, by which the good run is judged too.
+    come first. A good log without a mission is compared by its last values; one with a mission is judged by the same
+    thresholds.
     """
-    other = log_info(good, log_digest(good.path))
+    run = judged.run
     try:
-        good_run = read_run(good, profile.schema)
+        other = read_and_judge(good, profile, thresholds=judged.own)
     except CareError as err:
+        info = log_info(good, log_digest(good.path))
         before = {name: history[-1] for name, history in good.settings().items()}
-        return Since(str(good.path), _changes(run, before, profile), (*_strange(run, other, before), err.message))
+        return Since(str(good.path), _changes(run, before, profile), (*_strange(run, info, before), err.message))
+    before = dict(other.run.settings)
     return Since(
         log=str(good.path),
-        changes=_changes(run, good_run.settings, profile),
-        warnings=(*_strange(run, other, good_run.settings), *_not_good(good_run, profile, bounds)),
+        changes=_changes(run, before, profile),
+        warnings=(*_strange(run, other.run.log, before), *_not_good(other)),
     )
 
 
@@ -95,12 +95,10 @@ def _strange(run: Run, other: LogInfo, before: Mapping[str, Setting]) -> Iterato
         yield "it has no parameter in common with this log"
 
 
-def _not_good(good: Run, profile: Profile, bounds: Mapping[str, Threshold]) -> Iterator[str]:
+def _not_good(good: Judged) -> Iterator[str]:
     """Which objectives the good run misses itself, or else which nobody can judge."""
-    results = judge(good, profile.schema, bounds, profile.model.summaries)
-    broken = [result for result in results if result.status == "fault"]
-    for result in broken:
+    for result in good.broken:
         yield f"it has a fault itself: {result.variable.name} = {result.value:.4g}, wanted {result.threshold}"
-    for result in results:
-        if not broken and result.status == "not_evaluated":
+    for result in good.results:
+        if not good.broken and result.status == "not_evaluated":
             yield f"its {result.variable.name} could not be evaluated: {result.reason}"

@@ -1,4 +1,8 @@
-"""The whole line in one place: log -> run -> faults -> causes -> fix. Nothing else strings the steps together."""
+"""Judged run -> causes -> fix: nothing else strings these steps together.
+
+What comes before them, `judging.read_and_judge`, is the one way from a log to a run that can be asked about: what-if,
+comparison and verification come by it too.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,10 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import Config, World
-from care_core.configs.driven import readable
-from care_core.configs.loading import ConfigFile, resolve
+from care_core.configs.loading import ConfigFile
 from care_core.diagnose import provenance
 from care_core.diagnose.circumstances import circumstances
 from care_core.diagnose.evidence import refused_by, said
-from care_core.diagnose.faults import check_wishes, judge, thresholds_in_force
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
     Assignment,
@@ -24,6 +26,7 @@ from care_core.diagnose.fixes import (
     smallest_good,
     to_fix,
 )
+from care_core.diagnose.judging import Judged, check_wishes
 from care_core.diagnose.ranking import (
     Suspect,
     describe_path,
@@ -35,9 +38,7 @@ from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix,
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
 from care_core.diagnose.worlds import reference_of, world_of
-from care_core.extract.read import read_run
 from care_core.logs.base import Log
-from care_core.logs.digest import Sha256
 from care_core.profile.store import Profile
 from care_core.run import ProfileChoice, Run, is_known
 
@@ -71,71 +72,55 @@ class _Case:
 
 
 def triage(
-    log: Log,
+    judged: Judged,
     profile: Profile,
     choice: ProfileChoice,
     *,
     configs: Sequence[ConfigFile] = (),
     keep: Collection[str] = (),
-    thresholds: Mapping[str, float] | None = None,
-    mission: int | None = None,
     since: Log | None = None,
     top: int = 5,
     progress: Progress | None = None,
-    sha256: Sha256 | None = None,
 ) -> Diagnosis:
-    """Diagnose one mission of a log.
+    """Diagnose a run that was read and judged.
 
     Args:
-        configs: configuration files in the order they are loaded, used where the log holds no value.
+        configs: the configuration files that it was read with.
         keep: options that must stay as they are.
-        thresholds: the operator's own bounds, per objective.
-        mission: which mission of the log, from 1; the last when None.
         since: the log of a good run; what changed since then is told as evidence.
         top: most causes to report per fault.
-        sha256: gives the log's digest, where the caller has begun to work it out.
 
     Raises:
-        CareError: the log holds no such mission, the profile has no usable model, or no such option or objective.
+        CareError: the profile has no usable model, or no such option.
     """
-    report = progress or (lambda _step, _share: None)
-    report("reading the log", 0.0)
-    overrides = dict(thresholds or {})
-    check_wishes(profile.schema, keep, overrides)
-    given = resolve(configs, (parameter for option in profile.schema.options for parameter in readable(option)))
-    named = tuple(overrides)
-    run = read_run(log, profile.schema, overrides=given, mission=mission, judge_anyway=named, sha256=sha256)
-    report("judging the objectives", 0.6)
-    diagnosis = diagnose(run, profile, choice, keep=keep, thresholds=overrides, top=top, progress=progress)
-    diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *provenance.notes(profile.schema, run, configs, given)))
+    check_wishes(profile.schema, keep, {})
+    diagnosis = diagnose(judged, profile, choice, keep=keep, top=top, progress=progress)
+    notes = provenance.notes(profile.schema, judged.run, configs, judged.given)
+    diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *notes))
     if since is None:
         return diagnosis
-    report("comparing with the good log", 0.95)
-    bounds = thresholds_in_force(profile.schema, overrides)
-    return with_evidence(diagnosis, compare(run, since, profile, bounds))
+    if progress is not None:
+        progress("comparing with the good log", 0.95)
+    return with_evidence(diagnosis, compare(judged, since, profile))
 
 
 def diagnose(
-    run: Run,
+    judged: Judged,
     profile: Profile,
     choice: ProfileChoice,
     *,
     keep: Collection[str] = (),
-    thresholds: Mapping[str, float] | None = None,
     top: int = 5,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Diagnose a run that has been read; the arguments are those of `triage`."""
+    """Causes and fix of a run that has been judged; the arguments are those of `triage`."""
     report = progress or (lambda _step, _share: None)
-    model, schema = profile.model, profile.schema
-    bounds = thresholds_in_force(schema, thresholds or {})
-    objectives = judge(run, schema, bounds, model.summaries)
-    broken = [result for result in objectives if result.status == "fault"]
+    schema, run, objectives, broken = profile.schema, judged.run, judged.results, judged.broken
     if not broken:
         return Diagnosis(choice, run, objectives, (), None)
     report("ranking the causes", 0.7)
     reference = reference_of(run, profile)
-    world = world_of(run, profile, bounds)
+    world = world_of(judged, profile)
     weighed = {
         result.variable.name: suspects(world, schema, result.variable.name, reference, run.evidence)
         for result in broken

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from care_core.configs.driven import option_value, readable
+from care_core.diagnose.judging import Judged, read_and_judge, thresholds_in_force
 from care_core.diagnose.records import ObjectiveResult, Status
+from care_core.logs.base import Log
 from care_core.profile.schema import Schema
+from care_core.profile.store import Profile
 from care_core.run import Run
 from care_core.variables import Threshold, Variable
 
@@ -46,6 +49,12 @@ class PromisedSet:
 @dataclass(frozen=True, slots=True)
 class Promise:
     """What a report said and promised: the suggested set first, then its alternatives."""
+
+    sha256: str
+    """Of the log that the report is about."""
+    start: str | None
+    version: str
+    """Of the profile."""
 
     config: Mapping[str, float]
     objectives: Mapping[str, Before]
@@ -96,6 +105,7 @@ class Verification:
     changes: tuple[MadeChange, ...]
     others: tuple[OtherChange, ...]
     objectives: tuple[ObjectiveCheck, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def worked(self) -> bool | None:
@@ -105,23 +115,50 @@ class Verification:
         return self.verdict != "not_fixed"
 
 
-def verify(
-    promise: Promise, run: Run, schema: Schema, results: Sequence[ObjectiveResult], doubt: str = ""
-) -> Verification:
+def verify_log(promise: Promise, log: Log, profile: Profile, mission: int | None = None) -> tuple[Run, Verification]:
+    """Compare one mission of a log, judged by the report's thresholds, with what was promised for it.
+
+    Raises:
+        CareError: the log holds no mission of the profile.
+    """
+    schema = profile.schema
+    usual = thresholds_in_force(schema, {})
+    wanted = {name: before.threshold for name, before in promise.objectives.items() if before.threshold is not None}
+    own = {name: bound.value for name, bound in wanted.items() if name not in usual or usual[name].value != bound.value}
+    judged = read_and_judge(log, profile, thresholds=own, mission=mission)
+    found = verify(promise, judged, schema, _doubt(promise, judged.run))
+    return judged.run, replace(found, notes=tuple(_notes(promise, judged.run, schema)))
+
+
+def _doubt(promise: Promise, run: Run) -> str:
+    if run.log.sha256 == promise.sha256:
+        return "this is the log that the report is about, not one of a later run"
+    return run.mission.mismatch
+
+
+def _notes(promise: Promise, run: Run, schema: Schema) -> Iterator[str]:
+    if promise.version != schema.version:
+        yield f"the report was written with version {promise.version} of the profile, not {schema.version}"
+    if promise.start and run.log.start and run.log.start < promise.start:
+        yield "this log is older than the one of the report"
+
+
+def verify(promise: Promise, judged: Judged, schema: Schema, doubt: str = "") -> Verification:
     """Compare a run with what was promised for it.
 
     Args:
         promise: at least one set.
-        results: the run's objectives, judged by the report's thresholds.
+        judged: the run, judged by the report's thresholds.
         doubt: why the run may not be of the same robot or mission, one sentence; empty where it is.
     """
+    run = judged.run
     attempts = [_changes(one, run, schema) for one in promise.sets]
     chosen = max(range(len(attempts)), key=lambda i: (_share_made(attempts[i]), -i))
     kept, changes = promise.sets[chosen], attempts[chosen]
     others = tuple(_others(promise, kept, run, schema))
     checks = tuple(
         _check(promise.objectives[result.variable.name], result, kept.intervals.get(result.variable.name))
-        for result in results
+        for result in judged.results
         if result.variable.name in promise.objectives
     )
     verdict, sentence = _verdict(changes, others, checks, doubt)

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from care_core.causal.counterfactual import Config, World
-from care_core.configs.driven import option_value, readable
-from care_core.configs.loading import ConfigFile, resolve
-from care_core.diagnose.faults import check_wishes, judge, thresholds_in_force
+from care_core.configs.driven import option_value
 from care_core.diagnose.fixes import change_notes, prediction
+from care_core.diagnose.judging import Judged
 from care_core.diagnose.records import ObjectiveResult, Prediction
 from care_core.diagnose.worlds import reference_of, world_of
 from care_core.errors import UsageError, nearest
-from care_core.extract.read import read_run
-from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.run import ProfileChoice, Run, Setting
@@ -96,38 +93,18 @@ def acceptable(option: Variable) -> str:
     return "any" if option.range is None else f"{option.range[0]:g} to {option.range[1]:g} {option.unit}".rstrip()
 
 
-def question(
-    run: Run, profile: Profile, choice: ProfileChoice, thresholds: Mapping[str, float] | None = None
-) -> Question:
-    """Get a run ready to be asked. `thresholds` are the operator's own bounds, per objective."""
-    bounds = thresholds_in_force(profile.schema, thresholds or {})
+def question(judged: Judged, profile: Profile, choice: ProfileChoice) -> Question:
+    """Get a run ready to be asked."""
     asked = Question(
         profile=choice,
         schema=profile.schema,
-        run=run,
-        world=world_of(run, profile, bounds),
-        reference=reference_of(run, profile),
-        objectives=judge(run, profile.schema, bounds, profile.model.summaries),
+        run=judged.run,
+        world=world_of(judged, profile),
+        reference=reference_of(judged.run, profile),
+        objectives=judged.results,
     )
     asked.ask({})  # The mechanisms invert their covariance when first asked, which nobody should wait for at a key.
     return asked
-
-
-def question_of_log(
-    log: Log,
-    profile: Profile,
-    choice: ProfileChoice,
-    *,
-    configs: Sequence[ConfigFile] = (),
-    thresholds: Mapping[str, float] | None = None,
-    mission: int | None = None,
-) -> Question:
-    """Read one mission of a log and get it ready to be asked; the arguments are those of `triage`."""
-    bounds = dict(thresholds or {})
-    check_wishes(profile.schema, (), bounds)
-    given = resolve(configs, (parameter for option in profile.schema.options for parameter in readable(option)))
-    run = read_run(log, profile.schema, overrides=given, mission=mission, judge_anyway=tuple(bounds))
-    return question(run, profile, choice, bounds)
 
 
 def parse_change(text: str, schema: Schema) -> tuple[str, float]:

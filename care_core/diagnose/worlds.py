@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from care_core.causal.counterfactual import World
+from care_core.diagnose.judging import Judged
 from care_core.diagnose.ranking import reference_config
 from care_core.profile.store import Profile
 from care_core.run import Run, is_known
-from care_core.variables import Threshold
 
 
 def reference_of(run: Run, profile: Profile) -> dict[str, float]:
@@ -17,7 +15,8 @@ def reference_of(run: Run, profile: Profile) -> dict[str, float]:
     return {**reference_config(profile.schema, profile.model), **met}
 
 
-def world_of(run: Run, profile: Profile, bounds: Mapping[str, Threshold]) -> World:
+def world_of(judged: Judged, profile: Profile) -> World:
     """This run, ready to be asked; options that no source holds are taken to be at their reference."""
+    run = judged.run
     config = {**reference_of(run, profile), **run.config}
-    return World(profile.model, config, {**run.metrics, **run.objectives}, bounds)
+    return World(profile.model, config, {**run.metrics, **run.objectives}, judged.bounds)

@@ -6,7 +6,7 @@ Everything a profile asks of a log is merged into one reading plan, so the log i
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 # Importing them registers their extractors and mission kinds.
@@ -23,7 +23,7 @@ from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import Sha256, hashing
 from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
-from care_core.run import Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
+from care_core.run import Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value
 from care_core.variables import Role, Variable
 
 
@@ -33,16 +33,13 @@ def read_run(
     *,
     overrides: Mapping[str, Setting] | None = None,
     mission: int | None = None,
-    judge_anyway: Collection[str] = (),
     sha256: Sha256 | None = None,
 ) -> Run:
     """Read one mission of a log: the last one, or number `mission` (from 1).
 
     `overrides` are settings of configuration files by the name of the parameter in the log, used only for options
     that the log does not hold.
-    `judge_anyway` names objectives that the operator gave thresholds for: they are judged even where the mission
-    is not the one that the profile's thresholds belong to. `sha256` gives the log's digest where the caller has
-    begun to work it out.
+    `sha256` gives the log's digest where the caller has begun to work it out.
 
     Raises:
         ProfileError: the profile reads no logs, or the log holds no mission of its kind.
@@ -53,13 +50,13 @@ def read_run(
     if mission is not None and not 1 <= mission <= count:
         held = "holds one mission" if count == 1 else f"holds missions 1 to {count}"
         raise UsageError(f"There is no mission {mission}: the log {held}.", hint="Name one of them.", where="--mission")
-    return source.run((mission or count) - 1, overrides or {}, judge_anyway)
+    return source.run((mission or count) - 1, overrides or {})
 
 
 def read_runs(log: Log, schema: Schema) -> tuple[Run, ...]:
     """Read every mission of a log, in time order. Raises as `read_run` does."""
     source = _Source.read(log, schema)
-    return tuple(source.run(index, {}, ()) for index in range(len(source.missions)))
+    return tuple(source.run(index, {}) for index in range(len(source.missions)))
 
 
 def mission_kind(schema: Schema) -> MissionKind:
@@ -129,20 +126,19 @@ class _Source:
             )
         return cls(schema, kind, log_info(log, sha256()), settings, missions)
 
-    def run(self, index: int, overrides: Mapping[str, Setting], judge_anyway: Collection[str]) -> Run:
+    def run(self, index: int, overrides: Mapping[str, Setting]) -> Run:
         found = self.missions[index]
         found = replace(found, ended=found.ended and not _cut_short(found, self.log))
         driven = {name: in_force(history, found.end_s) for name, history in self.settings.items()}
         config, sources, settings = configuration(self.schema.options, driven, overrides)
         mission = replace(found, settings={name: setting.value for name, setting in driven.items()})
         mismatch = self.kind.mismatch(mission)
-        objectives = self._values(Role.OBJECTIVE, mission)
         return Run(
             config=config,
             sources=sources,
             context=self._values(Role.CONTEXT, mission),
             metrics=self._values(Role.METRIC, mission),
-            objectives=_gated(self.schema, objectives, mission.ended, mismatch, judge_anyway),
+            objectives=self._values(Role.OBJECTIVE, mission),
             settings=settings,
             log=self.log,
             mission=MissionInfo(
@@ -205,36 +201,3 @@ def _cut_short(mission: Mission, log: LogInfo) -> bool:
     """Whether the log breaks off while the mission lasts: an arming refused so far may be granted later."""
     runs_out = mission.end_s >= log.duration_s - 1e-3
     return runs_out and any(d.time_s is None or d.time_s >= mission.end_s - 1.0 for d in log.damage)
-
-
-def _gated(
-    schema: Schema, objectives: Mapping[str, Value], ended: bool, mismatch: str, judge_anyway: Collection[str]
-) -> dict[str, Value]:
-    """Objectives with those withheld whose value means nothing for this mission."""
-    if not ended:
-        cut = Unavailable("the log ends before the mission does", "record until the mission has ended")
-        return {name: value if isinstance(value, Unavailable) else cut for name, value in objectives.items()}
-    withheld: Unavailable | None = None
-    if not _accomplished(schema, objectives):
-        withheld = Unavailable("mission was not accomplished, so its value means nothing", "repair the mission first")
-    gated = dict(objectives)
-    for objective in schema.objectives:
-        value = objectives[objective.name]
-        if objective.kind == "functional" or isinstance(value, Unavailable):
-            continue
-        if withheld is not None:
-            gated[objective.name] = withheld
-        elif mismatch and objective.name not in judge_anyway:
-            hint = f"give this mission's bound with --threshold {objective.name}=VALUE"
-            gated[objective.name] = Unavailable(mismatch, hint)
-    return gated
-
-
-def _accomplished(schema: Schema, objectives: Mapping[str, Value]) -> bool:
-    for objective in schema.objectives:
-        if objective.kind != "functional":
-            continue
-        value = objectives[objective.name]
-        if not is_known(value) or (objective.threshold is not None and not objective.threshold.met(value)):
-            return False
-    return True

@@ -8,8 +8,6 @@ from typing import Any, Final, Literal
 
 from pydantic import ConfigDict, Field
 
-from care_core.diagnose.faults import judge, thresholds_in_force
-from care_core.diagnose.records import ObjectiveResult
 from care_core.diagnose.verify import (
     Before,
     Made,
@@ -20,14 +18,9 @@ from care_core.diagnose.verify import (
     PromisedSet,
     Verdict,
     Verification,
-    verify,
 )
 from care_core.errors import ExitCode, UsageError
-from care_core.extract.read import read_run
-from care_core.logs.base import Log
-from care_core.profile.store import Profile
 from care_core.report.document import (
-    FixSet,
     ObjectiveEntry,
     ProfileEntry,
     Strict,
@@ -125,42 +118,15 @@ def verify_schema() -> dict[str, Any]:
     return VerifyDocument.model_json_schema(by_alias=True, mode="serialization")
 
 
-def verify_log(report: TriageDocument, log: Log, profile: Profile, mission: int | None = None) -> VerifyDocument:
-    """Compare the run of a log with what a report promised for it.
-
-    Raises:
-        UsageError: the report suggests no change.
-        CareError: the log holds no mission of the profile.
-    """
+def promise_of(report: TriageDocument) -> Promise:
+    """What a report said and promised. Raises UsageError where it suggests no change."""
     if report.fix is None:
         why = report.abstained or "every objective was within its threshold"
         raise UsageError(f"The report suggests no change, so nothing was promised: {clean(why)}.")
-    schema = profile.schema
-    wanted = {one.name: one.threshold.value for one in report.objectives if one.threshold is not None}
-    usual = thresholds_in_force(schema, {})
-    own = {name: value for name, value in wanted.items() if name not in usual or usual[name].value != value}
-    run = read_run(log, schema, mission=mission, judge_anyway=tuple(own))
-    results = judge(run, schema, thresholds_in_force(schema, own), profile.model.summaries)
-    found = verify(_promise(report, report.fix), run, schema, results, _doubt(report, run))
-    notes = []
-    if report.profile.version != schema.version:
-        notes.append(
-            f"the report was written with version {report.profile.version} of the profile, not {schema.version}"
-        )
-    if report.log.start and run.log.start and run.log.start < report.log.start:
-        notes.append("this log is older than the one of the report")
-    return _document(report, run, results, found, notes)
-
-
-def _doubt(report: TriageDocument, run: Run) -> str:
-    if run.log.sha256 == report.log.sha256:
-        return "this is the log that the report is about, not one of a later run"
-    return run.mission.mismatch
-
-
-def _promise(report: TriageDocument, fix: FixSet) -> Promise:
-    alternatives = report.fix.alternatives if report.fix is not None else []
     return Promise(
+        sha256=report.log.sha256,
+        start=report.log.start,
+        version=report.profile.version,
         config={name: float(value) for name, value in report.config.items()},
         objectives={
             one.name: Before(
@@ -174,14 +140,13 @@ def _promise(report: TriageDocument, fix: FixSet) -> Promise:
                 one.p_fixed,
                 {name: (predicted.low, predicted.high) for name, predicted in one.predicted.items()},
             )
-            for one in (fix, *alternatives)
+            for one in (report.fix, *report.fix.alternatives)
         ),
     )
 
 
-def _document(
-    report: TriageDocument, run: Run, results: tuple[ObjectiveResult, ...], found: Verification, notes: list[str]
-) -> VerifyDocument:
+def verify_document(report: TriageDocument, run: Run, found: Verification) -> VerifyDocument:
+    """The document of a report and what became of its promise in a later run."""
     before = {one.name: one for one in report.objectives}
     return VerifyDocument(
         profile=report.profile,
@@ -198,7 +163,7 @@ def _document(
             for o in found.others
         ],
         objectives=[_objective(check, before[check.variable.name]) for check in found.objectives],
-        notes=[clean(note) for note in notes],
+        notes=[clean(note) for note in found.notes],
     )
 
 

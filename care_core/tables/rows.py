@@ -7,6 +7,7 @@ import io
 from collections.abc import Sequence
 from pathlib import Path
 
+from care_core.diagnose.judging import judge
 from care_core.errors import UsageError
 from care_core.extract.read import read_runs
 from care_core.logs.opening import open_log
@@ -21,8 +22,8 @@ Row = dict[str, str | int | float | None]
 
 
 def rows_of(path: Path, schema: Schema) -> list[Row]:
-    """The rows of one log."""
-    return [_row(path, run, schema) for run in read_runs(open_log(path), schema)]
+    """The rows of one log; objectives that mean nothing for their mission are empty."""
+    return [_row(path, judge(run, schema, {}).run, schema) for run in read_runs(open_log(path), schema)]
 
 
 def _row(path: Path, run: Run, schema: Schema) -> Row:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from care_core.diagnose.faults import judge, thresholds_in_force
+from care_core.diagnose.judging import judge
 from care_core.errors import CareError, ExitCode, LogError
 from care_core.extract.read import read_run
 from care_core.extract.select import choose_profile
@@ -166,7 +166,7 @@ def _judge(path: Path, profile: Profile | None) -> Verdict:
         choose_profile(log, [profile])
     schema = nav2_drive.schema() if profile is None else profile.schema
     run = read_run(log, schema)
-    statuses = {result.status for result in judge(run, schema, thresholds_in_force(schema, {}), {})}
+    statuses = {result.status for result in judge(run, schema, {}).results}
     if "fault" in statuses:
         return _verdict(ExitCode.FAULT, run.mission)
     return _verdict(ExitCode.NOT_EVALUATED if "not_evaluated" in statuses else ExitCode.OK, run.mission)

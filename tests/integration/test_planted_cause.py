@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from care_core.diagnose.judging import judge
 from care_core.diagnose.records import Diagnosis
 from care_core.diagnose.triage import diagnose
 from care_core.learn.train import train
@@ -31,7 +32,7 @@ CASES: tuple[tuple[str, float, str], ...] = (
 
 
 def diagnosed(run: Run, profile: Profile, keep: tuple[str, ...] = (), **thresholds: float) -> Diagnosis:
-    return diagnose(run, profile, CHOICE, keep=keep, thresholds=thresholds)
+    return diagnose(judge(run, profile.schema, profile.model.summaries, thresholds), profile, CHOICE, keep=keep)
 
 
 def repaired(diagnosis: Diagnosis, noise: Mapping[str, float] = CALM) -> bool:

@@ -12,6 +12,7 @@ from care_core.configs.driven import clock, configuration, differing, remark
 from care_core.configs.loading import read_configs, resolve
 from care_core.configs.self_written import SELF_WRITTEN, is_self_written
 from care_core.diagnose import provenance
+from care_core.diagnose.judging import judge
 from care_core.diagnose.since import compare
 from care_core.logs.base import Log
 from care_core.logs.opening import open_log
@@ -135,7 +136,7 @@ def sample_run(arducopter: Profile, **values: float) -> tuple[Run, Log]:
 def test_options_come_first_and_what_the_vehicle_wrote_not_at_all(arducopter: Profile) -> None:
     run, log = sample_run(arducopter, LAND_SPEED=30.0, ACRO_RP_RATE=1.0, STAT_RUNTIME=9.0)
     assert arducopter.schema.variables["LAND_SPEED"].threshold is None
-    since = compare(run, log, arducopter, {o.name: o.threshold for o in arducopter.schema.objectives if o.threshold})
+    since = compare(judge(run, arducopter.schema, {}), log, arducopter)
     assert [(change.parameter, change.option is not None, change.text) for change in since.changes] == [
         ("LAND_SPEED", True, "16 -> 30"),
         ("ACRO_RP_RATE", False, "360 -> 1"),

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from care_core.diagnose.faults import judge, thresholds_in_force
+from care_core.diagnose.judging import judge
 from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, same, verify
 from care_core.errors import ConfigError
 from care_core.report.document import build_document
@@ -29,6 +29,9 @@ PROMISED = PromisedSet({"speed": (2.0, 5.0)}, 0.9, {"time": (130.0, 150.0), "ene
 
 def promise(*others: PromisedSet) -> Promise:
     return Promise(
+        sha256="",
+        start=None,
+        version="1",
         config=SLOW,
         objectives={
             "success": Before(1.0, "ok", SUCCESS.threshold),
@@ -40,8 +43,7 @@ def promise(*others: PromisedSet) -> Promise:
 
 
 def checked(doubt: str = "", *others: PromisedSet, **options: float) -> Verification:
-    run = planted_run(**options)
-    return verify(promise(*others), run, SCHEMA, judge(run, SCHEMA, thresholds_in_force(SCHEMA, {}), {}), doubt)
+    return verify(promise(*others), judge(planted_run(**options), SCHEMA, {}), SCHEMA, doubt)
 
 
 def test_a_change_that_was_made_and_did_what_it_promised() -> None:
@@ -101,7 +103,7 @@ def test_a_mission_that_failed_otherwise_is_not_fixed() -> None:
 def test_what_was_not_evaluated_or_is_another_mission_cannot_be_told() -> None:
     run = planted_run(speed=5.0)
     run = replace(run, objectives={**run.objectives, "time": Unavailable("the log ends early")})
-    found = verify(promise(), run, SCHEMA, judge(run, SCHEMA, thresholds_in_force(SCHEMA, {}), {}))
+    found = verify(promise(), judge(run, SCHEMA, {}), SCHEMA)
     assert found.verdict == "cannot_tell"
     assert "the log ends early" in found.sentence
     assert checked("the mission has 3 waypoints", speed=5.0).verdict == "cannot_tell"
@@ -121,9 +123,10 @@ def test_an_option_of_two_keys_is_made_when_both_are() -> None:
     for values, made in (((0.3, 0.3), "made"), ((0.3, 0.5), "not_made"), ((0.4, 0.4), "other_value")):
         keys = dict(zip(("/a/radius", "/b/radius"), values, strict=True))
         driven = replace(run, settings={key: Setting(key, value, "log") for key, value in keys.items()})
-        found = verify(replace(promise(), sets=(both,)), driven, SCHEMA, ())
+        found = verify(replace(promise(), sets=(both,)), judge(driven, SCHEMA, {}), SCHEMA)
         assert found.changes[0].made == made
-    assert verify(replace(promise(), sets=(both,)), replace(run, config={}), SCHEMA, ()).changes[0].made == "unknown"
+    unread = judge(replace(run, config={}), SCHEMA, {})
+    assert verify(replace(promise(), sets=(both,)), unread, SCHEMA).changes[0].made == "unknown"
 
 
 @settings(deadline=None)

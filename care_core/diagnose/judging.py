@@ -1,0 +1,166 @@
+"""Log -> judged run: which objectives are broken, which are fine, and which cannot be judged. Nothing else judges."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from care_core.causal.model import Summary
+from care_core.configs.driven import readable
+from care_core.configs.loading import ConfigFile, resolve
+from care_core.diagnose.records import ObjectiveResult, Status
+from care_core.errors import UsageError, nearest
+from care_core.extract.read import read_run
+from care_core.logs.base import Log
+from care_core.logs.digest import Sha256
+from care_core.profile.schema import Schema
+from care_core.profile.store import Profile
+from care_core.run import Run, Setting, Unavailable, Value, is_known
+from care_core.variables import Threshold, Variable
+
+_FEW = 10
+"""As many names can be listed in a sentence."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """A run with the verdict on each objective. In `run` those are withheld whose value means nothing."""
+
+    run: Run
+    bounds: Mapping[str, Threshold]
+    """The thresholds in force: the profile's with the operator's put in."""
+    own: Mapping[str, float]
+    """The operator's."""
+    results: tuple[ObjectiveResult, ...]
+    given: Mapping[str, Setting] = field(default_factory=dict)
+    """What the operator's files say of the profile's parameters."""
+
+    @property
+    def broken(self) -> tuple[ObjectiveResult, ...]:
+        return tuple(result for result in self.results if result.status == "fault")
+
+
+def read_and_judge(
+    log: Log,
+    profile: Profile,
+    *,
+    configs: Sequence[ConfigFile] = (),
+    thresholds: Mapping[str, float] | None = None,
+    mission: int | None = None,
+    sha256: Sha256 | None = None,
+) -> Judged:
+    """Read one mission of a log and judge it.
+
+    Args:
+        configs: configuration files in the order they are loaded, used where the log holds no value.
+        thresholds: the operator's own bounds, per objective.
+        mission: which mission of the log, from 1; the last when None.
+        sha256: gives the log's digest, where the caller has begun to work it out.
+
+    Raises:
+        CareError: the log holds no such mission, the profile has no usable model, or no such objective.
+    """
+    schema = profile.schema
+    check_wishes(schema, (), thresholds or {})
+    given = resolve(configs, (parameter for option in schema.options for parameter in readable(option)))
+    run = read_run(log, schema, overrides=given, mission=mission, sha256=sha256)
+    return replace(judge(run, schema, profile.model.summaries, thresholds), given=given)
+
+
+def judge(
+    run: Run, schema: Schema, summaries: Mapping[str, Summary], thresholds: Mapping[str, float] | None = None
+) -> Judged:
+    """Every objective of the profile against its threshold. Not evaluated is not OK.
+
+    Args:
+        thresholds: the operator's own bounds: they hold for any mission, the profile's for its own alone.
+    """
+    own = dict(thresholds or {})
+    bounds = thresholds_in_force(schema, own)
+    run = replace(run, objectives=meaningful(run, schema, bounds, own))
+    results = tuple(
+        _judge_one(objective, run, bounds.get(objective.name), summaries.get(objective.name))
+        for objective in schema.objectives
+    )
+    return Judged(run, bounds, own, results)
+
+
+def meaningful(
+    run: Run, schema: Schema, bounds: Mapping[str, Threshold], judged_anyway: Container[str] = ()
+) -> dict[str, Value]:
+    """The run's objectives, those withheld whose value means nothing for its mission."""
+    if not run.mission.ended:
+        cut = Unavailable("the log ends before the mission does", "record until the mission has ended")
+        return {name: cut if is_known(value) else value for name, value in run.objectives.items()}
+    accomplished = _accomplished(run, schema, bounds)
+    found = dict(run.objectives)
+    for objective in schema.objectives:
+        name = objective.name
+        if objective.kind == "functional" or not is_known(found.get(name)):
+            continue
+        if not accomplished:
+            reason = "mission was not accomplished, so its value means nothing"
+            found[name] = Unavailable(reason, "repair the mission first")
+        elif run.mission.mismatch and name not in judged_anyway:
+            hint = f"give this mission's bound with --threshold {name}=VALUE"
+            found[name] = Unavailable(run.mission.mismatch, hint)
+    return found
+
+
+def _accomplished(run: Run, schema: Schema, bounds: Mapping[str, Threshold]) -> bool:
+    for objective in schema.objectives:
+        if objective.kind != "functional":
+            continue
+        value, bound = run.objectives.get(objective.name), bounds.get(objective.name)
+        if not is_known(value) or (bound is not None and not bound.met(value)):
+            return False
+    return True
+
+
+def thresholds_in_force(schema: Schema, overrides: Mapping[str, float]) -> dict[str, Threshold]:
+    """The profile's thresholds with the operator's values put in."""
+    bounds: dict[str, Threshold] = {}
+    for objective in schema.objectives:
+        bound = objective.threshold
+        if objective.name in overrides:
+            bound = Threshold(bound.op if bound else "<=", overrides[objective.name])
+        if bound is not None:
+            bounds[objective.name] = bound
+    return bounds
+
+
+def check_wishes(schema: Schema, keep: Iterable[str], thresholds: Mapping[str, float]) -> None:
+    """Refuse options to keep and thresholds that the profile does not have. Raises UsageError."""
+    for name in keep:
+        _known(name, schema.options, "option", "--keep", schema.name)
+    for name, bound in thresholds.items():
+        objective = _known(name, schema.objectives, "objective", "--threshold", schema.name)
+        if objective.kind == "functional" and bound not in (0, 1):
+            raise UsageError(f"{name} is 0 or 1, never {bound:g}.", hint="Write 0 or 1.", where="--threshold")
+
+
+def _known(name: str, variables: Iterable[Variable], what: str, where: str, profile: str) -> Variable:
+    by_name = {variable.name: variable for variable in variables}
+    if name not in by_name:
+        few = len(by_name) <= _FEW
+        known = f"Known are {', '.join(by_name)}." if few else f"List them with 'care profiles show {profile}'."
+        hint = nearest(name, by_name) or known
+        raise UsageError(f"The profile has no {what} '{name}'.", hint=hint, where=where)
+    return by_name[name]
+
+
+def _judge_one(objective: Variable, run: Run, bound: Threshold | None, summary: Summary | None) -> ObjectiveResult:
+    value = run.objectives.get(objective.name)
+    if value is None:
+        return ObjectiveResult(
+            objective, None, bound, "not_evaluated", "the profile does not say how to read it from a log"
+        )
+    if isinstance(value, Unavailable):
+        reason = f"{value.reason} ({value.hint})" if value.hint else value.reason
+        return ObjectiveResult(objective, None, bound, "not_evaluated", reason)
+    if bound is None:
+        return ObjectiveResult(objective, value, None, "not_evaluated", "no threshold: give one with --threshold")
+    status: Status = "ok" if bound.met(value) else "fault"
+    # A yes-or-no result has no place among others.
+    percentile = summary.percentile(value) if summary and objective.kind == "non-functional" else None
+    return ObjectiveResult(objective, value, bound, status, percentile=percentile)
