@@ -48,9 +48,11 @@ import sys, time
 from pathlib import Path
 import care_core.diagnose.triage
 from care_core.extract.read import read_run
-from care_tui.jobs import open_and_choose
+from care_core.application.case import choose
+from care_core.logs.opening import open_log
 started = time.perf_counter()
-log, profile, _ = open_and_choose(Path(sys.argv[1]), None)
+log = open_log(Path(sys.argv[1]))
+profile, _ = choose(log)
 read_run(log, profile.schema, sha256=str)
 print(time.perf_counter() - started)
 """

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from care_core.application.training import evaluation_as_text
 from care_core.causal.mechanisms import FloatArray, Mechanism
 from care_core.learn.completion import complete
 from care_core.learn.evaluation import evaluate
@@ -28,7 +29,6 @@ from care_core.learn.screening import screen_options
 from care_core.learn.table import normal_scores, read_table
 from care_core.learn.transfer import carry_over, out_of_support
 from care_core.profile.store import Profile, load_profile
-from care_tui.training import evaluation_as_text
 
 RANKS = {
     "energy": {

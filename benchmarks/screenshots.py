@@ -11,9 +11,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+from care_core.application.case import Request
 from care_core.files import bundled, write_atomically
 from care_tui.app import CareApp
-from care_tui.jobs import Request
 from care_tui.screens.walk import WalkScreen
 from care_tui.settings import Settings
 from care_tui.widgets.step_bar import STEPS

@@ -15,11 +15,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import care_core
+from care_core.application.case import exit_code
 from care_core.errors import CareError
 from care_core.logs.finding import is_recorder_folder as is_recording
-from care_core.logs.opening import open_log
-from care_tui.inspection import inspect_log
-from care_tui.jobs import Request, diagnose_log, exit_code
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ def outcome_of(path: Path) -> Outcome:
 
 def _inspected(path: Path) -> tuple[str, str]:
     try:
-        document = inspect_log(open_log(path))
+        document = care_core.inspect(path)
     except CareError as err:
         return "refused", f"{err.message} {err.hint}".strip()
     damage = document.log.damage
@@ -64,7 +63,7 @@ def _inspected(path: Path) -> tuple[str, str]:
 
 def _triaged(path: Path) -> int:
     try:
-        return int(exit_code(diagnose_log(Request(path), lambda _step, _share: None)))
+        return int(exit_code(care_core.triage(path).diagnosis))
     except CareError as err:
         return int(err.exit_code)
 

@@ -1,0 +1,31 @@
+"""Which parameter made a robot's run fail, along which path, and what to change.
+
+    case = care_core.triage("flight.BIN")
+    print(case.report())
+
+The names below are the public ones. Each is imported when it is first used, so `import care_core` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from care_core.application.api import apply, inspect, open_log, triage, verify, what_if
+    from care_core.application.case import Case, Request
+    from care_core.errors import CareError
+
+__all__ = ["CareError", "Case", "Request", "apply", "inspect", "open_log", "triage", "verify", "what_if"]
+
+_HOMES = {
+    "CareError": "care_core.errors",
+    "Case": "care_core.application.case",
+    "Request": "care_core.application.case",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+    return getattr(import_module(_HOMES.get(name, "care_core.application.api")), name)

@@ -17,8 +17,9 @@ from textual.reactive import Reactive
 from textual.screen import Screen
 from textual.scrollbar import ScrollBar, ScrollBarRender
 
+from care_core.application.case import Case, Request, exit_code
 from care_core.errors import CareError, ExitCode, UsageError, nearest
-from care_tui.jobs import Case, Engine, Request, exit_code
+from care_tui.jobs import Engine
 from care_tui.places import as_path, is_openable
 from care_tui.render.rows import ASCII, UNICODE
 from care_tui.screens.base import CareScreen

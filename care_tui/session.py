@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from care_core.application.case import Case, ReportFormat, changes_of, decided, fixes
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult
 from care_core.errors import CareError
 from care_core.variables import Variable
 from care_tui.basket import Basket
-from care_tui.jobs import Case, ReportFormat, changes_of, decided, fixes
 
 FORMATS: tuple[ReportFormat, ...] = ("yaml", "markdown", "html", "json", "patch")
 State = Literal["empty", "loading", "data", "error"]

@@ -14,6 +14,7 @@ from care_core.configs.driven import option_value, readable
 from care_core.diagnose.judging import Judged, read_and_judge, thresholds_in_force
 from care_core.diagnose.records import ObjectiveResult, Status
 from care_core.logs.base import Log
+from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.run import Run
@@ -115,7 +116,9 @@ class Verification:
         return self.verdict != "not_fixed"
 
 
-def verify_log(promise: Promise, log: Log, profile: Profile, mission: int | None = None) -> tuple[Run, Verification]:
+def verify_log(
+    promise: Promise, log: Log, profile: Profile, mission: int | None = None, sha256: Sha256 | None = None
+) -> tuple[Run, Verification]:
     """Compare one mission of a log, judged by the report's thresholds, with what was promised for it.
 
     Raises:
@@ -125,7 +128,7 @@ def verify_log(promise: Promise, log: Log, profile: Profile, mission: int | None
     usual = thresholds_in_force(schema, {})
     wanted = {name: before.threshold for name, before in promise.objectives.items() if before.threshold is not None}
     own = {name: bound.value for name, bound in wanted.items() if name not in usual or usual[name].value != bound.value}
-    judged = read_and_judge(log, profile, thresholds=own, mission=mission)
+    judged = read_and_judge(log, profile, thresholds=own, mission=mission, sha256=sha256)
     found = verify(promise, judged, schema, _doubt(promise, judged.run))
     return judged.run, replace(found, notes=tuple(_notes(promise, judged.run, schema)))
 

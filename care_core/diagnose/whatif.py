@@ -114,7 +114,7 @@ def parse_change(text: str, schema: Schema) -> tuple[str, float]:
         UsageError: no such option (the nearest is named), or no such value.
     """
     name, _, value = (part.strip() for part in text.partition("="))
-    option = _option(name, schema)
+    option = option_named(name, schema)
     number = option_value(option, Setting(option.name, value, "--set"))
     if number is None:
         raise UsageError(
@@ -125,7 +125,8 @@ def parse_change(text: str, schema: Schema) -> tuple[str, float]:
     return option.name, number
 
 
-def _option(name: str, schema: Schema) -> Variable:
+def option_named(name: str, schema: Schema) -> Variable:
+    """An option by its name or by one of its parameters. Raises UsageError, which names the nearest."""
     variable = schema.variables.get(name)
     if variable is not None and variable.role is Role.OPTION:
         return variable

@@ -58,7 +58,12 @@ def open_log(path: str | Path) -> Log:
         LogError: no such file, a folder, no permission, an empty file, or content that no reader knows.
     """
     path = Path(path)
-    module, reader = READERS[sniff(path)]
+    return open_as(sniff(path), path)
+
+
+def open_as(format: LogFormat, path: Path) -> Log:
+    """Open a log whose format was told already. Raises LogError."""
+    module, reader = READERS[format]
     log: Log = getattr(import_module(module), reader)(path)
     return log
 

@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+import care_core
+from care_core.application.case import Request, read_case
+from care_core.application.remembering import remember
 from care_core.errors import UsageError
 from care_tui.commands.arguments import (
     AsJson,
@@ -21,8 +24,6 @@ from care_tui.commands.arguments import (
 )
 from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit
-from care_tui.jobs import Request, open_and_choose, question_of
-from care_tui.remembering import remember
 
 app = typer.Typer()
 
@@ -48,7 +49,7 @@ def whatif(
         raise UsageError("Nothing is asked.", hint="Change an option with --set OPTION=VALUE.", where="--set")
     request = Request(log, profile, tuple(config or ()), thresholds=bounds(threshold or ()), mission=mission)
     with Progress() as progress:
-        question = question_of(request, progress)
+        question = read_case(request, progress).question
     answer = question.ask(dict(parse_change(text, question.schema) for text in set_))
     emit((whatif_json if json or is_json(out) else whatif_text)(question, answer), out)
 
@@ -64,16 +65,13 @@ def verify(
     no_history: NoHistory = False,
 ) -> None:
     """Tell whether a fix did what it promised. Ends with 0 recovered, 1 still a fault, 3 cannot tell."""
-    from care_core.report.reading import read_report
-    from care_core.report.verification import EXIT_CODES, verify_json, verify_log, verify_text
+    from care_core.report.verification import EXIT_CODES, verify_json, verify_text
 
     if out is not None and out.exists() and report.exists() and out.samefile(report):
         raise UsageError("That is the report itself.", hint="Name another file.", where=str(out))
-    promised = read_report(report)
     with Progress() as progress:
         progress("reading the log", 0.0)
-        opened, chosen, _ = open_and_choose(log, profile or promised.profile.name)
-        document = verify_log(promised, opened, chosen, mission)
+        document = care_core.verify(report, log, profile, mission)
     if not no_history:
         verified = document.model_dump(by_alias=True, mode="json")
         mention(remember(lambda history: history.add_verification(verified)))

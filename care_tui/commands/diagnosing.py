@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import care_core
+from care_core.application.case import Case, ReportFormat, Request, exit_code
+from care_core.application.remembering import remember_triage
 from care_core.errors import LogError, UsageError
 from care_tui.commands.arguments import (
     AsJson,
@@ -22,11 +25,9 @@ from care_tui.commands.arguments import (
 )
 from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit, painted
-from care_tui.jobs import Request, diagnose_log, exit_code
-from care_tui.remembering import remember_triage
 
 if TYPE_CHECKING:
-    from care_core.diagnose.records import Diagnosis
+    pass
 
 app = typer.Typer()
 
@@ -50,7 +51,8 @@ def triage(
     no_history: NoHistory = False,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
-    formats = [name for name, wanted in (("json", json), ("yaml", yaml), ("markdown", markdown)) if wanted]
+    flags: tuple[tuple[ReportFormat, bool], ...] = (("json", json), ("yaml", yaml), ("markdown", markdown))
+    formats = [name for name, wanted in flags if wanted]
     if len(formats) > 1:
         raise UsageError("Only one of --json, --yaml and --markdown can be printed.", hint="Leave the others out.")
     request = Request(
@@ -64,11 +66,11 @@ def triage(
         since=since,
     )
     with Progress() as progress:
-        diagnosis = diagnose_log(request, progress)
+        case = care_core.triage(request, progress)
     if not no_history:
-        mention(remember_triage(diagnosis))
-    emit(_written(diagnosis, formats[0] if formats else _format_of(out), to_file=out is not None), out)
-    raise typer.Exit(exit_code(diagnosis))
+        mention(remember_triage(case.diagnosis))
+    emit(_written(case, formats[0] if formats else _format_of(out), to_file=out is not None), out)
+    raise typer.Exit(exit_code(case.diagnosis))
 
 
 @app.command()
@@ -80,23 +82,16 @@ def demo() -> None:
     if not path.is_file():
         raise LogError("The bundled sample is missing.", hint="Install the program again.", where=str(path))
     with Progress() as progress:
-        diagnosis = diagnose_log(Request(path), progress)
-    emit(_written(diagnosis, None, to_file=False))
-    raise typer.Exit(exit_code(diagnosis))
+        case = care_core.triage(path, progress)
+    emit(_written(case, None, to_file=False))
+    raise typer.Exit(exit_code(case.diagnosis))
 
 
-def _format_of(out: Path | None) -> str | None:
-    suffixes = {".json": "json", ".yaml": "yaml", ".yml": "yaml", ".md": "markdown"}
+def _format_of(out: Path | None) -> ReportFormat | None:
+    suffixes: dict[str, ReportFormat] = {".json": "json", ".yaml": "yaml", ".yml": "yaml", ".md": "markdown"}
     return None if out is None else suffixes.get(out.suffix.lower())
 
 
-def _written(diagnosis: Diagnosis, format: str | None, *, to_file: bool) -> str:
-    from care_core.report.document import build_document
-    from care_core.report.terminal import to_text
-    from care_core.report.writers import to_json, to_markdown, to_yaml
-
-    if format is None:
-        text = to_text(diagnosis)
-        return text if to_file else painted(text)
-    write = {"json": to_json, "yaml": to_yaml, "markdown": to_markdown}[format]
-    return write(build_document(diagnosis))
+def _written(case: Case, format: ReportFormat | None, *, to_file: bool) -> str:
+    text = case.report(format or "text")
+    return text if to_file or format else painted(text)

@@ -24,7 +24,7 @@ def train(
     resamples: Annotated[int, typer.Option("--resamples", min=2, help="Bootstrap resamples.")] = 50,
 ) -> None:
     """Learn a profile from a table of runs."""
-    from care_tui.training import train_profile
+    from care_core.application.training import train_profile
 
     with Progress() as progress:
         train_profile(runs, schema, out, seed=seed, resamples=resamples, progress=progress)
@@ -39,7 +39,7 @@ def update(
     seed: Annotated[int, typer.Option("--seed", help="Seed of every random choice.")] = 0,
 ) -> None:
     """Carry a profile over to another robot with a few of its runs."""
-    from care_tui.training import update_profile
+    from care_core.application.training import update_profile
 
     with Progress() as progress:
         outside = update_profile(profile, runs, out, seed=seed, progress=progress)
@@ -59,7 +59,7 @@ def evaluate(
     json: AsJson = False,
 ) -> None:
     """Compare a profile's causes with the true ones. Accuracy, precision, recall, F1, RMSE, and baselines beside it."""
-    from care_tui.training import evaluate_profile, evaluation_as_json, evaluation_as_text
+    from care_core.application.training import evaluate_profile, evaluation_as_json, evaluation_as_text
 
     evaluation = evaluate_profile(profile, faults, truth or (), method)
     emit(evaluation_as_json(evaluation) if json else evaluation_as_text(evaluation))

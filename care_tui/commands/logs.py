@@ -24,14 +24,13 @@ MOST_FAILURES = 20
 @app.command()
 def inspect(log: LogPath, json: AsJson = False) -> None:
     """Show what a log holds. Span, channels, parameters, damage, missions, and what each profile would miss."""
-    from care_core.logs.opening import open_log
-    from care_core.report.inspection import inspection_json
-    from care_tui.inspection import as_text, inspect_log
+    import care_core
+    from care_core.report.inspection import inspection_json, inspection_text
 
     with Progress() as progress:
         progress("reading the log", 0.0)
-        document = inspect_log(open_log(log))
-    emit(inspection_json(document) if json else as_text(document))
+        document = care_core.inspect(log)
+    emit(inspection_json(document) if json else inspection_text(document))
 
 
 @app.command()

@@ -11,10 +11,11 @@ from typing import Annotated
 
 import typer
 
+from care_core.application.case import Request
 from care_core.errors import UsageError
 from care_tui.commands.arguments import ConfigPaths, Keep, Mission, ProfileName, Since, Thresholds, bounds
 from care_tui.console import say
-from care_tui.jobs import CAUSES, Request
+from care_tui.jobs import CAUSES
 from care_tui.places import files_of, logs_in, written_s
 
 app = typer.Typer()

@@ -106,10 +106,10 @@ def _described(variable: Variable) -> str:
 @app.command("check")
 def check(name: Annotated[str | None, typer.Argument(metavar="[PROFILE]")] = None) -> None:
     """Check that profiles are sound. What can be recomputed from their files is."""
+    from care_core.application.training import relearned_problems
     from care_core.extract.read import reading_plan
     from care_core.profile.check import problems
     from care_core.profile.store import available_profiles, load_profile
-    from care_tui.training import relearned_problems
 
     paths: list[Path] | list[str] = available_profiles() if name is None else [name]
     unsound = False

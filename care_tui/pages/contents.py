@@ -27,10 +27,10 @@ class ContentsPage(Page):
         self._found.start(self._inspect)
 
     def _inspect(self) -> Rows:
-        from care_core.logs.opening import open_log
-        from care_tui.inspection import as_text, inspect_log
+        import care_core
+        from care_core.report.inspection import inspection_text
 
-        return plain_rows(as_text(inspect_log(open_log(self._log))))
+        return plain_rows(inspection_text(care_core.inspect(self._log)))
 
     def view(self) -> View:
         title = f"Contents of {clean(self._log.name)}"

@@ -6,8 +6,8 @@ from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.application.configuring import DiffSide
 from care_core.errors import CareError
-from care_tui.jobs import DiffSide
 from care_tui.pages.page import View, sentence
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.fix import no_fix_rows

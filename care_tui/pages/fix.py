@@ -6,10 +6,10 @@ from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.application.case import changes_of, fixes
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.basket import acceptable, nudged, parsed
-from care_tui.jobs import changes_of, fixes
 from care_tui.pages.page import View
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.fix import no_fix_rows, option_item, option_rows, outcome_rows

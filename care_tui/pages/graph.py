@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 from textual.content import Content
 
+from care_core.application.case import Case
 from care_core.run import is_known
-from care_tui.jobs import Case
 from care_tui.pages.page import Page, View, sentence
 from care_tui.render.rows import Row, Rows, heading, labelled, measure, padded, percent, warning
 from care_tui.screens.panes import PanesScreen

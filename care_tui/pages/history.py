@@ -8,9 +8,9 @@ from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.application.viewing import Past, past_runs
 from care_core.text import clean
 from care_tui.pages.page import Fetch, Page, View, sentence
-from care_tui.reading import Past, past_runs
 from care_tui.render.rows import ASCII, Row, Rows, labelled, padded, text
 from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing

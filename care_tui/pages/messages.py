@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from textual.content import Content
 
-from care_tui.jobs import Case
+from care_core.application.case import Case
+from care_core.application.viewing import LogMessage, messages_of
 from care_tui.pages.page import Fetch, Page, View, sentence
-from care_tui.reading import LogMessage, messages_of
 from care_tui.render.objectives import meaning
 from care_tui.render.rows import Row, Rows, labelled, text
 from care_tui.screens.panes import PanesScreen

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from textual.content import Content
 
+from care_core.application.viewing import Installed, installed_profiles
 from care_tui.pages.page import Fetch, Page, View, sentence
-from care_tui.reading import Installed, installed_profiles
 from care_tui.render.rows import Row, Rows, padded, plain_rows, text
 from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing

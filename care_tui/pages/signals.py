@@ -7,10 +7,10 @@ from functools import partial
 
 from textual.content import Content
 
+from care_core.application.case import Case
+from care_core.application.viewing import Signal, Trace, signals_of, trace_of
 from care_core.errors import CareError
-from care_tui.jobs import Case
 from care_tui.pages.page import Fetch, Page, View, sentence
-from care_tui.reading import Signal, Trace, signals_of, trace_of
 from care_tui.render.plot import dots_across, plot
 from care_tui.render.rows import ASCII, Row, Rows, error_rows, padded, text
 from care_tui.screens.panes import PanesScreen

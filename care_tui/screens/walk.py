@@ -13,10 +13,11 @@ from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
+from care_core.application.case import Case, Request
 from care_core.diagnose.records import Fix
 from care_core.errors import CareError
 from care_tui.clipboard import fits, osc52
-from care_tui.jobs import CAUSES, Case, Engine, Job, Request
+from care_tui.jobs import CAUSES, Engine, Job
 from care_tui.messages import Progressed, StepChosen
 from care_tui.pages.causes import CausesPage
 from care_tui.pages.diff import DiffPage

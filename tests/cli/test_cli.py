@@ -14,14 +14,14 @@ from typing import Any
 
 import pytest
 
+from care_core.application import api
+from care_core.application.case import Case, Request
 from care_core.diagnose.records import Diagnosis
 from care_core.profile.store import load_profile
 from care_core.tables.rows import ABOUT
 from care_tui import __version__, console
 from care_tui.cli import route
-from care_tui.commands import diagnosing
 from care_tui.commands.opening import newest_log
-from care_tui.jobs import Request
 from tests.conftest import Care
 from tests.made import made_diagnosis
 
@@ -48,12 +48,11 @@ def made(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Puts a diagnosis made by hand in the place of the engine, and keeps what the engine was asked."""
     asked: dict[str, Any] = {"answer": made_diagnosis()}
 
-    def diagnose(request: Request, progress: object) -> Diagnosis:
+    def triage(request: Request, progress: object) -> Case:
         asked["request"] = request
-        answer: Diagnosis = asked["answer"]
-        return answer
+        return Case(asked["answer"])
 
-    monkeypatch.setattr(diagnosing, "diagnose_log", diagnose)
+    monkeypatch.setattr(api, "triage", triage)
     return asked
 
 
@@ -334,7 +333,7 @@ def test_an_unexpected_error_is_one_sentence(care: Care, monkeypatch: pytest.Mon
     def fail(*_: object, **__: object) -> Diagnosis:
         raise RuntimeError("oops \x1b[31m")
 
-    monkeypatch.setattr(diagnosing, "diagnose_log", fail)
+    monkeypatch.setattr(api, "triage", fail)
     outcome = care("triage", "a.BIN")
     assert outcome.code == 2
     assert outcome.stderr == (
@@ -348,7 +347,7 @@ def test_interrupted(care: Care, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupt(*_: object, **__: object) -> Diagnosis:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(diagnosing, "diagnose_log", interrupt)
+    monkeypatch.setattr(api, "triage", interrupt)
     assert care("triage", "a.BIN").code == 130
 
 

@@ -16,6 +16,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+import care_core
+from care_core.application.case import Request, exit_code
 from care_core.diagnose.judging import judge
 from care_core.errors import CareError, ExitCode, LogError
 from care_core.extract.read import read_run
@@ -24,7 +26,6 @@ from care_core.files import bundled
 from care_core.logs.opening import open_log
 from care_core.profile.store import Profile, load_profile
 from care_core.run import MissionInfo
-from care_tui.jobs import Request, diagnose_log, exit_code
 from tests import nav2_drive
 from tests.groundstation import write_tlog
 from tests.rewritten import write_ulog
@@ -174,7 +175,7 @@ def _judge(path: Path, profile: Profile | None) -> Verdict:
 
 def _diagnosed(path: Path, profile: str) -> Verdict:
     try:
-        diagnosis = diagnose_log(Request(path, profile), lambda _step, _share: None)
+        diagnosis = care_core.triage(Request(path, profile)).diagnosis
     except CareError as err:
         return Verdict(err.exit_code)
     return _verdict(exit_code(diagnosis), diagnosis.run.mission)

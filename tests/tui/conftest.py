@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
+from care_core.application.case import Case, Progress, ReportFormat, Request
+from care_core.application.configuring import DiffSide
 from care_core.diagnose.records import Diagnosis, Fix
 from care_core.variables import Change
 from care_tui.app import CareApp
-from care_tui.jobs import Case, DiffSide, Engine, Progress, ReportFormat, Request
+from care_tui.jobs import Engine
 from care_tui.screens.panes import PanesScreen
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample

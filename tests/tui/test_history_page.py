@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
+from care_core.application.case import Case, Request
+from care_core.application.remembering import remember_triage
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError
 from care_core.history.store import History
 from care_tui.app import CareApp
-from care_tui.jobs import Case, Request
-from care_tui.remembering import remember_triage
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import LOG, fake_engine, settle

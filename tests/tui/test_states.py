@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from textual import events
 
+from care_core.application.case import Case, Progress, Request
 from care_core.errors import CareError, ExitCode, LogError, ProfileError
 from care_tui.app import CareApp
-from care_tui.jobs import Case, Engine, Job, Progress, Request
+from care_tui.jobs import Engine, Job
 from care_tui.places import as_path, entries, found_logs, recent_logs, remember
 from care_tui.screens.open_log import OpenLogDialog
 from care_tui.settings import Settings

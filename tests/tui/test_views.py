@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from textual.widgets import Static
 
+from care_core.application.case import Request
 from care_core.files import bundled
 from care_tui.app import CareApp
-from care_tui.jobs import Request
 from care_tui.pages.history import HistoryPage
 from care_tui.render.plot import dots_across, plot
 from care_tui.screens.walk import WalkScreen
@@ -178,7 +178,7 @@ async def test_a_view_that_cannot_read_the_log_says_so(make_app: MakeApp) -> Non
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "m")
-        assert "No such file" in text(app)
+        assert "no log to look into" in text(app)
         await settle(pilot, "escape", "w")
         assert "no model of this" in text(app)
         assert app.screen.query_one(".title", Static).display

@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 HEAVY = {"mcap", "numpy", "pandas", "pydantic", "pymavlink", "rich", "rosbags", "ruamel", "textual"}
 LEARNING = {"ananke", "causallearn", "joblib", "pyarrow", "scipy", "sklearn"}
 TERMINAL = {"care_tui", "rich", "textual", "typer"}
-DIAGNOSIS = "care_core.diagnose.triage, care_core.report.html, care_core.extract.select, care_core.logs.opening"
+DIAGNOSIS = "care_core.diagnose.triage, care_core.report.html, care_core.extract.select, care_core.application.api"
 
 
 def imported_by(code: str) -> set[str]:

@@ -152,7 +152,7 @@ def test_a_good_log_of_another_vehicle_is_told(arducopter: Profile) -> None:
     run, log = sample_run(arducopter)
     facts = {"firmware": "ArduCopter V4.6.0 (00000000)", "frame": run.log.facts["frame"]}
     other = replace(run, log=replace(run.log, format="mavlink-tlog", facts=facts, sha256="0"))
-    warnings = compare(other, log, arducopter, {}).warnings
+    warnings = compare(judge(other, arducopter.schema, {}), log, arducopter).warnings
     assert warnings[:2] == (
         "its format is dataflash-bin, this log's is mavlink-tlog",
         f"its firmware is {run.log.facts['firmware']}, this log's is ArduCopter V4.6.0 (00000000)",

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from care_core.application.case import Case
 from care_core.errors import CareError
-from care_tui.jobs import Case
 
 if TYPE_CHECKING:
     from care_core.history.store import Triaged
+    from care_core.logs.base import Log
 
 TEXTS = {
     "MSG": ("Message",),
@@ -70,11 +71,15 @@ class LogMessage:
     text: str
 
 
+def _log(case: Case) -> Log:
+    if case.log is None:
+        raise CareError("There is no log to look into.", hint="Open one.")
+    return case.log
+
+
 def messages_of(case: Case) -> list[LogMessage]:
     """Everything that the log holds in words, and what was found in its numbers, in time order."""
-    from care_core.logs.opening import open_log
-
-    tables = open_log(case.diagnosis.run.log.path).read(TEXTS)
+    tables = _log(case).read(TEXTS)
     if "/rosout" in tables:
         tables = {name: table for name, table in tables.items() if name != "/rosout_agg"}
     found = []
@@ -139,11 +144,10 @@ class Trace:
 def signals_of(case: Case) -> list[Signal]:
     """The signals that the profile reads from this log, those of objectives and of causal paths first."""
     from care_core.extract.registry import find_extractor
-    from care_core.logs.opening import open_log
 
     if case.schema is None:
         return []
-    present = {channel.name for channel in open_log(case.diagnosis.run.log.path).channels()}
+    present = {channel.name for channel in _log(case).channels()}
     users: dict[tuple[str, str], list[str]] = {}
     for variable in case.schema.variables.values():
         if variable.extract is None:
@@ -171,10 +175,8 @@ def trace_of(case: Case, signal: Signal, columns: int) -> Trace:
     """
     import numpy as np
 
-    from care_core.logs.opening import open_log
-
     run = case.diagnosis.run
-    table = open_log(run.log.path).read({signal.channel: (signal.field,)}).get(signal.channel)
+    table = _log(case).read({signal.channel: (signal.field,)}).get(signal.channel)
     if table is None or signal.field not in table.columns or table[signal.field].dtype.kind not in "fiub":
         raise CareError(f"The log holds no numbers in {signal.name}.", hint="Choose another signal.")
     table = table.between(run.mission.start_s, run.mission.end_s)

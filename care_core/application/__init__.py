@@ -1,0 +1,1 @@
+"""What the command line, the app and scripts have in common. Above all rooms; `api` is its public face."""

@@ -1,0 +1,100 @@
+"""The functions that scripts and notebooks call, and the commands with them; `care_core` hands them on by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from care_core.application.case import Case, Progress, Request, choose, open_case, opened, read_case
+from care_core.errors import CareError
+
+if TYPE_CHECKING:
+    from care_core.configs.edit import EditedFile
+    from care_core.diagnose.whatif import Answer
+    from care_core.logs.base import Log
+    from care_core.report.inspection import InspectDocument
+    from care_core.report.verification import VerifyDocument
+
+
+def _silent(_step: str, _share: float) -> None:
+    pass
+
+
+def open_log(path: str | Path) -> Log:
+    """A log by what it holds, not by what it is called. Raises LogError."""
+    from care_core.logs import opening
+
+    return opening.open_log(path)
+
+
+def inspect(log: str | Path) -> InspectDocument:
+    """What a log holds, and what each installed profile finds in it; nothing is judged. Raises LogError."""
+    from care_core.extract.coverage import try_on
+    from care_core.profile.store import available_profiles, load_profile
+    from care_core.report.inspection import build_inspection
+
+    found = open_log(log)
+    return build_inspection(found, [try_on(found, load_profile(path).schema) for path in available_profiles()])
+
+
+def triage(asked: Request | str | Path, progress: Progress = _silent) -> Case:
+    """Diagnose a run: the last mission of a log, or as the request says. Raises CareError."""
+    return open_case(_request(asked), progress)
+
+
+def what_if(asked: Case | Request | str | Path, changes: Mapping[str, float]) -> Answer:
+    """What a run would have done with these options changed, named as in the profile or in the log.
+
+    Raises:
+        CareError: the log cannot be read, no profile fits it, or the profile has no such option.
+    """
+    from care_core.diagnose.whatif import option_named
+
+    reading = asked.reading if isinstance(asked, Case) else read_case(_request(asked), _silent)
+    if reading is None:
+        raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
+    schema = reading.profile.schema
+    return reading.question.ask({option_named(name, schema).name: value for name, value in changes.items()})
+
+
+def verify(
+    report: str | Path, log: str | Path, profile: str | None = None, mission: int | None = None
+) -> VerifyDocument:
+    """What became of a report's promise in the run of a later log.
+
+    Args:
+        profile: another than that of the report.
+
+    Raises:
+        CareError: the report is none or suggests no change, or the log cannot be read.
+    """
+    from care_core.diagnose.verify import verify_log
+    from care_core.report.reading import read_report
+    from care_core.report.verification import promise_of, verify_document
+
+    promised = read_report(report)
+    promise = promise_of(promised)
+    with opened(Path(log)) as (found, sha256):
+        chosen, _ = choose(found, profile or promised.profile.name)
+        run, verification = verify_log(promise, found, chosen, mission, sha256)
+    return verify_document(promised, run, verification)
+
+
+def apply(report: str | Path, *configs: str | Path, alternative: int = 0) -> tuple[EditedFile, ...]:
+    """Configuration files with a report's fix put in; comments and order stay, and nothing is written.
+
+    Args:
+        configs: files in the order they are loaded, `FILE` or for ROS `NAMESPACE=FILE`.
+        alternative: another of the report's fixes, from 1.
+
+    Raises:
+        CareError: the report suggests no change, or no file can hold it.
+    """
+    from care_core.application.configuring import apply_report
+
+    return apply_report(Path(report), [str(name) for name in configs], alternative)
+
+
+def _request(asked: Request | str | Path) -> Request:
+    return asked if isinstance(asked, Request) else Request(Path(asked))

@@ -1,0 +1,224 @@
+"""The whole line from a log to its diagnosis, and the case that stays open to be asked more.
+
+The work is imported by the function that needs it: the app draws its first frame, and `care --help` its text, before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from care_core.errors import CareError, ExitCode
+
+if TYPE_CHECKING:
+    from care_core.causal.model import Model
+    from care_core.configs.loading import ConfigFile
+    from care_core.diagnose.judging import Judged
+    from care_core.diagnose.records import Diagnosis, Fix
+    from care_core.diagnose.whatif import Question
+    from care_core.logs.base import Log
+    from care_core.logs.digest import Sha256
+    from care_core.profile.schema import Schema
+    from care_core.profile.store import Profile
+    from care_core.run import ProfileChoice
+    from care_core.variables import Variable
+
+Progress = Callable[[str, float], None]
+"""Is told the step and the share that is done, 0 to 1."""
+
+ReportFormat = Literal["text", "yaml", "markdown", "html", "json", "patch"]
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What an operator asks: a log, and how to look at it. The fields are the options of `care triage`."""
+
+    log: Path
+    profile: str | None = None
+    """Name or folder of the profile; the one that fits best when None."""
+    configs: tuple[str | Path, ...] = ()
+    """Files as the operator names them: FILE or NAMESPACE=FILE."""
+    keep: tuple[str, ...] = ()
+    """Options that must stay as they are."""
+    thresholds: Mapping[str, float] = field(default_factory=dict)
+    """The operator's own bounds, per objective."""
+    top: int = 5
+    """Most causes to report per fault."""
+    mission: int | None = None
+    """Which mission of the log, from 1; the last when None."""
+    since: Path | None = None
+    """The log of a good run; what changed since then is told as evidence."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A log read by a profile and judged: what every question about a run begins with."""
+
+    profile: Profile
+    choice: ProfileChoice
+    configs: tuple[ConfigFile, ...]
+    judged: Judged
+
+    @cached_property
+    def question(self) -> Question:
+        """The run ready to be asked what other options would have done."""
+        from care_core.diagnose.whatif import question
+
+        return question(self.judged, self.profile, self.choice)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A diagnosis with what is needed to ask more about it. The log was opened and digested once, and stays open."""
+
+    diagnosis: Diagnosis
+    options: tuple[Variable, ...] = ()
+    """Every option of the profile, in its order."""
+    log: Log | None = None
+    reading: Reading | None = None
+    """None where no profile fits the log."""
+    configs: tuple[str | Path, ...] = ()
+    """Configuration files that the operator named."""
+
+    @property
+    def schema(self) -> Schema | None:
+        return None if self.reading is None else self.reading.profile.schema
+
+    @property
+    def model(self) -> Model | None:
+        return None if self.reading is None else self.reading.profile.model
+
+    def report(self, format: ReportFormat = "text") -> str:
+        """The fix report in one of its formats."""
+        return report_of(self.diagnosis, format)
+
+
+def open_case(request: Request, progress: Progress) -> Case:
+    """Log -> choice of a profile -> judged run -> diagnosis, in this one place. Raises CareError."""
+    from care_core.configs.loading import read_configs
+
+    configs = read_configs(request.configs)
+    progress("opening the log", 0.0)
+    with opened(request.log) as (log, sha256):
+        reading = _read(log, request, configs, progress, sha256)
+        diagnosis = _diagnose(reading, request, progress)
+    return Case(diagnosis, reading.profile.schema.options, log, reading, request.configs)
+
+
+def read_case(request: Request, progress: Progress) -> Reading:
+    """The first half of the line: a judged run, whose faults nobody asked about. Raises CareError."""
+    from care_core.configs.loading import read_configs
+
+    configs = read_configs(request.configs)
+    with opened(request.log) as (log, sha256):
+        return _read(log, request, configs, progress, sha256)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[tuple[Log, Sha256]]:
+    """A log, and its digest in the making."""
+    from care_core.logs.digest import hashing
+    from care_core.logs.opening import open_as, sniff
+
+    format = sniff(path)
+    # Begun before anything else is imported: of a large log it takes as long as all the rest.
+    with hashing(path) as sha256:
+        yield open_as(format, path), sha256
+
+
+def choose(log: Log, name: str | None = None) -> tuple[Profile, ProfileChoice]:
+    """The installed profile that fits a log, or how the one that was named does. Raises CareError where none does."""
+    from care_core.extract.select import fitting_profile
+    from care_core.profile.store import available_profiles, load_profile
+
+    names: list[Path] | list[str] = available_profiles() if name is None else [name]
+    return fitting_profile(log, [load_profile(one) for one in names])
+
+
+def _read(log: Log, request: Request, configs: tuple[ConfigFile, ...], progress: Progress, sha256: Sha256) -> Reading:
+    from care_core.diagnose.judging import read_and_judge
+
+    profile, choice = choose(log, request.profile)
+    progress("reading the log", 0.0)
+    judged = read_and_judge(
+        log, profile, configs=configs, thresholds=request.thresholds, mission=request.mission, sha256=sha256
+    )
+    return Reading(profile, choice, configs, judged)
+
+
+def _diagnose(reading: Reading, request: Request, progress: Progress) -> Diagnosis:
+    from care_core.diagnose.triage import triage
+    from care_core.logs.opening import open_log
+
+    progress("judging the objectives", 0.6)
+    return triage(
+        reading.judged,
+        reading.profile,
+        reading.choice,
+        configs=reading.configs,
+        keep=request.keep,
+        since=None if request.since is None else open_log(request.since),
+        top=request.top,
+        progress=progress,
+    )
+
+
+def report_of(diagnosis: Diagnosis, format: ReportFormat) -> str:
+    """The fix report in one of its formats."""
+    from care_core.report.document import build_document
+    from care_core.report.html import to_html
+    from care_core.report.terminal import to_text
+    from care_core.report.writers import to_json, to_markdown, to_yaml
+
+    if format == "text":
+        return to_text(diagnosis)
+    document = build_document(diagnosis)
+    if format == "patch":
+        return document.diff
+    write = {"yaml": to_yaml, "markdown": to_markdown, "html": to_html, "json": to_json}[format]
+    return write(document)
+
+
+def exit_code(diagnosis: Diagnosis) -> ExitCode:
+    """What the diagnosis means for the process that asked for it."""
+    statuses = {objective.status for objective in diagnosis.objectives}
+    if "fault" in statuses:
+        return ExitCode.FAULT
+    return ExitCode.NOT_EVALUATED if "not_evaluated" in statuses or not statuses else ExitCode.OK
+
+
+def fixes(diagnosis: Diagnosis) -> tuple[Fix, ...]:
+    """Every fix that the engine found, the suggested one first."""
+    return () if diagnosis.fix is None else (diagnosis.fix, *diagnosis.alternatives)
+
+
+def decided(diagnosis: Diagnosis, fix: Fix | None, dismissed: Mapping[str, str]) -> Diagnosis:
+    """The diagnosis with what the operator made of it: the changes that are ticked, and the causes set aside."""
+    from care_core.diagnose.records import Dismissal
+
+    aside = tuple(Dismissal(option, reason) for option, reason in dismissed.items())
+    if fix is None or not fix.changes:
+        return replace(diagnosis, fix=None, alternatives=fixes(diagnosis), dismissed=aside)
+    wanted = changes_of(fix)
+    others = tuple(other for other in fixes(diagnosis) if changes_of(other) != wanted)
+    return replace(diagnosis, fix=fix, alternatives=others, dismissed=aside)
+
+
+def changes_of(fix: Fix) -> dict[str, float]:
+    """The fix as option to value."""
+    return {change.option.name: change.suggested for change in fix.changes}
+
+
+def predict(case: Case, changes: Mapping[str, float]) -> Fix:
+    """These changes with what they would bring; without any, what the same configuration would bring again."""
+    from care_core.diagnose.records import Fix
+
+    if case.reading is None:
+        raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
+    answer = case.reading.question.ask(changes)
+    predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
+    return Fix(answer.changes, answer.p_ok, predicted)

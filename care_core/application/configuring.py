@@ -1,0 +1,151 @@
+"""The configuration in whatever was named, and fixes put into configuration files. Nothing is written here."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from care_core.errors import ConfigError, UsageError
+from care_core.text import clean
+
+if TYPE_CHECKING:
+    from care_core.application.case import Case
+    from care_core.configs.compare import Side
+    from care_core.configs.edit import EditedFile
+    from care_core.diagnose.records import Diagnosis, Fix
+    from care_core.report.document import TriageDocument
+
+DiffSide = Literal["driven", "file", "changed"]
+
+_HEAD_BYTES = 4096
+
+
+def side_of(name: str) -> Side:
+    """The configuration in whatever was named, told by its content: a file, a log or a report. Raises CareError."""
+    from care_core.configs.compare import Side
+    from care_core.configs.loading import read_configs, split_name
+    from care_core.logs.opening import is_recording, open_log
+    from care_core.report.reading import read_report
+
+    path, _ = split_name(name)
+    head = b"" if path.is_dir() else _head(path)
+    if path.is_dir() or b"\0" in head or is_recording(path):
+        histories = open_log(path).settings()
+        if not histories:
+            raise ConfigError("The log holds no parameters.", hint="Compare a configuration file.", where=str(path))
+        return Side(str(path), {name: history[-1] for name, history in histories.items()})
+    if b"care.triage/" in head:
+        return _suggested(read_report(path), path)
+    (file,) = read_configs([name])
+    return Side(name, file.settings, file.format)
+
+
+def _head(path: Path) -> bytes:
+    """The first bytes of a file. Raises ConfigError for what is none, or empty."""
+    try:
+        if path.exists() and not path.is_file():
+            raise ConfigError("This is no file but a pipe or a device.", hint="Save it to a file.", where=str(path))
+        with path.open("rb") as stream:
+            head = stream.read(_HEAD_BYTES)
+    except OSError as err:
+        hint = "Check the path."
+        raise ConfigError(f"Cannot read the file: {err.strerror}.", hint=hint, where=str(path)) from err
+    if not head:
+        raise ConfigError("The file is empty.", hint="Was it copied whole?", where=str(path))
+    return head
+
+
+def _suggested(report: TriageDocument, path: Path) -> Side:
+    """The configuration that a report suggests: what was driven, with its fix."""
+    from care_core.configs.compare import Side
+    from care_core.configs.driven import readable
+    from care_core.profile.store import load_profile
+    from care_core.run import Setting
+
+    config = {name: float(value) for name, value in report.config.items()}
+    if report.fix is not None:
+        config.update({change.option: float(change.to) for change in report.fix.changes})
+    options = [option for option in load_profile(report.profile.name).schema.options if option.name in config]
+    keys = {parameter: config[option.name] for option in options for parameter in readable(option)}
+    return Side(str(path), {key: Setting(key, value, str(path)) for key, value in keys.items()}, partial=True)
+
+
+def apply_report(report: Path, configs: Sequence[str], alternative: int = 0) -> tuple[EditedFile, ...]:
+    """Configuration files with a report's fix put in, or with one of its alternatives.
+
+    Args:
+        configs: files in the order they are loaded, `FILE` or for ROS `NAMESPACE=FILE`.
+
+    Raises:
+        CareError: the report suggests no change or is damaged, or no file can hold it.
+    """
+    from care_core.configs.edit import Wanted, apply_changes
+    from care_core.profile.store import load_profile
+    from care_core.report.reading import read_report
+
+    document = read_report(report)
+    if document.fix is None:
+        raise UsageError("The report suggests no change.", where=str(report))
+    sets = [document.fix, *document.fix.alternatives]
+    if alternative >= len(sets):
+        held = "none" if len(sets) == 1 else f"1 to {len(sets) - 1}"
+        raise UsageError(f"There is no alternative {alternative}: the report has {held}.", where="--alternative")
+    variables = load_profile(document.profile.name).schema.variables
+    wanted = []
+    for change in sets[alternative].changes:
+        option = variables.get(change.option)
+        if option is None:
+            raise ConfigError(f"The profile has no option '{clean(change.option)}'.", where=str(report))
+        named = [change.parameter] if isinstance(change.parameter, str) else change.parameter
+        wanted += [Wanted(option, parameter, float(change.to)) for parameter in named]
+    return apply_changes(configs, wanted)
+
+
+def patch_of(files: Iterable[EditedFile]) -> str:
+    """What was changed in files, as a patch."""
+    lines: list[str] = []
+    for file in files:
+        before, after = file.before.splitlines(), file.after.splitlines()
+        lines += difflib.unified_diff(before, after, f"a/{file.path}", f"b/{file.path}", lineterm="")
+    return "".join(f"{clean(line)}\n" for line in lines)
+
+
+def diff_of(case: Case, fix: Fix, side: DiffSide) -> str:
+    """A unified diff: what was driven, or the operator's files, against the suggestion; or one against the other."""
+    from care_core.configs.changes import unified_diff
+    from care_core.configs.driven import parameter_value, readable
+    from care_core.configs.edit import Wanted, apply_changes
+
+    if side == "driven":
+        return unified_diff(case.diagnosis.run, fix.changes)
+    if side == "file":
+        wanted = [
+            Wanted(change.option, parameter, parameter_value(change.option, change.suggested))
+            for change in fix.changes
+            for parameter in readable(change.option)
+        ]
+        return patch_of(apply_changes([str(name) for name in case.configs], wanted))
+    return _file_against_driven(case)
+
+
+def _file_against_driven(case: Case) -> str:
+    """What the files hold otherwise than the robot drove."""
+    from care_core.configs.compare import Side, compare
+    from care_core.configs.loading import read_configs, resolve
+
+    settings = case.diagnosis.run.settings
+    held = resolve(read_configs(case.configs), settings)
+    found = compare(Side("as driven", {name: settings[name] for name in held if name in settings}), Side("file", held))
+    return "".join(f"{difference}\n" for difference in found)
+
+
+def commands_of(diagnosis: Diagnosis) -> list[str]:
+    """The shell or ground station commands that make the changes of the fix."""
+    from care_core.configs.changes import apply_commands
+    from care_core.configs.formats import format_for
+
+    if diagnosis.fix is None:
+        return []
+    return apply_commands(diagnosis.fix.changes, format_for(diagnosis.run.log.format, diagnosis.run.settings))
