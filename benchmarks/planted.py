@@ -28,6 +28,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.mechanisms import FloatArray
+from care_core.diagnose.judging import judge
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Cause, Diagnosis
 from care_core.diagnose.triage import diagnose
@@ -199,7 +200,8 @@ def _judge(
 ) -> None:
     config = {name: row[name] for name in OPTIONS}
     choice = ProfileChoice("planted", "1", "Planted robot", "")
-    diagnosis = diagnose(_run_of(world.schema, row), profile, choice, top=10)
+    judged = judge(_run_of(world.schema, row), world.schema, profile.model.summaries)
+    diagnosis = diagnose(judged, profile, choice, top=10)
     off = deviating(config, dict.fromkeys(OPTIONS, REFERENCE))
     now = true_probability(world, config, noise)
     gain = {name: true_probability(world, {**config, name: REFERENCE}, noise) - now for name in off}
