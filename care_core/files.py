@@ -20,10 +20,11 @@ def bundled(kind: Literal["profiles", "samples"], name: str = "") -> Path:
     return folder / name if name else folder
 
 
-def write_atomically(path: Path, text: str) -> None:
+def write_atomically(path: Path, text: str, mode: int | None = None) -> None:
     """Write a file through a temporary one beside it: a reader sees the old file or the new one, never half.
 
-    What a link leads to is written, and the link stays. A pipe or a device is written to as it is.
+    What a link leads to is written, and the link stays. A pipe or a device is written to as it is. `mode` is that of
+    the new file; without it, it keeps that of the file it replaces.
 
     Raises:
         UsageError: the folder does not exist or may not be written to, or the file is a log.
@@ -33,20 +34,45 @@ def write_atomically(path: Path, text: str) -> None:
         if path.exists() and not path.is_file() and not path.is_dir():
             path.write_text(text, encoding="utf-8")
             return
-        path = path.resolve()
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8") as stream:
-                stream.write(text)
-            Path(temporary).chmod(_mode(path))
-            Path(temporary).replace(path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
+        replace_file(path, text.encode(), mode)
     except OSError as err:
         raise UsageError(
             f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
         ) from err
+
+
+def replace_file(path: Path, content: bytes, mode: int | None = None) -> None:
+    """Put a file in another's place: after a crash or a power cut either the old one is there, or the new one whole.
+
+    Raises OSError.
+    """
+    path = path.resolve()
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            Path(temporary).chmod(_mode(path) if mode is None else mode)
+            os.fsync(stream.fileno())
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Have the names in a folder on the disk, where the system can: a rename is not before its folder is."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:  # Windows opens no folders
+        return
+    try:
+        os.fsync(handle)
+    except OSError:  # nor does every file system sync one
+        pass
+    finally:
+        os.close(handle)
 
 
 def refuse_recording(path: Path) -> None:

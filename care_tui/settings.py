@@ -72,14 +72,13 @@ def load_settings(path: Path | None = None) -> Settings:
 
 
 def _read(file: Path) -> Any:
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
+    from care_core.plain_yaml import PlainYamlError, load
 
     try:
-        return YAML(typ="safe").load(file.read_text(encoding="utf-8"))
+        return load(file.read_text(encoding="utf-8"))
     except OSError as err:
         raise ConfigError(f"Cannot read the settings: {err.strerror}.", where=str(file)) from err
-    except (YAMLError, UnicodeDecodeError) as err:
+    except (PlainYamlError, UnicodeDecodeError) as err:
         raise ConfigError("The settings are no YAML.", hint=str(err).splitlines()[0], where=str(file)) from err
 
 

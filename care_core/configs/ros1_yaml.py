@@ -22,7 +22,7 @@ def read(text: str, path: Path, namespace: str = "") -> dict[str, Setting]:
         return {}
     outer = (namespace.strip("/"),) if namespace.strip("/") else ()
     settings = {}
-    for leaf in yaml_tree.leaves(root, path, unwrap=DYNAMIC_RECONFIGURE):
+    for leaf in yaml_tree.leaves(root, unwrap=DYNAMIC_RECONFIGURE):
         name = "/".join((*outer, *leaf.keys))
         settings[name] = Setting(name, leaf.value, f"{path}:{leaf.line}")
     return settings

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap
-from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
+from care_core import plain_yaml
 from care_core.errors import ConfigError
 
 _BARE = re.compile(r"[A-Za-z][\w/]*")
@@ -22,9 +22,6 @@ _BARE = re.compile(r"[A-Za-z][\w/]*")
 _REFERENCE = re.compile(r"(^|[\[,\s])[&*!]")
 """An anchor, an alias or a tag in a list, which no parameter has and which can make a short one endless."""
 
-_DEEPEST = 32
-_MOST_NODES = 100_000
-"""Bounds on aliases, which can make a small file endless."""
 _NOT_ONE = "Is it the robot's configuration?"
 
 _NULL_TAG = "tag:yaml.org,2002:null"
@@ -49,82 +46,53 @@ def compose(text: str, path: Path) -> MappingNode | None:
         ConfigError: not YAML, or no mapping of names.
     """
     try:
-        node: Node | None = YAML(typ="safe", pure=True).compose(StringIO(text))
-    except YAMLError as err:
-        mark = getattr(err, "problem_mark", None)
-        where = f"{path}:{mark.line + 1}" if mark is not None else str(path)
-        problem = getattr(err, "problem", None) or "the text cannot be read"
-        if problem.startswith("but "):
-            problem = f"{getattr(err, 'context', '')} {problem}"
-        raise ConfigError(f"Not valid YAML: {problem}.", hint="Correct the line.", where=where) from err
-    except RecursionError as err:
-        raise ConfigError("The file is nested too deeply.", hint=_NOT_ONE, where=str(path)) from err
+        node = plain_yaml.compose(text)
+    except plain_yaml.PlainYamlError as err:
+        where = str(path) if err.line is None else f"{path}:{err.line}"
+        raise ConfigError(f"Not valid YAML: {err.problem}.", hint="Correct the line.", where=where) from err
     if node is not None and not isinstance(node, MappingNode):
         raise ConfigError("Not a parameter file: it is no mapping of names.", hint=_NOT_ONE, where=str(path))
     return node
 
 
-def leaves(root: MappingNode, path: Path, *, unwrap: str = "") -> Iterator[Leaf]:
+def leaves(root: MappingNode, *, unwrap: str = "") -> Iterator[Leaf]:
     """Every value with the keys that lead to it. Nulls and lists of mappings are passed over.
 
     Args:
         unwrap: class in the tag of a dumped Python object, whose values are those under its key `dictitems`.
-
-    Raises:
-        ConfigError: deeper or longer than any configuration.
     """
-    return _Walk(path, unwrap).mapping(root, ())
+    return _mapping(root, (), unwrap)
 
 
-class _Walk:
-    """Goes through a tree once, counting what it meets: an alias is met again each time it is named."""
+def _mapping(node: MappingNode, keys: tuple[str, ...], unwrap: str) -> Iterator[Leaf]:
+    dumped = bool(unwrap) and unwrap in str(node.tag)
+    for key, value in node.value:
+        name = str(key.value).strip("/") or str(key.value)
+        if dumped and name == "dictitems" and isinstance(value, MappingNode):
+            yield from _mapping(value, keys, unwrap)
+        elif dumped:
+            continue
+        elif isinstance(value, MappingNode):
+            yield from _mapping(value, (*keys, name), unwrap)
+        elif (plain := _plain(value)) is not None:
+            yield Leaf((*keys, name), plain, value.start_mark.line + 1)
 
-    def __init__(self, path: Path, unwrap: str) -> None:
-        self._path, self._unwrap, self._left = path, unwrap, _MOST_NODES
 
-    def mapping(self, node: MappingNode, keys: tuple[str, ...]) -> Iterator[Leaf]:
-        self._met(len(keys))
-        dumped = bool(self._unwrap) and self._unwrap in str(node.tag)
-        for key, value in node.value:
-            name = str(key.value).strip("/") or str(key.value)
-            if dumped and name == "dictitems" and isinstance(value, MappingNode):
-                yield from self.mapping(value, keys)
-            elif dumped:
-                continue
-            elif isinstance(value, MappingNode):
-                yield from self.mapping(value, (*keys, name))
-            elif (plain := self._plain(value)) is not None:
-                yield Leaf((*keys, name), plain, value.start_mark.line + 1)
+def _plain(node: Node) -> float | str | None:
+    if isinstance(node, ScalarNode) and node.tag != _NULL_TAG:
+        return _scalar(node)
+    return _list(node) if isinstance(node, SequenceNode) and node.tag == _LIST_TAG else None
 
-    def _plain(self, node: Node) -> float | str | None:
-        if isinstance(node, ScalarNode) and node.tag != _NULL_TAG:
-            self._met(0)
-            return _scalar(node)
-        if isinstance(node, SequenceNode) and node.tag == _LIST_TAG:
-            return self._list(node, 0)
-        return None
 
-    def _list(self, node: SequenceNode, depth: int) -> str | None:
-        """A list as its text, `[1.0, 2.0]`; None for one that holds mappings."""
-        parts = []
-        for item in node.value:
-            self._met(depth)
-            if isinstance(item, SequenceNode):
-                part = self._list(item, depth + 1)
-            else:
-                part = _item(item) if isinstance(item, ScalarNode) else None
-            if part is None:
-                return None
-            parts.append(part)
-        return f"[{', '.join(parts)}]"
-
-    def _met(self, depth: int) -> None:
-        self._left -= 1
-        if depth > _DEEPEST:
-            raise ConfigError("The file is nested too deeply.", hint=_NOT_ONE, where=str(self._path))
-        if self._left < 0:
-            raise ConfigError("The file holds more values than a configuration can.", hint=_NOT_ONE,
-                              where=str(self._path))  # fmt: skip
+def _list(node: SequenceNode) -> str | None:
+    """A list as its text, `[1.0, 2.0]`; None for one that holds mappings."""
+    parts = []
+    for item in node.value:
+        part = _list(item) if isinstance(item, SequenceNode) else _item(item) if isinstance(item, ScalarNode) else None
+        if part is None:
+            return None
+        parts.append(part)
+    return f"[{', '.join(parts)}]"
 
 
 def _scalar(node: ScalarNode) -> float | str:
@@ -155,8 +123,8 @@ def plain(value: float | str) -> Any:
         return value == "true"
     if value.startswith("[") and value.endswith("]") and not _REFERENCE.search(value):
         try:
-            items = YAML(typ="safe", pure=True).load(value)
-        except (YAMLError, RecursionError):
+            items = plain_yaml.load(value)
+        except plain_yaml.PlainYamlError:
             return value
         return items if isinstance(items, list) else value
     return value

@@ -10,12 +10,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO
 
+from care_core import limits
 from care_core.errors import LogError
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-
-MOST_BYTES = 1 << 30
-"""No chunk or message of a log is larger."""
 
 _BLOCK = 1 << 14
 """Packed bytes taken at a time: small, since a hostile block unpacks to thousands of times its size."""
@@ -27,25 +25,46 @@ class CannotUnpackError(Exception):
     """Bytes that cannot be unpacked. Stays inside the readers."""
 
 
-def unpack(compression: str, data: bytes, limit: int = MOST_BYTES) -> bytes:
-    """Plain data of at most `limit` bytes; of data that was cut short, or broken in the middle, what comes before.
+class Unpacker:
+    """Unpacks the chunks and messages of a file in one pass over it, and no more of them than limits allow."""
 
-    Args:
-        compression: bz2, lz4 or zstd.
+    def __init__(self, file_size: int) -> None:
+        self._most = limits.unpacked_bytes(file_size)
+        self._left = self._most
 
-    Raises:
-        CannotUnpackError: nothing could be unpacked, or the compression is unknown.
-    """
-    unpackers = {"bz2": _unpack_bz2, "lz4": _unpack_lz4, "zstd": _unpack_zstd}
-    if compression not in unpackers:
-        raise CannotUnpackError(f"a chunk of unknown compression '{compression}'")
-    try:
-        plain = unpackers[compression](data, min(limit, MOST_BYTES))
-    except (OSError, RuntimeError, EOFError, ValueError, MemoryError) as err:
-        raise CannotUnpackError(f"a {compression} chunk cannot be unpacked") from err
-    if limit and not plain:
-        raise CannotUnpackError(f"a {compression} chunk cannot be unpacked")
-    return plain
+    def __call__(self, compression: str, data: bytes, size: int = 0) -> bytes:
+        """Plain data; of data that was cut short, or broken in the middle, what comes before.
+
+        Args:
+            compression: bz2, lz4 or zstd.
+            size: of the plain data, as the file says; 0 where it does not.
+
+        Raises:
+            CannotUnpackError: nothing could be unpacked, the compression is unknown, or a limit is reached.
+        """
+        unpackers = {"bz2": _unpack_bz2, "lz4": _unpack_lz4, "zstd": _unpack_zstd}
+        if compression not in unpackers:
+            raise CannotUnpackError(f"a chunk of unknown compression '{compression}'")
+        if size > limits.CHUNK_BYTES:
+            raise CannotUnpackError(f"a chunk that claims to be {_more_than(size, limits.CHUNK_BYTES)}")
+        most = min(size or limits.CHUNK_BYTES, self._left)
+        if most <= 0:
+            raise CannotUnpackError(f"its chunks unpack to more than {limits.megabytes(self._most)}")
+        try:
+            plain = unpackers[compression](data, most)
+        except (OSError, RuntimeError, EOFError, ValueError, MemoryError) as err:
+            raise CannotUnpackError(f"a {compression} chunk cannot be unpacked") from err
+        if not plain:
+            raise CannotUnpackError(f"a {compression} chunk cannot be unpacked")
+        self._left -= len(plain)
+        if len(plain) == limits.CHUNK_BYTES > size:
+            raise CannotUnpackError(f"a chunk that unpacks to {_more_than(0, limits.CHUNK_BYTES)}")
+        return plain
+
+
+def _more_than(size: int, most: int) -> str:
+    claimed = f"{limits.megabytes(size)} large, " if size else ""
+    return f"{claimed}more than the {limits.megabytes(most)} that are read"
 
 
 class PlainFile:
@@ -67,10 +86,18 @@ class PlainFile:
         self._folder = TemporaryDirectory(prefix="care-")
         where, self.path = self.path, Path(self._folder.name) / self.path.stem
         self.is_cut = True
+        left = most = limits.unpacked_bytes(where.stat().st_size)
         with self.path.open("wb") as target:
             for piece in _zstd_pieces(packed):
                 self.is_cut = bool(piece)
                 target.write(piece)
+                left -= len(piece)
+                if left < 0:
+                    raise LogError(
+                        f"The log unpacks to more than {limits.megabytes(most)}.",
+                        hint="Unpack it with 'zstd -d' where there is room for it, and name the unpacked file.",
+                        where=str(where),
+                    )
                 if shutil.disk_usage(self._folder.name).free < _DISK_MARGIN:
                     raise LogError(
                         "There is no room to unpack the log.",

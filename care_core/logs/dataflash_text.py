@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core import limits
 from care_core.errors import LogError
 from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, wall_clock
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
@@ -30,6 +31,9 @@ _TEXT_CODES = frozenset("nNZ")
 _MAYBE_TEXT_CODES = frozenset("aM")
 _NAME_BYTES = 5  # four of a message's name and the comma
 _PIECE = 2048  # lines parsed in one go
+_HEADS = 1 << 18
+_MOST_BROKEN = 100_000
+"""Broken lines of a message that are told one by one before they are summed up."""
 
 
 class Columns(NamedTuple):
@@ -105,17 +109,27 @@ class DataFlashTextLog:
         self._ends = np.append(np.flatnonzero(self._data == ord("\n")), len(self._data))
         starts = np.append(0, self._ends[:-1] + 1)
         starts = starts[starts < len(self._data)]
+        starts = starts[~np.isin(self._data[starts], (ord("\r"), ord("\n")))]  # a file can be all line ends
+        names = np.concatenate([self._heads(part) for part in np.array_split(starts, len(starts) // _HEADS + 1)])
+        order = np.argsort(names, kind="stable")
+        firsts = np.flatnonzero(np.append(True, names[order][1:] != names[order][:-1]))
+        lines: dict[str, Offsets] = {}
+        others = [np.empty(0, dtype=np.int64)]
+        for low, own in zip(firsts.tolist(), np.split(starts[order], firsts[1:]), strict=True):
+            name = names[order[low]].decode("latin-1")
+            if len(name) < _NAME_BYTES and name.isidentifier() and len(lines) < limits.TEXT_MESSAGE_TYPES:
+                lines[name] = own
+            else:
+                others.append(own)
+        lines[""] = np.sort(np.concatenate(others))
+        return lines
+
+    def _heads(self, starts: Offsets) -> NDArray[np.bytes_]:
+        """What stands before the comma in the first bytes of lines."""
         within = np.minimum(starts[:, None] + np.arange(_NAME_BYTES), len(self._data) - 1)
         heads = self._data[within]
         heads[np.cumsum(heads == ord(","), axis=1) > 0] = 0
-        names, which = np.unique(heads.view(f"S{_NAME_BYTES}")[:, 0], return_inverse=True)
-        lines: dict[str, Offsets] = {}
-        for at, raw in enumerate(names.tolist()):
-            name = raw.decode("latin-1")
-            is_name = len(name) < _NAME_BYTES and name.isidentifier()
-            key = name if is_name else ""
-            lines[key] = np.sort(np.append(lines.get(key, np.empty(0, dtype=np.int64)), starts[which == at]))
-        return lines
+        return np.asarray(heads.view(f"S{_NAME_BYTES}")[:, 0], dtype=np.bytes_)
 
     def _line(self, place: int) -> str:
         """The line that begins at a byte, without its end."""
@@ -146,11 +160,13 @@ class DataFlashTextLog:
                 for place in places[places >= first].tolist():
                     if self._line(place).strip():
                         broken.append((place, "a line is no message that the log declares"))
+                    if len(broken) > _MOST_BROKEN:
+                        break
                 continue
             if name == "FMT":
                 continue
             sound = self._sound(name, places)
-            broken += [(place, f"a line is no whole {name}") for place in places[~sound].tolist()]
+            broken += [(place, f"a line is no whole {name}") for place in places[~sound][:_MOST_BROKEN].tolist()]
             self._lines[name] = places[sound]
         return sorted(broken)
 

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from mmap import mmap
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_core.logs.base import LogFormat
-from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, unpack
-from care_core.logs.mapped import mapped
+from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
+from care_core.logs.mapped import FileBytes, opened
 from care_core.logs.mcap_records import MAGIC, Chunk, Contents, locate, read_contents
 from care_core.logs.recording import recording_at
-from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Message, RosLog, timed
-from care_core.logs.ros_message import Buffer
+from care_core.logs.ros_log import (
+    BrokenRecordError,
+    Connection,
+    Flaw,
+    Message,
+    RosLog,
+    Source,
+    check_room,
+    piece_of,
+    timed,
+)
 from care_core.logs.ros_metadata import Metadata, parse_metadata
 
 _WHAT = "an MCAP file"
@@ -41,7 +49,7 @@ class McapPart:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._file = PlainFile(path)
-        with mapped(self._file.path, MAGIC, _WHAT) as log:
+        with opened(self._file.path, MAGIC, _WHAT) as log:
             contents = read_contents(log)
         self._chunks = contents.chunks
         self._checked: set[int] = set()
@@ -54,41 +62,46 @@ class McapPart:
 
     def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
         """The messages of some channels, chunk by chunk."""
-        with mapped(self._file.path, MAGIC, _WHAT) as log:
+        with opened(self._file.path, MAGIC, _WHAT) as log:
+            unpack = Unpacker(len(log))
             for chunk in self._chunks:
                 wanted = [number for number in chunk.index if number in numbers]
-                if wanted and (opened := self._open(chunk, log)):
-                    for number in wanted:
-                        yield from self._of_channel(chunk, number, *opened)
+                if wanted and (plain := self._open(chunk, log, unpack)):
+                    yield from self._of_chunk(chunk, wanted, unpack, *plain)
 
-    def _open(self, chunk: Chunk, log: mmap) -> tuple[Buffer, int, int] | None:
+    def _open(self, chunk: Chunk, log: FileBytes, unpack: Unpacker) -> tuple[Source, int, int] | None:
         key = f"chunk {chunk.pos}"
         try:
-            opened = chunk.open(log)
+            found = chunk.open(log, unpack)
         except BrokenRecordError as err:
             self.flaws.setdefault(key, Flaw(str(err), chunk.pos, _first_ns(chunk)))
             return None
         if chunk.pos not in self._checked:
             self._checked.add(chunk.pos)
-            why = chunk.flaw(*opened)
+            why = chunk.flaw(*found)
             if why:
                 self.flaws.setdefault(key, Flaw(why, chunk.pos, _first_ns(chunk)))
-        return opened
+        return found
 
-    def _of_channel(self, chunk: Chunk, number: int, buffer: Buffer, begin: int, end: int) -> Iterator[Message]:
-        entries = chunk.index[number]
-        is_cdr = self.connections[number].encoding == "cdr"
-        for time_ns, offset in entries.tolist():
-            try:
-                pos, after = locate(buffer, begin, end, offset, number, time_ns)
-                # No CDR message begins so: the recorder packed each message by itself.
-                if is_cdr and buffer[pos : pos + len(ZSTD_MAGIC)] == ZSTD_MAGIC:
-                    plain = unpack("zstd", buffer[pos:after])
-                    yield number, time_ns, plain, 0, len(plain)
-                else:
-                    yield number, time_ns, buffer, pos, after
-            except (BrokenRecordError, CannotUnpackError) as err:
-                self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
+    def _of_chunk(
+        self, chunk: Chunk, wanted: Sequence[int], unpack: Unpacker, buffer: Source, begin: int, end: int
+    ) -> Iterator[Message]:
+        left = end - begin
+        for number in wanted:
+            is_cdr = self.connections[number].encoding == "cdr"
+            for time_ns, offset in chunk.index[number].tolist():
+                try:
+                    pos, after = locate(buffer, begin, end, offset, number, time_ns)
+                    left -= after - pos
+                    check_room(left)
+                    # No CDR message begins so: the recorder packed each message by itself.
+                    if is_cdr and buffer[pos : pos + len(ZSTD_MAGIC)] == ZSTD_MAGIC:
+                        plain = unpack("zstd", buffer[pos:after])
+                        yield number, time_ns, plain, 0, len(plain)
+                    else:
+                        yield number, time_ns, *piece_of(buffer, pos, after)
+                except (BrokenRecordError, CannotUnpackError) as err:
+                    self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
 
 
 def _metadata(contents: Contents) -> Metadata:

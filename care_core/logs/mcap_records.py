@@ -12,7 +12,6 @@ from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
-from mmap import mmap
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,9 +21,10 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Metadata, Schema, Statistics
 from numpy.typing import NDArray
 
-from care_core.logs.compression import CannotUnpackError, unpack
-from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw
-from care_core.logs.ros_message import Buffer
+from care_core import limits
+from care_core.logs.compression import CannotUnpackError, Unpacker
+from care_core.logs.mapped import FileBytes
+from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Source
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -40,6 +40,7 @@ _SIZE = struct.Struct("<Q")
 _INDEX = struct.Struct("<HI")
 _TEXT_SIZE = struct.Struct("<I")
 _LONGEST_NAME = 64
+_PIECE = 1 << 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +58,7 @@ class Chunk:
     """CRC-32 of the plain records, 0 where the recorder made none."""
     index: dict[int, NDArray[Any]] = field(default_factory=dict)
 
-    def open(self, log: mmap) -> tuple[Buffer, int, int]:
+    def open(self, log: FileBytes, unpack: Unpacker) -> tuple[Source, int, int]:
         """The plain records as (buffer, begin, end); what is there of a cut chunk. Raises BrokenRecordError."""
         if not self.compression:
             return log, self.start, self.end
@@ -67,15 +68,14 @@ class Chunk:
             raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
 
-    def flaw(self, buffer: Buffer, begin: int, end: int) -> str:
+    def flaw(self, buffer: Source, begin: int, end: int) -> str:
         """Why the plain records cannot all be trusted, empty where they can."""
         if not self.is_whole:
             return "a chunk is cut short"
         if self.compression and end - begin < self.size:
             return "the rest of a chunk cannot be unpacked"
-        with memoryview(buffer) as view, view[begin:end] as plain:
-            if self.checksum and zlib.crc32(plain) != self.checksum:
-                return "a chunk does not match its checksum: values in it may be wrong"
+        if self.checksum and _checksum(buffer, begin, end) != self.checksum:
+            return "a chunk does not match its checksum: values in it may be wrong"
         return ""
 
 
@@ -103,6 +103,13 @@ class Contents:
         return Connection(channel.topic, schema.name, definition, channel.message_encoding, schema.encoding)
 
 
+def _checksum(buffer: Source, begin: int, end: int) -> int:
+    summed = 0
+    for low in range(begin, end, _PIECE):
+        summed = zlib.crc32(buffer[low : min(low + _PIECE, end)], summed)
+    return summed
+
+
 class _Record(NamedTuple):
     pos: int
     op: int
@@ -110,7 +117,7 @@ class _Record(NamedTuple):
     end: int
 
 
-def read_contents(log: mmap) -> Contents:
+def read_contents(log: FileBytes) -> Contents:
     """Walk over a file's records; behind a broken one, go on where the summary says that the next chunk is."""
     contents = Contents()
     loose = _Loose()
@@ -139,12 +146,12 @@ def read_contents(log: mmap) -> Contents:
     return contents
 
 
-def locate(buffer: Buffer, begin: int, end: int, offset: int, number: int, time_ns: int) -> tuple[int, int]:
+def locate(buffer: Source, begin: int, end: int, offset: int, number: int, time_ns: int) -> tuple[int, int]:
     """Where the data of the message that an index entry describes lies. Raises BrokenRecordError."""
     pos = begin + offset
     if pos + _MESSAGE.size > end:
         raise BrokenRecordError("a message lies beyond the end of its chunk")
-    op, size, channel, _, stamp_ns, _ = _MESSAGE.unpack_from(buffer, pos)
+    op, size, channel, _, stamp_ns, _ = _MESSAGE.unpack(buffer[pos : pos + _MESSAGE.size])
     after = pos + _RECORD.size + size
     is_it = op == Opcode.MESSAGE and channel == number and stamp_ns == time_ns
     if not is_it or not pos + _MESSAGE.size <= after <= end:
@@ -159,10 +166,10 @@ class _Loose:
         self.times: dict[int, array[int]] = {}
         self.offsets: dict[int, array[int]] = {}
 
-    def add(self, log: mmap, record: _Record) -> None:
+    def add(self, log: FileBytes, record: _Record) -> None:
         if record.end - record.pos < _MESSAGE.size:
             raise BrokenRecordError("a message is too short")
-        _, _, number, _, time_ns, _ = _MESSAGE.unpack_from(log, record.pos)
+        _, _, number, _, time_ns, _ = _MESSAGE.unpack(log[record.pos : record.pos + _MESSAGE.size])
         self.times.setdefault(number, array("Q")).append(time_ns)
         self.offsets.setdefault(number, array("Q")).append(record.pos)
 
@@ -172,7 +179,7 @@ class _Loose:
             yield Chunk(0, 0, size, is_whole=True, index=index)
 
 
-def _take(log: mmap, record: _Record, contents: Contents) -> None:
+def _take(log: FileBytes, record: _Record, contents: Contents) -> None:
     """Add what a top-level record says to the contents."""
     if record.op == Opcode.CHUNK:
         contents.chunks.append(_chunk(log, record))
@@ -188,17 +195,17 @@ def _take(log: mmap, record: _Record, contents: Contents) -> None:
         _take_described(log, record, contents)
 
 
-def _take_index(log: mmap, record: _Record, chunk: Chunk) -> None:
+def _take_index(log: FileBytes, record: _Record, chunk: Chunk) -> None:
     if record.end - record.start < _INDEX.size:
         raise BrokenRecordError("a message index of the wrong size")
-    number, size = _INDEX.unpack_from(log, record.start)
+    number, size = _INDEX.unpack(log[record.start : record.start + _INDEX.size])
     if size % ENTRY.itemsize or size != record.end - record.start - _INDEX.size:
         raise BrokenRecordError("a message index of the wrong size")
     if size:
         chunk.index[number] = np.frombuffer(log[record.start + _INDEX.size : record.end], ENTRY)
 
 
-def _take_described(log: Buffer, record: _Record, contents: Contents) -> None:
+def _take_described(log: Source, record: _Record, contents: Contents) -> None:
     """Take records that the mcap library reads: schemas, channels, metadata, statistics."""
     kinds: Mapping[int, Any] = {
         Opcode.HEADER: Header, Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
@@ -223,41 +230,44 @@ def _take_described(log: Buffer, record: _Record, contents: Contents) -> None:
         contents.statistics = read
 
 
-def _chunk(log: mmap, record: _Record) -> Chunk:
+def _chunk(log: FileBytes, record: _Record) -> Chunk:
     """A chunk record; of one that is cut short, what is there."""
     end = min(record.end, len(log))
     name_at = record.start + _CHUNK.size
     if name_at > end:
         raise BrokenRecordError("its last record is cut short")
-    _, _, size, checksum, name_size = _CHUNK.unpack_from(log, record.start)
+    _, _, size, checksum, name_size = _CHUNK.unpack(log[record.start : name_at])
     start = name_at + name_size + _SIZE.size
     if name_size > _LONGEST_NAME or start > end:
         raise BrokenRecordError("a chunk's header is broken")
-    (packed,) = _SIZE.unpack_from(log, start - _SIZE.size)
+    (packed,) = _SIZE.unpack(log[start - _SIZE.size : start])
     if start + packed != record.end:
         raise BrokenRecordError("a chunk of the wrong size")
     compression = log[name_at : name_at + name_size].decode("ascii", "replace")
     return Chunk(record.pos, start, end, end == record.end, compression, size, checksum)
 
 
-def _complete(log: mmap, contents: Contents) -> None:
+def _complete(log: FileBytes, contents: Contents) -> None:
     """Look into chunks for what their message index and the summary do not say."""
+    unpack = Unpacker(len(log))
+    left = limits.messages(len(log))
     for chunk in contents.chunks:
         is_indexed = bool(chunk.index) or not chunk.size
         if is_indexed and all(number in contents.channels for number in chunk.index):
             continue
         try:
-            found = _scan(chunk, log, contents)
+            found = _scan(chunk, log, contents, unpack, left)
         except BrokenRecordError as err:
             contents.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos))
             continue
         if not chunk.index:
             chunk.index.update(found)
+        left -= sum(map(len, found.values()))
 
 
-def _scan(chunk: Chunk, log: mmap, contents: Contents) -> dict[int, NDArray[Any]]:
+def _scan(chunk: Chunk, log: FileBytes, contents: Contents, unpack: Unpacker, most: int) -> dict[int, NDArray[Any]]:
     """Index entries of a chunk's complete messages per channel; takes its schemas and channels on the way."""
-    buffer, begin, end = chunk.open(log)
+    buffer, begin, end = chunk.open(log, unpack)
     times: dict[int, array[int]] = {}
     offsets: dict[int, array[int]] = {}
     pos = begin
@@ -269,7 +279,10 @@ def _scan(chunk: Chunk, log: mmap, contents: Contents) -> dict[int, NDArray[Any]
         if record.end > end:
             break
         if record.op == Opcode.MESSAGE and record.end - pos >= _MESSAGE.size:
-            _, _, number, _, time_ns, _ = _MESSAGE.unpack_from(buffer, pos)
+            if not most:
+                raise BrokenRecordError("it holds more messages than a file of its size can")
+            most -= 1
+            _, _, number, _, time_ns, _ = _MESSAGE.unpack(buffer[pos : pos + _MESSAGE.size])
             times.setdefault(number, array("Q")).append(time_ns)
             offsets.setdefault(number, array("Q")).append(pos - begin)
         elif record.op in (Opcode.SCHEMA, Opcode.CHANNEL):
@@ -284,12 +297,12 @@ def _entries(times: array[int], offsets: array[int]) -> NDArray[Any]:
     return entries
 
 
-def _summarised(log: mmap) -> list[int]:
+def _summarised(log: FileBytes) -> list[int]:
     """Where the summary at the end of a file says that chunks are, and where it is itself, in order."""
     footer = len(log) - len(MAGIC) - _FOOTER.size
-    if footer < len(MAGIC) or log[-len(MAGIC) :] != MAGIC:
+    if footer < len(MAGIC) or log[footer + _FOOTER.size :] != MAGIC:
         return []
-    start, _, _ = _FOOTER.unpack_from(log, footer)
+    start, _, _ = _FOOTER.unpack(log[footer : footer + _FOOTER.size])
     known = [start, footer - _RECORD.size]
     pos = start
     while len(MAGIC) < pos < footer:
@@ -298,16 +311,16 @@ def _summarised(log: mmap) -> list[int]:
         except BrokenRecordError:
             break
         if record.op == Opcode.CHUNK_INDEX and record.end - record.start >= _CHUNK_INDEX.size:
-            known.append(_CHUNK_INDEX.unpack_from(log, record.start)[2])
+            known.append(_CHUNK_INDEX.unpack(log[record.start : record.start + _CHUNK_INDEX.size])[2])
         pos = record.end
     return sorted(known)
 
 
-def _read_record(buffer: Buffer, pos: int, end: int) -> _Record:
+def _read_record(buffer: Source, pos: int, end: int) -> _Record:
     """The record at a position; only a chunk may reach beyond the end."""
     if pos + _RECORD.size > end:
         raise BrokenRecordError("a record header is cut short")
-    op, size = _RECORD.unpack_from(buffer, pos)
+    op, size = _RECORD.unpack(buffer[pos : pos + _RECORD.size])
     start = pos + _RECORD.size
     if not op:
         raise BrokenRecordError("these bytes are no record")

@@ -12,10 +12,21 @@ from numpy.typing import NDArray
 
 from care_core.errors import LogError
 from care_core.logs.base import LogFormat
-from care_core.logs.mapped import mapped
+from care_core.logs.compression import Unpacker
+from care_core.logs.mapped import opened
 from care_core.logs.recording import recording_at
 from care_core.logs.ros1_records import MAGIC, Chunk, Contents, locate, read_contents
-from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Message, RosLog, timed
+from care_core.logs.ros_log import (
+    BrokenRecordError,
+    Connection,
+    Flaw,
+    Message,
+    RosLog,
+    Source,
+    check_room,
+    piece_of,
+    timed,
+)
 from care_core.logs.ros_metadata import Metadata
 
 _MOST_PAUSE_NS = 60_000_000_000
@@ -41,7 +52,7 @@ class Ros1Part:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.metadata = Metadata()
-        with mapped(path, MAGIC, "a ROS 1 bag of format 2.0") as bag:
+        with opened(path, MAGIC, "a ROS 1 bag of format 2.0") as bag:
             self._contents: Contents = read_contents(bag)
         if self._contents.is_encrypted:
             raise LogError("The bag is encrypted.", hint="Decrypt it with 'rosbag decrypt' first.", where=str(path))
@@ -52,26 +63,33 @@ class Ros1Part:
 
     def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
         """The messages of some connections, chunk by chunk."""
-        with mapped(self.path, MAGIC, "a ROS 1 bag of format 2.0") as bag:
+        with opened(self.path, MAGIC, "a ROS 1 bag of format 2.0") as bag:
+            unpack = Unpacker(len(bag))
             for chunk in self._contents.chunks:
                 wanted = [number for number in chunk.index if number in numbers]
                 if not wanted:
                     continue
                 try:
-                    buffer, begin, end = chunk.open(bag)
+                    plain = chunk.open(bag, unpack)
                 except BrokenRecordError as err:
                     self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, _first_ns(chunk)))
-                    continue
-                for number in wanted:
-                    entries = chunk.index[number]
-                    times = _entry_times_ns(entries).tolist()
-                    for time_ns, offset in zip(times, entries["offset"].tolist(), strict=True):
-                        try:
-                            pos, after = locate(buffer, begin, end, offset)
-                        except BrokenRecordError as err:
-                            self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
-                        else:
-                            yield number, time_ns, buffer, pos, after
+                else:
+                    yield from self._of_chunk(chunk, wanted, *plain)
+
+    def _of_chunk(self, chunk: Chunk, wanted: Sequence[int], buffer: Source, begin: int, end: int) -> Iterator[Message]:
+        left = end - begin
+        for number in wanted:
+            entries = chunk.index[number]
+            times = _entry_times_ns(entries).tolist()
+            for time_ns, offset in zip(times, entries["offset"].tolist(), strict=True):
+                try:
+                    pos, after = locate(buffer, begin, end, offset)
+                    left -= after - pos
+                    check_room(left)
+                except BrokenRecordError as err:
+                    self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
+                else:
+                    yield number, time_ns, *piece_of(buffer, pos, after)
 
 
 def _check_one_run(path: Path, parts: Sequence[Ros1Part]) -> None:

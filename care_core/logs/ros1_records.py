@@ -10,15 +10,15 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from mmap import mmap
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.logs.compression import CannotUnpackError, unpack
-from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw
-from care_core.logs.ros_message import Buffer
+from care_core import limits
+from care_core.logs.compression import CannotUnpackError, Unpacker
+from care_core.logs.mapped import FileBytes
+from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Source
 
 MAGIC = b"#ROSBAG V2.0\n"
 
@@ -28,6 +28,9 @@ ENTRY = np.dtype([("seconds", "<u4"), ("nanoseconds", "<u4"), ("offset", "<u4")]
 _MESSAGE, _BAG, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = range(2, 8)
 _SIZE = struct.Struct("<I")
 _TIME = struct.Struct("<II")
+_LONGEST_HEADER = 1 << 16
+_MOST_AHEAD = 16
+"""Records that are looked at for the message that an index entry means."""
 _IS_MESSAGE = b"\x04\x00\x00\x00op=\x02"
 
 
@@ -39,14 +42,16 @@ class Chunk:
     start: int
     end: int
     compression: str
+    size: int = 0
+    """Bytes of the plain data, 0 where the bag does not say."""
     index: dict[int, NDArray[Any]] = field(default_factory=dict)
 
-    def open(self, bag: Buffer) -> tuple[Buffer, int, int]:
+    def open(self, bag: FileBytes, unpack: Unpacker) -> tuple[Source, int, int]:
         """The chunk's plain data as (buffer, begin, end); what is there of a cut one. Raises BrokenRecordError."""
         if self.compression == "none":
             return bag, self.start, self.end
         try:
-            plain = unpack(self.compression, bag[self.start : self.end])
+            plain = unpack(self.compression, bag[self.start : self.end], self.size)
         except CannotUnpackError as err:
             raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
@@ -83,7 +88,7 @@ class _Record:
         return int.from_bytes(value, "little")
 
 
-def read_contents(bag: mmap) -> Contents:
+def read_contents(bag: FileBytes) -> Contents:
     """Walk over a bag's records; behind a broken one, go on where the index says that the next chunk is."""
     contents = Contents()
     pos, size = len(MAGIC), len(bag)
@@ -113,7 +118,7 @@ def read_contents(bag: mmap) -> Contents:
     return contents
 
 
-def _indexed(bag: mmap, index_pos: int) -> list[int]:
+def _indexed(bag: FileBytes, index_pos: int) -> list[int]:
     """Where the index at the end of a bag says that chunks are, and where it is itself, in order."""
     if not len(MAGIC) < index_pos < len(bag):
         return []
@@ -124,19 +129,21 @@ def _indexed(bag: mmap, index_pos: int) -> list[int]:
     return sorted(known)
 
 
-def locate(buffer: Buffer, begin: int, end: int, offset: int) -> tuple[int, int]:
+def locate(buffer: Source, begin: int, end: int, offset: int) -> tuple[int, int]:
     """Where the data of the message at an index entry's offset lies. Raises BrokenRecordError.
 
     Some writers let the offset point at a connection record that comes before the message.
     """
     pos = begin + offset
-    while pos + 8 <= end:
-        (header_size,) = _SIZE.unpack_from(buffer, pos)
+    for _ in range(_MOST_AHEAD):
+        if pos + 8 > end:
+            break
+        (header_size,) = _SIZE.unpack(buffer[pos : pos + 4])
         start = pos + 8 + int(header_size)
-        if start > end:
+        if start > end or header_size > _LONGEST_HEADER:
             break
         header = buffer[pos + 4 : start - 4]
-        (data_size,) = _SIZE.unpack_from(buffer, start - 4)
+        (data_size,) = _SIZE.unpack(buffer[start - 4 : start])
         if start + data_size > end:
             break
         if _IS_MESSAGE in header:
@@ -145,11 +152,12 @@ def locate(buffer: Buffer, begin: int, end: int, offset: int) -> tuple[int, int]
     raise BrokenRecordError("a message lies beyond the end of its chunk")
 
 
-def _take(bag: mmap, record: _Record, contents: Contents) -> None:
+def _take(bag: FileBytes, record: _Record, contents: Contents) -> None:
     """Add what a top-level record says to the contents."""
     if record.op == _CHUNK:
         compression = record.fields.get(b"compression", b"").decode("ascii", "replace")
-        contents.chunks.append(Chunk(record.pos, record.start, min(record.end, len(bag)), compression))
+        size = int.from_bytes(record.fields.get(b"size", b"")[:4], "little")
+        contents.chunks.append(Chunk(record.pos, record.start, min(record.end, len(bag)), compression, size))
     if record.end > len(bag):
         raise BrokenRecordError("its last record is cut short")
     if record.op == _INDEX and contents.chunks:
@@ -161,8 +169,8 @@ def _take(bag: mmap, record: _Record, contents: Contents) -> None:
         _take_connection(bag, record, contents)
 
 
-def _take_connection(buffer: Buffer, record: _Record, contents: Contents) -> None:
-    described = _fields(buffer, record.start, record.end)
+def _take_connection(buffer: Source, record: _Record, contents: Contents) -> None:
+    described = _fields(buffer[record.start : record.end])
     contents.connections[record.number(b"conn")] = Connection(
         topic=_normal(record.fields.get(b"topic", b"").decode("utf-8", "replace")),
         type=described.get(b"type", b"").decode("utf-8", "replace"),
@@ -170,34 +178,42 @@ def _take_connection(buffer: Buffer, record: _Record, contents: Contents) -> Non
     )
 
 
-def _complete(bag: mmap, contents: Contents) -> None:
+def _complete(bag: FileBytes, contents: Contents) -> None:
     """Look into chunks for what index and connection records at the top level do not say."""
+    unpack = Unpacker(len(bag))
+    left = limits.messages(len(bag))
     for chunk in contents.chunks:
         if chunk.index and all(number in contents.connections for number in chunk.index):
             continue
         try:
-            found = _scan(chunk, bag, contents)
+            found = _scan(chunk, bag, contents, unpack, left)
         except BrokenRecordError as err:
             contents.flaws[f"chunk {chunk.pos}"] = Flaw(str(err), chunk.pos)
             continue
         if not chunk.index:
             chunk.index.update({number: np.array(entries, ENTRY) for number, entries in found.items()})
+        left -= sum(map(len, found.values()))
 
 
-def _scan(chunk: Chunk, bag: mmap, contents: Contents) -> dict[int, list[tuple[int, int, int]]]:
+def _scan(
+    chunk: Chunk, bag: FileBytes, contents: Contents, unpack: Unpacker, most: int
+) -> dict[int, list[tuple[int, int, int]]]:
     """Index entries of a chunk's complete messages per connection; takes its connection records on the way."""
-    buffer, begin, end = chunk.open(bag)
+    buffer, begin, end = chunk.open(bag, unpack)
     found: dict[int, list[tuple[int, int, int]]] = {}
     for record in _complete_records(buffer, begin, end):
         if record.op == _CONNECTION:
             _take_connection(buffer, record, contents)
         elif record.op == _MESSAGE and len(record.fields.get(b"time", b"")) == _TIME.size:
+            if not most:
+                raise BrokenRecordError("it holds more messages than a file of its size can")
+            most -= 1
             seconds, nanoseconds = _TIME.unpack(record.fields[b"time"])
             found.setdefault(record.number(b"conn"), []).append((seconds, nanoseconds, record.pos - begin))
     return found
 
 
-def _complete_records(buffer: Buffer, pos: int, end: int) -> Iterator[_Record]:
+def _complete_records(buffer: Source, pos: int, end: int) -> Iterator[_Record]:
     while pos < end:
         try:
             record = _read_record(buffer, pos, end)
@@ -209,14 +225,14 @@ def _complete_records(buffer: Buffer, pos: int, end: int) -> Iterator[_Record]:
         pos = record.end
 
 
-def _read_record(buffer: Buffer, pos: int, end: int) -> _Record:
+def _read_record(buffer: Source, pos: int, end: int) -> _Record:
     try:
-        (header_size,) = _SIZE.unpack_from(buffer, pos)
+        (header_size,) = _SIZE.unpack(buffer[pos : pos + 4])
         start = pos + 8 + int(header_size)
         if start > end:
             raise BrokenRecordError("a record header is cut short")
-        fields = _fields(buffer, pos + 4, start - 4)
-        (data_size,) = _SIZE.unpack_from(buffer, start - 4)
+        fields = _fields(buffer[pos + 4 : start - 4])
+        (data_size,) = _SIZE.unpack(buffer[start - 4 : start])
     except struct.error as err:
         raise BrokenRecordError("a record header is cut short") from err
     if b"op" not in fields:
@@ -224,14 +240,15 @@ def _read_record(buffer: Buffer, pos: int, end: int) -> _Record:
     return _Record(pos, fields, start, start + int(data_size))
 
 
-def _fields(buffer: Buffer, pos: int, end: int) -> dict[bytes, bytes]:
+def _fields(header: bytes) -> dict[bytes, bytes]:
     fields: dict[bytes, bytes] = {}
+    pos, end = 0, len(header)
     while pos < end:
-        (size,) = _SIZE.unpack_from(buffer, pos)
+        size = int.from_bytes(header[pos : pos + 4], "little")
         pos += 4
         if pos + size > end:
             raise BrokenRecordError("these bytes are no record")
-        name, _, value = buffer[pos : pos + size].partition(b"=")
+        name, _, value = header[pos : pos + size].partition(b"=")
         fields[name] = value
         pos += size
     return fields

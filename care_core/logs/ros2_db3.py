@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from care_core.errors import LogError
 from care_core.logs.base import LogFormat
-from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, unpack
-from care_core.logs.mapped import mapped
+from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
+from care_core.logs.mapped import opened
 from care_core.logs.recording import recording_at
 from care_core.logs.ros_log import Connection, Flaw, Message, RosLog
 from care_core.logs.ros_metadata import Metadata, parse_metadata
@@ -26,8 +26,13 @@ from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, Row, is_b
 _WHAT = "a SQLite file"
 _NOT_SOUND = (sqlite3.Error, UnicodeDecodeError)
 """What the sqlite3 module raises for a damaged file; names in a broken schema need not be text."""
-_SMALLEST_ROW = 8
-"""No row takes fewer bytes, so a damaged tree that gives more rows than fit runs in circles."""
+_SMALLEST_ROW, _SHARED = 8, 2
+"""No row takes fewer bytes, so a damaged tree whose rows are twice as large as the file runs in circles."""
+_COLUMNS = {
+    "topics": {"id", "name", "type", "serialization_format"},
+    "messages": {"id", "topic_id", "timestamp", "data"},
+}
+"""What a bag has; a column that is computed is not listed by SQLite, and so no bag's."""
 
 _MESSAGE_COLUMNS, _DEFINITION_COLUMNS, _DISTRO_COLUMNS, _METADATA_COLUMNS = 4, 5, 2, 3
 _LANGUAGES = ("ros2msg", "ros2idl", "unknown")
@@ -74,26 +79,26 @@ class Db3Part:
 
     def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
         """The messages of some topics; behind a place that SQLite cannot read, what the pages hold."""
-        last = -1
+        last, unpack = -1, Unpacker(self._file.path.stat().st_size)
         try:
             for row, number, time_ns, data in self._store.rows(numbers):
                 last = row
-                yield from self._message(number, time_ns, data)
+                yield from self._message(number, time_ns, data, unpack)
             return
         except _NOT_SOUND as err:
             salvaged = self._salvage(str(err))
         for row, number, time_ns, data in salvaged.rows(numbers):
             if row > last:
-                yield from self._message(number, time_ns, data)
+                yield from self._message(number, time_ns, data, unpack)
 
-    def _message(self, number: int, time_ns: int, data: Any) -> Iterator[Message]:
+    def _message(self, number: int, time_ns: int, data: Any, unpack: Unpacker) -> Iterator[Message]:
         if not isinstance(data, bytes):
             self.flaws.setdefault("row", Flaw("a message is not there", time_ns=time_ns))
             return
         try:
             plain = unpack("zstd", data) if data.startswith(ZSTD_MAGIC) else data
-        except CannotUnpackError:
-            self.flaws.setdefault("packed", Flaw("a packed message cannot be unpacked", time_ns=time_ns))
+        except CannotUnpackError as err:
+            self.flaws.setdefault("packed", Flaw(f"a packed message: {err}", time_ns=time_ns))
         else:
             yield number, time_ns, plain, 0, len(plain)
 
@@ -144,7 +149,7 @@ class _Database:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.is_own = False
-        self.most_rows = path.stat().st_size // _SMALLEST_ROW
+        self.size = path.stat().st_size
         journal = path.with_name(f"{path.name}-wal")
         if journal.is_file() and journal.stat().st_size:
             self._copy_with(journal)
@@ -163,7 +168,7 @@ class _Database:
                 where=str(journal),
             ) from err
         self.path, self.is_own = copy, True
-        self.most_rows += journal.stat().st_size // _SMALLEST_ROW
+        self.size += journal.stat().st_size
 
     def check_size(self) -> None:
         """Raise sqlite3.Error for a file that is cut short: SQLite reads zeros for the missing rest of a page."""
@@ -178,18 +183,22 @@ class _Database:
             }
             if not columns["topics"] or not columns["messages"]:
                 return _Contents(is_bag=False)
+            if not all(needed <= set(columns[name]) for name, needed in _COLUMNS.items()):
+                raise sqlite3.DatabaseError("its tables lack columns")
+
+            def rows(query: str) -> Iterator[Any]:
+                return self._bounded(database.execute(query))
+
             contents = _Contents()
             query = "SELECT id, name, type, serialization_format FROM topics"
-            contents.topics = {row: (str(a), str(b), str(c)) for row, a, b, c in database.execute(query)}
+            contents.topics = {row: (str(a), str(b), str(c)) for row, a, b, c in rows(query)}
             if columns["message_definitions"]:
                 query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
-                contents.definitions = {str(a): (str(b), str(c)) for a, b, c in database.execute(query)}
+                contents.definitions = {str(a): (str(b), str(c)) for a, b, c in rows(query)}
             if columns["metadata"]:
-                contents.metadata = [
-                    str(text) for (text,) in database.execute("SELECT metadata FROM metadata ORDER BY id")
-                ]
+                contents.metadata = [str(text) for (text,) in rows("SELECT metadata FROM metadata ORDER BY id")]
             if "ros_distro" in columns["schema"]:
-                contents.distro = "".join(str(name) for (name,) in database.execute("SELECT ros_distro FROM schema"))
+                contents.distro = "".join(str(name) for (name,) in rows("SELECT ros_distro FROM schema"))
             contents.times_ns = self._times(database)
             return contents
 
@@ -214,16 +223,29 @@ class _Database:
         return dict(zip(numbers.tolist(), np.split(pairs[order, 1], firsts[1:]), strict=False))
 
     def _bounded(self, rows: Iterable[Any]) -> Iterator[Any]:
-        for count, row in enumerate(rows):
-            if count > self.most_rows:
+        left = _SHARED * self.size
+        for row in rows:
+            left -= _SMALLEST_ROW + sum(len(value) for value in row if isinstance(value, (bytes, str)))
+            if left < 0:
                 raise sqlite3.DatabaseError("its tree runs in circles")
             yield row
 
     def _connect(self) -> sqlite3.Connection:
         mode = "" if self.is_own else "?mode=ro&immutable=1"
         database = sqlite3.connect(f"{self.path.resolve().as_uri()}{mode}", uri=True)
+        database.set_authorizer(_authorised)
         database.text_factory = lambda raw: raw.decode("utf-8", "replace")
         return database
+
+
+def _authorised(action: int, what: str | None, name: str | None, _database: str | None, inside: str | None) -> int:
+    """Allow SQLite to read plain tables; a view or a recursion that stands for one computes without end."""
+    is_plain = inside is None and (
+        action in (sqlite3.SQLITE_SELECT, sqlite3.SQLITE_READ)
+        or (action == sqlite3.SQLITE_PRAGMA and what == "table_info")
+        or (action == sqlite3.SQLITE_FUNCTION and name == "typeof")
+    )
+    return sqlite3.SQLITE_OK if is_plain else sqlite3.SQLITE_DENY
 
 
 class _SalvagedPages:
@@ -235,7 +257,7 @@ class _SalvagedPages:
     def contents(self) -> _Contents:
         contents = _Contents()
         found: list[tuple[int, int, int]] = []
-        with mapped(self.path, MAGIC, _WHAT) as log:
+        with opened(self.path, MAGIC, _WHAT) as log:
             pages = Pages(log)
             for row in pages.rows():
                 message = _message_head(pages, row)
@@ -254,7 +276,7 @@ class _SalvagedPages:
 
     def rows(self, numbers: frozenset[int]) -> Iterator[_DataRow]:
         seen: set[int] = set()
-        with mapped(self.path, MAGIC, _WHAT) as log:
+        with opened(self.path, MAGIC, _WHAT) as log:
             pages = Pages(log)
             for row in pages.rows():
                 message = _message_head(pages, row)

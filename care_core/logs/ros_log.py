@@ -15,9 +15,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core import limits
 from care_core.errors import LogError
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.cdr_message import CdrDecoder
+from care_core.logs.mapped import FileBytes
 from care_core.logs.ros1_message import message_decoder
 from care_core.logs.ros_message import Buffer, Decoder, MalformedMessageError, short_name
 from care_core.logs.ros_metadata import Metadata
@@ -71,6 +73,21 @@ class Flaw:
 
 class BrokenRecordError(Exception):
     """Bytes that are no record. Stays inside the reader of a container."""
+
+
+Source = bytes | FileBytes
+"""What a container's records are read from: an unpacked chunk, or the file itself."""
+
+
+def piece_of(source: Source, pos: int, end: int) -> tuple[bytes, int, int]:
+    """Where a message lies, as `Message` tells it: in the chunk that holds it, or alone."""
+    return (source, pos, end) if isinstance(source, bytes) else (source[pos:end], 0, end - pos)
+
+
+def check_room(left: int) -> None:
+    """Raise BrokenRecordError where an index names more bytes of a chunk than it has: the same ones again and again."""
+    if left < 0:
+        raise BrokenRecordError("the messages of a chunk lie over one another")
 
 
 class Part(Protocol):
@@ -231,11 +248,18 @@ class RosLog:
         if not gathered:
             return gathered
         low_ns, high_ns = self._low_ns, self._high_ns
+        with_lists = {number for number, decoder in decoders.items() if not all(decoder.is_number)}
+        left = most = limits.messages(part.path.stat().st_size)
         for number, time_ns, buffer, pos, end in part.messages(frozenset(decoders)):
             if not low_ns <= time_ns <= high_ns:
                 continue
             try:
-                gathered[number].add(time_ns, decoders[number].decode(buffer, pos, end))
+                values = decoders[number].decode(buffer, pos, end)
+                if number in with_lists:
+                    left -= max((len(value) for value in values if isinstance(value, list)), default=0)
+                    if left < 0:
+                        raise MalformedMessageError(f"its lists hold more than {most} messages")
+                gathered[number].add(time_ns, values)
             except MalformedMessageError as err:
                 self._note_broken(part.connections[number].topic, str(err), time_ns)
         return gathered
@@ -251,6 +275,8 @@ class RosLog:
             key = (connection.type, connection.definition, connection.encoding, fields)
             try:
                 if key not in made:
+                    if len(made) >= limits.TOPIC_DEFINITIONS:
+                        raise MalformedMessageError(f"more than {limits.TOPIC_DEFINITIONS} definitions are asked for")
                     made[key] = self._decoder(part, number, fields)
             except MalformedMessageError as err:
                 self._note_broken(connection.topic, str(err), None)

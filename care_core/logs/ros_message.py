@@ -12,12 +12,13 @@ import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count
-from mmap import mmap
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-Buffer = bytes | mmap
+from care_core import limits
+
+Buffer = bytes
 Step = Callable[[Buffer, int, int, list[Any]], int]
 """Reads at a position of a buffer, not beyond `end`, appends what is wanted, and returns the next position."""
 
@@ -31,11 +32,11 @@ _TEXTS = ("string", "wstring")
 _TIMES = ("time", "builtin_interfaces/Time")
 _DURATIONS = ("duration", "builtin_interfaces/Duration")
 _SPAN_SIZE = 2
+_LONGEST_LENGTH = 9
+"""Digits of the length of an array."""
 _BOUND = r"(?:<=\d+)?"
 _FIELD = re.compile(rf"([\w/]+){_BOUND}(\[(?:<=\d+)?(\d*)\])?\s+(\w+)\s*(=(?!=))?")
 _SEPARATOR = re.compile(r"^=+\s*\nMSG:\s*(\S+)\s*$", re.MULTILINE)
-_MOST_FIELDS = 100_000
-"""Far more than any message has; a definition that doubles itself level by level ends here."""
 
 
 class MalformedMessageError(Exception):
@@ -136,6 +137,8 @@ def parse_definition(type_name: str, definition: str) -> Types:
     A definition as logs hold it is the message's own text, then per message it needs a line of `=`, a line
     `MSG: package/Type` and that one's text.
     """
+    if len(definition) > limits.DEFINITION_BYTES:
+        raise MalformedMessageError(f"its definition is larger than {limits.megabytes(limits.DEFINITION_BYTES)}")
     first, *rest = _SEPARATOR.split(definition.replace("\r\n", "\n"))
     names = [short_name(name) for name in rest[::2]]
     texts = dict(zip(names, rest[1::2], strict=True)) | {short_name(type_name): first}
@@ -154,6 +157,8 @@ def _fields(owner: str, text: str, known: Mapping[str, str]) -> list[Field]:
         base, is_array, length, name, is_constant = match.groups()
         if not is_constant:
             # A bounded sequence (`[<=3]`) is a sequence: its digits are outside the group.
+            if length and len(length) > _LONGEST_LENGTH:
+                raise MalformedMessageError("an array of its definition is too long")
             size = None if is_array is None else int(length or -1)
             fields.append(Field(name, _full_name(base, owner, known), size))
     return fields
@@ -216,8 +221,8 @@ class _Plan:
         if name not in self.types or name in inside:
             raise MalformedMessageError(f"the definition lacks {name}")
         for one in self.types[name]:
-            if next(self.visited) > _MOST_FIELDS:
-                raise MalformedMessageError("its definition is endless")
+            if next(self.visited) >= limits.FIELDS:
+                raise MalformedMessageError(f"its definition has more than {limits.FIELDS} fields")
             path = prefix + one.name
             if one.size is None:
                 self.single(path, one.type, (*inside, name))
@@ -287,6 +292,8 @@ def read_elements(each: MessageDecoder, buffer: Buffer, pos: int, end: int, size
     """Run an element's decoder `size` times from `pos`: appends one list per wanted path, returns the next position."""
     if size > end - pos:  # no element takes less than a byte, so the count itself is broken
         raise MalformedMessageError("an array reaches beyond the message")
+    if size > limits.ELEMENTS:
+        raise MalformedMessageError(f"a list of {size} messages, more than the {limits.ELEMENTS} that are read")
     rows: list[list[Any]] = []
     for _ in range(size):
         row: list[Any] = []

@@ -7,13 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from care_core import plain_yaml
 from care_core.run import Setting
 
 FILE_NAME = "metadata.yaml"
 
 _ROOT = "rosbag2_bagfile_information"
 _PARAMETERS = "ros__parameters"
-_MOST_TEXT = 16 << 20
 _MOST_VALUES = 50_000
 _LONGEST_NOTE = 200
 _NO_DISTRO = "rosbags"
@@ -123,15 +123,10 @@ def _value(given: Any) -> float | str | None:
 
 
 def _load(text: str) -> Any:
-    """The plain data of a YAML text, None where it is none."""
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    if len(text) > _MOST_TEXT:
-        return None
+    """The plain data of a YAML text, None where it is none, or goes beyond a limit."""
     try:
-        return YAML(typ="safe").load(text)
-    except (YAMLError, ValueError, TypeError, OverflowError, RecursionError):
+        return plain_yaml.load(text)
+    except plain_yaml.PlainYamlError:
         return None
 
 

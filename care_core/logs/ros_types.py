@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from functools import lru_cache
 
+from care_core import limits
 from care_core.logs.cdr_message import wide_size
 from care_core.logs.ros_message import Field, MalformedMessageError, Types, parse_definition, short_name
 
@@ -54,6 +55,8 @@ def _filled(types: Types) -> Types:
 def _from_idl(type_name: str, definition: str) -> Types:
     from rosbags.typesys import Stores, get_types_from_idl, get_typestore
 
+    if len(definition) > limits.DEFINITION_BYTES:
+        raise MalformedMessageError(f"its definition is larger than {limits.megabytes(limits.DEFINITION_BYTES)}")
     _, *rest = _IDL_SEPARATOR.split(definition)
     try:
         store = get_typestore(Stores.EMPTY)

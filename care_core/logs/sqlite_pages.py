@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from mmap import mmap
 from pathlib import Path
+
+from care_core.logs.mapped import FileBytes
 
 MAGIC = b"SQLite format 3\0"
 
@@ -18,6 +19,10 @@ _PAGE_HEADER = 8
 _PAGE_SIZES = tuple(1 << power for power in range(9, 17))
 _USUAL_PAGE_SIZE = 4096
 _MOST_COLUMNS = 12
+_SMALLEST_CELL = 8
+"""Bytes of a row on its page, with the two that say where it lies."""
+_SHARED = 2
+"""So many times the bytes of a file may be in its rows: pages that were given up are still there."""
 _INTEGER_SIZES = {0: 0, 1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8, 8: 0, 9: 0}
 _FIRST_BLOB, _FIRST_TEXT = 12, 13
 
@@ -31,7 +36,7 @@ def promised_size(path: Path) -> int:
     return _page_size(head) * int.from_bytes(head[28:32], "big")
 
 
-def _page_size(head: bytes | mmap) -> int:
+def _page_size(head: bytes | FileBytes) -> int:
     size = int.from_bytes(head[16:18], "big")
     size = 65536 if size == 1 else size
     return size if size in _PAGE_SIZES else _USUAL_PAGE_SIZE
@@ -55,27 +60,29 @@ class Row:
 
 
 class Pages:
-    """The pages of a SQLite file in memory."""
+    """The pages of a SQLite file."""
 
-    def __init__(self, log: mmap) -> None:
+    def __init__(self, log: FileBytes) -> None:
         self.log = log
         self.size = _page_size(log)
-        self.usable = self.size - (log[20] if len(log) > _FIRST_PAGE_HEADER else 0)
+        self.usable = self.size - (log.byte(20) if len(log) > _FIRST_PAGE_HEADER else 0)
+        self._left = _SHARED * len(log)
 
     def rows(self) -> Iterator[Row]:
         """Every row of every table, in the order of the pages; what is no row is passed over."""
         for page in range(len(self.log) // self.size):
             base = page * self.size
             header = base + (_FIRST_PAGE_HEADER if page == 0 else 0)
-            if self.log[header] != _LEAF:
+            if self.log.byte(header) != _LEAF:
                 continue
             count = int.from_bytes(self.log[header + 3 : header + 5], "big")
             first = header + _PAGE_HEADER
-            if first + 2 * count > base + self.size:
+            if first + _SMALLEST_CELL * count > base + self.size:
                 continue
-            for place in range(first, first + 2 * count, 2):
+            places = self.log[first : first + 2 * count]
+            for place in range(0, 2 * count, 2):
                 try:
-                    yield self._row(page, base + int.from_bytes(self.log[place : place + 2], "big"))
+                    yield self._row(page, base + int.from_bytes(places[place : place + 2], "big"))
                 except (BrokenCellError, IndexError):
                     continue
 
@@ -116,12 +123,15 @@ class Pages:
         while pos < start + head:
             kind, pos = self._varint(pos)
             types.append(kind)
-        if len(types) > _MOST_COLUMNS or head + sum(_size(kind) for kind in types) != size:
+        if size > len(self.log) or len(types) > _MOST_COLUMNS or head + sum(_size(kind) for kind in types) != size:
             raise BrokenCellError("a row's header is broken")
         return Row(rowid, tuple(types), page, start, size, head)
 
     def _payload(self, row: Row) -> bytes:
-        """A row's payload, gathered over its overflow pages."""
+        """A row's payload, gathered over its overflow pages, whose chain may run in circles."""
+        self._left -= row.size
+        if self._left < 0:
+            raise BrokenCellError("the rows are larger than the file")
         most = self.usable - 35
         if row.size <= most:
             return self.log[row.start : row.start + row.size]
@@ -143,11 +153,11 @@ class Pages:
     def _varint(self, pos: int) -> tuple[int, int]:
         value = 0
         for place in range(8):
-            byte = self.log[pos + place]
+            byte = self.log.byte(pos + place)
             value = value << 7 | byte & 0x7F
             if byte < 0x80:
                 return value, pos + place + 1
-        return value << 8 | self.log[pos + 8], pos + 9
+        return value << 8 | self.log.byte(pos + 8), pos + 9
 
 
 def _size(kind: int) -> int:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
-import os
+import math
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -13,9 +14,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.lib.npyio import NpzFile
 from pydantic import Field, ValidationError
 
+from care_core import limits
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Kernel, Mechanism, Transform
 from care_core.causal.model import (
@@ -30,8 +31,12 @@ from care_core.causal.model import (
     Training,
 )
 from care_core.errors import ProfileError
+from care_core.files import replace_file, sync_folder
 
 ARCHIVE = b"PK\x03\x04"
+_DAMAGED = (ValueError, TypeError, KeyError, EOFError, OverflowError, RuntimeError)
+"""What numpy and zipfile raise for what is no archive of arrays, beside their own errors."""
+_ARRAYS, _NEXT_ARRAYS = "mechanisms.npz", "mechanisms.npz.next"
 PRIOR = "prior:"
 """Begins the key of a mechanism that belongs to the platform a profile was carried over from."""
 
@@ -58,11 +63,19 @@ class _ModelFile(Record):
     skill: dict[str, SkillRecord]
     training: Training
     mechanisms: dict[str, _MechanismRecord]
+    arrays_sha256: str = ""
+    """Of `mechanisms.npz`; empty in a file of an earlier version."""
 
 
 def write_model(model: Model, folder: Path) -> None:
-    """Write `model.json` and `mechanisms.npz` into a profile folder, each atomically."""
+    """Write `model.json` and `mechanisms.npz` into a profile folder: after a kill anywhere both are old or both new.
+
+    The new arrays lie beside the old ones until the new `model.json`, which names their digest, is there.
+    """
     stored = _with_priors(model.mechanisms)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **_arrays(stored))  # type: ignore[arg-type]
+    arrays = buffer.getvalue()
     record = _ModelFile(
         model_version=1,
         schema_digest=model.schema_digest,
@@ -76,12 +89,13 @@ def write_model(model: Model, folder: Path) -> None:
         skill=dict(model.skill),
         training=model.training,
         mechanisms={key: _mechanism_record(key, m) for key, m in stored.items()},
+        arrays_sha256=hashlib.sha256(arrays).hexdigest(),
     )
     text = json.dumps(_rounded(record.model_dump(mode="json")), indent=1, ensure_ascii=False) + "\n"
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, **_arrays(stored))  # type: ignore[arg-type]
-    _replace(folder / "model.json", text.encode())
-    _replace(folder / "mechanisms.npz", buffer.getvalue())
+    replace_file(folder / _NEXT_ARRAYS, arrays)
+    replace_file(folder / "model.json", text.encode())
+    (folder / _NEXT_ARRAYS).replace(folder / _ARRAYS)
+    sync_folder(folder)
 
 
 def _with_priors(mechanisms: Mapping[str, Mechanism]) -> dict[str, Mechanism]:
@@ -113,12 +127,6 @@ def _rounded(value: Any) -> Any:
     return [_rounded(part) for part in value] if isinstance(value, (list, tuple)) else value
 
 
-def _replace(path: Path, content: bytes) -> None:
-    temporary = path.with_name(f".{path.name}.part")
-    temporary.write_bytes(content)
-    os.replace(temporary, path)
-
-
 def _arrays(mechanisms: Mapping[str, Mechanism]) -> dict[str, np.ndarray[Any, Any]]:
     arrays: dict[str, np.ndarray[Any, Any]] = {}
     for key, m in mechanisms.items():
@@ -142,9 +150,8 @@ def read_model(folder: Path) -> Model:
     """
     path = folder / "model.json"
     try:
-        record = _ModelFile.model_validate_json(path.read_text(encoding="utf-8"))
-        with _open_arrays(folder / "mechanisms.npz") as arrays:
-            mechanisms = _mechanisms(record.mechanisms, arrays)
+        record = _ModelFile.model_validate_json(_content(path))
+        mechanisms = _mechanisms(record.mechanisms, _read_arrays(folder, record.arrays_sha256))
         graph = CausalGraph(
             record.nodes,
             frozenset((e.source, e.target) for e in record.edges if e.kind == "directed"),
@@ -163,7 +170,7 @@ def read_model(folder: Path) -> Model:
         raise ProfileError(
             f"'{key}': {first['msg']}.", hint="Train the profile again with 'care train'.", where=str(path)
         ) from err
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as err:
+    except (*_DAMAGED, zipfile.BadZipFile, zlib.error) as err:
         raise ProfileError(
             f"The model is damaged: {str(err).rstrip('.')}.",
             hint="Train the profile again with 'care train'.",
@@ -172,13 +179,41 @@ def read_model(folder: Path) -> Model:
     return _to_model(record, graph, mechanisms)
 
 
-def _open_arrays(path: Path) -> NpzFile:
-    # Asked first: numpy's advice on a file that is no archive is to load it unsafely.
-    with path.open("rb") as stream:
-        if stream.read(len(ARCHIVE)) != ARCHIVE:
-            raise ValueError(f"{path.name} is not an archive of arrays")
-    arrays: NpzFile = np.load(path, allow_pickle=False)
-    return arrays
+def _read_arrays(folder: Path, sha256: str) -> Mapping[str, FloatArray]:
+    """The arrays that a `model.json` belongs to; they may not have got their name yet when writing was broken off."""
+    content = _content(folder / _ARRAYS)
+    following = folder / _NEXT_ARRAYS
+    if sha256 and hashlib.sha256(content).hexdigest() != sha256:
+        content = _content(following) if following.is_file() else b""
+        if hashlib.sha256(content).hexdigest() != sha256:
+            raise ValueError(f"{_ARRAYS} is not the one that model.json was written with")
+    if not content.startswith(ARCHIVE):
+        raise ValueError(f"{_ARRAYS} is not an archive of arrays")
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        if sum(member.file_size for member in archive.infolist()) > limits.MODEL_BYTES:
+            raise ValueError(f"{_ARRAYS} unpacks to more than {limits.megabytes(limits.MODEL_BYTES)}")
+        names = {name.removesuffix(".npy"): name for name in archive.namelist()}
+        return {key: _array(key, archive.read(name)) for key, name in names.items()}
+
+
+def _content(path: Path) -> bytes:
+    if path.stat().st_size > limits.MODEL_BYTES:
+        raise ValueError(f"{path.name} is larger than {limits.megabytes(limits.MODEL_BYTES)}")
+    return path.read_bytes()
+
+
+def _array(name: str, stored: bytes) -> FloatArray:
+    """The numbers of a `.npy` file. numpy's own reader makes room for what the header claims before it looks."""
+    stream = io.BytesIO(stored)
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, by_column, dtype = read(stream)
+    if dtype.hasobject:  # objects are never unpacked
+        raise ValueError(f"{name} holds no numbers")
+    if stream.tell() + math.prod(shape) * dtype.itemsize != len(stored):
+        raise ValueError(f"{name} is not of the size that its header says")
+    numbers = np.frombuffer(stored, dtype, offset=stream.tell())
+    return numbers.reshape(shape, order="F" if by_column else "C").astype(np.float64)
 
 
 def _check_references(record: _ModelFile) -> None:
@@ -227,10 +262,7 @@ def _mechanisms(records: Mapping[str, _MechanismRecord], arrays: Mapping[str, Fl
 
 def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArray]) -> Mechanism:
     def floats(name: str) -> FloatArray:
-        try:
-            array = np.asarray(arrays[f"{key}/{name}"], dtype=np.float64)
-        except ValueError as err:  # objects, which are never unpacked
-            raise ValueError(f"{key}/{name} holds no numbers") from err
+        array = arrays[f"{key}/{name}"]
         if not np.isfinite(array).all():
             raise ValueError(f"{key}/{name} holds values that are not finite")
         return array

@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
+from care_core import plain_yaml
 from care_core.errors import ProfileError, nearest
 from care_core.variables import Extract, Kind, Op, Role, Threshold, ValueType, Variable
 from care_core.vehicles import Kind as VehicleKind
@@ -240,10 +239,9 @@ def read_schema(path: Path) -> Schema:
 def parse_schema(text: str, path: Path) -> Schema:
     """Check the text of a `profile.yaml`; `path` names it in errors. Raises ProfileError as `read_schema`."""
     try:
-        data = YAML(typ="safe").load(text)
-    except YAMLError as err:
-        detail = " ".join(str(err).split())[:200]
-        raise ProfileError(f"Not valid YAML: {detail}", where=str(path)) from err
+        data = plain_yaml.load(text)
+    except plain_yaml.PlainYamlError as err:
+        raise ProfileError(f"Not valid YAML: {err}.", hint="Correct the line.", where=str(path)) from err
     if not isinstance(data, dict):
         raise ProfileError("A profile is a mapping with 'name' and 'variables'.", where=str(path))
     try:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
+from care_core import plain_yaml
 from care_core.errors import ConfigError
 from care_core.report.document import SCHEMA_ID, TriageDocument
 
@@ -54,9 +52,8 @@ def _load(path: Path) -> Any:
     except UnicodeDecodeError as err:
         raise ConfigError("Not a report: it is not text.", where=str(path)) from err
     try:
-        # Every JSON document is YAML too.
-        return YAML(typ="safe", pure=True).load(StringIO(text)) if not text.lstrip().startswith("{") else _json(text)
-    except (YAMLError, ValueError, RecursionError) as err:
+        return _json(text) if text.lstrip().startswith("{") else plain_yaml.load(text)
+    except (ValueError, RecursionError) as err:
         detail = " ".join(str(err).split())[:120]
         raise ConfigError(f"The report cannot be read: {detail}.", hint="Write it again.", where=str(path)) from err
 

@@ -89,11 +89,11 @@ def test_a_tag_never_runs_anything(tmp_path: Path) -> None:
     [
         ("a: [1, 2", "Not valid YAML"),
         ("- a\n- b\n", "no mapping"),
-        ("a: &a\n  b: *a\n", "too deeply"),
+        ("a: &a\n  b: *a\n", "an alias stands inside"),
         (
             "x0: &x0 {a: 1, b: 1, c: 1}\n"
             + "".join(f"x{i}: &x{i} {{a: *x{i - 1}, b: *x{i - 1}, c: *x{i - 1}}}\n" for i in range(1, 20)),
-            "more values",
+            "more than 200000 values",
         ),
     ],
 )

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from care_core import limits
 from care_core.errors import LogError
 from care_core.logs.dataflash import DataFlashLog
 
@@ -150,7 +151,15 @@ def test_reading_is_silent_and_does_not_write(tmp_path: Path, capfd: pytest.Capt
     assert (path.stat().st_mtime_ns, [one.name for one in folder.iterdir()]) == (stamp, ["a.BIN"])
 
 
-def test_a_file_cut_while_open_is_an_error(tmp_path: Path) -> None:
+def test_a_file_cut_while_open_is_read_to_its_end(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.BIN", HEADER, *samples(3))
+    log = DataFlashLog(path)
+    path.write_bytes(HEADER)
+    assert len(log.read({"TST": ("I",)})["TST"]) == 3
+
+
+def test_a_large_file_cut_while_open_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "HELD_BYTES", 0)
     path = write(tmp_path / "a.BIN", HEADER, *samples(3))
     log = DataFlashLog(path)
     path.write_bytes(HEADER)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import shutil
@@ -44,6 +45,8 @@ def edit_arrays(folder: Path, change: Callable[[Arrays], object]) -> None:
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
     (folder / "mechanisms.npz").write_bytes(buffer.getvalue())
+    digest = hashlib.sha256(buffer.getvalue()).hexdigest()
+    edit_json(folder, lambda data: data.update(arrays_sha256=digest))
 
 
 def test_what_is_written_is_read(planted: Profile, folder: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 import zstandard
 
 from care_core.errors import LogError
-from care_core.logs.compression import CannotUnpackError, PlainFile, unpack
+from care_core.logs.compression import CannotUnpackError, PlainFile, Unpacker
 from care_core.logs.digest import log_digest
 from care_core.logs.finding import find_logs
 from care_core.logs.opening import open_log
@@ -85,10 +85,10 @@ def test_a_packed_log_that_is_cut(tmp_path: Path) -> None:
 
 def test_unpacking_is_bounded() -> None:
     bomb = zstandard.ZstdCompressor().compress(bytes(1 << 26))
-    assert len(unpack("zstd", bomb, 1000)) == 1000
+    assert len(Unpacker(1000)("zstd", bomb, 1000)) == 1000
     for compression in ("zstd", "lz4", "bz2", "xz"):
         with pytest.raises(CannotUnpackError):
-            unpack(compression, b"no such thing", 1000)
+            Unpacker(1000)(compression, b"no such thing", 1000)
 
 
 def ros_logs(recorded: Path) -> Iterator[Path]:

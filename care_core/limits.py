@@ -1,0 +1,54 @@
+"""What a file may claim: bounds on sizes, depths and counts, each far above what any honest file holds.
+
+A file below 10 MB is read in 1 GB of memory and 20 s whatever it says of itself. Readers that meet more say so as
+damage or as an error, with the number; nothing is allocated, unpacked or followed before its size was asked here.
+"""
+
+from __future__ import annotations
+
+MEBIBYTE = 1 << 20
+
+HELD_BYTES = 32 * MEBIBYTE
+"""Of a log that is held in memory as a whole: a flight of half an hour."""
+UNPACKED_BYTES, UNPACKED_RATIO = 256 * MEBIBYTE, 32
+"""Laser scans pack 5:1, costmaps 30:1 and more, but no log is mostly empty costmaps."""
+CHUNK_BYTES = 128 * MEBIBYTE
+"""Recorders write chunks of 1 to 10 MB; the largest single messages are point clouds of some 50 MB."""
+
+MESSAGES, BYTES_A_MESSAGE = 1_000_000, 8
+"""A message takes far more bytes, packed or not."""
+ELEMENTS = 100_000
+"""Of a list of messages inside a message: diagnostics and goal lists hold hundreds."""
+FIELDS = 5_000
+"""Of a message, its parts' included: the largest of the ROS distributions has below 1000."""
+DEFINITION_BYTES = MEBIBYTE
+TOPIC_DEFINITIONS = 500
+"""Different ones that are compiled for one reading; a robot publishes some 100 types."""
+
+TEXT_MESSAGE_TYPES = 1_000
+"""A DataFlash log numbers its types by one byte."""
+
+YAML_BYTES = 16 * MEBIBYTE
+YAML_DEPTH = 64
+YAML_NODES = 200_000
+"""With every alias counted as what it stands for."""
+INTEGER_DIGITS = 300
+"""No more fit into a float."""
+
+MODEL_BYTES = 64 * MEBIBYTE
+"""Of a profile's arrays; the bundled ones stay below 3 MB."""
+
+
+def unpacked_bytes(packed: int) -> int:
+    """The most bytes that a file or stream of `packed` bytes may unpack to, all its chunks together."""
+    return UNPACKED_BYTES + UNPACKED_RATIO * packed
+
+
+def messages(size: int) -> int:
+    """The most messages, or elements of lists in messages, that a log of `size` bytes may hold."""
+    return MESSAGES + size // BYTES_A_MESSAGE
+
+
+def megabytes(size: int) -> str:
+    """A size as errors tell it."""
+    return f"{size / 1e6:.0f} MB"
