@@ -1,4 +1,7 @@
-"""In which order findings are told: the earliest before the impact that explains the later ones leads them."""
+"""In which order findings are told: the earliest before the impact that explains the later ones leads them.
+
+Severe before mild, likely before suspected, then in order of time.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +15,16 @@ Leads = Mapping[FindingKind, frozenset[FindingKind]]
 
 SLACK_S = 1.5
 """Onsets are told this exactly: a consequence may be seen so much before its cause is."""
+LIKELY = 0.5
+"""A finding at least this probable is told before suspicions of the same severity, and is no consequence of one."""
 _SEVERITY = {"critical": 0, "warning": 1, "info": 2}
 
 
 def told(findings: Iterable[Finding], leads: Leads, impact_s: float | None = None) -> tuple[Finding, ...]:
     """Findings in the order told: causes first, what each explains folded under it, what comes after the impact last.
 
-    A finding is explained by an earlier one that is as severe or worse and whose kind can lead to its kind, directly or
-    by others.
+    A finding is explained by one that is told before it and began before it, whose kind can lead to its kind, directly
+    or by others, and that is not much less sure: a part that surely failed is no consequence of a mere suspicion.
 
     Args:
         leads: which kind can bring about which.
@@ -37,12 +42,16 @@ def told(findings: Iterable[Finding], leads: Leads, impact_s: float | None = Non
     return tuple(replace(root, consequences=tuple(sorted(below, key=lambda f: f.onset_s))) for root, below in roots)
 
 
-def _by_cause(finding: Finding) -> tuple[bool, int, float]:
-    return finding.after_impact, _SEVERITY[finding.severity], finding.onset_s
+def _by_cause(finding: Finding) -> tuple[bool, int, bool, float]:
+    return finding.after_impact, _SEVERITY[finding.severity], finding.probability < LIKELY, finding.onset_s
 
 
 def _explains(cause: Finding, finding: Finding, reach: Leads) -> bool:
-    return finding.kind in reach.get(cause.kind, frozenset()) and cause.onset_s <= finding.onset_s + SLACK_S
+    return (
+        finding.kind in reach.get(cause.kind, frozenset())
+        and cause.onset_s <= finding.onset_s + SLACK_S
+        and (cause.probability >= LIKELY or finding.probability < LIKELY)
+    )
 
 
 def _closure(leads: Leads) -> dict[FindingKind, frozenset[FindingKind]]:

@@ -1,0 +1,108 @@
+"""Attitude: it does not follow its demand, it oscillates, and control that was lost.
+
+ArduPilot's crash check calls 30 degrees off the demand a loss of control (crash_check.cpp); in good flights roll and
+pitch follow within a few degrees (ArduPilot, Diagnosing problems using logs: "mechanical failure"). The lean error of
+97.5 % of the healthy training flights is below 6 degrees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.health.ardupilot.flight import Flight
+from care_core.health.ardupilot.measure import lasting, smooth, top
+from care_core.health.records import Finding, Severity
+from care_core.logs.base import Wanted
+
+READS: Wanted = {
+    "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
+    "RATE": ("R", "P", "RDes", "PDes"),
+}
+
+FAR_DEG, YAW_DEG = 15.0, 45.0
+_LASTS_S, _YAW_LASTS_S = 1.0, 3.0
+SWING_DPS, OVER_DEMAND = 30.0, 3.0
+"""degrees/s; how many times the demand's own movement."""
+_SWING_S = 5.0
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """Swings of the rates first: then the attitude's error is theirs."""
+    if not flight.is_copter:
+        return
+    swings = list(_swings(flight))
+    yield from swings
+    if flight.lost_control_s is not None:
+        yield from _lost(flight, flight.lost_control_s)
+    elif not swings:
+        yield from _far(flight)
+    yield from _yaw(flight)
+
+
+def _lost(flight: Flight, lost: float) -> Iterator[Finding]:
+    error = flight.lean_error
+    if error is None:
+        return
+    after = error[1][(error[0] >= lost) & (error[0] <= lost + 5)]
+    yield Finding(
+        "attitude", "control was lost", lost, flight.impact_s or flight.end_s, "critical",
+        f"the attitude is up to {float(np.max(after)):.0f} degrees off its demand and does not come back",
+        "ATT; 30 degrees: ArduCopter's crash check", probability=0.3,
+    )  # fmt: skip
+
+
+def _far(flight: Flight) -> Iterator[Finding]:
+    if flight.lean_error is None:
+        return
+    t, error = flight.lean_error
+    spans = lasting(t, (error > FAR_DEG) & flight.during(flight.flown, t), _LASTS_S)
+    if spans:
+        worst = top(error[(t >= spans[0][0]) & (t <= spans[-1][1])], 0.9)
+        severity: Severity = "critical" if flight.impact_s is not None else "warning"
+        yield Finding(
+            "attitude", "the attitude does not follow its demand", spans[0][0], spans[-1][1], severity,
+            f"roll and pitch are up to {worst:.0f} degrees off (limit {FAR_DEG:g})",
+            "ATT against DesRoll, DesPitch", probability=0.25, suspect="parameter",
+        )  # fmt: skip
+
+
+def _yaw(flight: Flight) -> Iterator[Finding]:
+    table = flight.one("ATT", "Yaw", "DesYaw")
+    if table is None or flight.lost_control_s is not None or not np.ptp(table["DesYaw"]):
+        return
+    off = np.abs((table["Yaw"] - table["DesYaw"] + 180) % 360 - 180)
+    spans = lasting(table.t, (off > YAW_DEG) & flight.during(flight.flown, table.t), _YAW_LASTS_S)
+    if spans:
+        yield Finding(
+            "attitude", "the heading does not follow its demand", spans[0][0], spans[-1][1], "warning",
+            f"up to {top(off[flight.during(spans, table.t)]):.0f} degrees off (limit {YAW_DEG:g})",
+            "ATT.Yaw against DesYaw", probability=0.25,
+        )  # fmt: skip
+
+
+def _swings(flight: Flight) -> Iterator[Finding]:
+    """Rates that swing far more than is asked for: gains too high, or filters too slow."""
+    table = flight.one("RATE", "R", "P", "RDes", "PDes")
+    if table is None:
+        return
+    t = table.t
+    flown = flight.during(flight.flown, t)
+    if flown.sum() < 20:
+        return
+    for axis, wanted, name in (("R", "RDes", "roll"), ("P", "PDes", "pitch")):
+        swing, asked = np.abs(table[axis] - table[wanted]), np.abs(table[wanted])
+        level, demand = smooth(t, swing, 3.0), smooth(t, asked, 3.0)
+        spans = lasting(t, flown & (level > SWING_DPS) & (level > OVER_DEMAND * demand), _SWING_S)
+        turns = np.diff(np.sign((table[axis] - table[wanted])[flight.during(spans, t)]))
+        if spans and float((turns != 0).mean()) > 0.15:
+            peak = top(level[flight.during(spans, t)], 0.9)
+            severity: Severity = "critical" if flight.lost_control_s is not None else "warning"
+            yield Finding(
+                "tuning", f"{name} oscillates", spans[0][0], spans[-1][1], severity,
+                f"the {name} rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
+                f"{OVER_DEMAND:g} times what is asked)",
+                "RATE against its demand", suspect="parameter", probability=0.2,
+            )  # fmt: skip
+            return

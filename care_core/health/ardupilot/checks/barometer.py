@@ -1,0 +1,97 @@
+"""Barometers: noisy, drifting from GPS or range finder, at odds with each other.
+
+The firmware refuses arming where the height of the barometer and of the estimator are 1 m apart (Copter AP_Arming:
+"Altitude disparity", PREARM_MAX_ALT_DISPARITY_CM). Good barometers resolve 0.1 to 0.2 m; GPS heights wander by some
+metres in minutes, 10 m is far. On the training table healthy barometers differ by at most 0.24 m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.health.ardupilot.flight import Flight
+from care_core.health.ardupilot.measure import Calibration, aligned, lasting, likely, roughness, smooth
+from care_core.health.ardupilot.signals import Floats
+from care_core.health.records import Finding, Severity
+from care_core.logs.base import Table, Wanted
+
+READS: Wanted = {
+    "BARO": ("Alt", "Health"),
+    "GPS": ("Status", "Alt", "NSats"),
+    "RFND": ("Dist", "Stat"),
+    "CTUN": ("Alt", "BAlt", "SAlt"),
+}
+
+APART_M = 3.0
+"""Between two barometers; three times what arming allows between barometer and estimator."""
+DRIFT_M = 10.0
+NOISE_M = 0.5
+"""Standard deviation from record to record: three times what a barometer resolves."""
+_GOOD_SATS = 8
+_LASTS_S = 5.0
+_CALIBRATION: Calibration = ((1.0, 0.8), (2.0, 0.97))
+"""By the largest of the three over its limit; on the training table only flights with a failing barometer exceed one
+(17 of 17, no healthy one)."""
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """A barometer that is not to be believed."""
+    baros = [table.where(flight.watch(table.t)) for table in flight.all("BARO", "Alt")]
+    baros = [table for table in baros if len(table) >= 5 and np.ptp(table["Alt"]) > 0]
+    if not baros:
+        return
+    first = baros[0]
+    t, height = first.t, first["Alt"]
+    tests: list[tuple[Floats, str]] = [(_noise(flight, t, height) / NOISE_M, "jumps by {:.1f} m from record to record")]
+    for other in baros[1:]:
+        apart = height - aligned(t, other.t, other["Alt"])
+        apart -= np.median(apart[: max(len(t) // 20, 3)])
+        tests.append((np.abs(smooth(t, apart, 3.0)) / APART_M, "is {:.1f} m off the second barometer"))
+    drift = _drift(flight, first)
+    if drift is not None:
+        tests.append((np.abs(drift) / DRIFT_M, "drifts {:.0f} m from the GPS height"))
+    limits = [NOISE_M, *[APART_M] * (len(baros) - 1), DRIFT_M]
+    broken = [
+        (spans, over, words, limit)
+        for (over, words), limit in zip(tests, limits, strict=False)
+        if (spans := lasting(t, over > 1.0, _LASTS_S, gap_s=5.0))
+    ]
+    if not broken:
+        return
+    start = min(spans[0][0] for spans, *_ in broken)
+    end = max(spans[-1][1] for spans, *_ in broken)
+    peaks = [float(np.quantile(over[(t >= spans[0][0]) & (t <= spans[-1][1])], 0.9)) for spans, over, *_ in broken]
+    said = "; ".join(
+        f"{words.format(peak * limit)} (limit {limit:g} m)"
+        for peak, (_, _, words, limit) in zip(peaks, broken, strict=True)
+    )
+    yield Finding(
+        "barometer", "the barometer is noisy or drifts", start, end, _severity(flight, start, max(peaks)),
+        f"it {said}", "BARO.Alt against its neighbours, BARO of the second, GPS.Alt; Copter's pre-arm check allows 1 m",
+        probability=likely(max(peaks), _CALIBRATION),
+    )  # fmt: skip
+
+
+def _noise(flight: Flight, t: Floats, height: Floats) -> Floats:
+    """Roughness of the height beside what the vehicle's own estimate explains, shape of `height`."""
+    moved = np.interp(t, *flight.height) if flight.height is not None else np.zeros(len(t))
+    return np.minimum(smooth(t, roughness(height - moved), 10.0), smooth(t, roughness(height), 10.0))
+
+
+def _drift(flight: Flight, first: Table) -> Floats | None:
+    """Metres between barometer and GPS, from where they began; None where the GPS is too poor to say."""
+    gps = flight.one("GPS", "Status", "Alt", "NSats")
+    if gps is None:
+        return None
+    good = gps.where((gps["Status"] >= 3) & (gps["NSats"] >= _GOOD_SATS) & flight.watch(gps.t))
+    if len(good) < 10:
+        return None
+    apart = first["Alt"] - aligned(first.t, good.t, good["Alt"])
+    return smooth(first.t, apart - np.median(apart[: max(len(apart) // 20, 3)]), 5.0)
+
+
+def _severity(flight: Flight, start: float, over: float) -> Severity:
+    """Critical far out of limits in the air: the vehicle holds its height by it."""
+    return "critical" if over > 2.0 and any(end > start for _, end in flight.flown) else "warning"

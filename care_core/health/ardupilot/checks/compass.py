@@ -1,0 +1,196 @@
+"""Compasses: dead, at odds with each other, disturbed by the motors' currents, at odds with the estimator.
+
+Limits: two compasses may differ by 200 mGauss in the level plane (AP_Compass.h: AP_COMPASS_MAX_XY_LENGTH_DIFF) and 90
+degrees (AP_COMPASS_MAX_XYZ_ANG_DIFF); of the field's length 30 % may come from the motors, 60 % are too much
+(ArduPilot, Compass setup: below 30 % is good, 30 to 60 % a grey area); a length is plausible between 185 and 875 mGauss
+(AP_Arming). On the training table healthy compasses agree to a mGauss: those of a simulator are alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.health.ardupilot.flight import Flight, Mask
+from care_core.health.ardupilot.measure import Calibration, aligned, lasting, length, likely, smooth
+from care_core.health.ardupilot.signals import Floats
+from care_core.health.records import Finding, Severity
+from care_core.logs.base import Table, Wanted
+
+AXES = ("MagX", "MagY", "MagZ")
+READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",), "XKF3": ("IYAW",)}
+
+APART = 200.0
+MOVED = 100.0
+"""mGauss by which the difference of two compasses may change in flight: half of what arming allows."""
+GREY, TOO_MUCH = 0.3, 0.6
+_SHORTEST, _LONGEST = 185.0, 875.0
+_LASTS_S = 3.0
+_EKF_YAW_RESET = 62
+_CALIBRATION: Calibration = ((1.0, 0.8), (1.5, 0.95), (3.0, 0.98))
+"""By millligauss over the limit; on the training table all flights over it have a failing compass, and no other."""
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """What is wrong with the compasses while they matter: the first of these that shows."""
+    compasses = [table.where(flight.watch(table.t)) for table in flight.all("MAG", *AXES)]
+    compasses = [table for table in compasses if len(table) >= 3]
+    if not compasses or flight.setting("COMPASS_ENABLE", "MAG_ENABLE") == 0:
+        return
+    for test in (_dead, _apart, _refused, _by_motors, _implausible):
+        found = next(iter(test(flight, compasses)), None)
+        if found is not None:
+            yield found
+            return
+    yield from _doubted(flight)
+
+
+def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
+    """The first compass, which is the one in use, gives nothing or always the same."""
+    first = compasses[0]
+    strength = length(first[axis] for axis in AXES)
+    silent = ~(strength > 1.0)
+    if "Health" in first.columns:
+        silent |= first["Health"] == 0
+    spans = lasting(first.t, silent, 0.5)
+    if (spans and not silent.all()) or (spans and flight.armed):
+        broken = _nan_compensation(flight)
+        yield Finding(
+            "compass", "the compass reads nothing", spans[0][0], spans[-1][1], "critical",
+            "the field of compass 1 is zero or marked unhealthy" + (f"; {broken} is not a number" if broken else ""),
+            "MAG", suspect="parameter" if broken else "hardware", probability=0.95,
+        )  # fmt: skip
+
+
+def _nan_compensation(flight: Flight) -> str:
+    """A compensation parameter that is no number, which makes every field one."""
+    for name in ("COMPASS_MOT_X", "COMPASS_MOT_Y", "COMPASS_MOT_Z", "COMPASS_OFS_X", "COMPASS_OFS_Y", "COMPASS_OFS_Z"):
+        values = flight.settings.get(name, ())
+        if any(isinstance(one.value, float) and not np.isfinite(one.value) for one in values):
+            return name
+    return ""
+
+
+def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
+    """Two compasses whose difference exceeds what arming allows, or moves in flight."""
+    for n, other in enumerate(compasses[1:], start=2):
+        t = compasses[0].t
+        apart = np.stack([compasses[0][axis] - aligned(t, other.t, other[axis]) for axis in AXES])
+        if not np.isfinite(apart).all(axis=0).any():
+            continue
+        early = np.median(apart[:, : max(len(t) // 10, 3)], axis=1)
+        moved = smooth(t, length(apart - early[:, None]), 2.0)
+        level = smooth(t, np.hypot(apart[0], apart[1]), 2.0)
+        over = np.maximum(level / APART, moved / MOVED)
+        spans = lasting(t, over > 1.0, _LASTS_S)
+        if not spans:
+            continue
+        start, end = spans[0][0], spans[-1][1]
+        inside = (t >= start) & (t <= end)
+        size, ratio = float(np.median(length(apart)[inside])), float(np.median(over[inside]))
+        worse = _odd_one(compasses, n)
+        yield Finding(
+            "compass", f"compass {worse} is disturbed", start, end, _gravity(flight, start, worse == 1),
+            f"compasses 1 and {n} differ by {size:.0f} mGauss (limit {APART:.0f}, in flight a change of {MOVED:.0f})",
+            "MAG, MAG2; AP_COMPASS_MAX_XY_LENGTH_DIFF 200 mGauss", probability=likely(ratio, _CALIBRATION),
+        )  # fmt: skip
+
+
+def _odd_one(compasses: list[Table], other: int) -> int:
+    """Which of compass 1 and another is the bad one: the third agrees with the good one, else the unsteadier length."""
+    t = compasses[0].t
+    rest = [n for n in range(2, len(compasses) + 1) if n != other]
+    if rest:
+        third = compasses[rest[0] - 1]
+
+        def from_third(table: Table) -> float:
+            gaps = (aligned(t, table.t, table[axis]) - aligned(t, third.t, third[axis]) for axis in AXES)
+            return float(np.nanmedian(length(gaps)))
+
+        return 1 if from_third(compasses[0]) >= from_third(compasses[other - 1]) else other
+    spread = [float(np.nanstd(length(table[axis] for axis in AXES))) for table in (compasses[0], compasses[other - 1])]
+    return 1 if spread[0] >= spread[1] else other
+
+
+def _gravity(flight: Flight, start: float, is_used: bool) -> Severity:
+    """Critical where the compass in use is the bad one and the estimator's yaw suffered."""
+    return "critical" if is_used and (_rejected(flight, start) or flight.was_refused) else "warning"
+
+
+def _rejected(flight: Flight, start: float) -> bool:
+    return any(
+        bool(lasting(one.t, (one["SM"] > 1.0) & (one.t >= start - 1) & flight.watch(one.t), 1.0))
+        for one in flight.all("XKF4", "SM")
+    )
+
+
+def _refused(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
+    """The firmware refused arming for a compass: it knows what the Earth's field should be there."""
+    begin = flight.refused_for("mag field", "compass", "mag anomaly")
+    if begin is not None:
+        said = next(text for t, text in flight.messages if t == begin)
+        yield Finding(
+            "compass", "the firmware finds the compass wrong", begin, flight.end_s, "critical", said,
+            "MSG; AP_Arming's compass checks", probability=0.7,
+        )  # fmt: skip
+
+
+def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
+    """A field whose length follows the throttle."""
+    if flight.throttle is None:
+        return
+    first = compasses[0]
+    strength = length(first[axis] for axis in AXES)
+    throttle = np.interp(first.t, *flight.throttle)
+    usable: Mask = np.isfinite(strength) & (strength > 1.0)
+    if usable.sum() < 20 or np.ptp(throttle[usable]) < 0.15:
+        return
+    x, y = throttle[usable], strength[usable]
+    base, slope = _line(x, y)
+    with np.errstate(invalid="ignore"):
+        match = float(np.corrcoef(x, y)[0, 1])
+    share = abs(slope) * float(np.quantile(x, 0.95)) / max(base, 1.0)
+    if share > GREY and abs(match) > 0.6:
+        yield Finding(
+            "compass", "the motors' currents disturb the compass", float(first.t[usable][0]), float(first.t[-1]),
+            "critical" if share > TOO_MUCH and _rejected(flight, 0.0) else "warning",
+            f"the field changes by {100 * share:.0f} % with the throttle (correlation {match:.2f}; limit 30 %, above "
+            "60 % it is unusable)",
+            "MAG against CTUN.ThO; ArduPilot, Compass setup", probability=0.7 if share > TOO_MUCH else 0.5,
+        )  # fmt: skip
+
+
+def _line(x: Floats, y: Floats) -> tuple[float, float]:
+    """Intercept and slope of a straight line."""
+    slope = float(np.cov(x, y)[0, 1] / max(float(np.var(x, ddof=1)), 1e-12))
+    return float(y.mean() - slope * x.mean()), slope
+
+
+def _implausible(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
+    """A field that the Earth does not have."""
+    first = compasses[0]
+    strength = smooth(first.t, length(first[axis] for axis in AXES), 2.0)
+    spans = lasting(first.t, (strength < _SHORTEST) | (strength > _LONGEST), _LASTS_S)
+    if spans:
+        worst = strength[(first.t >= spans[0][0]) & (first.t <= spans[-1][1])]
+        yield Finding(
+            "compass", "the magnetic field is implausible", spans[0][0], spans[-1][1],
+            "critical" if _rejected(flight, spans[0][0]) else "warning",
+            f"length between {worst.min():.0f} and {worst.max():.0f} mGauss (plausible: {_SHORTEST:.0f} to "
+            f"{_LONGEST:.0f})",
+            "MAG; AP_Arming's limits of the field", probability=0.5,
+        )  # fmt: skip
+
+
+def _doubted(flight: Flight) -> Iterator[Finding]:
+    """The estimator found the compass wrong in the air, though the compass alone shows nothing."""
+    for one in flight.all("XKF4", "SM"):
+        spans = lasting(one.t, (one["SM"] > 1.0) & flight.during(flight.flown, one.t), 3.0)
+        if spans:
+            yield Finding(
+                "compass", "the estimator rejects the compass", spans[0][0], spans[-1][1], "warning",
+                f"test ratio {np.max(one['SM'][flight.watch(one.t)]):.1f} (limit 1)",
+                "XKF4.SM; 1 is the limit of its innovation test", probability=0.35,
+            )  # fmt: skip
+            return

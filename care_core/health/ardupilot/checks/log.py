@@ -1,0 +1,56 @@
+"""The log itself: holes in it, and an end in the air."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.health.ardupilot.flight import Flight
+from care_core.health.records import Finding
+from care_core.logs.base import Wanted
+
+READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "BAT": ("Volt",)}
+
+_STEADY = ("ATT", "RCOU", "CTUN", "IMU")
+_HOLE_S, _TIMES = 2.0, 20.0
+_HIGH_M = 2.0
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """Holes in all of the steady messages at once, and a log that ends before the landing."""
+    yield from _holes(flight)
+    yield from _ends_in_the_air(flight)
+
+
+def _holes(flight: Flight) -> Iterator[Finding]:
+    streams = [table.t for name in _STEADY if (table := flight.one(name)) is not None and len(table) > 20]
+    if not streams:
+        return
+    t = np.sort(np.concatenate(streams))
+    steps = np.diff(t)
+    limit = max(_HOLE_S, _TIMES * float(np.median(np.diff(streams[0]))))
+    armed = flight.during(flight.armed, t[:-1]) & flight.during(flight.armed, t[1:])
+    holes = np.flatnonzero((steps > limit) & armed)
+    if len(holes):
+        total = float(steps[holes].sum())
+        yield Finding(
+            "log", f"the log has {len(holes)} hole{'s' * (len(holes) > 1)}", float(t[holes[0]]),
+            float(t[holes[-1] + 1]), "warning", f"{total:.1f} s without any record (limit {limit:.0f} s)",
+            "times of ATT, RCOU, CTUN, IMU", probability=0.3,
+        )  # fmt: skip
+
+
+def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
+    """Armed and lifting at the last record: power was lost, or the recording was stopped."""
+    if not flight.armed or flight.armed[-1][1] < flight.end_s or flight.impact_s is not None:
+        return
+    high = flight.height is not None and float(np.median(flight.height[1][-3:])) > _HIGH_M
+    up = flight.throttle is not None and float(np.median(flight.throttle[1][-3:])) > 0.2
+    if flight.is_copter and high and (up or flight.throttle is None):
+        height = f" {float(np.median(flight.height[1][-3:])):.0f} m up" if flight.height is not None else ""
+        yield Finding(
+            "log", "the log ends in the air", flight.end_s, flight.end_s, "warning",
+            f"armed{height} at the last record: power was lost or the recording was stopped", "EV, ARM, CTUN, POS",
+            probability=0.4,
+        )  # fmt: skip

@@ -1,0 +1,260 @@
+"""Loss of a motor, its controller or its propeller: which, from what the outputs ask of each.
+
+In level flight all motors share the load. One that gives less thrust is asked for more, alone, until it is at its
+limit; then the vehicle tips towards it although it is asked for all that it has. The firmware's own check says so after
+a second (thrust_loss_check of crash_check.cpp), and a controller with telemetry shows it in its speed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.health.ardupilot.flight import Flight, Mask
+from care_core.health.ardupilot.measure import Calibration, lasting, likely, smooth
+from care_core.health.ardupilot.signals import Floats
+from care_core.health.records import Finding, Severity
+from care_core.logs.base import Wanted
+from care_core.vehicles import Motor, motors_of
+
+READS: Wanted = {
+    "RCOU": tuple(f"C{n}" for n in range(1, 15)),
+    "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
+    "ESC": ("RPM",),
+}
+
+ALONE = 0.08
+"""Share of an output's range by which one motor alone stands above the middle of its peers. 97.5 % of the healthy
+training flights stay below 0.03; a bent arm or a battery off the middle moves motors in pairs."""
+_NEXT = 0.6
+"""The next motor must stand below this share of that."""
+_ROOM, _ROOM_FLYING = 0.7, 0.85
+"""Peers above this share are near their limit themselves: then there is too little thrust, not one weak motor."""
+_STEADY = 2.0
+"""Least ratio of the excess to its own swings: all motors of a vehicle that oscillates are up in turn."""
+_STAYS = 0.7
+"""A weak motor stays weak: for so much of the flight that is left."""
+_LASTS_S = 4.0
+_TRYING_S = 20.0
+_LIFTING = 0.2
+_CALM_DEG, _CLEARLY = 12.0, 0.15
+_FALL_S = 1.2
+"""So long after control was lost the vehicle falls to the side that lost it, before it tumbles."""
+_AT_LIMIT = 0.97
+_CALIBRATION: Calibration = ((1.0, 0.8), (2.0, 0.96))
+"""By the excess over ALONE; on the training table 9 of 12 flights with one motor so far above the others, to stay, have
+a weak one, and the other three fail for another part's sake."""
+_ALWAYS: Calibration = ((1.0, 0.3), (2.0, 0.5))
+"""Of one that stood above the others from the start: a twisted arm or an uneven load looks the same."""
+_THRUST_LOSS = re.compile(r"Potential Thrust Loss \((\d+)\)")
+_SOURCE = "RCOU of each motor against the middle of the others"
+
+
+@dataclass(frozen=True, eq=False)
+class _Outputs:
+    """What the motors were asked for while lifting. `share` has shape (motors, n): 0 idle, 1 the most it may give."""
+
+    motors: tuple[Motor, ...]
+    t: Floats
+    share: NDArray[np.float64]
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """The motor that does not give what is asked of it, by the strongest evidence."""
+    outputs = _outputs(flight)
+    if outputs is None:
+        return
+    for test in (_stopped, _fell_towards, _weak, _told):
+        found = next(iter(test(flight, outputs)), None)
+        if found is not None:
+            yield found
+            return
+
+
+def _outputs(flight: Flight) -> _Outputs | None:
+    table = flight.one("RCOU")
+    if table is None or not flight.is_copter:
+        return None
+    motors = motors_of(flight.settings, flight.outputs) or _nameless(table.columns)
+    columns = [f"C{motor.output}" for motor in motors]
+    if len(columns) < 3 or not all(column in table.columns for column in columns):
+        return None
+    pwm = np.stack([table[column] for column in columns])
+    low, high = _range(flight, pwm)
+    if not np.isfinite(high - low) or high - low < 100:
+        return None
+    return _Outputs(motors, table.t, np.clip((pwm - low) / (high - low), 0.0, 1.0))
+
+
+def _nameless(columns: Mapping[str, Floats]) -> tuple[Motor, ...]:
+    """The motors of a frame that the parameters do not tell: outputs in use, of unknown place. The first four to eight
+    outputs move in flight, those of servos and unused ones do not."""
+    used = [n for n in range(1, 9) if (column := columns.get(f"C{n}")) is not None and np.ptp(column) > 100]
+    return tuple(Motor(n, n, 0.0, 0.0, 0.0, 0.0, "") for n in used) if len(used) >= 4 else ()
+
+
+def _range(flight: Flight, pwm: Floats) -> tuple[float, float]:
+    """Pulse widths (microseconds) of an idle output and of the most that one may be asked for."""
+    low = flight.setting("MOT_PWM_MIN") or flight.setting("RC3_MIN", "THR_MIN_PWM") or 1000.0
+    high = flight.setting("MOT_PWM_MAX") or flight.setting("RC3_MAX") or 2000.0
+    most = flight.setting("MOT_SPIN_MAX")
+    top = low + (high - low) * (most if most is not None and 0.5 < most <= 1.0 else 1.0)
+    seen = float(np.max(pwm)) if pwm.size else top
+    return low, min(top, max(seen, low + 0.6 * (high - low)))
+
+
+def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
+    """Rows in which the motors lift it, upright: in the air, or where it never left the ground the first seconds of
+    trying, before the integrators wind up."""
+    lifting = flight.watch(outputs.t) & (np.median(outputs.share, axis=0) > _LIFTING)
+    if flight.tilt is not None:
+        lifting &= np.interp(outputs.t, *flight.tilt) < 60.0
+    if flight.flown:
+        return lifting & flight.during(flight.flown, outputs.t)
+    return lifting & (outputs.t < outputs.t[lifting][0] + _TRYING_S) if lifting.any() else lifting
+
+
+def _excess(share: Floats) -> NDArray[np.float64]:
+    """How far each motor stands above the middle of the others, shape (motors, n)."""
+    everyone = np.arange(len(share))
+    return np.stack([share[n] - np.median(share[everyone != n], axis=0) for n in everyone])
+
+
+def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+    """One motor lastingly above all the others."""
+    lifting = _lifting(flight, outputs)
+    if lifting.sum() < 8:
+        return
+    t = outputs.t[lifting]
+    excess = np.stack([smooth(t, row, 4.0) for row in _excess(outputs.share[:, lifting])])
+    order = np.sort(excess, axis=0)
+    best: tuple[float, int, float, float] | None = None
+    for n, row in enumerate(excess):
+        alone = (row > ALONE) & (row >= order[-1] - 1e-9) & (order[-2] < _NEXT * row)
+        spans = lasting(t, alone, _LASTS_S, gap_s=3.0)
+        if not spans:
+            continue
+        since = outputs.share[:, lifting][:, t >= spans[0][0]]
+        asked = _excess(since)[n]
+        size = float(np.median(asked))
+        stays = float((row[t >= spans[0][0]] > ALONE / 2).mean()) > _STAYS
+        steady = size > max(0.7 * ALONE, _STEADY * float(np.std(asked)))
+        has_room = float(np.median(np.delete(since, n, axis=0))) < (_ROOM_FLYING if flight.flown else _ROOM)
+        if stays and steady and has_room and (best is None or size > best[0]):
+            best = (size, n, spans[0][0], spans[-1][1])
+    if best is None:
+        return
+    size, n, start, end = best
+    share = outputs.share[:, lifting][:, t >= start]
+    limit = float((share[n] > _AT_LIMIT).mean())
+    before = excess[n][t < start - 2.0]
+    changed = len(before) >= 5 and float(np.median(before)) < size / 3
+    over = size / ALONE
+    yield _finding(
+        outputs.motors[n], "lost thrust" if changed or over > 2 else "works harder than the others", start, end,
+        _severity(flight, limit, size) if changed or over > 2 else "warning",
+        f"it is asked for {100 * np.median(share[n]):.0f} % where the others are at "
+        f"{100 * np.median(np.delete(share, n, axis=0)):.0f} % (limit: {100 * ALONE:.0f} points above them)"
+        + ("; before, they were even" if changed else "")
+        + (f"; at its limit {100 * limit:.0f} % of the time" if limit > 0.05 else ""),
+        _SOURCE, likely(over, _CALIBRATION if changed or over > 2 else _ALWAYS),
+    )  # fmt: skip
+
+
+def _severity(flight: Flight, limit: float, size: float) -> Severity:
+    """Critical where it has nothing left to give, or where control was lost after it."""
+    lost = flight.lost_control_s is not None or flight.impact_s is not None
+    return "critical" if lost or limit > 0.2 or size > 4 * ALONE else "warning"
+
+
+def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+    """Control was lost towards a motor that was asked for more than the others, at or near its limit."""
+    lost = flight.lost_control_s
+    table = flight.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+    if lost is None or table is None or not flight.airborne or not _was_calm(flight, lost):
+        return
+    rows = (table.t >= lost - 0.3) & (table.t <= lost + _FALL_S)
+    if not rows.any():
+        return
+    roll = float(np.mean((table["Roll"] - table["DesRoll"])[rows]))
+    pitch = float(np.mean((table["Pitch"] - table["DesPitch"])[rows]))
+    if np.hypot(roll, pitch) < 10.0:
+        return
+    asked = (outputs.t >= lost - 0.2) & (outputs.t <= lost + 0.8)
+    if asked.sum() < 3:
+        asked = (outputs.t >= lost - 3.0) & (outputs.t <= lost + 2.0)
+    if not asked.any():
+        return
+    share = np.median(outputs.share[:, asked], axis=1)
+    # A motor pushes its own corner up: where it gives nothing, that corner goes down.
+    towards = np.array([-(motor.roll * roll + motor.pitch * pitch) for motor in outputs.motors]) / np.hypot(roll, pitch)
+    score = np.where(towards > 0.15, share, -1.0)
+    n = int(np.argmax(score + 0.2 * towards))
+    others = np.delete(share, n)
+    if score[n] < 0.6 or share[n] - float(np.median(others)) < _CLEARLY:
+        return
+    most = np.argmax(outputs.share[:, asked], axis=0) == n
+    if most.mean() < 0.6:  # asked for in turn with others: an oscillation
+        return
+    begin = outputs.t[(outputs.share[n] > _AT_LIMIT) & (outputs.t > lost - 2.0) & (outputs.t <= lost + 1.0)]
+    yield _finding(
+        outputs.motors[n], "gave no thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0, "critical",
+        f"asked for {100 * share[n]:.0f} % (others {100 * np.median(others):.0f} %), yet the vehicle fell towards it: "
+        f"{roll:+.0f} degrees of roll and {pitch:+.0f} of pitch off the demand",
+        f"{_SOURCE}, and ATT", 0.85 if asked.sum() > 3 else 0.6,
+    )  # fmt: skip
+
+
+def _was_calm(flight: Flight, lost: float) -> bool:
+    """Whether the attitude was followed until shortly before: what oscillates or drifts off lost no motor."""
+    error = flight.lean_error
+    if error is None:
+        return False
+    before = error[1][(error[0] >= lost - 6.0) & (error[0] <= lost - 0.6)]
+    return len(before) < 2 or float(np.quantile(before, 0.8)) < _CALM_DEG
+
+
+def _told(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+    """The firmware's thrust loss check, which names the motor."""
+    for t, text in flight.messages:
+        match = _THRUST_LOSS.search(text)
+        if match and any(start <= t <= end for start, end in flight.armed):
+            motor = next((one for one in outputs.motors if one.number == int(match[1])), None)
+            near = np.abs(outputs.t - t) < 5.0
+            excess = _excess(outputs.share[:, near])[outputs.motors.index(motor)] if motor is not None else np.empty(0)
+            crowded = float(np.median(outputs.share[:, near])) > _ROOM if near.any() else True
+            if motor is not None and not crowded and float(np.median(excess)) > ALONE:
+                severity: Severity = "critical" if flight.impact_s is not None else "warning"
+                yield _finding(motor, "lost thrust", t, flight.end_s, severity, f"the firmware says: {text}",
+                               "MSG; thrust_loss_check of ArduCopter", 0.2)  # fmt: skip
+                return
+
+
+def _stopped(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+    """A speed controller that reports no rotation while the others turn."""
+    speeds = flight.all("ESC", "RPM")
+    if len(speeds) < 3:
+        return
+    t = speeds[0].t
+    rpm = np.stack([np.interp(t, one.t, one["RPM"]) for one in speeds])
+    usual = np.median(rpm, axis=0)
+    for n, row in enumerate(rpm):
+        spans = lasting(t, (row < 0.3 * usual) & (usual > 1000) & flight.watch(t), 0.5)
+        if spans and n < len(outputs.motors):
+            yield _finding(outputs.motors[n], "stopped", spans[0][0], spans[-1][1], "critical",
+                           f"its controller reports {np.median(row[t >= spans[0][0]]):.0f} turns a minute, the others "
+                           f"{np.median(usual):.0f}", "ESC.RPM", 0.95)  # fmt: skip
+            return
+
+
+def _finding(
+    motor: Motor, what: str, start: float, end: float, severity: Severity, evidence: str, source: str,
+    probability: float,
+) -> Finding:  # fmt: skip
+    place = f" ({motor.place})" if motor.place else ""
+    title = f"motor {motor.number}{place} {what}"
+    return Finding("motor", title, start, max(end, start), severity, evidence, source, probability=probability)

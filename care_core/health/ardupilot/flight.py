@@ -1,0 +1,385 @@
+"""When a vehicle was armed, in the air and out of control: what every check of ArduPilot logs stands on.
+
+Nothing here needs a message at a rate: logs come thinned to one record in two seconds, and at 400 Hz. What a log does
+not hold is None or empty, and the checks that need it find nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.health.ardupilot.signals import Floats, instances
+from care_core.logs.base import Table, Wanted
+from care_core.run import Setting
+from care_core.vehicles import Vehicle, vehicle_of
+
+Mask = NDArray[np.bool_]
+Span = tuple[float, float]
+_T = TypeVar("_T")
+
+READS: Wanted = {
+    "ARM": ("ArmState", "Forced"),
+    "EV": ("Id",),
+    "ERR": ("Subsys", "ECode"),
+    "MODE": ("ModeNum",),
+    "MSG": ("Message",),
+    "CTUN": ("ThO", "ThI", "Alt", "BAlt", "DAlt", "SAlt", "CRt", "DCRt", "ThH"),
+    "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
+    "POS": ("Lat", "Lng", "RelHomeAlt"),
+    "RCOU": tuple(f"C{n}" for n in range(1, 15)),
+    "IMU": ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ"),
+}
+"""What the course of a flight is told by."""
+
+_EV_ARMED, _EV_DISARMED, _EV_NOT_LANDED, _EV_LANDED = 10, 11, 28, 18
+_ERR_CRASH = 12
+_CRASH_CHECK_S = 2.0
+"""The firmware says "crash" when control was lost for this long (crash_check.cpp: CRASH_CHECK_TRIGGER_SEC)."""
+_OUT_OF_CONTROL_DEG = 30.0
+"""Lean error of the firmware's crash check (crash_check.cpp: CRASH_CHECK_ANGLE_DEVIATION_DEG)."""
+_HELD_DEG, _BACK_S = 15.0, 5.0
+"""Within this of its demand for so long in the air, it had come back."""
+_OVER_DEG = 70.0
+"""No copter leans this far in any mode but acro, sport and flip: ANGLE_MAX is at most 80, 30 to 45 as shipped."""
+_LIFTING = 0.2
+"""Throttle above which a copter is about to lift; MOT_SPIN_MIN and what armed motors idle at is below."""
+_AIRBORNE_M = 1.0
+_REFUSED_S = 30.0
+"""The firmware repeats its complaints at least as often (AP_Arming: every 30 s)."""
+_GROUND_M = 2.0
+_SHOCK = 30.0
+"""m/s^2: three times gravity is no flight."""
+_ACRO = frozenset((1, 13, 14))
+"""Copter modes in which any attitude is meant: acro, sport, flip."""
+_NOMINAL_HZ: Mapping[str, float] = {"ATT": 10.0, "CTUN": 10.0, "MOT": 10.0, "CURR": 1.0, "PM": 0.1}
+"""Rate at which firmware before 3.1 wrote messages that carried no time (Copter log docs: "medium" is 10 Hz)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """One log. Times are seconds since its start; spans are (start, end)."""
+
+    tables: Mapping[str, Table]
+    settings: Mapping[str, tuple[Setting, ...]]
+    facts: Mapping[str, str]
+    end_s: float
+    _known: dict[str, tuple[Table, ...]] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        tables: Mapping[str, Table],
+        settings: Mapping[str, tuple[Setting, ...]],
+        facts: Mapping[str, str],
+        duration_s: float,
+    ) -> Flight:
+        """The flight of decoded tables. A log without any clock gets the rates at which its messages were written."""
+        if duration_s > 0 or not any(name in tables for name in _NOMINAL_HZ):
+            return cls(tables, settings, facts, duration_s)
+        timed = {
+            name: Table(np.arange(len(table)) / _NOMINAL_HZ[name], table.columns)
+            for name, table in tables.items()
+            if name in _NOMINAL_HZ
+        }
+        return cls(timed, settings, facts, max((float(t.t[-1]) for t in timed.values() if len(t)), default=0.0))
+
+    def all(self, name: str, *fields: str) -> tuple[Table, ...]:
+        """The instances of a message that have these fields."""
+        if name not in self._known:
+            self._known[name] = instances(self.tables, name)
+        return tuple(t for t in self._known[name] if len(t) and all(one in t.columns for one in fields))
+
+    def one(self, name: str, *fields: str) -> Table | None:
+        """The first instance of a message, None where the log lacks it or one of these fields."""
+        return next(iter(self.all(name, *fields)), None)
+
+    def setting(self, *names: str) -> float | None:
+        """The value of a parameter as first driven, by the first of its names that the log holds."""
+        for name in names:
+            values = self.settings.get(name)
+            if values and isinstance(values[0].value, (int, float)) and math.isfinite(values[0].value):
+                return float(values[0].value)
+        return None
+
+    @cached_property
+    def vehicle(self) -> Vehicle:
+        """What the log says that it is."""
+        return vehicle_of(self.facts, self.settings, self.outputs)
+
+    @cached_property
+    def outputs(self) -> int | None:
+        """How many motor outputs the log records, where it names them so (firmware before 3.2)."""
+        motors = self.tables.get("MOT")
+        return None if motors is None else sum(name.startswith("Mot") for name in motors.columns)
+
+    @property
+    def is_copter(self) -> bool:
+        """Whether rotors alone lift it; a log that does not say is told by what only copters have."""
+        kind = self.vehicle.kind
+        return kind in ("copter", "heli") or (kind == "unknown" and "MOT_THST_HOVER" in self.settings)
+
+    @cached_property
+    def messages(self) -> tuple[tuple[float, str], ...]:
+        """The vehicle's texts with their times."""
+        table = self.one("MSG", "Message")
+        return () if table is None else tuple(zip(table.t.tolist(), map(str, table["Message"].tolist()), strict=True))
+
+    def errors(self, subsystem: int) -> list[tuple[float, int]]:
+        """Times and codes of the ERR records of a subsystem."""
+        table = self.one("ERR", "Subsys", "ECode")
+        if table is None:
+            return []
+        own = table.where(table["Subsys"] == subsystem)
+        return list(zip(own.t.tolist(), own["ECode"].astype(int).tolist(), strict=True))
+
+    def events(self, *ids: int) -> list[float]:
+        """Times of the EV records with one of these numbers."""
+        table = self.one("EV", "Id")
+        return [] if table is None else table.t[np.isin(table["Id"], ids)].tolist()
+
+    @cached_property
+    def modes(self) -> tuple[tuple[float, int], ...]:
+        """When each mode was entered, by number."""
+        table = self.one("MODE", "ModeNum")
+        if table is None or table["ModeNum"].dtype == object:
+            return ()
+        return tuple(zip(table.t.tolist(), table["ModeNum"].astype(int).tolist(), strict=True))
+
+    def mode_at(self, t: float) -> int | None:
+        """The number of the mode at a time, None where the log does not say."""
+        before = [mode for at, mode in self.modes if at <= t]
+        return before[-1] if before else None
+
+    @cached_property
+    def armed(self) -> tuple[Span, ...]:
+        """Spans armed. A log whose first word is a disarming was armed from its start; one that tells of no arming
+        at all is taken as armed where its throttle is up."""
+        changes = self._arm_changes()
+        if not changes:
+            return self._driven()
+        spans: list[Span] = []
+        start: float | None = 0.0 if not changes[0][1] else None
+        for t, is_armed in changes:
+            if is_armed and start is None:
+                start = t
+            elif not is_armed and start is not None:
+                spans.append((start, t))
+                start = None
+        if start is not None:
+            spans.append((start, self.end_s))
+        return tuple(span for span in spans if span[1] > span[0])
+
+    def _arm_changes(self) -> list[tuple[float, bool]]:
+        table = self.one("ARM", "ArmState")
+        if table is not None:
+            return [(t, state > 0) for t, state in zip(table.t.tolist(), table["ArmState"].tolist(), strict=True)]
+        changes = [(t, True) for t in self.events(_EV_ARMED)] + [(t, False) for t in self.events(_EV_DISARMED)]
+        return sorted(changes)
+
+    def _driven(self) -> tuple[Span, ...]:
+        throttle = self.throttle
+        if throttle is None:
+            return ()
+        up = np.flatnonzero(throttle[1] > 0.05)
+        return ((float(throttle[0][up[0]]), float(throttle[0][up[-1]])),) if len(up) else ()
+
+    @cached_property
+    def throttle(self) -> tuple[Floats, Floats] | None:
+        """Time and throttle out (0 to 1) of the motors together."""
+        table = self.one("CTUN", "ThO")
+        return None if table is None else (table.t, table["ThO"])
+
+    @cached_property
+    def height(self) -> tuple[Floats, Floats] | None:
+        """Time and height (m) above where it was armed, as estimated by the vehicle."""
+        for name, column in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt")):
+            table = self.one(name, column)
+            if table is not None and len(table) > 1 and np.ptp(table[column]) > 0:
+                start = self.armed[0][0] if self.armed else 0.0
+                before = table[column][table.t <= start + 1.0]
+                zero = float(np.median(before[-20:])) if len(before) else float(table[column][0])
+                return table.t, table[column] - (zero if abs(zero) < 50 or name == "CTUN" else 0.0)
+        return None
+
+    @cached_property
+    def airborne(self) -> tuple[Span, ...]:
+        """Spans in the air: armed, and higher than a metre or lifted by more than half of what hovering takes."""
+        if not self.is_copter:
+            return self.armed
+        if self.throttle is None and self.height is None:
+            return ()
+        t = self.throttle[0] if self.throttle is not None else self.height[0]  # type: ignore[index]
+        up = np.zeros(len(t), dtype=bool)
+        if self.height is not None:
+            up |= np.interp(t, *self.height) > _AIRBORNE_M
+        if self.throttle is not None:
+            up &= self.throttle[1] > 0.02
+            if self.height is None:
+                up |= self.throttle[1] > 0.25
+        spans: list[Span] = []
+        for start, end in self.armed:
+            spans += runs(t, up & (t >= start) & (t <= end), gap_s=3.0)
+        return tuple((a, b) for a, b in spans if b - a >= 1.0)
+
+    def during(self, spans: Iterable[Span], t: Floats) -> Mask:
+        """Which of these times lie within one of the spans."""
+        inside = np.zeros(len(t), dtype=bool)
+        for start, end in spans:
+            inside |= (t >= start) & (t <= end)
+        return inside
+
+    @cached_property
+    def lean_error(self) -> tuple[Floats, Floats] | None:
+        """Time and angle (degrees) between the thrust direction wanted and the one there is."""
+        table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+        if table is None:
+            return None
+        has, wants = (_up(table[r], table[p]) for r, p in (("Roll", "Pitch"), ("DesRoll", "DesPitch")))
+        return table.t, np.degrees(np.arccos(np.clip((has * wants).sum(axis=0), -1.0, 1.0)))
+
+    @cached_property
+    def tilt(self) -> tuple[Floats, Floats] | None:
+        """Time and lean from level (degrees)."""
+        table = self.one("ATT", "Roll", "Pitch")
+        return None if table is None else (table.t, np.degrees(np.arccos(_up(table["Roll"], table["Pitch"])[2])))
+
+    @cached_property
+    def lost_control_s(self) -> float | None:
+        """When a copter in the air stopped following its attitude demand for good: it never came back within limits
+        before the end, the ground, or the disarming."""
+        if not self.is_copter or self.lean_error is None or self.tilt is None:
+            return None
+        t, error = self.lean_error
+        far = (error > _OUT_OF_CONTROL_DEG) | (self.tilt[1] > _OVER_DEG)
+        far &= self.during(self.armed, t)
+        if self.throttle is not None:
+            far &= np.interp(t, *self.throttle) > _LIFTING
+        if self.modes:
+            codes = np.array([mode for _, mode in self.modes])
+            at = np.searchsorted([s for s, _ in self.modes], t, side="right") - 1
+            far &= ~(np.isin(codes[np.maximum(at, 0)], tuple(_ACRO)) & (at >= 0))
+        up = self.airborne
+        far &= self.during(((start - 1.0, end) for start, end in up), t) | (t < (up[0][0] if up else math.inf))
+        held = (error < _HELD_DEG) & self.during(up, t)
+        for start, end in runs(t, far):
+            back = runs(t, held & (t > end), gap_s=0.5)
+            rest = held[(t > end) & self.during(up, t)]
+            went_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.3
+            came_back = went_on or any(b - a > _BACK_S for a, b in back)
+            if (end - start >= 0.5 or end >= t[-1] - 2.0) and not came_back:
+                return start
+        return None
+
+    @cached_property
+    def impact_s(self) -> float | None:
+        """When it hit something, or its firmware found it crashed; None where neither happened."""
+        crash = min((t for t, code in self.errors(_ERR_CRASH) if code > 0), default=None)
+        lost = self.lost_control_s
+        if crash is None and lost is None:
+            return None
+        first = lost if lost is not None and (crash is None or lost < crash) else crash
+        assert first is not None
+        candidates = [] if crash is None else [max(crash - _CRASH_CHECK_S, first)]
+        shock = self._shock_after(first)
+        if shock is not None:
+            candidates.append(shock)
+        ground = self._ground_after(first)
+        if ground is not None:
+            candidates.append(ground)
+        return min(candidates, default=None)
+
+    def _shock_after(self, first: float) -> float | None:
+        table = self.one("IMU", "AccX", "AccY", "AccZ")
+        if table is None:
+            return None
+        hit = (np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2) > _SHOCK) & (table.t >= first)
+        return float(table.t[hit][0]) if hit.any() else None
+
+    def _ground_after(self, first: float) -> float | None:
+        if self.height is None:
+            return None
+        t, height = self.height
+        low = (t >= first) & (height < _GROUND_M)
+        return float(t[low][0]) if low.any() else None
+
+    @cached_property
+    def was_refused(self) -> bool:
+        """Whether it never armed though that was asked for."""
+        return not self.armed and any(text.startswith(("Arm: ", "PreArm: ")) for _, text in self.messages)
+
+    def refused_for(self, *words: str) -> float | None:
+        """When arming was first refused with one of these words, where that still stood at the last refusal and it
+        never armed."""
+        if not self.was_refused:
+            return None
+        refusals = [(t, text) for t, text in self.messages if text.startswith(("Arm: ", "PreArm: "))]
+        named = [t for t, text in refusals if any(word in text.casefold() for word in words)]
+        return named[0] if named and named[-1] > refusals[-1][0] - _REFUSED_S else None
+
+    @cached_property
+    def watched(self) -> tuple[Span, ...]:
+        """Spans in which its sensors matter: armed and before it was lost; all of the log where arming was refused."""
+        if not self.armed:
+            return ((0.0, self.end_s),) if self.was_refused else ()
+        lost = min((t for t in (self.lost_control_s, self.impact_s) if t is not None), default=math.inf)
+        return tuple((start, min(end, lost)) for start, end in self.armed if start < lost)
+
+    def watch(self, t: Floats) -> Mask:
+        """Which of these times are watched."""
+        return self.during(self.watched, t)
+
+    @cached_property
+    def flown(self) -> tuple[Span, ...]:
+        """Spans in the air before it was lost."""
+        lost = min((t for t in (self.lost_control_s, self.impact_s) if t is not None), default=math.inf)
+        return tuple((start, min(end, lost)) for start, end in self.airborne if start < lost)
+
+    @cached_property
+    def hover(self) -> Mask | None:
+        """Rows of RCOU in steady flight: in the air, upright, under control, before anything was lost."""
+        table = self.one("RCOU", "C1")
+        if table is None:
+            return None
+        steady = self.during(self.airborne, table.t)
+        if self.tilt is not None:
+            steady &= np.interp(table.t, *self.tilt) < 25.0
+        if self.impact_s is not None:
+            steady &= table.t < self.impact_s
+        return steady
+
+
+def _up(roll: Floats, pitch: Floats) -> Floats:
+    """The thrust axis in a level frame that turns with the vehicle, shape (3, n)."""
+    r, p = np.radians(roll), np.radians(pitch)
+    return np.stack((np.cos(r) * np.sin(p), -np.sin(r), np.cos(r) * np.cos(p)))
+
+
+def runs(t: Floats, mask: Mask, gap_s: float = 0.0) -> list[Span]:
+    """Spans in which a mask holds; those closer than `gap_s` are one."""
+    if not mask.any():
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    spans: list[Span] = []
+    for start, end in zip(t[edges[::2]].tolist(), t[edges[1::2] - 1].tolist(), strict=True):
+        if spans and start - spans[-1][1] <= gap_s:
+            spans[-1] = (spans[-1][0], end)
+        else:
+            spans.append((start, end))
+    return spans
+
+
+def longest(spans: Iterable[Span]) -> Span | None:
+    """The longest span."""
+    return max(spans, key=lambda span: span[1] - span[0], default=None)
+
+
+def first(values: Iterable[_T], wanted: Callable[[_T], bool]) -> _T | None:
+    """The first value that is wanted."""
+    return next((value for value in values if wanted(value)), None)

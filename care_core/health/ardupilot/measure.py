@@ -1,0 +1,71 @@
+"""Small measures that checks share. Arrays have shape (n,) and one row a record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from care_core.health.ardupilot.flight import Mask, Span, runs
+from care_core.health.ardupilot.signals import Floats
+
+Calibration = Sequence[tuple[float, float]]
+"""Points (how many times over the limit, probability that the part really failed), rising."""
+
+
+def likely(over: float, points: Calibration) -> float:
+    """Probability at `over` times the limit, between measured points on a logarithmic scale."""
+    ratios, shares = zip(*points, strict=True)
+    return float(np.interp(np.log(max(over, 1e-9)), np.log(ratios), shares))
+
+
+def lasting(t: Floats, mask: Mask, for_s: float, gap_s: float = 1.0, records: int = 3) -> list[Span]:
+    """Spans of at least `for_s` seconds and that many records in which a mask holds, but for gaps of `gap_s` or a
+    record."""
+    if not mask.any():
+        return []
+    step = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    held = runs(t, mask, max(gap_s, 1.5 * step))
+    counts = np.searchsorted(t[mask], [edge for span in held for edge in span], side="right").tolist()
+    starts = np.searchsorted(t[mask], [span[0] for span in held], side="left").tolist()
+    return [
+        span
+        for span, begin, end in zip(held, starts, counts[1::2], strict=True)
+        if span[1] - span[0] >= for_s and end - begin >= records
+    ]
+
+
+def smooth(t: Floats, x: Floats, width_s: float) -> Floats:
+    """Mean over a window of `width_s` around each record, shape of x; at least three records wide."""
+    if len(t) < 3:
+        return x
+    step = max(float(np.median(np.diff(t))), 1e-6)
+    n = min(max(round(width_s / step) | 1, 3), len(t) if len(t) % 2 else len(t) - 1)
+    padded = np.pad(x, n // 2, mode="edge")
+    total = np.cumsum(np.concatenate(([0.0], padded)))
+    mean: Floats = (total[n:] - total[:-n]) / n
+    return mean
+
+
+def roughness(x: Floats) -> Floats:
+    """How far each record lies off the middle of its neighbours, as a standard deviation of white noise; length n."""
+    if len(x) < 3:
+        return np.zeros(len(x))
+    off = np.abs(x[1:-1] - 0.5 * (x[2:] + x[:-2])) / np.sqrt(1.5)
+    return np.concatenate((off[:1], off, off[-1:]))
+
+
+def length(columns: Iterable[Floats]) -> Floats:
+    """Euclidean length of a vector per record."""
+    return np.sqrt(sum((np.square(column) for column in columns), start=np.zeros(1)))
+
+
+def aligned(t: Floats, other_t: Floats, x: Floats) -> Floats:
+    """A second instance's column at the first's times."""
+    return np.interp(t, other_t, x) if len(other_t) else np.full(len(t), np.nan)
+
+
+def top(x: Floats, share: float = 0.975) -> float:
+    """A value that only few exceed; NaN where there is none."""
+    known = x[np.isfinite(x)]
+    return float(np.quantile(known, share)) if len(known) else float("nan")

@@ -1,0 +1,114 @@
+"""What a vehicle recorded, under one set of names: those of today's firmware, whatever the log's age calls them.
+
+Firmware before 4.1 writes a sensor's second instance as a message of its own (MAG2), before 3.3 the battery is CURR and
+the outputs are Chan1 or Mot1. Checks see instances of a message with today's fields and units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.logs.base import Table, Wanted
+
+Floats = NDArray[np.float64]
+
+MESSAGES: Mapping[str, tuple[str, ...]] = {
+    "IMU": ("IMU", "IMU2", "IMU3"),
+    "MAG": ("MAG", "MAG2", "MAG3"),
+    "BARO": ("BARO", "BAR2", "BAR3"),
+    "GPS": ("GPS", "GPS2", "GPSB"),
+    "GPA": ("GPA", "GPA2"),
+    "BAT": ("BAT", "CURR", "BAT2", "CUR2", "CURR2"),
+    "RCOU": ("RCOU", "MOT"),
+    "XKF1": ("XKF1", "NKF1", "EKF1", "NKF6"),
+    "XKF3": ("XKF3", "NKF3", "EKF3", "NKF8"),
+    "XKF4": ("XKF4", "NKF4", "EKF4", "NKF9"),
+}
+"""Today's message -> the messages that carry it or carried it, one an instance. All others keep their name."""
+
+_INSTANCE: Mapping[str, tuple[str, ...]] = {
+    "IMU": ("I",), "MAG": ("I",), "BARO": ("I",), "GPS": ("I",), "GPA": ("I",), "BAT": ("Inst", "Instance"),
+    "VIBE": ("IMU",), "XKF1": ("C",), "XKF3": ("C",), "XKF4": ("C",), "RFND": ("Instance",), "ESC": ("Instance",),
+}  # fmt: skip
+"""The field that numbers the instances of a message, where one message holds them all."""
+
+_FORMER: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "ATT": {"DesRoll": ("RollIn",), "DesPitch": ("PitchIn",), "DesYaw": ("YawIn",)},
+    "CTUN": {"ThO": ("ThrOut",), "ThI": ("ThrIn",), "BAlt": ("BarAlt",), "DAlt": ("WPAlt",), "CRt": ("CRate",),
+             "DCRt": ("DCRate",), "SAlt": ("SonAlt",)},
+    "RCOU": {f"C{n}": (f"Ch{n}", f"Chan{n}", f"Mot{n}") for n in range(1, 15)},
+    "RCIN": {f"C{n}": (f"Ch{n}", f"Chan{n}") for n in range(1, 15)},
+    "XKF3": {"IYAW": ("IYAW",)},
+    "PM": {"NL": ("NLoop",), "NLon": ("NLon",)},
+    "MODE": {"ModeNum": ("Mode",)},
+    "VIBE": {"Clip": ("Clip0",)},
+    "RFND": {"Dist": ("Dist1",), "Instance": ()},
+}  # fmt: skip
+"""Today's field -> what it was called."""
+
+_CENTIVOLTS = 200.0
+"""A pack reads more than this only where it is recorded in hundredths of a volt (CURR before 3.3)."""
+_FULL_SCALE = 2.0
+"""Throttle above this is in thousandths (before 3.4), at most 1 since."""
+
+
+def expanded(reads: Wanted) -> dict[str, tuple[str, ...]]:
+    """The channels and fields by every name that they may have in a log."""
+    wanted: dict[str, tuple[str, ...]] = {}
+    for name, fields in reads.items():
+        former = _FORMER.get(name, {})
+        known = [old for field in fields for old in (field, *former.get(field, ()))]
+        for message in MESSAGES.get(name, (name,)):
+            wanted[message] = tuple(dict.fromkeys([*wanted.get(message, ()), *known, *_INSTANCE.get(name, ())]))
+    return wanted
+
+
+def instances(tables: Mapping[str, Table], name: str) -> tuple[Table, ...]:
+    """The instances of a message in order of their number, under today's names; none where the log has none."""
+    found: list[Table] = []
+    for message in MESSAGES.get(name, (name,)):
+        table = tables.get(message)
+        if table is not None and len(table):
+            found += _split(name, _renamed(name, table))
+    return tuple(found)
+
+
+def _renamed(name: str, table: Table) -> Table:
+    former = _FORMER.get(name, {})
+    columns: dict[str, NDArray[Any]] = {}
+    for field in table.columns:
+        columns[field] = table[field]
+    for field, olds in former.items():
+        old = next((old for old in olds if old in columns), None)
+        if field not in columns and old is not None:
+            columns[field] = columns[old]
+    if name == "BAT" and "Volt" in columns and _top(columns["Volt"]) > _CENTIVOLTS:
+        columns["Volt"] = columns["Volt"] / 100
+        if "Curr" in columns:
+            columns["Curr"] = columns["Curr"] / 100
+    if name == "CTUN":
+        for field in ("ThO", "ThI"):
+            if field in columns and _top(columns[field]) > _FULL_SCALE:
+                columns[field] = columns[field] / 1000
+        if "Alt" not in columns and "BAlt" in columns:
+            columns["Alt"] = columns["BAlt"]
+    keep = np.isfinite(table.t)
+    found = Table(table.t, columns)
+    return found if keep.all() else found.where(keep)
+
+
+def _top(column: NDArray[Any]) -> float:
+    known = column[np.isfinite(column)]
+    return float(known.max()) if len(known) else 0.0
+
+
+def _split(name: str, table: Table) -> list[Table]:
+    field = next((field for field in _INSTANCE.get(name, ()) if field in table.columns), None)
+    if field is None:
+        return [table]
+    number = table[field]
+    return [table.where(number == own) for own in np.unique(number[np.isfinite(number)])]
