@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from care_core.configs import yaml_tree
 from care_core.configs.formats import ConfigFormat
 from care_core.configs.loading import ConfigFile, resolve
-from care_core.configs.self_written import is_self_written
 from care_core.run import Setting, shown
+from care_core.vehicles.self_written import is_self_written
 
 FLOAT32 = 1e-6
 """Vehicles hold parameters in 32 bits, files in seven digits."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from care_core.configs.self_written import is_self_written
 from care_core.run import Setting, shown
 from care_core.text import clean
 from care_core.variables import Variable
+from care_core.vehicles.self_written import is_self_written
 
 SIMULATOR_PREFIX = "SIM_"
 """Parameters of a simulated world: a real vehicle has none, so they are never options."""

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from care_core.configs.driven import readable
-from care_core.configs.self_written import is_self_written
 from care_core.diagnose.judging import Judged, read_and_judge
 from care_core.diagnose.records import Cause, Diagnosis, ParameterChange, Since
 from care_core.errors import CareError
@@ -18,6 +17,7 @@ from care_core.logs.digest import log_digest
 from care_core.profile.store import Profile
 from care_core.run import LogInfo, Run, Setting
 from care_core.variables import Variable
+from care_core.vehicles.self_written import is_self_written
 
 
 def compare(judged: Judged, good: Log, profile: Profile) -> Since:

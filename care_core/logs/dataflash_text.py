@@ -34,6 +34,8 @@ _PIECE = 2048  # lines parsed in one go
 _HEADS = 1 << 18
 _MOST_BROKEN = 100_000
 """Broken lines of a message that are told one by one before they are summed up."""
+_STEADY, _STEADY_HZ = ("CTUN", "ATT"), 10.0
+"""Messages that firmware without time stamps wrote from its loop of 10 Hz (ArduCopter 3.0, `ten_hz_logging_loop`)."""
 
 
 class Columns(NamedTuple):
@@ -56,6 +58,7 @@ class DataFlashTextLog:
         self.path = path
         self._data = MappedFile(path).bytes()
         self._formats: dict[str, Columns] = {}
+        self._counted_from = ""
         self._lines = self._index()
         self._read_formats()
         broken = self._drop_broken()
@@ -93,11 +96,14 @@ class DataFlashTextLog:
 
     @cached_property
     def facts(self) -> Mapping[str, str]:
-        """`firmware`, `vehicle` and `frame`, where a message or the greeting names them."""
+        """`firmware`, `vehicle`, `frame` as a message or the greeting names them; `clock` where times are counted."""
         tables = self.read({"VER": ("FWS",), "MSG": ("Message",)})
         texts = [str(text) for table in tables.values() for column in table.columns.values() for text in column]
         first = int(min(places[0] for places in self._lines.values() if len(places)))
-        return facts_of([*texts, *(line.strip() for line in _text(self._data[:first]).splitlines())])
+        facts = facts_of([*texts, *(line.strip() for line in _text(self._data[:first]).splitlines())])
+        if self._counted_from:
+            facts["clock"] = f"counted from {self._counted_from}, {_STEADY_HZ:.0f} a second"
+        return facts
 
     @cached_property
     def start(self) -> str | None:
@@ -240,6 +246,9 @@ class DataFlashTextLog:
             if stamp is not None and len(own):
                 places.append(own)
                 stamps.append(self._columns(name, (stamp[0],))[stamp[0]] / stamp[1])
+        if len(places) == 1:
+            self._keep_count()
+            return ()
         order = np.argsort(np.concatenate(places), kind="stable")
         place, second = np.concatenate(places)[order], np.concatenate(stamps)[order]
         clock, impossible, jumps = find_clock(second, place)
@@ -249,6 +258,14 @@ class DataFlashTextLog:
             self._lines = {name: own[~np.isin(own, place[impossible])] for name, own in self._lines.items()}
         self.duration_s = clock.duration_s
         return (*summarised(jumps, "clock jumps"), *summarised(lost, "lines with an impossible time"))
+
+    def _keep_count(self) -> None:
+        """Count time by a message that comes steadily, where none has a stamp (APM boards before firmware 3.1)."""
+        name = next((name for name in _STEADY if len(self._lines.get(name, ())) > 1), None)
+        self._places = self._lines[name] if name else np.empty(0, dtype=np.int64)
+        self._seconds = np.arange(len(self._places)) / _STEADY_HZ
+        self.duration_s = float(self._seconds[-1]) if name else 0.0
+        self._counted_from = name or ""
 
     def _times(self, name: str) -> Floats:
         """Seconds of the lines of a message; one without a stamp has that of the last one before it."""

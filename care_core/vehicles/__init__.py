@@ -3,11 +3,13 @@
 Facts of ArduPilot's and PX4's source, as tables. Knows nothing of logs.
 """
 
+from care_core.vehicles.arming import method_words
 from care_core.vehicles.errors import error_kind, error_words, is_over
 from care_core.vehicles.events import event_words
 from care_core.vehicles.modes import Way, mode_name, mode_number, reason_words, way_of
 from care_core.vehicles.motors import Motor, motor_outputs, motors_of
 from care_core.vehicles.parameters import Spelling, renamed, spelled_in, spellings
+from care_core.vehicles.self_written import is_self_written
 from care_core.vehicles.vehicle import Kind, Vehicle, vehicle_of
 
 __all__ = [
@@ -20,6 +22,8 @@ __all__ = [
     "error_words",
     "event_words",
     "is_over",
+    "is_self_written",
+    "method_words",
     "mode_name",
     "mode_number",
     "motor_outputs",

@@ -23,6 +23,11 @@ _KINDS: Mapping[str, Kind] = {
 _VERSION = re.compile(r"[Vv](\d+)\.(\d+)(?:\.(\d+))?")
 _HELI_CLASSES = frozenset((6, 11, 13))
 _ROVER_CLASSES = {2: "boat", 3: "balance bot"}
+_MAV_TYPES = {
+    1: "fixed wing", 2: "quad", 3: "coaxial copter", 4: "helicopter", 7: "airship", 10: "rover", 11: "boat",
+    12: "submarine", 13: "hexa", 14: "octa", 15: "tricopter", **dict.fromkeys(range(19, 26), "VTOL"),
+}  # fmt: skip
+"""MAV_TYPE of PX4, which its airframes set."""
 _SUB_FRAMES = {
     0: "BlueROV1", 1: "vectored", 2: "vectored, 6 axes", 3: "vectored, 6 axes, thrusters at 90 degrees",
     4: "3 thrusters", 5: "4 thrusters", 6: "5 thrusters",
@@ -82,10 +87,10 @@ def _name(kind: Kind, facts: Mapping[str, str], settings: Driven, motors: int | 
     if kind == "sub":
         frame = _SUB_FRAMES.get(-1 if (chosen := code(settings, "FRAME_CONFIG")) is None else chosen, "")
         return f"submarine, {frame}" if frame else "submarine"
-    if kind == "unknown":
-        return facts.get("vehicle", "") or "vehicle"
-    if kind == "px4":
-        return facts.get("vehicle", "") or "vehicle"
+    if kind == "px4" and code(settings, "MAV_TYPE") in _MAV_TYPES:
+        return _MAV_TYPES[code(settings, "MAV_TYPE") or 0]
+    if kind in ("unknown", "px4"):
+        return facts.get("vehicle", "") or "unknown vehicle"
     return {"plane": "fixed wing", "heli": "helicopter", "tracker": "antenna tracker"}.get(kind, kind)
 
 

@@ -114,6 +114,19 @@ def test_lines_are_parsed_together_as_they_are_one_by_one(
     assert len(log.damage) == len(lines) - len(expected)
 
 
+def test_without_any_stamp_time_is_counted_from_a_steady_message(tmp_path: Path) -> None:
+    head = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\nFMT, 13, 4, EV, B, Id\nFMT, 4, 19, CTUN, h, ThrIn\n"
+    path = tmp_path / "apm.log"
+    path.write_text(head + "EV, 10\n" + "CTUN, 500\n" * 51 + "EV, 11\n")
+    log = open_log(path)
+    tables = log.read({"EV": ("Id",), "CTUN": ("ThrIn",)})
+    assert log.duration_s == pytest.approx(5.0)
+    np.testing.assert_allclose(tables["EV"].t, [0.0, 5.0])
+    np.testing.assert_allclose(tables["CTUN"].t, np.arange(51) / 10)
+    assert log.facts["clock"] == "counted from CTUN, 10 a second"
+    assert log.damage == ()
+
+
 SHARED = os.environ.get("CARE_SHARED")
 
 

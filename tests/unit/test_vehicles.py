@@ -42,7 +42,7 @@ QUAD_OUTPUTS = {f"SERVO{n}_FUNCTION": 32.0 + n for n in range(1, 5)}
         ({"firmware": "ArduCopter V4.6.0"}, {"FRAME_CLASS": 6.0}, "heli", "ArduCopter V4.6.0, helicopter"),
         ({"firmware": "ArduSub V4.1.0"}, {"FRAME_CONFIG": 1.0}, "sub", "ArduSub V4.1.0, submarine, vectored"),
         ({"firmware": "AntennaTracker V4.5.0"}, {}, "tracker", "AntennaTracker V4.5.0, antenna tracker"),
-        ({"firmware": "PX4 v1.15.0 (cb09dde6)", "stack": "PX4"}, {}, "px4", "PX4 v1.15.0, vehicle"),
+        ({"firmware": "PX4 v1.15.0 (cb09dde6)", "stack": "PX4"}, {}, "px4", "PX4 v1.15.0, unknown vehicle"),
         ({"vehicle": "rover"}, {}, "unknown", "rover"),
     ],
 )

@@ -1,0 +1,57 @@
+"""Which of a vehicle's texts an account repeats: what every start says is left out, and what records say better."""
+
+from __future__ import annotations
+
+import re
+
+_ROUTINE = re.compile(
+    r"""
+      (Ardu\w+|APM:\w+|Rover|AntennaTracker|Blimp)\sV\d          # firmware
+    | .?[0-9a-fA-F]{31,32}$ | (ChibiOS|NuttX|PX4|Pixhawk|Pixracer|Cube\w*|fmuv\d|Nano)\b | \S+\s[0-9A-F]{8}\s[0-9A-F]{8}
+    | Param\sspace | RC\sProtocol | RCOut | RCInput | New\s(mission|rally|fence)$ | Frame: | GROUND\sSTART
+    | Ground\sstart | Initiali[sz]ing | ArduPilot\sReady | Calibrating | (Barometer|barometer)\s.*complete | Ready\s
+    | Beginning\sINS | <startup | Warming\sup | AHRS:\s\w+\sactive | DCM\sactive | Field\sElevation
+    | EKF[23]?\sIMU\d+\s(initialised|tilt\salignment|.*yaw\salign|origin\sset|is\susing\sGPS|buffs)
+    | EKF[23]\swaiting | GPS\s?\d?:\s(probing|detected|detecting|specified|u-blox) | u-blox | IMU\d:\sfast\ssampling
+    | (Arming|Disarming)\smotors | Throttle\s(armed|disarmed) | Polyfence | RC\d+:\s | ESC\stelem | SmartRTL\s(act|ded)
+    | Mission:\s\d+\s*$ | Logging\s(started|stopped) | Log\sNum | got\sMISSION | Airspeed\ssensor\scalibrated
+    | Set\s(home|speed|HOME) | CAN\d?\b | Board\svoltage | Hit\s | GyroFFT | Motors?:\s | Lua: | Rally | ADSB:\sOn
+    | Trim\ssaved | Sampling\s | Flight\smodes? | Target\s | Loaded\s
+    """,
+    re.VERBOSE,
+)
+_MISSION = re.compile(r"(?:Mission: (\d+) (.+)|Reached (?:command|waypoint) #(\d+))")
+_REFUSAL = re.compile(r"(?:Pre)?Arm: (.*)")
+RECORDED = {
+    11: re.compile(r"GPS Glitch|Glitch cleared", re.IGNORECASE),
+    16: re.compile(r"EKF variance", re.IGNORECASE),
+    24: re.compile(r"EKF primary changed|lane switch", re.IGNORECASE),
+    25: re.compile(r"Potential Thrust Loss", re.IGNORECASE),
+    29: re.compile(r"Vibration compensation", re.IGNORECASE),
+}
+"""Subsystem of ERR records -> the texts that say the same."""
+
+
+def is_routine(text: str) -> bool:
+    """Whether a text is one of those that every start, arming or mission item brings."""
+    return not text.strip() or _ROUTINE.match(text) is not None
+
+
+def refusal(text: str) -> str | None:
+    """Why arming was refused, None where the text is no refusal."""
+    match = _REFUSAL.match(text)
+    return match[1] if match else None
+
+
+def says_what_is_recorded(text: str, subsystem: int) -> bool:
+    """Whether a text says no more than an ERR record of this subsystem."""
+    known = RECORDED.get(subsystem)
+    return known is not None and known.search(text) is not None
+
+
+def mission_item(text: str) -> tuple[int, str] | None:
+    """Number of the mission item that a text is about, and what it says of it: a command, or `reached`."""
+    match = _MISSION.match(text)
+    if match is None:
+        return None
+    return (int(match[1]), match[2].strip()) if match[1] else (int(match[3]), "reached")

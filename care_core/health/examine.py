@@ -1,0 +1,30 @@
+"""What happened in a log, whatever wrote it: the one door to the health of a log. Needs no profile.
+
+Each ecosystem is one entry: a module with `examine(log) -> Health` that reads the log once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+
+from care_core.health.records import Health
+from care_core.logs.base import Log, LogFormat
+
+_ARDUPILOT, _PX4 = "care_core.health.ardupilot.examining", "care_core.health.px4"
+ECOSYSTEMS: Mapping[LogFormat, str] = {
+    LogFormat.DATAFLASH_BIN: _ARDUPILOT,
+    LogFormat.DATAFLASH_TEXT: _ARDUPILOT,
+    LogFormat.MAVLINK_TLOG: _ARDUPILOT,
+    LogFormat.PX4_ULG: _PX4,
+}
+"""Format of a log -> the module that looks at it, imported only then."""
+
+
+def examine(log: Log) -> Health:
+    """Account and findings of a log; nothing of either where nobody knows what its messages mean."""
+    module = ECOSYSTEMS.get(log.format)
+    if module is None:
+        return Health("", (), (), is_readable=False)
+    health: Health = import_module(module).examine(log)
+    return health

@@ -1,0 +1,146 @@
+"""The account of a PX4 flight, and what its own checks found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from care_core.health.px4 import examine
+from care_core.health.records import Health
+from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.run import Damage, Setting
+
+
+@dataclass
+class MadeLog:
+    """A ULog of tables."""
+
+    tables: Mapping[str, Table]
+    duration_s: float = 60.0
+    parameters: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
+    damage: tuple[Damage, ...] = ()
+    path: Path = Path("made.ulg")
+    format: LogFormat = LogFormat.PX4_ULG
+    start: str | None = None
+    facts: Mapping[str, str] = field(
+        default_factory=lambda: {"stack": "PX4", "firmware": "PX4 v1.15.0 (cb09dde6)", "vehicle": "multicopter"}
+    )
+
+    def channels(self) -> tuple[Channel, ...]:
+        return tuple(Channel(name, name, len(table)) for name, table in self.tables.items())
+
+    def settings(self) -> Mapping[str, tuple[Setting, ...]]:
+        return self.parameters
+
+    def read(self, wanted: Wanted) -> Mapping[str, Table]:
+        return {
+            name: Table(table.t, {one: table[one] for one in wanted[name] if one in table.columns})
+            for name, table in self.tables.items()
+            if name in wanted
+        }
+
+
+def states(**changes: Sequence[tuple[float, float]]) -> Table:
+    """A topic ten times a second whose fields change at given times."""
+    t = np.arange(0.0, 60.0, 0.1)
+    columns: dict[str, Any] = {}
+    for name, steps in changes.items():
+        at, values = zip(*steps, strict=True)
+        columns[name] = np.array(values, dtype=np.float64)[np.searchsorted(at, t + 1e-9, side="right") - 1]
+    return Table(t, columns)
+
+
+def words(*said: tuple[float, str, str]) -> Table:
+    t, levels, texts = zip(*said, strict=True)
+    return Table(np.array(t), {"level": np.array(levels, object), "message": np.array(texts, object)})
+
+
+def texts(health: Health, kind: str = "") -> list[str]:
+    return [moment.text for moment in health.account if not kind or moment.kind == kind]
+
+
+FLOWN = states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 4), (10, 17), (20, 3), (40, 5)],
+               failsafe=[(0, 0)])  # fmt: skip
+
+
+def test_a_flight_is_told_by_its_status_and_its_words() -> None:
+    health = examine(MadeLog({
+        "vehicle_status": FLOWN,
+        "vehicle_land_detected": states(landed=[(0, 1), (12, 0), (48, 1)]),
+        "logged_messages": words((0.0, "INFO", "[logger] Start file log"), (10.0, "INFO", "[commander] Armed by RC"),
+                                 (40.0, "WARNING", "[failsafe] Failsafe activated\t")),
+    }))  # fmt: skip
+    assert texts(health) == [
+        "PX4 v1.15.0, multicopter", "mode Hold", "armed by RC", "mode Takeoff", "took off", "mode Mission",
+        "Failsafe activated", "mode Return", "landed", "disarmed, armed for 40 s",
+    ]  # fmt: skip
+    assert health.findings == ()
+
+
+def test_flags_raised_in_flight_are_findings_and_those_before_arming_are_not() -> None:
+    health = examine(MadeLog({
+        "vehicle_status": FLOWN,
+        "failsafe_flags": states(manual_control_signal_lost=[(0, 1), (5, 0), (30, 1), (33, 0)],
+                                 gcs_connection_lost=[(0, 1)], fd_motor_failure=[(0, 0), (35, 1)]),
+    }))  # fmt: skip
+    assert [(one.kind, round(one.onset_s), one.severity) for one in health.findings] == [
+        ("motor", 35, "critical"), ("radio", 30, "warning"),
+    ]  # fmt: skip
+    assert "radio lost for 3.0 s" in texts(health, "error")
+    assert not any("ground station" in text for text in texts(health))
+
+
+def test_a_sensor_that_the_estimator_rejects_is_found_after_a_second_of_it() -> None:
+    ratios = states(vel_test_ratio=[(0, 0.1), (30, 1.4), (30.3, 0.2)], mag_test_ratio=[(0, 0.1), (30, 1.4), (36, 0.2)])
+    health = examine(MadeLog({"vehicle_status": FLOWN, "estimator_status": ratios}))
+    assert [(one.kind, one.title) for one in health.findings] == [("compass", "estimator rejects compass")]
+
+
+def test_a_vehicle_that_is_not_ready_says_why() -> None:
+    text = "[commander_tests] Not ready to fly: Sensors not set up correctly"
+    health = examine(MadeLog({
+        "vehicle_status": states(arming_state=[(0, 1)], nav_state=[(0, 0)]),
+        "logged_messages": words((3.0, "WARNING", text)),
+    }))  # fmt: skip
+    assert texts(health, "arming") == ["it never armed: Sensors not set up correctly"]
+    assert [(one.kind, one.title) for one in health.findings] == [
+        ("prearm", "not ready to fly: Sensors not set up correctly"),
+    ]  # fmt: skip
+
+
+def test_a_complaint_before_an_arming_is_no_finding() -> None:
+    said = words((3.0, "WARNING", "[health_and_arming_checks] Preflight: GPS fix too low"))
+    health = examine(MadeLog({"vehicle_status": FLOWN, "logged_messages": said}))
+    assert texts(health, "arming")[0] == "Preflight: GPS fix too low"
+    assert health.findings == ()
+
+
+def test_battery_and_satellites_in_brief() -> None:
+    health = examine(MadeLog({
+        "vehicle_status": FLOWN,
+        "battery_status": states(voltage_v=[(0, 16.4), (30, 13.1), (32, 15.0)], current_a=[(0, 2.0), (30, 50.0)],
+                                 cell_count=[(0, 4)], warning=[(0, 0), (30, 1)], connected=[(0, 1)]),
+        "vehicle_gps_position": states(fix_type=[(0, 3), (25, 0), (26, 3)], satellites_used=[(0, 12)]),
+    }))  # fmt: skip
+    assert texts(health, "battery") == [
+        "battery at 16.4 V (4 cells)", "battery at its lowest while armed: 13.1 V at 50 A", "battery low",
+    ]  # fmt: skip
+    assert texts(health, "gps") == ["GPS: 3D fix, 12 satellites", "GPS lost its 3D fix while armed"]
+
+
+def test_a_wrong_stamp_makes_no_long_flight() -> None:
+    health = examine(MadeLog({"vehicle_status": FLOWN}, duration_s=1200.0))
+    assert "the recording ends, but for a message stamped 1140 s later" in texts(health, "log")
+
+
+def test_a_log_that_ends_armed_says_so() -> None:
+    armed = states(arming_state=[(0, 1), (10, 2)], nav_state=[(0, 3)])
+    assert texts(examine(MadeLog({"vehicle_status": armed})))[-1].startswith("the log ends with the vehicle armed")
+
+
+def test_nothing_is_said_of_a_log_without_status() -> None:
+    assert not examine(MadeLog({})).is_readable
