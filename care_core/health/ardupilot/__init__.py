@@ -1,22 +1,24 @@
-"""What went wrong on an ArduPilot vehicle, by its log alone: no profile, no training data needed."""
+"""What happened on an ArduPilot vehicle and what went wrong, by its log alone: no profile, no training data needed."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from care_core.health.ardupilot import flight
+from care_core.health.ardupilot import account, flight
 from care_core.health.ardupilot.checks import CHECKS
 from care_core.health.ardupilot.leads import LEADS
 from care_core.health.ardupilot.signals import expanded
 from care_core.health.records import Finding
 from care_core.health.telling import told
 from care_core.logs.base import Log, Wanted
+from care_core.logs.plausible import plausible
+from care_core.logs.telemetry import as_dataflash
 
 
 def _plan() -> Wanted:
-    """All that any check looks at, for one reading."""
+    """All that the account and any check look at, for one reading."""
     wanted: dict[str, tuple[str, ...]] = {}
-    for reads in (flight.READS, *(check.READS for check in CHECKS)):
+    for reads in (flight.READS, account.READS, *(check.READS for check in CHECKS)):
         for name, fields in expanded(reads).items():
             wanted[name] = tuple(dict.fromkeys((*wanted.get(name, ()), *fields)))
     return wanted
@@ -26,8 +28,9 @@ READS: Wanted = _plan()
 
 
 def flight_of(log: Log) -> flight.Flight:
-    """The flight that a DataFlash log, or telemetry seen as one, holds."""
-    return flight.Flight.of(log.read(READS), log.settings(), log.facts, log.duration_s)
+    """The flight that a DataFlash or telemetry log holds."""
+    tables = plausible(as_dataflash(log).read(READS))
+    return flight.Flight.of(tables, log.settings(), log.facts, log.duration_s)
 
 
 def find(of: flight.Flight) -> tuple[Finding, ...]:

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from care_core.health.ardupilot import account as telling_of
-from care_core.health.ardupilot.flight import READS, Flight
-from care_core.health.ardupilot.signals import expanded
+from care_core.health.ardupilot import find, flight_of
+from care_core.health.ardupilot.account import account
 from care_core.health.records import Health
-from care_core.logs.base import Log, Wanted
-from care_core.logs.plausible import plausible
-from care_core.logs.telemetry import as_dataflash
+from care_core.logs.base import Log
 
 _TOO_SHORT_S = 2.0
+_TELLING = ("MODE", "MSG", "ATT", "IMU")
 
 
 def examine(log: Log) -> Health:
     """What happened in a DataFlash or telemetry log."""
-    wanted: dict[str, tuple[str, ...]] = {}
-    for reads in (READS, telling_of.READS):
-        for name, fields in reads.items():
-            wanted[name] = tuple(dict.fromkeys((*wanted.get(name, ()), *fields)))
-    flight = _flight(log, wanted)
-    account = telling_of.account(flight, log.damage)
-    is_told = any(name in flight.tables for name in ("MODE", "MSG", "ATT", "IMU"))
-    return Health(flight.vehicle.title, account, (), is_readable=is_told and flight.end_s >= _TOO_SHORT_S)
-
-
-def _flight(log: Log, wanted: Wanted) -> Flight:
-    tables = plausible(as_dataflash(log).read(expanded(wanted)))
-    return Flight.of(tables, log.settings(), log.facts, log.duration_s)
+    flight = flight_of(log)
+    is_readable = flight.end_s >= _TOO_SHORT_S and any(name in flight.tables for name in _TELLING)
+    findings = find(flight) if is_readable else ()
+    return Health(flight.vehicle.title, account(flight, log.damage), findings, is_readable)
