@@ -24,6 +24,8 @@ class Session:
     progress: tuple[str, float] | None = None
     case: Case | None = None
     error: CareError | None = None
+    looked_at: str | None = None
+    """The objective that the operator was at when the log was asked to be judged again."""
     objective: int = 0
     """Place of the objective that the causes are shown of."""
     option: str | None = None
@@ -62,8 +64,11 @@ class Session:
     def take(self, case: Case) -> None:
         """A diagnosis has come: start at its first fault, with the suggested fix in the basket."""
         self.case = case
+        names = [result.variable.name for result in case.diagnosis.objectives]
         statuses = [result.status for result in case.diagnosis.objectives]
         self.objective = statuses.index("fault") if "fault" in statuses else 0
+        if self.looked_at in names:
+            self.objective = names.index(self.looked_at)
         self.fix = case.diagnosis.fix
         if self.fix is not None:
             self.basket = Basket(changes_of(self.fix), self.suggested())
@@ -73,12 +78,11 @@ class Session:
     def suggested(self) -> dict[str, float]:
         """A value for every option that the engine would change: in a fix, an alternative, or for a cause."""
         values: dict[str, float] = {}
-        for fix in fixes(self.diagnosis):
-            values = {**changes_of(fix), **values}
-        for fault in self.diagnosis.faults:
-            for cause in fault.causes:
-                if cause.suggested is not None:
-                    values.setdefault(cause.option.name, cause.suggested)
+        suggested, *others = [changes_of(fix) for fix in fixes(self.diagnosis)] or [{}]
+        causes = [cause for fault in self.diagnosis.faults for cause in fault.causes]
+        alone = {cause.option.name: cause.suggested for cause in causes if cause.suggested is not None}
+        for found in (suggested, alone, *others):
+            values = {**found, **values}
         return values
 
     def alone(self) -> dict[tuple[str, float], float]:

@@ -242,17 +242,16 @@ def past_runs() -> list[Past]:
 
 
 def _past(triaged: Triaged) -> Past:
+    from care_core.report.history import verdict_of
+
     document = triaged.document
-    broken = [entry["name"] for entry in document["objectives"] if entry["status"] == "fault"]
-    unknown = [entry["name"] for entry in document["objectives"] if entry["status"] == "not_evaluated"]
-    verdict = f"FAULT {', '.join(broken)}" if broken else "NOT ALL EVALUATED" if unknown else "OK"
     causes = [cause["option"] for fault in document["faults"] for cause in fault["causes"]]
     return Past(
         at=triaged.at,
         log=document["log"]["path"],
         mission=triaged.mission,
         profile=document["profile"]["name"],
-        verdict=verdict,
+        verdict=verdict_of(document),
         cause=causes[0] if causes else "",
         values={entry["name"]: entry["value"] for entry in document["objectives"]},
         config=document["config"],

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from textual.content import Content
 
-from care_core.diagnose.records import Fault
+from care_core.diagnose.records import Cause, Fault, Hypothesis
+from care_core.health.records import Finding
 from care_core.text import clean
 from care_tui.pages.page import View
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.causes import cause_detail, cause_item, no_cause_rows
+from care_tui.render.happened import hypothesis_item, hypothesis_rows
 from care_tui.render.rows import Rows
 from care_tui.screens.prompt import Prompt
 from care_tui.widgets.choices import Listing
 
 
+class Explanation(NamedTuple):
+    """One line of the ranking: a cause, or what explains the failure and is none; with its probability where known."""
+
+    cause: Cause | None
+    hypothesis: Hypothesis | None
+
+
 class CausesPage(DiagnosisPage):
     name = "Causes"
+    NOTHING = "no cause is named"
     HELP = (
         "Options that moved the objective the wrong way in this run, best first, with the causal path of the one under "
         "the cursor. Enter goes to the fix. d sets a cause aside with a reason that goes into the report, and undoes "
@@ -27,15 +37,38 @@ class CausesPage(DiagnosisPage):
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"dismiss", "next_fault"})
 
     def view_of_diagnosis(self) -> View:
-        causes, glyphs, dismissed = self.session.causes, self.glyphs, self.session.dismissed
-        evidence = self.session.diagnosis.run.evidence
-        listing = Listing(
-            len(causes),
-            lambda i, _width: cause_item(causes[i], dismissed.get(causes[i].option.name), evidence, glyphs),
-            lambda i: causes[i].option.name,
-            height=2,
-        )
+        ranked = self.ranked()
+        listing = Listing(len(ranked), lambda i, _width: self._item(ranked[i]), lambda i: _words(ranked[i]), height=2)
         return View(self._title(), self._detail, listing)
+
+    def ranked(self) -> list[Explanation]:
+        """Parts, parameters, what was met and chance in one ranking, then the causes that it does not name."""
+        causes = {cause.option.name: cause for cause in self.session.causes}
+        if not self.session.causes and self.session.fault is None:
+            return []
+        found = [
+            Explanation(causes.pop(one.name, None) if one.what == "parameter" else None, one)
+            for one in self.session.diagnosis.hypotheses
+        ]
+        return found + [Explanation(cause, None) for cause in causes.values()]
+
+    def _item(self, one: Explanation) -> tuple[Content, Content]:
+        if one.cause is None:
+            assert one.hypothesis is not None
+            return hypothesis_item(one.hypothesis, self._finding(one.hypothesis))
+        aside, evidence = self.session.dismissed.get(one.cause.option.name), self.session.diagnosis.run.evidence
+        share = None if one.hypothesis is None else one.hypothesis.probability
+        return cause_item(one.cause, share, aside, evidence, self.glyphs)
+
+    def _finding(self, hypothesis: Hypothesis) -> Finding | None:
+        """The finding that an explanation is named after."""
+        findings = self.session.diagnosis.health.findings
+        return next((finding for finding in findings if hypothesis.name and finding.title == hypothesis.name), None)
+
+    def option_at(self, index: int | None) -> str | None:
+        """The option of the cause at this place, None where there is none."""
+        cause = None if index is None else self.ranked()[index].cause
+        return None if cause is None else cause.option.name
 
     def _title(self) -> Content:
         result, faults, fault = self.session.result, self.session.diagnosis.faults, self.session.fault
@@ -64,13 +97,16 @@ class CausesPage(DiagnosisPage):
         session, result = self.session, self.session.result
         if index is None or result is None or session.case is None:
             return no_cause_rows(session.diagnosis, result)
-        cause = session.causes[index]
+        cause, hypothesis = self.ranked()[index]
+        if cause is None:
+            assert hypothesis is not None
+            return Rows(hypothesis_rows(hypothesis, self._finding(hypothesis)))
         model = session.case.model
         effect = model.effects.get((cause.option.name, result.variable.name)) if model else None
         return cause_detail(cause, session.causes, result, effect, session.diagnosis, session.dismissed, self.glyphs)
 
     def open(self, index: int | None) -> None:
-        self.session.option = None if index is None else self.session.causes[index].option.name
+        self.session.option = self.option_at(index)
         self.walk.action_go(4)
 
     def next_fault(self) -> None:
@@ -80,10 +116,9 @@ class CausesPage(DiagnosisPage):
 
     def dismiss(self) -> None:
         """Set the cause under the cursor aside, or take it back."""
-        index = self.screen.choices.highlighted
-        if index is None:
+        option = self.option_at(self.screen.choices.highlighted)
+        if option is None:
             return
-        option = self.session.causes[index].option.name
         if option in self.session.dismissed:
             self._redraw(self.session.take_back(option), f"{option} is back in the fix.")
             return
@@ -100,3 +135,9 @@ class CausesPage(DiagnosisPage):
             self.screen.say(words)
         else:
             self.screen.draw()
+
+
+def _words(one: Explanation) -> str:
+    """What `/` searches in."""
+    named = "" if one.hypothesis is None else f"{one.hypothesis.what} {one.hypothesis.name}"
+    return named if one.cause is None else f"{one.cause.option.name} {named}"

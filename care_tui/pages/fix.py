@@ -22,6 +22,7 @@ NAME_WIDTH = 26
 
 class FixPage(DiagnosisPage):
     name = "Fix"
+    NOTHING = "no change is suggested"
     HELP = (
         "Space ticks a change, + and - nudge its value, = types one. The odds follow at once. a loads the next "
         "alternative, s the suggestion, u takes the last change back. Every option of the profile is here: / finds "

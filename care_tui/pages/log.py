@@ -103,7 +103,7 @@ class LogPage(StepPage):
             path = found[index].path
             is_open = path == self.session.path
             if is_open and self.session.state == "data":
-                self.walk.action_go(2)
+                self.walk.action_go(1)
             elif is_open and self.session.state == "loading":
                 self.screen.say("It is being read; Esc stops that.")
             else:
@@ -120,8 +120,7 @@ class LogPage(StepPage):
 
     def again(self) -> None:
         """Read the log again, after an error or a change."""
-        if self.session.path is not None:
-            self.walk.open_log(self.session.path)
+        self.walk.again()
 
     def rescan(self) -> None:
         """Look for logs again."""

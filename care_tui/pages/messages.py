@@ -27,6 +27,8 @@ class MessagesPage(Page):
     )
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"next_marked"})
 
+    LIST_FIRST = True
+
     def __init__(self, screen: PanesScreen, case: Case) -> None:
         super().__init__(screen)
         self._case = case

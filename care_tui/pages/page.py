@@ -41,6 +41,8 @@ class Page:
     ENTER: ClassVar[str] = ""
     """Where Enter leads, in a word for the line of keys; empty where it does nothing."""
     ACTIONS: ClassVar[frozenset[str]] = frozenset()
+    LIST_FIRST: ClassVar[bool] = False
+    """Whether the list is what the page is read for: it gets most of the room."""
 
     def __init__(self, screen: PanesScreen) -> None:
         self.screen = screen

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, ClassVar, cast
 
 from textual.content import Content
 
@@ -29,11 +29,21 @@ class StepPage(Page):
 class DiagnosisPage(StepPage):
     """A step that needs a diagnosis: says so while there is none."""
 
+    NOTHING: ClassVar[str] = ""
+    """What there is not where no profile fits; empty for a step that has something to show all the same."""
+
     def works(self, action: str) -> bool:
-        return super().works(action) and self.session.state == "data"
+        return super().works(action) and self.session.state == "data" and not self._is_empty
+
+    @property
+    def _is_empty(self) -> bool:
+        return bool(self.NOTHING) and self.session.diagnosis.profile.fit.verdict == "no"
 
     def view(self) -> View:
         session = self.session
+        if session.state == "data" and self._is_empty:
+            why = f"No profile fits this log, so {self.NOTHING}. 1 tells what happened, and what would make one fit."
+            return View(Content.styled(self.name, "bold"), lambda _: sentence(why))
         if session.state == "data":
             return self.view_of_diagnosis()
         title = Content.styled(self.name, "bold")

@@ -37,26 +37,30 @@ FEW_RESAMPLES = 0.5
 
 
 def cause_item(
-    cause: Cause, dismissed: str | None, evidence: Sequence[Evidence], glyphs: Glyphs
+    cause: Cause, share: float | None, dismissed: str | None, evidence: Sequence[Evidence], glyphs: Glyphs
 ) -> tuple[Content, Content]:
-    """One cause of the ranked list: the option with its change, then what it is worth, with its caveats beside it."""
+    """One cause of the ranked list: the option with its change, then what it is worth, with its caveats beside it.
+
+    `share` is its probability beside whatever else may explain the failure, None where nothing else was weighed.
+    """
     option = cause.option
     head = Content.assemble(
-        f"{cause.rank:>2} ",
+        f"{cause.rank:>2} " if share is None else f"{percent(share):>5} ",
         text(option.name, "bold"),
         "  ",
         change_text(option, cause.current, cause.suggested, glyphs),
     )
+    below = " " * (3 if share is None else 6)
     if dismissed is not None:
-        return head, Content("   set aside: " + clean(dismissed))
+        return head, Content(f"{below}set aside: " + clean(dismissed))
     worth = ["not ruled out" if cause.is_lead else f"{cause.confidence} confidence"]
     if cause.p_fixed is not None:
         worth.append(f"{percent(cause.p_fixed)} odds if changed alone")
     if cause.is_lead:  # its one caveat is that it is no more than a lead
-        return head, Content("   " + ", ".join(worth))
+        return head, Content(below + ", ".join(worth))
     worth.append(f"costs {percent(cause.contribution)}")
     caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause, evidence))
-    return head, Content("   " + ", ".join(worth) + caveats)
+    return head, Content(below + ", ".join(worth) + caveats)
 
 
 def caveats_of(cause: Cause, evidence: Sequence[Evidence]) -> tuple[str, ...]:

@@ -155,6 +155,11 @@ def text(value: str, style: str = "") -> Content:
     return Content.styled(clean(value), style) if style else Content(clean(value))
 
 
+def joined(parts: Iterable[Content], gap: str) -> Content:
+    """The parts with a gap between them. `Content.join` counts a gap too many: what is shown by it leaves remains."""
+    return Content.assemble(*(piece for part in parts for piece in (gap, part)))[len(gap) :]
+
+
 def labelled(label: str, value: Content | str, style: str = "") -> Row:
     """A row `label  value` with the values in one column."""
     body = text(value) if isinstance(value, str) else value

@@ -97,6 +97,7 @@ class PanesScreen(CareScreen):
         self.choices.filter("")
         self.text.filter("")
         self.page.enter()
+        self.set_class(self.page.LIST_FIRST, "-list-first")
         view = self.page.view()
         self._put(view, view.index if index is None else index)
         self.take_focus()

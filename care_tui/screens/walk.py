@@ -19,6 +19,7 @@ from care_core.errors import CareError
 from care_tui.clipboard import fits, osc52
 from care_tui.jobs import CAUSES, Engine, Job
 from care_tui.messages import Progressed, StepChosen
+from care_tui.pages.account import AccountPage
 from care_tui.pages.causes import CausesPage
 from care_tui.pages.diff import DiffPage
 from care_tui.pages.fix import FixPage
@@ -28,14 +29,16 @@ from care_tui.pages.page import Page
 from care_tui.pages.report import ReportPage
 from care_tui.pages.step import StepPage
 from care_tui.places import remember
+from care_tui.render.happened import standing
 from care_tui.render.rows import Glyphs
 from care_tui.screens.panes import PanesScreen
 from care_tui.session import Session
 from care_tui.settings import Settings
+from care_tui.widgets.pinned import Pinned
 from care_tui.widgets.step_bar import STEPS, StepBar
 
 PAGES: tuple[type[StepPage], ...] = (LogPage, ObjectivesPage, CausesPage, FixPage, DiffPage, ReportPage)
-LOG, OBJECTIVES, CAUSES_STEP = 1, 2, 3
+LOG, OBJECTIVES = 1, 2
 VIEWS = {
     "graph": "The causal model around the fault",
     "messages": "What the robot's software said",
@@ -82,6 +85,7 @@ class WalkScreen(PanesScreen):
         Binding("o", "do('pick')", "Other log", id="log.pick"),
         Binding("r", "do('again')", "Read again", show=False, id="log.again"),
         Binding("R", "do('rescan')", "Look for logs again", show=False, id="log.rescan"),
+        Binding("equals_sign,i", "do('type_threshold')", "Threshold", key_display="=", id="objectives.threshold"),
         Binding("d", "do('dismiss')", "Set aside", id="causes.dismiss"),
         Binding("o", "do('next_fault')", "Next fault", show=False, id="causes.next-fault"),
         Binding("space", "do('toggle')", "Tick", key_display="space", id="fix.toggle", priority=True),
@@ -112,14 +116,17 @@ class WalkScreen(PanesScreen):
         self.session = Session()
         self.step = LOG
         self._pages = tuple(page(self) for page in PAGES)
+        self._account = AccountPage(self)
+        self._causes = next(page for page in self._pages if isinstance(page, CausesPage))
         self._view: Page | None = None
-        self._views: dict[str, Page] = {}
+        self._views: dict[str, Page] = {"logs": self._pages[0]}
         """Views of this log that were opened before: what they read of it is kept."""
         self._visited: list[Place] = []
         self._request = request
 
     def compose_body(self) -> ComposeResult:
         yield StepBar(self.glyphs)
+        yield Pinned(self.glyphs.more)
         yield from super().compose_body()
 
     def on_mount(self) -> None:
@@ -130,6 +137,8 @@ class WalkScreen(PanesScreen):
 
     @property
     def page(self) -> Page:
+        if self._view is None and self.step == LOG and self.session.state == "data":
+            return self._account
         return self._view or self._pages[self.step - 1]
 
     # Moving through the steps and views
@@ -145,6 +154,7 @@ class WalkScreen(PanesScreen):
         self.step, self._view = place.step, place.view
         with self.app.batch_update():
             self._mark()
+            self._pin()
             self.turn_to_page(place.index)
 
     def _mark(self) -> None:
@@ -152,6 +162,10 @@ class WalkScreen(PanesScreen):
         self.query_one(StepBar).mark(
             self.step, "" if path is None else path.name, None if self._view is None else self._view.name
         )
+
+    def _pin(self) -> None:
+        case = self.session.case
+        self.query_one(Pinned).show([] if case is None else standing(case.diagnosis, self.glyphs))
 
     def _go(self, place: Place) -> None:
         """Show another place; Esc leads back to this one, as it is now."""
@@ -197,8 +211,9 @@ class WalkScreen(PanesScreen):
         session, index = self.session, self.choices.highlighted
         if session.case is None:
             return None
-        if self._view is None and self.step == CAUSES_STEP and index is not None:
-            return session.causes[index].option.name
+        option = self._causes.option_at(index) if self.page is self._causes else None
+        if option is not None:
+            return option
         return None if session.result is None else session.result.variable.name
 
     @on(StepChosen)
@@ -208,16 +223,36 @@ class WalkScreen(PanesScreen):
 
     # Reading a log
 
+    def again(self) -> None:
+        """Read the log again, after an error or a change."""
+        if self._request is not None:
+            self._read(self._request)
+
+    def judge_by(self, objective: str, bound: float | None) -> None:
+        """Judge the log again with another threshold of an objective; None: that of the profile."""
+        assert self._request is not None
+        others = {name: value for name, value in self._request.thresholds.items() if name != objective}
+        bounds = others if bound is None else {**others, objective: bound}
+        self._read(replace(self._request, thresholds=bounds), step=self.step, objective=objective)
+
     def open_log(self, path: Path) -> None:
         """Diagnose a log, asked for as the one before; what was chosen for that one is gone."""
-        self._read(replace(self._request, log=path) if self._request else Request(path, top=CAUSES))
+        # A mission and a good log belong to the log that they were named for.
+        asked = self._request
+        is_other = asked is not None and asked.log.absolute() != path.absolute()
+        self._read(
+            Request(path, top=CAUSES)
+            if asked is None
+            else replace(asked, log=path, mission=None if is_other else asked.mission)
+        )
 
-    def _read(self, request: Request) -> None:
+    def _read(self, request: Request, *, step: int = LOG, objective: str | None = None) -> None:
+        """Read and judge a log; the operator waits at `step`, and comes back to `objective`."""
         self._request = request
-        self.session = Session(path=request.log.absolute(), progress=("starting", 0.0))
+        self.session = Session(path=request.log.absolute(), progress=("starting", 0.0), looked_at=objective)
         self._visited.clear()
-        self._views.clear()
-        self._show(Place(LOG))
+        self._views = {"logs": self._pages[0]}
+        self._show(Place(step))
         # After the first frame, which the imports of the work would hold up.
         self.call_after_refresh(self.fetch, "diagnose", partial(self._diagnose, request), self._opened)
 
@@ -252,8 +287,11 @@ class WalkScreen(PanesScreen):
             self.draw()
             return
         self.session.take(answer)
+        self._pin()
         if self._view is not None:
             self.draw()
+        elif answer.diagnosis.profile.fit.verdict == "no":
+            self._show(Place(self.step))
         elif self.step == LOG:
             self.action_go(OBJECTIVES)
         else:

@@ -12,9 +12,10 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 from care_core.text import clean
+from care_tui.render.rows import joined
 from care_tui.screens.base import CareScreen
 
-GAP = Content("  ")
+GAP = "  "
 
 
 class Hint(NamedTuple):
@@ -66,9 +67,8 @@ class KeyHints(Static):
         return Hint(key, Content.assemble((self.app.get_key_display(binding), "bold"), f" {does}"))
 
     def _draw(self) -> None:
-        line = (
-            Content.styled(self._notice, "bold") if self._notice else GAP.join([hint.words for hint in self._fitting()])
-        )
+        hints = joined([hint.words for hint in self._fitting()], GAP)
+        line = Content.styled(self._notice, "bold") if self._notice else hints
         if line != self.content:
             self.update(line, layout=False)
 
@@ -89,11 +89,11 @@ class KeyHints(Static):
             start, end = end, end + hint.words.cell_length
             if start <= x < end:
                 self.app.simulate_key(hint.key)
-            end += GAP.cell_length
+            end += len(GAP)
 
 
 def _width(hints: Sequence[Hint]) -> int:
-    return sum(hint.words.cell_length for hint in hints) + GAP.cell_length * (len(hints) - 1)
+    return sum(hint.words.cell_length for hint in hints) + len(GAP) * (len(hints) - 1)
 
 
 def _order(binding: Binding) -> int:

@@ -7,8 +7,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
-from care_core.run import Damage, Evidence, Fit, LogInfo, MissionInfo, ProfileChoice, Run, Setting
+from care_core.diagnose.records import (
+    Cause,
+    Diagnosis,
+    Fault,
+    Fix,
+    Hypothesis,
+    ObjectiveResult,
+    PathNode,
+    Prediction,
+)
+from care_core.health.records import Finding, Health, Moment
+from care_core.run import Damage, Evidence, Fit, FitVerdict, LogInfo, MissionInfo, ProfileChoice, Run, Setting
 from care_core.variables import Change, Role, Threshold, Variable
 
 HOSTILE = "PreArm: [bold]check[/bold] \x1b[31mfences\x1b[0m\u202e"
@@ -160,6 +170,61 @@ def faulty() -> Diagnosis:
         fix=FIX,
         alternatives=(OTHER_FIX,),
         notes=("mission_time and energy move together (0.99): one cause explains both",),
+    )
+
+
+MOTOR = Finding(
+    kind="motor",
+    title="motor 2 lost thrust \x1b[31m",
+    onset_s=91.3,
+    end_s=110.1,
+    severity="critical",
+    evidence="output 1950 us for 2.1 s while the rear left sank at 78 deg",
+    source="RCOU C2 against ATT Roll; SERVO2_MAX 1950",
+    consequences=(
+        Finding("attitude", "roll does not follow its demand", 91.5, 95.0, "critical", "48 deg apart", "ATT"),
+        Finding("crash", "it hit the ground", 110.1, 110.1, "critical", "", "ERR", after_impact=True),
+    ),
+)
+LOW_SATELLITES = Finding("gps", "few satellites", 3.0, 8.0, "warning", "5, 6 are wanted", "GPS NSats")
+HEALTH = Health(
+    "ArduCopter V4.3.6, quad X",
+    (
+        Moment(1.0, "vehicle", "ArduCopter V4.3.6", "MSG"),
+        Moment(12.4, "arming", "armed", "EV"),
+        Moment(60.0, "mode", f"AUTO {HOSTILE}", "MODE"),
+        Moment(137.4, "error", "crash check", "ERR"),
+    ),
+    (MOTOR, LOW_SATELLITES),
+)
+
+
+def fitting(verdict: FitVerdict, *reasons: str) -> ProfileChoice:
+    """The profile, and how well it fits."""
+    return replace(faulty().profile, fit=Fit(verdict, reasons))
+
+
+def crashed() -> Diagnosis:
+    """The faulty flight, and it lost a motor: hardware and parameters in one ranking; the profile fits in part."""
+    return replace(
+        faulty(),
+        profile=fitting("partly", "the firmware is 4.3.6, the profile's is 4.5", "3 options are not in the log"),
+        health=HEALTH,
+        hypotheses=(
+            Hypothesis("hardware", MOTOR.title, 0.9),
+            Hypothesis("parameter", "LAND_SPEED", 0.06),
+            Hypothesis("chance", "", 0.04),
+        ),
+    )
+
+
+def unfitting() -> Diagnosis:
+    """A log that no profile fits: its account and findings are the answer."""
+    return replace(
+        all_ok(),
+        objectives=(),
+        profile=fitting("no", "it is a rover, the profile is of a copter", "4 of 33 options are in the log"),
+        health=HEALTH,
     )
 
 

@@ -1,0 +1,65 @@
+"""Step 1 once a log is open: what happened in it, the first cause first, whether or not a profile fits."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.content import Content
+
+from care_core.health.records import Health
+from care_tui.pages.page import View
+from care_tui.pages.step import StepPage
+from care_tui.render.happened import Told, fit_rows, told, told_item, told_rows, verdict_line
+from care_tui.render.objectives import run_rows
+from care_tui.render.rows import Row, Rows
+from care_tui.widgets.choices import Listing
+
+
+class AccountPage(StepPage):
+    name = "Log"
+    HELP = (
+        "What happened: findings, the first cause first with what it led to, then the account in order of time. "
+        "m shows the messages, p the plots at the moment under the cursor. t chooses another mission of the log, "
+        "o another log. Enter goes to the objectives."
+    )
+    ENTER = "Objectives"
+    ACTIONS: ClassVar[frozenset[str]] = frozenset({"pick", "again"})
+    LIST_FIRST = True
+
+    _told: tuple[Health, list[Told]] | None = None
+
+    @property
+    def _lines(self) -> list[Told]:
+        """The lines of the pane, made once for a log."""
+        health = self.session.diagnosis.health
+        if self._told is None or self._told[0] is not health:
+            self._told = health, told(health)
+        return self._told[1]
+
+    def view(self) -> View:
+        diagnosis, glyphs, lines = self.session.diagnosis, self.glyphs, self._lines
+        listing = Listing(len(lines), lambda i, _width: (told_item(lines[i], glyphs),), lambda i: lines[i].words)
+        start = Content("No profile fits. ") if diagnosis.profile.fit.verdict == "no" else Content()
+        return View(start + verdict_line(diagnosis.health, glyphs), self._detail, listing)
+
+    def _detail(self, index: int | None) -> Rows:
+        diagnosis = self.session.diagnosis
+        fit = fit_rows(diagnosis)
+        rows = [] if index is None else told_rows(self._lines[index])
+        parts = [part for part in (rows, fit, run_rows(diagnosis).rows) if part]
+        return Rows(row for place, part in enumerate(parts) for row in ([Row(Content())] if place else []) + [*part])
+
+    def moment_s(self) -> float | None:
+        index = self.screen.choices.highlighted
+        return None if index is None else self._lines[index].time_s
+
+    def open(self, index: int | None) -> None:
+        self.walk.action_go(2)
+
+    def pick(self) -> None:
+        """Choose another log."""
+        self.walk.action_view("logs")
+
+    def again(self) -> None:
+        """Read the log again."""
+        self.walk.again()

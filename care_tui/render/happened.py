@@ -1,0 +1,140 @@
+"""What happened in a log: its account and findings, how well the profile fits, and what explains the failure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from textual.content import Content
+
+from care_core.diagnose.records import Diagnosis, Hypothesis
+from care_core.health.records import Finding, Health, Moment, Severity
+from care_core.report.happened import SEVERITY_WORDS, clock, hypothesis_text
+from care_core.text import clean
+from care_tui.render.objectives import damage
+from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, text, warning
+
+TIME_WIDTH, KIND_WIDTH = 8, 10
+_COLOURS: dict[Severity, str] = {"critical": "bold $text-error", "warning": "$text-warning", "info": ""}
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A line of the pane: a finding, one that `cause` led to, or a moment of the account."""
+
+    what: Finding | Moment
+    cause: Finding | None = None
+
+    @property
+    def time_s(self) -> float:
+        return self.what.onset_s if isinstance(self.what, Finding) else self.what.time_s
+
+    @property
+    def words(self) -> str:
+        """What `/` searches in."""
+        if isinstance(self.what, Finding):
+            return f"{self.what.kind} {SEVERITY_WORDS[self.what.severity]} {self.what.title}"
+        return f"{self.what.kind} {self.what.text}"
+
+
+def told(health: Health) -> list[Told]:
+    """Findings, the first cause first and what each led to below it; then the account in order of time."""
+    lines = []
+    for finding in health.findings:
+        lines += [Told(finding), *(Told(below, finding) for below in finding.consequences)]
+    return [*lines, *(Told(moment) for moment in health.account)]
+
+
+def told_item(one: Told, glyphs: Glyphs) -> Content:
+    """One line of the pane. A finding has a sign and a word, what it led to is set in, a moment is plain."""
+    time = f"{clock(one.time_s):>{TIME_WIDTH}}  "
+    if isinstance(one.what, Moment):
+        return Content.assemble("  ", padded(one.what.kind, KIND_WIDTH), time, text(one.what.text))
+    late = "  (after the impact)" if one.what.after_impact else ""
+    if one.cause is not None:
+        return Content.assemble(f"  {glyphs.to} ", padded("led to", KIND_WIDTH - 2), time, text(one.what.title + late))
+    sign = {"critical": glyphs.fault, "warning": "!", "info": " "}[one.what.severity]
+    head = padded(f"{sign} {SEVERITY_WORDS[one.what.severity]}", KIND_WIDTH + 2, _COLOURS[one.what.severity])
+    return Content.assemble(head, time, text(one.what.title, "bold"), text(late))
+
+
+def told_rows(one: Told) -> list[Row]:
+    """All about one line of the pane."""
+    if isinstance(one.what, Moment):
+        return [labelled(clock(one.what.time_s), one.what.text), labelled("From", one.what.source)]
+    return finding_rows(one.what, one.cause)
+
+
+def finding_rows(finding: Finding, cause: Finding | None = None) -> list[Row]:
+    """A finding with its numbers, where they come from, and what it led to."""
+    span = clock(finding.onset_s)
+    if finding.end_s > finding.onset_s:
+        span += f" to {clock(finding.end_s)}"
+    rows = [heading(finding.title), labelled("When", span + (", after the impact" if finding.after_impact else ""))]
+    rows += [labelled("Seen by", finding.evidence)] if finding.evidence else []
+    rows += [labelled("From", finding.source)] if finding.source else []
+    if cause is not None:
+        rows.append(labelled("Explained by", f"{cause.title} ({clock(cause.onset_s)})"))
+    rows += [
+        labelled("" if place else "It led to", f"{below.title} ({clock(below.onset_s)})")
+        for place, below in enumerate(finding.consequences)
+    ]
+    return rows
+
+
+def verdict_line(health: Health, glyphs: Glyphs) -> Content:
+    """What robot this is, and the finding that comes first; that nothing was found is said plainly."""
+    robot = Content(clean(f"{health.robot}: " if health.robot else ""))
+    first = next(iter(health.findings), None)
+    if not health.is_readable:
+        return robot + Content("too little in the log to say what happened")
+    if first is None:
+        return robot + Content("nothing out of the ordinary was found")
+    sign = {"critical": f"{glyphs.fault} ", "warning": "! ", "info": ""}[first.severity]
+    return Content.assemble(robot, (sign + clean(first.title), "bold"), f" at {clock(first.onset_s)}")
+
+
+def standing(diagnosis: Diagnosis, glyphs: Glyphs) -> list[Content]:
+    """How far the answer carries, for every step: the fit of the profile, then what limits the answer besides."""
+    profile, fit = diagnosis.profile, diagnosis.profile.fit
+    name = clean(f"{profile.name} {profile.version}".strip()) or "Profile"
+    style = {"fits": "", "partly": "$text-warning", "no": "bold $text-error"}[fit.verdict]
+    mark = "" if fit.verdict == "fits" else "! "
+    lines = [Content.styled(f"{mark}{name} {clean(str(fit))}", style)]
+    limits = warnings_of(diagnosis)
+    if limits:
+        lines.append(Content.styled("! " + clean("; ".join(limits)), "$text-warning"))
+    return lines
+
+
+def warnings_of(diagnosis: Diagnosis) -> list[str]:
+    """What limits the answer, beside the fit of the profile; the gravest first."""
+    run = diagnosis.run
+    found = [] if run.mission.ended else ["the log stops before the mission does"]
+    found += [run.mission.mismatch] if run.mission.mismatch else []
+    found += [damage(part) for part in run.log.damage]
+    return found
+
+
+def fit_rows(diagnosis: Diagnosis) -> list[Row]:
+    """What would make a profile fit, where none does."""
+    fit = diagnosis.profile.fit
+    if fit.verdict != "no":
+        return []
+    head = heading("No profile fits this log. What keeps the nearest from fitting:")
+    return [head, *(Row(text(f"- {reason}"), 2) for reason in fit.reasons)]
+
+
+def hypothesis_item(one: Hypothesis, finding: Finding | None) -> tuple[Content, Content]:
+    """An explanation that is no cause of the list: how likely it is, what it is, and when it began."""
+    when = "" if finding is None else f", from {clock(finding.onset_s)}"
+    kind = {"hardware": "a part of the robot", "world": "what the robot met", "parameter": "a parameter"}
+    head = Content.assemble(f"{percent(one.probability):>5} ", text(hypothesis_text(one), "bold"))
+    return head, Content(f"      {kind.get(one.what, 'no cause')}{when}")
+
+
+def hypothesis_rows(one: Hypothesis, finding: Finding | None) -> list[Row]:
+    """All about an explanation."""
+    rows = [] if finding is None else [*finding_rows(finding), Row(Content())]
+    if one.what in ("hardware", "world"):
+        rows.append(warning("No parameter", "as far as this explains it, no change of a parameter helps"))
+    return [labelled("Probability", percent(one.probability)), *rows]

@@ -1,0 +1,167 @@
+"""What happened, how well the profile fits and what explains the failure, as the app shows them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from care_core.diagnose.records import Diagnosis
+from care_core.health.records import Health
+from care_tui.app import CareApp
+from care_tui.jobs import Case, Progress, Request
+from care_tui.settings import Settings
+from care_tui.widgets.pinned import Pinned
+from tests.tui import sample_diagnosis as sample
+from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
+from tests.tui.test_walk import hints, items, text, title, walk
+
+
+def pinned(app: CareApp) -> list[str]:
+    return str(app.screen.query_one(Pinned).content).splitlines()
+
+
+async def test_the_first_step_tells_what_happened_the_first_cause_first(make_app: MakeApp) -> None:
+    app = make_app(sample.crashed())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "1")
+        assert title(app).startswith("ArduCopter V4.3.6, quad X: ✗ motor 2 lost thrust \\x1b[31m at 91.3 s")
+        lines = [line.split() for line in items(app).splitlines()]
+        assert [line[:4] for line in lines[:4]] == [
+            ["✗", "CRITICAL", "91.3", "s"],
+            ["→", "led", "to", "91.5"],
+            ["→", "led", "to", "110.1"],
+            ["!", "WARNING", "3.0", "s"],
+        ]
+        assert [line[0] for line in lines[4:]] == ["vehicle", "arming", "mode", "error"]
+        assert "after the impact" in items(app)
+        for fact in ("91.3 s to 110.1 s", "output 1950 us", "SERVO2_MAX", "roll does not follow", "This run"):
+            assert fact in text(app)
+        await settle(pilot, "j")
+        assert "Explained by  motor 2 lost thrust" in text(app)
+        await settle(pilot, "G")
+        assert "137.4 s       crash check" in text(app)
+        await settle(pilot, "slash", *"arming", "enter")
+        assert walk(app).choices.option_count == 1
+        await settle(pilot, "escape", "enter")
+        assert walk(app).step == 2
+
+
+async def test_that_nothing_was_found_is_said_plainly(make_app: MakeApp) -> None:
+    healthy = replace(sample.all_ok(), health=Health("Rover V4.5", sample.HEALTH.account, ()))
+    app = make_app(healthy)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "1")
+        assert title(app) == "Rover V4.5: nothing out of the ordinary was found"
+    app = make_app(replace(healthy, health=Health("", (), (), is_readable=False)))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "1")
+        assert "too little in the log" in title(app)
+        assert "This run" in text(app)
+
+
+async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_say_why_they_are_empty(
+    make_app: MakeApp,
+) -> None:
+    app = make_app(sample.unfitting())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        assert walk(app).step == 1
+        assert "No profile fits" in title(app)
+        assert "motor 2 lost thrust" in items(app)
+        assert "What keeps the nearest from fitting" in text(app)
+        assert "- it is a rover, the profile is of a copter" in text(app)
+        for step in "2345":
+            await settle(pilot, step)
+            assert text(app).startswith("No profile fits this log, so ")
+            assert items(app) == ""
+            await settle(pilot, "a", "d", "space", "equals_sign", "plus", "u", "f", "c", "o")
+            assert walk(app).step == int(step)
+            await settle(pilot, "enter")
+        await settle(pilot, "6")
+        assert text(app) == "report: yaml", "the account is exported all the same"
+
+
+async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_view(make_app: MakeApp) -> None:
+    app = make_app(sample.crashed())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        for key in "123456yb":
+            await settle(pilot, key)
+            fit, warnings = pinned(app)
+            assert fit.startswith("! arducopter 1.0 fits in part: the firmware is 4.3.6, ")
+            assert warnings.startswith("! 142 bytes that are no message")
+            assert all(len(line) <= 78 for line in (fit, warnings))
+            assert app.screen.query_one(Pinned).size.height == 2
+    app = make_app(replace(sample.all_ok(), profile=sample.fitting("fits")))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        assert pinned(app)[0] == "arducopter 1.0 fits"
+
+
+async def test_parts_parameters_and_chance_compete_in_one_ranking(make_app: MakeApp) -> None:
+    app = make_app(sample.crashed())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3")
+        lines = items(app).splitlines()
+        assert [line.split()[0] for line in lines[::2]] == ["90", "6", "4", "2", "3"]
+        assert "motor 2 lost thrust" in lines[0]
+        assert "a part of the robot, from 91.3 s" in lines[1]
+        assert "LAND_SPEED  16 → 50 cm/s" in lines[2]
+        assert "output 1950 us" in text(app), "the evidence of the part"
+        await settle(pilot, "d")
+        assert walk(app).session.dismissed == {}, "only a parameter is set aside"
+        await settle(pilot, "w")
+        assert walk(app).page.name == "Graph"
+        await settle(pilot, "escape", "j")
+        assert "● LAND_SPEED" in text(app)
+        await settle(pilot, "enter")
+        assert walk(app).step == 4
+
+
+async def test_an_objective_is_judged_by_another_threshold() -> None:
+    asked: list[dict[str, float]] = []
+
+    def diagnose(request: Request, progress: Progress) -> Case:
+        asked.append(dict(request.thresholds))
+        found, hungry = sample.faulty(), sample.HUNGRY
+        assert hungry.threshold is not None
+        bound = replace(hungry.threshold, value=request.thresholds.get("energy", 9.5))
+        results = tuple(replace(one, threshold=bound) if one is hungry else one for one in found.objectives)
+        return Case(replace(found, objectives=results), sample.OPTIONS)
+
+    app = CareApp(
+        Request(LOG, thresholds={"mission_time": 150.0}), engine=fake_engine(diagnose), settings=Settings(places=())
+    )
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "j", "equals_sign")
+        await settle(pilot, *"2x", "enter")
+        assert "no number" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]
+        await settle(pilot, "backspace", "backspace", *"12", "enter")
+        await settle(pilot)
+        assert asked[-1] == {"mission_time": 150.0, "energy": 12.0}
+        assert walk(app).step == 2
+        assert walk(app).choices.highlighted == 2, "the cursor is where it was"
+        assert "<= 12 Wh" in items(app)
+        await settle(pilot, "equals_sign", "backspace", "backspace", "enter")
+        await settle(pilot)
+        assert asked[-1] == {"mission_time": 150.0}
+        await settle(pilot, "g", "equals_sign")
+        assert "met or not" in hints(app)
+
+
+@pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60)])
+@pytest.mark.parametrize("diagnosis", [sample.crashed(), sample.unfitting()], ids=["crashed", "unfitting"])
+async def test_no_pane_is_wider_than_its_terminal(
+    make_app: MakeApp, size: tuple[int, int], diagnosis: Diagnosis
+) -> None:
+    app = make_app(diagnosis)
+    async with app.run_test(size=size) as pilot:
+        for step in "123456":
+            await settle(pilot, step)
+            for pane in (walk(app).choices, walk(app).text):
+                if pane.display:
+                    assert pane.size.height >= 2
+                    assert all(pane.line(y).cell_length <= pane.size.width for y in range(pane.line_count))
+            screen = "\n".join(strip.text for strip in app.screen._compositor.render_strips())
+            assert "\x1b" not in screen
