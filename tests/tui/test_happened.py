@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from care_core.application.case import Case, Progress, Request
 from care_core.diagnose.records import Diagnosis
 from care_core.health.records import Health
 from care_tui.app import CareApp
-from care_tui.jobs import Case, Progress, Request
 from care_tui.settings import Settings
 from care_tui.widgets.pinned import Pinned
 from tests.tui import sample_diagnosis as sample

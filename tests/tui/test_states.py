@@ -185,7 +185,7 @@ async def test_o_opens_any_log_by_its_path(make_app: MakeApp, tmp_path: Path) ->
     (folder / "a.BIN").write_bytes(b"x")
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "1", "o")
+        await settle(pilot, "1", "o", "o")
         assert isinstance(app.screen, OpenLogDialog)
         box = app.screen.query_one("Input")
         box.value = f"{tmp_path}/fli"  # type: ignore[attr-defined]
@@ -194,7 +194,7 @@ async def test_o_opens_any_log_by_its_path(make_app: MakeApp, tmp_path: Path) ->
         await settle(pilot, "down", "up", "enter")
         await settle(pilot)
         assert walk(app).session.path == folder / "a.BIN"
-        await settle(pilot, "1", "o")
+        await settle(pilot, "1", "o", "o")
         app.screen.query_one("Input").value = "/nowhere/x.BIN"  # type: ignore[attr-defined]
         await settle(pilot, "enter")
         assert "no such file" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]
