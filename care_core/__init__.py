@@ -24,8 +24,9 @@ _HOMES = {
     "Request": "care_core.application.case",
 }
 
+if not TYPE_CHECKING:  # so that mistyped names are found where types are checked
 
-def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-    return getattr(import_module(_HOMES.get(name, "care_core.application.api")), name)
+    def __getattr__(name: str) -> Any:
+        if name not in __all__:
+            raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
+        return getattr(import_module(_HOMES.get(name, "care_core.application.api")), name)

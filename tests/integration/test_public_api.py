@@ -1,0 +1,62 @@
+"""The public names of the core: the README's notebook runs as it stands, and importing costs nothing until then."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import care_core
+from care_core.errors import UsageError
+
+ROOT = Path(__file__).parents[2]
+SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
+
+
+@pytest.fixture(scope="module")
+def case() -> care_core.Case:
+    return care_core.triage(SAMPLE)
+
+
+def test_the_notebook_of_the_readme_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "samples").symlink_to(SAMPLE.parent)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    exec(compile(code, "README.md", "exec"), names)
+    fix = names["case"].diagnosis.fix
+    assert names["fault"].causes[0].option.name in {change.option.name for change in fix.changes}
+    assert names["edited"].before == "LAND_SPEED,16\n" != names["edited"].after
+    assert names["outcome"].verdict == "cannot_tell"  # it is the log that the report is about
+    assert len(names["attitude"].t) == len(names["attitude"]["Roll"]) > 100
+    assert "as driven" in capsys.readouterr().out
+
+
+def test_every_public_name_is_there() -> None:
+    assert all(getattr(care_core, name).__doc__ for name in care_core.__all__)
+    assert not hasattr(care_core, "trage")
+
+
+def test_what_if_takes_parameters_and_refuses_strangers(case: care_core.Case) -> None:
+    assert case.schema is not None
+    option = next(option for option in case.schema.options if option.parameters)
+    current = case.diagnosis.run.config[option.name]
+    answer = care_core.what_if(case, {option.parameters[0]: current})
+    assert answer.p_ok == pytest.approx(answer.p_ok_now)
+    with pytest.raises(UsageError, match="no option"):
+        care_core.what_if(case, {"LAND_SPED": 40})
+
+
+def test_a_case_keeps_its_log_open_and_reads_the_same_from_it(case: care_core.Case) -> None:
+    from care_core.application.viewing import messages_of, signals_of, trace_of
+
+    assert case.log is not None
+    assert case.log.path == SAMPLE
+    assert messages_of(case)
+    trace = trace_of(case, signals_of(case)[0], 40)
+    assert trace.count > 0
+    assert len(trace.columns) == 40
