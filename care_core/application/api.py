@@ -31,11 +31,11 @@ def open_log(path: str | Path) -> Log:
 def inspect(log: str | Path) -> InspectDocument:
     """What a log holds, and what each installed profile finds in it; nothing is judged. Raises LogError."""
     from care_core.extract.coverage import try_on
-    from care_core.profile.store import available_profiles, load_profile
+    from care_core.extract.select import sound_profiles
     from care_core.report.inspection import build_inspection
 
     found = open_log(log)
-    return build_inspection(found, [try_on(found, load_profile(path).schema) for path in available_profiles()])
+    return build_inspection(found, [try_on(found, profile.schema) for profile in sound_profiles()[0]])
 
 
 def triage(asked: Request | str | Path, progress: Progress = _silent) -> Case:

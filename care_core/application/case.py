@@ -132,11 +132,15 @@ def opened(path: Path) -> Iterator[tuple[Log, Sha256]]:
 
 def choose(log: Log, name: str | None = None) -> tuple[Profile, ProfileChoice]:
     """The installed profile that fits a log, or how the one that was named does. Raises CareError where none does."""
-    from care_core.extract.select import fitting_profile
-    from care_core.profile.store import available_profiles, load_profile
+    from care_core.extract.select import fitting_profile, sound_profiles
+    from care_core.profile.store import load_profile
 
-    names: list[Path] | list[str] = available_profiles() if name is None else [name]
-    return fitting_profile(log, [load_profile(one) for one in names])
+    if name is not None:
+        return fitting_profile(log, [load_profile(name)])
+    sound, problems = sound_profiles()
+    profile, choice = fitting_profile(log, sound)
+    left_out = "".join(f"; left out as it is not sound: {problem}" for problem in problems)
+    return profile, replace(choice, reason=f"{choice.reason}{left_out}")
 
 
 def _read(log: Log, request: Request, configs: tuple[ConfigFile, ...], progress: Progress, sha256: Sha256) -> Reading:

@@ -204,11 +204,11 @@ class Installed:
 
 def installed_profiles() -> list[Installed]:
     """Every installed profile with its model card."""
-    from care_core.profile.store import available_profiles, load_profile
+    from care_core.extract.select import sound_profiles
 
     return [
-        Installed(schema.name, schema.version, schema.platform, _card(path))
-        for path, schema in ((path, load_profile(path).schema) for path in available_profiles())
+        Installed(one.schema.name, one.schema.version, one.schema.platform, _card(one.path))
+        for one in sound_profiles()[0]
     ]
 
 

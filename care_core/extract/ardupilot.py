@@ -15,7 +15,19 @@ from numpy.typing import NDArray
 
 from care_core.extract.asked import asked
 from care_core.extract.flight import NEEDS, Flight, analyse, messages, waypoint_offsets
-from care_core.extract.registry import MISSION_KINDS, Args, Mission, MissionKind, extractor, has, merge_needs, missing
+from care_core.extract.registry import (
+    MISSION_KINDS,
+    Args,
+    Mission,
+    MissionKind,
+    extractor,
+    has,
+    merge_needs,
+    missing,
+    numeric,
+    one_of,
+    points,
+)
 from care_core.logs.base import Table, Wanted
 from care_core.logs.plausible import plausible
 from care_core.run import Evidence, Unavailable, Value, is_known
@@ -30,9 +42,13 @@ _WAYPOINT_TOLERANCE_M = 5.0
 _MIN_ROWS = 5
 _AUTO = 3  # ArduCopter's flight mode number
 _PHASE_ARGS = {
-    "phase": "only this part of the flight: takeoff, leg, return, return_climb, return_cruise, descent, touchdown",
-    "index": "number of the leg, from 1",
+    "phase": one_of(
+        "only this part of the flight: takeoff, leg, return, return_climb, return_cruise, descent, touchdown",
+        *("takeoff", "leg", "return", "return_climb", "return_cruise", "descent", "touchdown"),
+    ),
+    "index": numeric("number of the leg, from 1"),
 }
+_STATISTIC = one_of("mean, max, min, std, rms or peak (95th percentile)", "mean", "max", "min", "std", "rms", "peak")
 
 # Subsystems of an ERR record by the kind of event; code 0 means that the fault went away.
 ERR_SUBSYSTEMS: dict[int, tuple[str, str]] = {
@@ -58,8 +74,8 @@ class ArduPilotFlight(MissionKind):
 
     name = "ardupilot_flight"
     args: Mapping[str, str] = {
-        "waypoints": "list of [latitude, longitude, height above home in m] that the thresholds belong to",
-        "tolerance_m": "how far from home a landing may end, and a waypoint may be off",
+        "waypoints": points("list of [latitude, longitude, height above home in m] that the thresholds belong to", 3),
+        "tolerance_m": numeric("how far from home a landing may end, and a waypoint may be off"),
     }
 
     def needs(self, spec: Args) -> Wanted:
@@ -394,7 +410,7 @@ def distance(mission: Mission, args: Args) -> Value:
     return float(steps[flight.track.airborne(flight.track.t)[1:]].sum())
 
 
-@extractor("path_error", needs=NEEDS, unit="m", args={"stat": "max or mean"})
+@extractor("path_error", needs=NEEDS, unit="m", args={"stat": one_of("max or mean", "max", "mean")})
 def path_error(mission: Mission, args: Args) -> Value:
     """Horizontal distance from the legs (home, waypoints, home if it returns) while airborne."""
     flight = _flight(mission)
@@ -552,12 +568,13 @@ def _register(
         return _statistic(measure(table, mission, given), str(given.get("stat", stat)))
 
     compute.__doc__ = f"{doc} Statistic: {stat} unless `stat` says otherwise."
-    described = {"stat": "mean, max, min, std, rms or peak (95th percentile)", **_PHASE_ARGS, **(args or {})}
+    described = {"stat": _STATISTIC, **_PHASE_ARGS, **(args or {})}
     extractor(name, needs=merge_needs((NEEDS, wanted)), unit=unit, args=described)(compute)
 
 
 _AXES = {"roll": ("R", "RDes", "ROut"), "pitch": ("P", "PDes", "POut"), "yaw": ("Y", "YDes", "YOut")}
-_AXIS = {"axis": "roll, pitch, yaw, or tilt (roll and pitch together)"}
+_AXIS = {"axis": one_of("roll, pitch or yaw; roll unless given", *_AXES)}
+_TILT = {"axis": one_of("roll, pitch, yaw, or tilt (roll and pitch together); tilt unless given", *_AXES, "tilt")}
 
 
 def _attitude_error(table: Table, mission: Mission, args: Args) -> Floats:
@@ -566,12 +583,12 @@ def _attitude_error(table: Table, mission: Mission, args: Args) -> Floats:
         "pitch": table["DesPitch"] - table["Pitch"],
         "yaw": _wrapped(table["DesYaw"] - table["Yaw"]),
     }
-    axis = str(args.get("axis", "tilt"))
-    return np.asarray(errors[axis] if axis in errors else np.hypot(errors["roll"], errors["pitch"]))
+    axis = args.get("axis", "tilt")
+    return np.asarray(np.hypot(errors["roll"], errors["pitch"]) if axis == "tilt" else errors[axis])
 
 
 def _of_axis(column: Callable[[Table, tuple[str, str, str]], Floats]) -> Callable[[Table, Mission, Args], Floats]:
-    return lambda table, _mission, args: column(table, _AXES.get(str(args.get("axis")), _AXES["roll"]))
+    return lambda table, _mission, args: column(table, _AXES[args.get("axis", "roll")])
 
 
 def _lean(table: Table) -> Floats:
@@ -595,7 +612,7 @@ _LEAN = {"ATT": ("Roll", "Pitch")}
 _SINK = {"PSCD": ("VD",)}
 _OUTPUTS = {"RCOU": ("C1", "C2", "C3", "C4")}
 
-_register("attitude_error", _ATTITUDE, "deg", "Wanted minus flown attitude.", _attitude_error, stat="rms", args=_AXIS)
+_register("attitude_error", _ATTITUDE, "deg", "Wanted minus flown attitude.", _attitude_error, stat="rms", args=_TILT)
 _register("rate_error", _RATE, "deg/s", "Wanted minus flown rotation rate: slack or oscillation of one axis.",
           _of_axis(lambda t, c: t[c[0]] - t[c[1]]), stat="rms", args=_AXIS)  # fmt: skip
 _register("rate_activity", _RATE, "deg/s", "Rotation rate of one axis.",
@@ -636,7 +653,11 @@ _register("ekf_position_innovation", {"XKF3": ("C", "IPN", "IPE")}, "m",
     "ekf_innovation",
     needs=lambda args: merge_needs((NEEDS, {"XKF4": ("C", str(args.get("field", "SV")))})),
     unit="",
-    args={"field": "SV velocity, SP position, SH height, SM compass", "stat": "mean, max, rms or peak", **_PHASE_ARGS},
+    args={
+        "field": one_of("SV velocity, SP position, SH height, SM compass", "SV", "SP", "SH", "SM"),
+        "stat": one_of("mean, max, rms or peak", "mean", "max", "rms", "peak"),
+        **_PHASE_ARGS,
+    },
 )
 def ekf_innovation(mission: Mission, args: Args) -> Value:
     """Innovation test ratio of the first estimator core (above 1 it rejects the sensor). Mean unless `stat`."""
@@ -683,7 +704,10 @@ def _both_axes(mission: Mission, args: Args, of_axis: Callable[[Callable[[str], 
     return _statistic(np.hypot(parts[0][:count], parts[1][:count]), str(args.get("stat", stat)))
 
 
-_HORIZONTAL_ARGS = {"stat": "mean, max, rms or peak (95th percentile)", **_PHASE_ARGS}
+_HORIZONTAL_ARGS = {
+    "stat": one_of("mean, max, rms or peak (95th percentile)", "mean", "max", "rms", "peak"),
+    **_PHASE_ARGS,
+}
 
 
 @extractor("velocity_error", needs=_horizontal("TV", "V"), unit="m/s", args=_HORIZONTAL_ARGS)

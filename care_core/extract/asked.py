@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.extract.registry import Args, Mission, extractor, has, missing
+from care_core.extract.registry import Args, Mission, extractor, has, missing, one_of
 from care_core.logs.base import Table, Wanted
 from care_core.run import Unavailable, Value
 
@@ -215,7 +215,7 @@ _MISSION: Mapping[str, Callable[[Asked], float]] = {
 }
 
 
-@extractor("mission_asked", needs=ITEMS, unit="", args={"what": ", ".join(_MISSION)})
+@extractor("mission_asked", needs=ITEMS, unit="", args={"what": one_of(", ".join(_MISSION), *_MISSION)})
 def mission_asked(mission: Mission, args: Args) -> Value:
     """One number of the mission that the vehicle was given: lengths and heights in m, times in s, turns in degrees,
     `commanded_speed` in m/s (0: none), `returns` 1 or 0."""

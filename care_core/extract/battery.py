@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_core.extract.drive import BATTERY_FIELDS, Floats, has, topics
-from care_core.extract.registry import Args, Mission, extractor, missing
+from care_core.extract.registry import Args, Mission, extractor, missing, one_of
 from care_core.run import Unavailable, Value
 
 _TOO_SHORT = Unavailable("the mission takes no time", "record the whole mission")
@@ -43,7 +43,11 @@ def battery_power(mission: Mission, args: Args) -> Value:
 
 
 @extractor(
-    "battery_voltage", needs={}, parts=("battery",), unit="V", args={"of": "start or lowest, lowest unless given"}
+    "battery_voltage",
+    needs={},
+    parts=("battery",),
+    unit="V",
+    args={"of": one_of("start or lowest, lowest unless given", "start", "lowest")},
 )
 def battery_voltage(mission: Mission, args: Args) -> Value:
     """The battery's voltage at the start, or its lowest."""

@@ -32,7 +32,7 @@ from care_core.extract.drive import (
     timeout_s,
     topics,
 )
-from care_core.extract.registry import Args, Mission, MissionKind
+from care_core.extract.registry import Args, Mission, MissionKind, numeric, points
 from care_core.logs.base import Table, Wanted
 from care_core.run import Evidence, Unavailable
 
@@ -62,10 +62,10 @@ _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
 """What a message of the log speaks about, first match counts."""
 
 GOAL_ARGS: Mapping[str, str] = {
-    "goals": "list of [x, y] in m, in the frame of the goals, that the thresholds belong to",
-    "goal_timeout_s": "time within which each goal must be reached, 60 unless given",
-    "tolerance_m": "how far a goal may be from the listed one, 0.3 unless given",
-    "passages": "list of [x, y] of narrow passages, in the frame of the odometry",
+    "goals": points("list of [x, y] in m, in the frame of the goals, that the thresholds belong to", 2),
+    "goal_timeout_s": numeric("time within which each goal must be reached, 60 unless given"),
+    "tolerance_m": numeric("how far a goal may be from the listed one, 0.3 unless given"),
+    "passages": points("list of [x, y] of narrow passages, in the frame of the odometry", 2),
     "odometry": "topic of nav_msgs/Odometry, /odom unless given",
     "commands": "topic of geometry_msgs/Twist or TwistStamped, /cmd_vel unless given",
     "battery": "topic of sensor_msgs/BatteryState, /battery_state unless given",

@@ -14,7 +14,7 @@ import numpy as np
 
 from care_core.extract.drive import GOAL_SERVERS, GoalServer, Leg, Recoveries, Status, has, heading
 from care_core.extract.goals import GoalMissions
-from care_core.extract.registry import MISSION_KINDS, Args, Mission, extractor, missing
+from care_core.extract.registry import MISSION_KINDS, Args, Mission, extractor, missing, one_of
 from care_core.logs.base import Table, Wanted
 from care_core.run import Unavailable, Value
 
@@ -186,7 +186,9 @@ def _changes(table: Table) -> Iterator[tuple[float, str, str, str]]:
 
 @extractor("tree_count", needs={}, unit="", parts=("behavior_tree",), args={
     "node": "text in the node's name, such as ComputePathToPose or FollowPath",
-    "status": "state that it comes to: RUNNING, SUCCESS or FAILURE; FAILURE unless given",
+    "status": one_of(
+        "state that it comes to: RUNNING, SUCCESS or FAILURE; FAILURE unless given", "RUNNING", "SUCCESS", "FAILURE"
+    ),
 })  # fmt: skip
 def tree_count(mission: Mission, args: Args) -> Value:
     """How often a node of the behavior tree came to a state: what the planner or the controller failed at."""

@@ -29,7 +29,7 @@ from care_core.extract.drive import (
     share,
 )
 from care_core.extract.goals import ROSOUT, rosout
-from care_core.extract.registry import Args, Mission, extractor, missing
+from care_core.extract.registry import Args, Mission, extractor, missing, numeric, one_of
 from care_core.run import Unavailable, Value
 
 _CRAWL_M = 0.3
@@ -69,7 +69,12 @@ def goals_success(mission: Mission, args: Args) -> Value:
     needs={},
     parts=("goals",),
     unit="",
-    args={"status": "preempted, succeeded, aborted, rejected, recalled or lost"},
+    args={
+        "status": one_of(
+            "preempted, succeeded, aborted, rejected, recalled or lost; aborted unless given",
+            *("preempted", "succeeded", "aborted", "rejected", "recalled", "lost"),
+        )
+    },
 )
 def goals_ended(mission: Mission, args: Args) -> Value:
     """Number of goals that the goal server answered with a status: aborted means that it gave up by itself."""
@@ -91,8 +96,8 @@ def goals_time(mission: Mission, args: Args) -> Value:
     parts=("goals",),
     unit="s",
     args={
-        "index": "number of the goal, from 1; all unless given",
-        "of": "mean or longest of all goals, mean unless given",
+        "index": numeric("number of the goal, from 1; all unless given"),
+        "of": one_of("mean or longest of all goals, mean unless given", "mean", "longest"),
     },
 )
 def goal_time(mission: Mission, args: Args) -> Value:
@@ -125,7 +130,7 @@ def time_per_metre(mission: Mission, args: Args) -> Value:
     needs={},
     parts=("goals", "odometry"),
     unit="",
-    args={"within_m": "how near counts, 0.6 m unless given"},
+    args={"within_m": numeric("how near counts, 0.6 m unless given")},
 )
 def goals_approached(mission: Mission, args: Args) -> Value:
     """Share of the mission's goals that the robot was near to when they ended, reached or not."""
@@ -142,7 +147,10 @@ def goals_approached(mission: Mission, args: Args) -> Value:
     needs={},
     parts=("goals", "odometry"),
     unit="",
-    args={"how": "given_up, unsettled, crawling or stuck", "within_m": "how near to the goal, 0.6 m unless given"},
+    args={
+        "how": one_of("given_up, unsettled, crawling or stuck", "given_up", "unsettled", "crawling", "stuck"),
+        "within_m": numeric("how near to the goal, 0.6 m unless given"),
+    },
 )
 def first_failure(mission: Mission, args: Args) -> Value:
     """1 when the first goal that was not reached failed in this way, else 0: `given_up` by the stack; out of time
@@ -171,7 +179,7 @@ def _way_of_failing(drive: Drive, odometry: Odometry, number: int, args: Args) -
     needs={},
     parts=("goals", "odometry"),
     unit="",
-    args={"within_m": "how near counts as passed, 0.6 m unless given"},
+    args={"within_m": numeric("how near counts as passed, 0.6 m unless given")},
 )
 def passages_passed(mission: Mission, args: Args) -> Value:
     """Share of the narrow passages listed in the profile's mission section that the robot came near to."""
@@ -244,7 +252,7 @@ def heading_error(mission: Mission, args: Args) -> Value:
     needs={},
     parts=("goals", "odometry"),
     unit="s",
-    args={"within_m": "how near to the goal, 0.5 m unless given"},
+    args={"within_m": numeric("how near to the goal, 0.5 m unless given")},
 )
 def settling_time(mission: Mission, args: Args) -> Value:
     """Mean time near a goal before it ended: hunting for position and heading."""
@@ -301,7 +309,7 @@ def drive_acceleration(mission: Mission, args: Args) -> Value:
     needs={},
     parts=("goals", "odometry"),
     unit="",
-    args={"of": "share of the time, or longest in s; share unless given"},
+    args={"of": one_of("share of the time, or longest in s; share unless given", "share", "longest")},
 )
 def standstill(mission: Mission, args: Args) -> Value:
     """Not moving while a goal is active: share of that time, or the longest stretch of it."""
@@ -362,7 +370,7 @@ def commanded_speed(mission: Mission, args: Args) -> Value:
     needs={},
     parts=("goals", "commands"),
     unit="",
-    args={"order": "stand, spot_turn or reverse; stand unless given"},
+    args={"order": one_of("stand, spot_turn or reverse; stand unless given", "stand", "spot_turn", "reverse")},
 )
 def commanded_share(mission: Mission, args: Args) -> Value:
     """Share of the time with a goal that the robot was commanded to stand, to turn on the spot, or to back up."""
@@ -407,7 +415,7 @@ def turn_reversals(mission: Mission, args: Args) -> Value:
     needs={},
     parts=("goals", "commands"),
     unit="s",
-    args={"percentile": "0 to 100, 50 unless given"},
+    args={"percentile": numeric("0 to 100, 50 unless given")},
 )
 def command_interval(mission: Mission, args: Args) -> Value:
     """Time between commands while a goal is active: the controller's real period and, at the top, its stalls."""
@@ -430,7 +438,9 @@ def command_interval(mission: Mission, args: Args) -> Value:
     unit="",
     args={
         "behavior": "text in the behavior's name; all unless given",
-        "absent": "value where the log lacks the topic, which is only published on a recovery; not known unless given",
+        "absent": numeric(
+            "value where the log lacks the topic, which is only published on a recovery; not known unless given"
+        ),
     },
 )
 def recoveries(mission: Mission, args: Args) -> Value:
@@ -449,7 +459,7 @@ def recoveries(mission: Mission, args: Args) -> Value:
     args={
         "text": "text in the message, ignoring case",
         "node": "text in the name of the node that said it, such as controller_server; any unless given",
-        "level": "lowest level that counts: 1 debug, 2 info, 4 warn, 8 error, 16 fatal; any unless given",
+        "level": numeric("lowest level that counts: 1 debug, 2 info, 4 warn, 8 error, 16 fatal; any unless given"),
     },
 )
 def rosout_count(mission: Mission, args: Args) -> Value:

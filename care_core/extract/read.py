@@ -18,7 +18,7 @@ import care_core.extract.nav2
 import care_core.extract.navigation  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
 from care_core.errors import ProfileError, UsageError, nearest
-from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, find_extractor, merge_needs
+from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import Sha256, hashing
 from care_core.logs.telemetry import as_dataflash
@@ -60,7 +60,7 @@ def read_runs(log: Log, schema: Schema) -> tuple[Run, ...]:
 
 
 def mission_kind(schema: Schema) -> MissionKind:
-    """How this profile finds missions. Raises ProfileError when it does not say, or names no known kind."""
+    """How this profile finds missions. Raises ProfileError when it does not say, or says what no kind knows."""
     kind = schema.mission.get("kind")
     if not schema.logs or kind is None:
         raise ProfileError(
@@ -70,16 +70,25 @@ def mission_kind(schema: Schema) -> MissionKind:
         )
     if kind not in MISSION_KINDS:
         raise ProfileError(f"There is no mission kind '{kind}'.", hint=nearest(str(kind), MISSION_KINDS))
-    return MISSION_KINDS[str(kind)]
+    found = MISSION_KINDS[str(kind)]
+    spec = {name: value for name, value in schema.mission.items() if name != "kind"}
+    check_args(spec, found.args, f"The mission kind '{kind}'", f"{schema.name}: mission")
+    return found
 
 
 def reading_plan(schema: Schema) -> dict[str, tuple[str, ...]]:
-    """The channels and fields that a profile reads from a log."""
+    """The channels and fields that a profile reads from a log.
+
+    Raises:
+        ProfileError: an extractor, mission kind, argument or value that is not known, with the nearest that is.
+    """
     needs = [mission_kind(schema).needs(schema.mission)]
     for variable in schema.variables.values():
         if variable.extract is not None:
             where = f"{schema.name}: {variable.name}"
-            needs.append(find_extractor(variable.extract.kind, where).needs(variable.extract.args))
+            found = find_extractor(variable.extract.kind, where)
+            check_args(variable.extract.args, found.args, f"The extractor '{found.name}'", where)
+            needs.append(found.needs(variable.extract.args))
     return merge_needs(needs)
 
 

@@ -20,6 +20,43 @@ Args = Mapping[str, Any]
 T = TypeVar("T")
 
 
+class Argument(str):
+    """What an argument means, in words, and what it may be."""
+
+    accepts: Callable[[object], bool]
+    choices: tuple[str, ...]
+
+    def __new__(cls, meaning: str, accepts: Callable[[object], bool], choices: tuple[str, ...] = ()) -> Argument:
+        argument = super().__new__(cls, meaning)
+        argument.accepts, argument.choices = accepts, choices
+        return argument
+
+
+def one_of(meaning: str, *choices: str) -> Argument:
+    """An argument that is one of few words."""
+    return Argument(meaning, lambda value: value in choices, choices)
+
+
+def numeric(meaning: str) -> Argument:
+    """An argument that is a number."""
+    return Argument(meaning, _is_number)
+
+
+def points(meaning: str, size: int) -> Argument:
+    """An argument that lists points of so many numbers each."""
+
+    def accepts(value: object) -> bool:
+        return isinstance(value, list) and all(
+            isinstance(point, list) and len(point) == size and all(map(_is_number, point)) for point in value
+        )
+
+    return Argument(meaning, accepts)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Mission:
     """One mission cut out of a log: what extractors see.
@@ -119,6 +156,18 @@ def find_extractor(kind: str, where: str = "") -> Extractor:
     if kind not in EXTRACTORS:
         raise ProfileError(f"There is no extractor '{kind}'.", hint=nearest(kind, EXTRACTORS), where=where)
     return EXTRACTORS[kind]
+
+
+def check_args(given: Args, known: Mapping[str, str], what: str, where: str) -> None:
+    """Refuse arguments that `what` does not take, and values that they cannot have. Raises ProfileError."""
+    for name, value in given.items():
+        if name not in known:
+            hint = nearest(name, known) or (f"It takes {', '.join(known)}." if known else "It takes none.")
+            raise ProfileError(f"{what} has no argument '{name}'.", hint=hint, where=where)
+        argument = known[name]
+        if isinstance(argument, Argument) and not argument.accepts(value):
+            hint = nearest(str(value), argument.choices)
+            raise ProfileError(f"{what} takes no '{name}: {value}'.", hint=hint or f"It is: {argument}.", where=where)
 
 
 def merge_needs(parts: Iterable[Wanted]) -> dict[str, tuple[str, ...]]:

@@ -8,8 +8,10 @@ from typing import Protocol, TypeVar
 from care_core.errors import LogError, ProfileError
 from care_core.extract.coverage import Coverage, cover
 from care_core.extract.fit import fit_of
+from care_core.extract.read import reading_plan
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
+from care_core.profile.store import Profile, available_profiles, load_profile
 from care_core.run import Fit, ProfileChoice
 
 NEARLY_AS_WELL = 0.9
@@ -25,6 +27,20 @@ class HasSchema(Protocol):
 
 
 P = TypeVar("P", bound=HasSchema)
+
+
+def sound_profiles() -> tuple[list[Profile], list[ProfileError]]:
+    """The installed profiles, and what is wrong with those that cannot be used: one never keeps the others from use."""
+    sound, problems = [], []
+    for path in available_profiles():
+        try:
+            profile = load_profile(path)
+            if profile.schema.logs:
+                reading_plan(profile.schema)
+            sound.append(profile)
+        except ProfileError as err:
+            problems.append(err)
+    return sound, problems
 
 
 def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P | None, ProfileChoice]:

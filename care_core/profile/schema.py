@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from care_core import plain_yaml
 from care_core.errors import ProfileError, nearest
+from care_core.logs.base import LogFormat
 from care_core.variables import Extract, Kind, Op, Role, Threshold, ValueType, Variable
 from care_core.vehicles import Kind as VehicleKind
 
@@ -128,6 +129,15 @@ class _Profile(_Strict):
     circumstances: dict[str, dict[str, Side]] = Field(default_factory=dict)
     known: list[_Known] = Field(default_factory=list)
     variables: dict[str, _Variable]
+
+    @field_validator("logs")
+    @classmethod
+    def _are_formats(cls, formats: list[str]) -> list[str]:
+        known = [format.value for format in LogFormat]
+        for format in formats:
+            if format not in known:
+                raise ValueError(f"there is no log format '{format}'. {nearest(format, known)}".strip())
+        return formats
 
     @model_validator(mode="after")
     def _names_are_declared(self) -> _Profile:

@@ -40,12 +40,24 @@ class Profile:
 
 
 def available_profiles() -> list[Path]:
-    """Folders of the profiles that came with this installation, by name."""
-    return sorted(path.parent for path in bundled("profiles").glob(f"*/{PROFILE_FILE}"))
+    """Folders of the installed profiles by name: the user's own, and those that came with this installation.
+
+    A profile of the user's stands for the one that came under the same name.
+    """
+    found = {path.parent.name: path.parent for path in bundled("profiles").glob(f"*/{PROFILE_FILE}")}
+    found |= {path.parent.name: path.parent for path in own_profiles().glob(f"*/{PROFILE_FILE}")}
+    return [found[name] for name in sorted(found)]
+
+
+def own_profiles() -> Path:
+    """The folder for profiles of the user's own; it may not exist."""
+    from platformdirs import user_data_path
+
+    return user_data_path("care", appauthor=False) / "profiles"
 
 
 def load_profile(name_or_path: str | Path) -> Profile:
-    """Open a bundled profile by its name, or any profile by its folder or `profile.yaml`.
+    """Open an installed profile by its name, or any profile by its folder or `profile.yaml`.
 
     Raises:
         ProfileError: no such profile (the nearest name is given), or it is unsound.

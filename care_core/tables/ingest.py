@@ -20,11 +20,11 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from care_core.errors import LogError, UsageError
-from care_core.extract.select import fitting_profile
+from care_core.extract.select import fitting_profile, sound_profiles
 from care_core.logs.opening import open_log
 from care_core.parallel import Failed, each
 from care_core.profile.schema import Schema
-from care_core.profile.store import available_profiles, load_profile
+from care_core.profile.store import load_profile
 from care_core.tables.rows import Row, rows_of
 
 Report = Callable[[str, float], None]
@@ -203,5 +203,4 @@ def schema_that_fits(paths: Sequence[Path], *, limit_s: float = 600.0) -> Schema
 
 
 def _fitting_profile(path: Path) -> Path:
-    profiles = [load_profile(folder) for folder in available_profiles()]
-    return fitting_profile(open_log(path), profiles)[0].path
+    return fitting_profile(open_log(path), sound_profiles()[0])[0].path

@@ -27,12 +27,15 @@ def _profiles(ctx: typer.Context) -> None:
 
 @app.command("list")
 def list_profiles() -> None:
-    """List the profiles that come with this installation."""
-    from care_core.profile.store import available_profiles, load_profile
+    """List the installed profiles, your own among them."""
+    from care_core.extract.select import sound_profiles
 
-    rows = [(s.name, s.version, s.platform) for s in (load_profile(path).schema for path in available_profiles())]
+    sound, problems = sound_profiles()
+    rows = [(s.name, s.version, s.platform) for s in (profile.schema for profile in sound)]
     if not rows:
         say("No profile is installed.")
+    for problem in problems:
+        say(f"care: {problem}")
     widths = [max((len(row[column]) for row in rows), default=0) for column in range(2)]
     emit("".join(f"{name:<{widths[0]}}  {version:<{widths[1]}}  {platform}\n" for name, version, platform in rows))
 

@@ -55,7 +55,7 @@ class MadeLog:
 
 class MadeMissions(MissionKind):
     name = "made"
-    args: Mapping[str, str] = {}
+    args: Mapping[str, str] = {"mismatch": "what it says of every mission"}
 
     def needs(self, spec: Args) -> Wanted:
         return {"marks": ("start", "end", "ended")}
@@ -82,7 +82,7 @@ def _made_library(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         table = mission.table("track")
         return Unavailable("no track") if table is None else float(np.ptp(table["x"]))
 
-    @extractor("made_constant", needs={}, unit="")
+    @extractor("made_constant", needs={}, unit="", args={"value": "what it answers"})
     def made_constant(mission: Mission, args: Args) -> Value:
         """The value of its argument, or of a parameter."""
         return Unavailable("told so") if args["value"] is None else float(args["value"])
