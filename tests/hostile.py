@@ -112,13 +112,13 @@ def overflow_in_circles(folder: Path) -> Path:
     size = int.from_bytes(raw[16:18], "big")
     pages = len(raw) // size
     blob = 5_900_000_000
-    types = b"\0\x01\x06" + _varint(2 * blob + 12)
+    types = b"\0\x01" + _varint(2 * blob + 13)
     header = bytes([len(types) + 1]) + types
-    total = len(header) + 1 + 8 + blob
+    total = len(header) + 1 + blob
     least = (size - 12) * 32 // 255 - 23
     local = least + (total - least) % (size - 4)
     local = local if local <= size - 35 else least
-    body = (header + b"\x01" + START_NS.to_bytes(8, "big")).ljust(local, b"\0")
+    body = (header + b"\x09").ljust(local, b"x")
     cell = _varint(total) + b"\x7f" + body + (pages + 2).to_bytes(4, "big")
     leaf = bytearray(size)
     place = (size - len(cell)).to_bytes(2, "big")

@@ -29,7 +29,7 @@ from care_core.extract.registry import (
     points,
 )
 from care_core.logs.base import Table, Wanted
-from care_core.logs.plausible import plausible
+from care_core.logs.plausible import is_alive, plausible
 from care_core.run import Evidence, Unavailable, Value, is_known
 
 Floats = NDArray[np.float64]
@@ -434,18 +434,33 @@ def energy_used(mission: Mission, args: Args) -> Value:
         return missing("BAT")
     used = [_energy(battery, mission) for battery in _instances(table)]
     known = [value for value in used if value is not None]
-    return sum(known) if known else missing("BAT energy, or voltage with current")
+    if known:
+        return sum(known)
+    if not has(table, "EnrgTot") and not has(table, "Volt", "Curr"):
+        return missing("BAT energy, or voltage with current")
+    return Unavailable("BAT says the same current throughout, or none", "is BATT_MONITOR one that measures current?")
 
 
 def _energy(battery: Table, mission: Mission) -> float | None:
-    if has(battery, "EnrgTot") and np.ptp(battery["EnrgTot"]) > 0:
-        start, end = np.interp((mission.start_s, mission.end_s), battery.t, battery["EnrgTot"])
-        return float(end - start)
+    """Wh of one battery, None where its monitor counts and measures nothing."""
     inside = battery.between(mission.start_s, mission.end_s)
-    if len(inside) < _MIN_ROWS or not has(inside, "Volt", "Curr"):
+    counted = _known(inside, "EnrgTot")
+    if len(counted) and np.ptp(counted["EnrgTot"]) > 0 and (np.diff(counted["EnrgTot"]) >= 0).all():
+        whole = _known(battery, "EnrgTot")
+        start, end = np.interp((mission.start_s, mission.end_s), whole.t, whole["EnrgTot"])
+        return float(end - start)
+    measured = _known(inside, "Volt", "Curr")
+    if len(measured) < _MIN_ROWS or not is_alive(measured["Curr"]) or not measured["Curr"].any():
         return None
-    power = inside["Volt"] * inside["Curr"]
-    return float(np.sum((power[1:] + power[:-1]) / 2 * np.diff(inside.t)) / 3600)
+    power = measured["Volt"] * measured["Curr"]
+    return float(np.sum((power[1:] + power[:-1]) / 2 * np.diff(measured.t)) / 3600)
+
+
+def _known(table: Table, *fields: str) -> Table:
+    """The rows in which all of the fields are numbers; none where the table lacks one."""
+    if not has(table, *fields):
+        return table.where(slice(0))
+    return table.where(np.logical_and.reduce([np.isfinite(table[field]) for field in fields]))
 
 
 @extractor("min_voltage", needs=merge_needs((NEEDS, _BATTERY)), unit="V")

@@ -8,6 +8,7 @@ import numpy as np
 
 from care_core.extract.drive import BATTERY_FIELDS, Floats, has, topics
 from care_core.extract.registry import Args, Mission, extractor, missing, one_of
+from care_core.logs.plausible import is_alive
 from care_core.run import Unavailable, Value
 
 _TOO_SHORT = Unavailable("the mission takes no time", "record the whole mission")
@@ -22,15 +23,17 @@ def battery_energy(mission: Mission, args: Args) -> Value:
     battery = _battery(mission)
     if isinstance(battery, Unavailable):
         return battery
-    if np.isfinite(battery.current).all():
+    inside = (battery.t >= mission.start_s) & (battery.t <= mission.end_s)
+    if np.isfinite(battery.current).all() and is_alive(battery.current[inside]) and battery.current[inside].any():
         power = battery.voltage * battery.current
         joule = np.concatenate([[0.0], np.cumsum(np.diff(battery.t) * (power[1:] + power[:-1]) / 2)])
         start, end = np.interp([mission.start_s, mission.end_s], battery.t, joule)
         return abs(float(end - start)) / 3600
-    if np.isfinite(battery.charge).all():
+    if np.isfinite(battery.charge).all() and np.ptp(battery.charge[inside]) > 0:
         start, end = np.interp([mission.start_s, mission.end_s], battery.t, battery.charge)
-        inside = (battery.t >= mission.start_s) & (battery.t <= mission.end_s)
         return float(start - end) * float(battery.voltage[inside].mean())
+    if np.isfinite(battery.current).any() or np.isfinite(battery.charge).any():
+        return Unavailable("the battery says the same current and charge throughout", "check its sensor and driver")
     return Unavailable("the battery reports neither current nor charge", "have its driver fill in one of them")
 
 

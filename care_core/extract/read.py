@@ -21,6 +21,7 @@ from care_core.errors import ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import Sha256, hashing
+from care_core.logs.plausible import clock_doubt, dead_sources
 from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
 from care_core.run import Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value
@@ -114,6 +115,10 @@ class _Source:
     log: LogInfo
     settings: Mapping[str, tuple[Setting, ...]]
     missions: tuple[Mission, ...]
+    dead: Mapping[str, str]
+    """Channels that measure nothing, and why."""
+    doubts: tuple[str, ...]
+    """Per mission why its times cannot be right, empty where they can."""
 
     @classmethod
     def read(cls, log: Log, schema: Schema, sha256: Sha256 | None = None) -> _Source:
@@ -133,7 +138,8 @@ class _Source:
                 hint="Look at what was recorded with 'care inspect'.",
                 where=str(log.path),
             )
-        return cls(schema, kind, log_info(log, sha256()), settings, missions)
+        doubts = tuple(clock_doubt(tables, one.start_s, one.end_s) for one in missions)
+        return cls(schema, kind, log_info(log, sha256()), settings, missions, dead_sources(tables), doubts)
 
     def run(self, index: int, overrides: Mapping[str, Setting]) -> Run:
         found = self.missions[index]
@@ -145,9 +151,9 @@ class _Source:
         return Run(
             config=config,
             sources=sources,
-            context=self._values(Role.CONTEXT, mission),
-            metrics=self._values(Role.METRIC, mission),
-            objectives=self._values(Role.OBJECTIVE, mission),
+            context=self._values(Role.CONTEXT, mission, self.doubts[index]),
+            metrics=self._values(Role.METRIC, mission, self.doubts[index]),
+            objectives=self._values(Role.OBJECTIVE, mission, self.doubts[index]),
             settings=settings,
             log=self.log,
             mission=MissionInfo(
@@ -163,20 +169,28 @@ class _Source:
             changes=_changes(self.settings, mission),
         )
 
-    def _values(self, role: Role, mission: Mission) -> dict[str, Value]:
+    def _values(self, role: Role, mission: Mission, doubt: str) -> dict[str, Value]:
+        if doubt:
+            return dict.fromkeys((v.name for v in self.schema.of(role)), Unavailable(doubt, _CLOCK_ADVICE))
         values = {variable.name: _extract(variable, mission) for variable in self.schema.of(role)}
-        return {name: _explained(value, self.log.format) for name, value in values.items()}
+        return {name: self._explained(value) for name, value in values.items()}
+
+    def _explained(self, value: Value) -> Value:
+        """The value, where it is a number; else why there is none: a dead source, or telemetry, which lacks much."""
+        if not isinstance(value, Unavailable):
+            return value if math.isfinite(value) else Unavailable("what the log says of it is no number", _LOOK)
+        dead = next((why for name, why in self.dead.items() if value.reason.startswith(f"no {name} ")), None)
+        if dead is not None:
+            return Unavailable(dead, "check the sensor and its driver")
+        is_telemetry = self.log.format == LogFormat.MAVLINK_TLOG.value
+        return (
+            Unavailable(value.reason, _TELEMETRY_ADVICE) if is_telemetry and value.reason.startswith("no ") else value
+        )
 
 
 _TELEMETRY_ADVICE = "telemetry does not carry it: use the .BIN of the vehicle's memory card"
-
-
-def _explained(value: Value, log_format: str) -> Value:
-    """The value; where telemetry lacks what an extractor needs, the advice names the log that has it."""
-    is_telemetry = log_format == LogFormat.MAVLINK_TLOG.value
-    if isinstance(value, Unavailable) and is_telemetry and value.reason.startswith("no "):
-        return Unavailable(value.reason, _TELEMETRY_ADVICE)
-    return value
+_CLOCK_ADVICE = "judge a log whose messages carry the time at which they were recorded"
+_LOOK = "look at its source with 'care inspect'"
 
 
 def _changes(settings: Mapping[str, tuple[Setting, ...]], mission: Mission) -> dict[str, tuple[Setting, ...]]:

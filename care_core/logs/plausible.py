@@ -1,6 +1,8 @@
-"""Values that cannot be: DataFlash records carry no checksum, so a flipped bit is read as a flight to the moon.
+"""Whether what a log says can be: before anything is computed from a source it is alive, and its values are possible.
 
-Rows that say the impossible are left out before anything is computed from them. What is merely bad stays.
+DataFlash records carry no checksum, so a flipped bit is read as a flight to the moon: rows that say the impossible are
+left out. A sensor that says the same throughout measures nothing, and a clock that stands still or runs a thousand
+times too fast turns a failed flight into one of 0 s and 0 Wh. What is merely bad stays.
 """
 
 from __future__ import annotations
@@ -32,14 +34,81 @@ JUMPS: Mapping[str, Mapping[str, float]] = {
 """A step that no vehicle makes from one sample to the next and back again: away by more, and back to within half."""
 
 
+MOVING: Mapping[str, tuple[str, ...]] = {"POS": ("Lat", "Lng", "RelHomeAlt"), "ATT": ("Roll", "Pitch", "Yaw")}
+"""Fields of which at least one changes in any flight, by the estimator's noise alone."""
+
+FASTEST_HZ: Mapping[str, float] = {
+    "BAT": 100.0, "GPS": 100.0, "POS": 1_000.0, "ATT": 1_000.0,
+    "RATE": 2e4, "IMU": 2e4, "GYR": 2e4, "ACC": 2e4, "PIDR": 2e4, "PIDP": 2e4, "PIDY": 2e4,
+}  # fmt: skip
+"""Most messages of a sensor in a second. ArduPilot reads batteries at 10 Hz and receivers at up to 20 Hz, its main loop
+runs at 400 Hz, its gyros at 8 kHz."""
+ANY_FASTEST_HZ = 2_000.0
+"""Of a message without an entry: robots publish odometry and lasers at up to some 100 Hz, joints at 1 kHz."""
+SLOWEST_S: Mapping[str, float] = {"BAT": 60.0, "POS": 30.0, "ATT": 30.0}
+"""Longest usual time between two messages of a sensor, also in thinned logs."""
+
+_ENOUGH = 20
+"""Samples that must agree before a source is called dead or a clock wrong."""
+
+
 def plausible(tables: Mapping[str, Table]) -> dict[str, Table]:
-    """The tables without the rows in which a field is beyond its limits, or leaps away for one sample."""
-    return {name: _cleaned(name, table) for name, table in tables.items()}
+    """The tables without dead ones, and without the rows in which a field is beyond its limits, steps back in time, or
+    leaps away for one sample."""
+    dead = dead_sources(tables)
+    return {name: _cleaned(name, table) for name, table in tables.items() if name not in dead}
+
+
+def dead_sources(tables: Mapping[str, Table]) -> dict[str, str]:
+    """Tables of something that moves, but whose values never change, each with the reason in words."""
+    return {
+        name: f"{name} says the same throughout the log, so it measures nothing"
+        for name, fields in MOVING.items()
+        if name in tables and len(tables[name]) >= _ENOUGH and set(fields) <= tables[name].columns.keys()
+        and not any(is_alive(tables[name][field]) for field in fields)
+    }  # fmt: skip
+
+
+def is_alive(values: Floats) -> bool:
+    """Whether samples of a sensor, shape (n,), are numbers that differ; a few may be equal by chance."""
+    known = values[np.isfinite(values)]
+    return len(known) > 0 and (len(known) < _ENOUGH or bool(np.ptp(known) > 0))
+
+
+def clock_doubt(tables: Mapping[str, Table], start_s: float, end_s: float) -> str:
+    """Why the times of a mission cannot be right, in words; empty where they can.
+
+    Time must go on, and no sensor may say more, or less, in a second than any does.
+    """
+    if not end_s > start_s:
+        return "the log's clock does not advance during the mission"
+    for name, table in tables.items():
+        inside = table.t[(table.t >= start_s) & (table.t <= end_s)]
+        if len(inside) < _ENOUGH:
+            continue
+        sensors = len(_instances(table)) if name in FASTEST_HZ else 1
+        rate_hz = (len(inside) - 1) / max(float(inside[-1] - inside[0]), 1e-9) / sensors
+        if rate_hz > FASTEST_HZ.get(name, ANY_FASTEST_HZ):
+            return f"the log's clock is too slow or stands still: it has {name} {rate_hz:.3g} times a second"
+        if name in SLOWEST_S and 1 / rate_hz > SLOWEST_S[name]:
+            return f"the log's clock is too fast: it has {name} only every {1 / rate_hz:.3g} s"
+        stands = _longest_stand(inside) if name in MOVING else 0
+        if stands >= _ENOUGH:
+            return f"the log's clock stands still: {stands} {name} messages in a row have the same time"
+    return ""
+
+
+def _longest_stand(t: Floats) -> int:
+    """The most samples in a row with one time."""
+    changes = np.flatnonzero(np.diff(t) != 0)
+    return int(np.diff(np.concatenate(([-1], changes, [len(t) - 1]))).max())
 
 
 def _cleaned(name: str, table: Table) -> Table:
     limits, jumps = LIMITS.get(name, {}), JUMPS.get(name, {})
     keep = np.ones(len(table), dtype=bool)
+    if limits and (np.diff(table.t) < 0).any():
+        keep = table.t >= np.maximum.accumulate(table.t)
     for field, (low, high) in limits.items():
         if field in table.columns:
             column = table[field]

@@ -26,7 +26,7 @@ from care_core.files import bundled
 from care_core.logs.opening import open_log
 from care_core.profile.store import Profile, load_profile
 from care_core.run import MissionInfo
-from tests import nav2_drive
+from tests import nav2_drive, restamped
 from tests.groundstation import write_tlog
 from tests.rewritten import write_ulog
 
@@ -74,24 +74,7 @@ def drive(_: Path) -> bytes:
 
 def drive_as_mcap(_: Path) -> bytes:
     """The good drive as MCAP in the ros1 profile."""
-    from io import BytesIO
-
-    from mcap.writer import CompressionType, Writer
-    from rosbags.rosbag1 import Reader
-
-    stream = BytesIO()
-    writer = Writer(stream, chunk_size=16 * 1024, compression=CompressionType.LZ4)
-    writer.start(profile="ros1", library="test")
-    with Reader(DATA / "move_base_good.bag") as bag:
-        channels = {}
-        for connection in bag.connections:
-            kind = connection.msgtype.replace("/msg/", "/")
-            schema = writer.register_schema(kind, "ros1msg", connection.msgdef.data.encode())
-            channels[connection.id] = writer.register_channel(connection.topic, "ros1", schema)
-        for connection, time_ns, raw in bag.messages():
-            writer.add_message(channels[connection.id], time_ns, bytes(raw), time_ns)
-    writer.finish()  # type: ignore[no-untyped-call]
-    return stream.getvalue()
+    return restamped.mcap(DATA / "move_base_good.bag", lambda time_ns: time_ns)
 
 
 def nav2_drive_as_db3(folder: Path) -> bytes:

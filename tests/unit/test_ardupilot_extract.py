@@ -76,7 +76,7 @@ def flight(**replaced: Table | None) -> dict[str, Table]:
         "ATT": Table(
             at,
             {
-                "DesRoll": level + 1.0, "Roll": level, "DesPitch": level, "Pitch": level - 5.0,
+                "DesRoll": level + 1.0, "Roll": 1e-9 * at, "DesPitch": level, "Pitch": level - 5.0,
                 "DesYaw": level + 359.0, "Yaw": level + 1.0,
             },
         ),
@@ -138,7 +138,7 @@ def test_phases_cover_the_flight() -> None:
 
 def test_energy_is_integrated_where_the_monitor_does_not_count() -> None:
     battery = flight()["BAT"]
-    plain = Table(battery.t, {"Volt": np.full(len(battery), 10.0), "Curr": np.full(len(battery), 36.0)})
+    plain = Table(battery.t, {"Volt": np.full(len(battery), 10.0), "Curr": 36.0 + 1e-9 * battery.t})
     assert value(only(flight(BAT=plain)), "energy_used") == pytest.approx(6.0)
 
 

@@ -78,7 +78,7 @@ def commands(speed: float, turn: Sequence[float]) -> Table:
 
 def battery(current: float, charge: float = math.nan) -> Table:
     t = np.arange(0.0, DURATION_S, 1.0)
-    rows = [(24.0, current, charge - 0.001 * one) for one in t]
+    rows = [(24.0, current + 1e-9 * one, charge - 0.001 * one) for one in t]
     return table(t.tolist(), BATTERY_FIELDS, rows)
 
 

@@ -1,0 +1,70 @@
+"""Recorded logs with other times or other values in the same records: what a broken clock or a dead sensor leaves."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+
+from care_core.logs.dataflash import DataFlashLog
+from care_core.logs.mapped import MappedFile
+from care_core.logs.mavlink_packets import find_packets
+
+Clock = Callable[[int], int]
+"""The time that is written, of the one that was."""
+
+
+def dataflash(source: Path, clock: Clock) -> bytes:
+    """A .BIN with other stamps (us)."""
+    raw = bytearray(source.read_bytes())
+    log = DataFlashLog(source)
+    for form in (form for forms in log._formats.values() for form in forms if form.time_field):
+        for start in log._offsets[form.type].tolist():
+            at = start + form.fields["TimeUS"].offset
+            struct.pack_into("<Q", raw, at, clock(struct.unpack_from("<Q", raw, at)[0]))
+    return bytes(raw)
+
+
+def dataflash_with(source: Path, message: str, **values: float) -> bytes:
+    """A .BIN whose records of a message all say the same in some fields, as stored."""
+    raw = bytearray(source.read_bytes())
+    log = DataFlashLog(source)
+    (form,) = log._formats[message]
+    for name, value in values.items():
+        field = form.fields[name]
+        stored = np.array(value).astype(field.dtype).tobytes()
+        for start in log._offsets[form.type].tolist():
+            raw[start + field.offset : start + field.offset + len(stored)] = stored
+    return bytes(raw)
+
+
+def telemetry(source: Path, clock: Clock) -> bytes:
+    """A .tlog with other stamps (us)."""
+    raw = bytearray(source.read_bytes())
+    for start in find_packets(MappedFile(source).bytes()).start.tolist():
+        struct.pack_into(">Q", raw, start, clock(struct.unpack_from(">Q", raw, start)[0]))
+    return bytes(raw)
+
+
+def mcap(source: Path, clock: Clock) -> bytes:
+    """A ROS 1 bag as an MCAP file in the ros1 profile, with other log times (ns)."""
+    from mcap.writer import CompressionType, Writer
+    from rosbags.rosbag1 import Reader
+
+    stream = BytesIO()
+    writer = Writer(stream, chunk_size=16 * 1024, compression=CompressionType.LZ4)
+    writer.start(profile="ros1", library="test")
+    with Reader(source) as bag:
+        channels = {}
+        for connection in bag.connections:
+            kind = connection.msgtype.replace("/msg/", "/")
+            schema = writer.register_schema(kind, "ros1msg", connection.msgdef.data.encode())
+            channels[connection.id] = writer.register_channel(connection.topic, "ros1", schema)
+        for connection, time_ns, raw in bag.messages():
+            stamp_ns = clock(time_ns)
+            writer.add_message(channels[connection.id], stamp_ns, bytes(raw), stamp_ns)
+    writer.finish()  # type: ignore[no-untyped-call]
+    return stream.getvalue()
