@@ -12,11 +12,15 @@ from care_core.health.records import Health
 from care_core.logs.base import Log, LogFormat
 
 _ARDUPILOT, _PX4 = "care_core.health.ardupilot.examining", "care_core.health.px4"
+_ROS = "care_core.health.ros.examining"
 ECOSYSTEMS: Mapping[LogFormat, str] = {
     LogFormat.DATAFLASH_BIN: _ARDUPILOT,
     LogFormat.DATAFLASH_TEXT: _ARDUPILOT,
     LogFormat.MAVLINK_TLOG: _ARDUPILOT,
     LogFormat.PX4_ULG: _PX4,
+    LogFormat.ROS1_BAG: _ROS,
+    LogFormat.ROS2_DB3: _ROS,
+    LogFormat.MCAP: _ROS,
 }
 """Format of a log -> the module that looks at it, imported only then."""
 

@@ -33,7 +33,7 @@ def told(findings: Iterable[Finding], leads: Leads, impact_s: float | None = Non
     marked = [replace(f, after_impact=impact_s is not None and f.onset_s > impact_s) for f in findings]
     reach = _closure(leads)
     roots: list[tuple[Finding, list[Finding]]] = []
-    for finding in sorted(marked, key=_by_cause):
+    for finding in sorted(marked, key=lambda f: _place(f, marked, reach)):
         cause = next((entry for entry in roots if _explains(entry[0], finding, reach)), None)
         if cause is None:
             roots.append((finding, []))
@@ -42,8 +42,22 @@ def told(findings: Iterable[Finding], leads: Leads, impact_s: float | None = Non
     return tuple(replace(root, consequences=tuple(sorted(below, key=lambda f: f.onset_s))) for root, below in roots)
 
 
-def _by_cause(finding: Finding) -> tuple[bool, int, bool, float]:
-    return finding.after_impact, _SEVERITY[finding.severity], finding.probability < LIKELY, finding.onset_s
+def _place(finding: Finding, every: Iterable[Finding], reach: Leads) -> tuple[bool, int, bool, float, bool]:
+    """Sorts findings: one whose cause was seen within the slack after it comes after that cause."""
+    causes = (
+        other.onset_s
+        for other in every
+        if other.onset_s > finding.onset_s
+        and _rank(other) == _rank(finding)
+        and _explains(other, finding, reach)
+        and not _explains(finding, other, reach)
+    )
+    onset_s = max(causes, default=finding.onset_s)
+    return *_rank(finding), onset_s, onset_s > finding.onset_s
+
+
+def _rank(finding: Finding) -> tuple[bool, int, bool]:
+    return finding.after_impact, _SEVERITY[finding.severity], finding.probability < LIKELY
 
 
 def _explains(cause: Finding, finding: Finding, reach: Leads) -> bool:

@@ -218,8 +218,23 @@ class RosLog:
                     times.append(self._kept(part.times_ns[number]))
         return tuple(_channel(topic, types, times) for topic, (types, times) in sorted(by_topic.items()))
 
-    def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        """Decode the wanted fields in one pass; see the class for times, `compile_decoder` for values."""
+    def times(self) -> Mapping[str, NDArray[np.float64]]:
+        """Per topic the record times of its messages, s, in order. Nothing is decoded."""
+        found: dict[str, list[NDArray[np.int64]]] = {}
+        for part in self._parts:
+            for number, connection in part.connections.items():
+                own = found.setdefault(connection.topic, [])
+                if number in part.times_ns:
+                    own.append(self._kept(part.times_ns[number]))
+        none = np.empty(0, np.int64)
+        return {topic: (np.sort(np.concatenate([none, *own])) - self._low_ns) / 1e9 for topic, own in found.items()}
+
+    def read(self, wanted: Wanted, at_most: Mapping[str, int] | None = None) -> Mapping[str, Table]:
+        """Decode the wanted fields in one pass; see the class for times, `compile_decoder` for values.
+
+        Args:
+            at_most: per topic how many messages do; one with more gives every second, third, ... of each publisher.
+        """
         self._broken.clear()
         pieces: dict[str, list[_Piece]] = {}
         kinds: dict[str, dict[str, bool]] = {}
@@ -228,7 +243,7 @@ class RosLog:
             for number, decoder in decoders.items():
                 topic = part.connections[number].topic
                 kinds.setdefault(topic, {}).update(zip(decoder.paths, decoder.is_number, strict=True))
-            for number, gathered in self._gather(part, decoders).items():
+            for number, gathered in self._gather(part, decoders, at_most or {}).items():
                 pieces.setdefault(part.connections[number].topic, []).extend(gathered.pieces())
         return {topic: _table(kinds[topic], pieces.get(topic, []), self._low_ns) for topic in wanted if topic in kinds}
 
@@ -243,15 +258,19 @@ class RosLog:
         told = settings_in(types, self.read(fields)) if fields else {}
         return {**self._metadata.settings(), **told}
 
-    def _gather(self, part: Part, decoders: Mapping[int, Decoder]) -> Mapping[int, _Gathered]:
-        gathered = {number: _Gathered(decoder) for number, decoder in decoders.items()}
+    def _gather(
+        self, part: Part, decoders: Mapping[int, Decoder], at_most: Mapping[str, int]
+    ) -> Mapping[int, _Gathered]:
+        gathered = {
+            number: _Gathered(decoder, self._stride(part, number, at_most)) for number, decoder in decoders.items()
+        }
         if not gathered:
             return gathered
         low_ns, high_ns = self._low_ns, self._high_ns
         with_lists = {number for number, decoder in decoders.items() if not all(decoder.is_number)}
         left = most = limits.messages(part.path.stat().st_size)
         for number, time_ns, buffer, pos, end in part.messages(frozenset(decoders)):
-            if not low_ns <= time_ns <= high_ns:
+            if not low_ns <= time_ns <= high_ns or gathered[number].skips():
                 continue
             try:
                 values = decoders[number].decode(buffer, pos, end)
@@ -263,6 +282,11 @@ class RosLog:
             except MalformedMessageError as err:
                 self._note_broken(part.connections[number].topic, str(err), time_ns)
         return gathered
+
+    def _stride(self, part: Part, number: int, at_most: Mapping[str, int]) -> int:
+        """Of how many messages of a publisher one is decoded."""
+        most = at_most.get(part.connections[number].topic, 0)
+        return -(-len(part.times_ns.get(number, ())) * len(self._parts) // most) if most > 0 else 1
 
     def _decoders(self, part: Part, wanted: Wanted) -> dict[int, Decoder]:
         """A decoder per connection that has wanted fields. Publishers of one type share it."""
@@ -385,9 +409,16 @@ class _Gathered:
     """Decoded messages of one connection as they come."""
 
     decoder: Decoder
+    stride: int = 1
     times_ns: list[int] = field(default_factory=list)
     rows: list[list[Any]] = field(default_factory=list)
     done: list[_Piece] = field(default_factory=list)
+    met: int = 0
+
+    def skips(self) -> bool:
+        """Whether the next message is one to leave out."""
+        self.met += 1
+        return self.stride > 1 and (self.met - 1) % self.stride != 0
 
     def add(self, time_ns: int, values: list[Any]) -> None:
         self.times_ns.append(time_ns)

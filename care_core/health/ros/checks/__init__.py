@@ -1,0 +1,22 @@
+"""The health checks of ROS recordings, one module each: `check(recording)` yields findings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from care_core.health.records import Finding
+from care_core.health.ros.checks import battery, blocked, drive, imu, laser, messages, odometry, planner, timing, topics
+from care_core.health.ros.recording import Recording
+
+CHECKS: tuple[Callable[[Recording], Iterator[Finding]], ...] = (
+    battery.check,
+    laser.check,
+    odometry.check,
+    drive.check,
+    blocked.check,
+    imu.check,
+    topics.check,
+    planner.check,
+    timing.check,
+    messages.check,
+)

@@ -1,0 +1,50 @@
+"""A look at a ROS recording: its account and its findings, in one reading."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from care_core.health.records import Health, Moment
+from care_core.health.ros import plan
+from care_core.health.ros.account import account
+from care_core.health.ros.find import find
+from care_core.health.ros.recording import STREAM_MESSAGES, Recording
+from care_core.logs.base import Log
+from care_core.logs.ros_log import RosLog
+
+SHORT_S = 5.0
+"""Nothing can be said of how a robot drives in less."""
+_STACKS = {"move_base": "move_base", "nav2": "Nav2"}
+
+
+def examine(log: Log) -> Health:
+    """What happened in a ROS 1 bag or a ROS 2 recording."""
+    recording = Recording.read(cast(RosLog, log))
+    findings = find(recording)
+    told = account(recording)
+    too_little = "" if findings else _too_little(recording)
+    if too_little:
+        told = (*told, Moment(recording.duration_s, "recording", too_little, "recording"))
+    return Health(_robot(recording), told, findings, is_readable=not too_little)
+
+
+def _robot(recording: Recording) -> str:
+    ros = recording.facts.get("ros", "1")
+    stack = _STACKS.get(recording.facts.get("stack", ""), "")
+    distro = recording.facts.get("distro", "")
+    return f"ROS {ros}{f' {distro}' if distro else ''} robot{f' with {stack}' if stack else ''}"
+
+
+def _too_little(recording: Recording) -> str:
+    """Why nothing can be judged, empty where something can."""
+    if not any(len(times) for times in recording.times.values()):
+        return "an empty recording: nothing can be said of the robot"
+    drives = recording.odometry is not None or recording.commands is not None
+    senses = bool(recording.scans or recording.batteries)
+    longest = max(len(table) for _, table in recording.of(*plan.ROBOT)) if drives or senses else 0
+    speaks = bool(recording.said or recording.goals) or any(True for _ in recording.of(plan.DIAGNOSTICS))
+    if longest < STREAM_MESSAGES and not speaks:
+        return "nothing in it tells of a robot: no odometry, goals, commands, laser, battery or messages"
+    if recording.duration_s < SHORT_S:
+        return f"{recording.duration_s:.1f} s are too short to judge a robot by"
+    return ""

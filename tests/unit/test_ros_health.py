@@ -1,0 +1,132 @@
+"""What is found in drives that have one known fault, in healthy ones, and in recordings that tell of no robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from care_core.health.records import Health
+from care_core.health.ros.examining import examine
+from care_core.logs.opening import open_log
+from care_core.logs.ros_log import RosLog
+from tests.ros_drives import ABORTED, FAILS_AT_S, SUCCEEDED, Drive
+from tests.ros_samples import START_NS, McapFile, write_db3, write_mcap
+
+WARN, ERROR, FATAL = 30, 40, 50
+
+
+def looked_at(drive: Drive, tmp_path: Path) -> Health:
+    return examine(open_log(drive.write(tmp_path / "drive.mcap")))
+
+
+@pytest.mark.parametrize(
+    ("fault", "kind", "suspect"),
+    [
+        ("laser dead", "laser", "hardware"),
+        ("laser stuck", "laser", "hardware"),
+        ("laser noise", "laser", "hardware"),
+        ("jump", "localisation", "hardware"),
+        ("drift", "localisation", "hardware"),
+        ("weak", "drive", "hardware"),
+        ("pulls", "drive", "hardware"),
+        ("stall", "drive", "hardware"),
+        ("loss", "commands", "hardware"),
+        ("battery", "battery", "hardware"),
+        ("blocked", "blocked", "world"),
+    ],
+)
+def test_a_fault_is_the_first_finding_with_its_onset(fault: str, kind: str, suspect: str, tmp_path: Path) -> None:
+    health = looked_at(Drive(fault, ABORTED), tmp_path)
+    first = health.findings[0]
+    assert (first.kind, first.suspect) == (kind, suspect)
+    assert first.onset_s == pytest.approx(FAILS_AT_S, abs=3.0)
+    assert first.probability > 0.5
+
+
+@pytest.mark.parametrize("outcome", [SUCCEEDED, ABORTED])
+def test_a_healthy_drive_has_no_finding(outcome: int, tmp_path: Path) -> None:
+    health = looked_at(Drive(outcome=outcome), tmp_path)
+    assert health.findings == ()
+    assert health.is_readable
+
+
+def test_what_was_survived_is_no_more_than_a_warning(tmp_path: Path) -> None:
+    survived = looked_at(Drive("laser dead", SUCCEEDED), tmp_path)
+    lost = looked_at(Drive("laser dead", ABORTED), tmp_path)
+    assert [one.severity for one in survived.findings] == ["warning"]
+    assert lost.findings[0].severity == "critical"
+
+
+def test_consequences_fold_under_their_cause(tmp_path: Path) -> None:
+    said = [(FAILS_AT_S + 4 + n, ERROR, "planner_server", "GridBased: failed to create plan") for n in range(12)]
+    health = looked_at(Drive("laser dead", ABORTED, said), tmp_path)
+    assert [one.kind for one in health.findings] == ["laser"]
+    assert "planner" in [one.kind for one in health.findings[0].consequences]
+
+
+def test_a_planner_without_a_cause_is_suspected_of_its_parameters(tmp_path: Path) -> None:
+    said = [(20.0 + n, ERROR, "controller_server", "Failed to make progress") for n in range(12)]
+    health = looked_at(Drive(outcome=ABORTED, said=said), tmp_path)
+    assert [(one.kind, one.suspect) for one in health.findings] == [("planner", "parameter")]
+
+
+def test_the_account_tells_goals_and_groups_messages(tmp_path: Path) -> None:
+    said = [(10.0 + n, WARN, "local_costmap", f"Map update took {n}.5 seconds") for n in range(20)]
+    health = looked_at(Drive(outcome=ABORTED, said=said), tmp_path)
+    texts = [one.text for one in health.account]
+    assert any(text.startswith("goal 1") and "aborted after 39 s" in text for text in texts)
+    assert sum("Map update" in text for text in texts) == 1
+    assert any("(20 times, until 29.0 s)" in text for text in texts)
+    assert [one.time_s for one in health.account] == sorted(one.time_s for one in health.account)
+    assert len(texts) <= 40
+
+
+def test_qos_that_does_not_fit_is_no_broken_sensor(tmp_path: Path) -> None:
+    text = "New publisher discovered on topic '/points', offering incompatible QoS. No messages will be sent to it."
+    health = looked_at(Drive(said=[(1.5, WARN, "rosbag2_recorder", text)]), tmp_path)
+    (finding,) = health.findings
+    assert (finding.kind, finding.suspect, finding.onset_s) == ("topics", "operation", 1.5)
+    assert "/points" in finding.title
+
+
+def test_an_error_that_a_fatal_one_follows_leads_it(tmp_path: Path) -> None:
+    said = [(30.0, ERROR, "/lidar", "Connection timeout"), (30.5, FATAL, "/monitor", "Watchdog timeout")]
+    health = looked_at(Drive(outcome=ABORTED, said=said), tmp_path)
+    assert [one.kind for one in health.findings] == ["laser"]
+    assert [one.kind for one in health.findings[0].consequences] == ["software"]
+
+
+def test_recordings_that_tell_of_no_robot_say_so(tmp_path: Path) -> None:
+    write_mcap(tmp_path / "imu.mcap")
+    health = examine(open_log(tmp_path / "imu.mcap"))
+    assert not health.is_readable
+    assert health.findings == ()
+    assert any("nothing in it tells of a robot" in one.text for one in health.account)
+
+
+def test_an_empty_recording_is_said_to_be_empty(tmp_path: Path) -> None:
+    with McapFile(tmp_path / "empty.mcap"):
+        pass
+    health = examine(open_log(tmp_path / "empty.mcap"))
+    assert not health.is_readable
+    assert any("nothing was recorded" in one.text for one in health.account)
+
+
+def test_other_containers_are_looked_at_alike(tmp_path: Path) -> None:
+    messages = [
+        (topic, kind, START_NS + round(t * 1e9), message)
+        for topic, kind, t, message in Drive("stall", ABORTED).messages()
+    ]
+    log = open_log(write_db3(tmp_path / "bag", messages=sorted(messages, key=lambda one: one[2])))
+    assert [one.kind for one in examine(log).findings][:1] == ["drive"]
+
+
+def test_times_and_samples_of_a_recording(tmp_path: Path) -> None:
+    log = open_log(Drive().write(tmp_path / "drive.mcap"))
+    assert isinstance(log, RosLog)
+    times = log.times()["/front/scan"]
+    assert len(times) == 200
+    assert times[1] - times[0] == pytest.approx(0.2)
+    few = log.read({"/front/scan": ("range_max",)}, {"/front/scan": 50})["/front/scan"]
+    assert few.t.tolist() == times[::4].tolist()

@@ -1,0 +1,50 @@
+"""The order in which findings are told: causes first, what they explain folded under them."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from care_core.health.records import Finding, FindingKind, Severity
+from care_core.health.telling import SLACK_S, Leads, told
+
+LEADS: Leads = {"laser": frozenset({"planner"}), "planner": frozenset({"control"}), "battery": frozenset({"drive"})}
+KINDS: tuple[FindingKind, ...] = ("laser", "planner", "control", "battery", "drive")
+SEVERITIES: tuple[Severity, ...] = ("critical", "warning", "info")
+
+
+def finding(kind: FindingKind, onset_s: float, severity: Severity = "critical") -> Finding:
+    return Finding(kind, kind, onset_s, onset_s + 1, severity, "", "")
+
+
+def test_what_a_cause_leads_to_by_several_steps_folds_under_it() -> None:
+    (root,) = told([finding("control", 9.0), finding("laser", 1.0), finding("planner", 5.0)], LEADS)
+    assert (root.kind, [one.kind for one in root.consequences]) == ("laser", ["planner", "control"])
+
+
+def test_a_cause_seen_just_after_its_consequence_still_leads_it() -> None:
+    (root,) = told([finding("planner", 5.0), finding("laser", 5.0 + SLACK_S)], LEADS)
+    assert (root.kind, [one.kind for one in root.consequences]) == ("laser", ["planner"])
+    assert [one.kind for one in told([finding("planner", 5.0), finding("laser", 5.1 + SLACK_S)], LEADS)] == [
+        "planner",
+        "laser",
+    ]
+
+
+def test_a_lesser_finding_explains_no_worse_one() -> None:
+    assert [one.kind for one in told([finding("laser", 1.0, "warning"), finding("planner", 5.0)], LEADS)] == [
+        "planner",
+        "laser",
+    ]
+
+
+def test_what_comes_after_the_impact_is_told_last() -> None:
+    first, last = told([finding("laser", 8.0), finding("drive", 2.0, "warning")], LEADS, impact_s=5.0)
+    assert (first.kind, first.after_impact, last.kind, last.after_impact) == ("drive", False, "laser", True)
+
+
+@given(st.lists(st.tuples(st.sampled_from(KINDS), st.floats(0, 20), st.sampled_from(SEVERITIES)), max_size=8))
+def test_every_finding_is_told_once(given_ones: list[tuple[FindingKind, float, Severity]]) -> None:
+    findings = [finding(*one) for one in given_ones]
+    said = [(one.kind, one.onset_s) for root in told(findings, LEADS) for one in (root, *root.consequences)]
+    assert sorted(said) == sorted((one.kind, one.onset_s) for one in findings)
