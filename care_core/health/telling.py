@@ -1,6 +1,6 @@
 """In which order findings are told: the earliest before the impact that explains the later ones leads them.
 
-Severe before mild, likely before suspected, then in order of time.
+Severe before mild, likely before suspected, causes before symptoms, then in order of time.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ SLACK_S = 1.5
 """Onsets are told this exactly: a consequence may be seen so much before its cause is."""
 LIKELY = 0.5
 """A finding at least this probable is told before suspicions of the same severity, and is no consequence of one."""
+SYMPTOMS: frozenset[FindingKind] = frozenset(("attitude", "crash", "estimator", "log"))
+"""What shows that something is wrong, not what: told after causes of the same weight."""
 _SEVERITY = {"critical": 0, "warning": 1, "info": 2}
 
 
@@ -42,7 +44,7 @@ def told(findings: Iterable[Finding], leads: Leads, impact_s: float | None = Non
     return tuple(replace(root, consequences=tuple(sorted(below, key=lambda f: f.onset_s))) for root, below in roots)
 
 
-def _place(finding: Finding, every: Iterable[Finding], reach: Leads) -> tuple[bool, int, bool, float, bool]:
+def _place(finding: Finding, every: Iterable[Finding], reach: Leads) -> tuple[bool, int, bool, bool, float, bool]:
     """Sorts findings: one whose cause was seen within the slack after it comes after that cause."""
     causes = (
         other.onset_s
@@ -56,8 +58,9 @@ def _place(finding: Finding, every: Iterable[Finding], reach: Leads) -> tuple[bo
     return *_rank(finding), onset_s, onset_s > finding.onset_s
 
 
-def _rank(finding: Finding) -> tuple[bool, int, bool]:
-    return finding.after_impact, _SEVERITY[finding.severity], finding.probability < LIKELY
+def _rank(finding: Finding) -> tuple[bool, int, bool, bool]:
+    likely = finding.probability >= LIKELY
+    return finding.after_impact, _SEVERITY[finding.severity], not likely, finding.kind in SYMPTOMS
 
 
 def _explains(cause: Finding, finding: Finding, reach: Leads) -> bool:

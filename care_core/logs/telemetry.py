@@ -33,10 +33,15 @@ _AS_SENT: Mapping[str, tuple[str, _Scaled]] = {
     "PSCN": ("GLOBAL_POSITION_INT", {"VN": ("vx", 0.01)}),
     "PSCE": ("GLOBAL_POSITION_INT", {"VE": ("vy", 0.01)}),
     "PSCD": ("GLOBAL_POSITION_INT", {"VD": ("vz", 0.01)}),
-    "GPS": ("GPS_RAW_INT", {"Status": ("fix_type", 1), "NSats": ("satellites_visible", 1), "HDop": ("eph", 0.01)}),
+    "GPS": ("GPS_RAW_INT", {"Status": ("fix_type", 1), "NSats": ("satellites_visible", 1), "HDop": ("eph", 0.01),
+                            "Lat": ("lat", 1e-7), "Lng": ("lon", 1e-7), "Alt": ("alt", 1e-3), "Spd": ("vel", 0.01),
+                            "GCrs": ("cog", 0.01), "GMS": ("time_usec", 1e-3)}),
     "CTUN": ("VFR_HUD", {"ThO": ("throttle", 0.01), "Alt": ("alt", 1)}),
     "RCOU": ("SERVO_OUTPUT_RAW", {f"C{n}": (f"servo{n}_raw", 1) for n in range(1, 17)}),
-    "VIBE": ("VIBRATION", {f"Vibe{axis}": (f"vibration_{axis.lower()}", 1) for axis in "XYZ"}),
+    "VIBE": ("VIBRATION", {"Clip": ("clipping_0", 1)} | {f"Vibe{axis}": (f"vibration_{axis.lower()}", 1)
+                                                         for axis in "XYZ"}),
+    "RCIN": ("RC_CHANNELS", {f"C{n}": (f"chan{n}_raw", 1) for n in range(1, 15)}),
+    "POWR": ("POWER_STATUS", {"Vcc": ("Vcc", 1e-3)}),
     "XKF4": ("EKF_STATUS_REPORT", {"SV": ("velocity_variance", 1), "SP": ("pos_horiz_variance", 1),
                                    "SH": ("pos_vert_variance", 1), "SM": ("compass_variance", 1)}),
     "RATE": ("ATTITUDE", {"R": ("rollspeed", 180 / np.pi), "P": ("pitchspeed", 180 / np.pi),
@@ -44,8 +49,10 @@ _AS_SENT: Mapping[str, tuple[str, _Scaled]] = {
 }  # fmt: skip
 """DataFlash message -> the MAVLink message that carries it, and per field the sent one and its scale."""
 
-_UNKNOWN: Mapping[str, float] = {"eph": _UNKNOWN_U16, "voltage_battery": _UNKNOWN_U16, "current_battery": -1,
-                                 "energy_consumed": -1}  # fmt: skip
+_UNKNOWN: Mapping[str, float] = {
+    "eph": _UNKNOWN_U16, "vel": _UNKNOWN_U16, "cog": _UNKNOWN_U16, "voltage_battery": _UNKNOWN_U16,
+    "current_battery": -1, "energy_consumed": -1,
+}  # fmt: skip
 """Values by which a sender says that it does not know."""
 
 

@@ -48,7 +48,7 @@ def told(
     settings: Mapping[str, tuple[Setting, ...]] | None = None, damage: Sequence[Damage] = (),
 ) -> list[Moment]:  # fmt: skip
     known = {name: (Setting(name, value, "PARM"),) for name, value in QUAD_X.items()} | dict(settings or {})
-    return list(account(Flight.of(tables, known, facts, end_s), damage))
+    return list(account(Flight(tables, known, facts, end_s), damage))
 
 
 def texts(moments: Sequence[Moment], kind: str = "") -> list[str]:

@@ -10,7 +10,7 @@ from care_core.health.ardupilot.leads import LEADS
 from care_core.health.ardupilot.signals import expanded
 from care_core.health.records import Finding
 from care_core.health.telling import told
-from care_core.logs.base import Log, Wanted
+from care_core.logs.base import Log, LogFormat, Wanted
 from care_core.logs.plausible import plausible
 from care_core.logs.telemetry import as_dataflash
 
@@ -30,7 +30,7 @@ READS: Wanted = _plan()
 def flight_of(log: Log) -> flight.Flight:
     """The flight that a DataFlash or telemetry log holds."""
     tables = plausible(as_dataflash(log).read(READS))
-    return flight.Flight.of(tables, log.settings(), log.facts, log.duration_s)
+    return flight.Flight(tables, log.settings(), log.facts, log.duration_s, log.format is LogFormat.MAVLINK_TLOG)
 
 
 def find(of: flight.Flight) -> tuple[Finding, ...]:

@@ -58,8 +58,6 @@ _SHOCK = 30.0
 """m/s^2: three times gravity is no flight."""
 _ACRO = frozenset((1, 13, 14))
 """Copter modes in which any attitude is meant: acro, sport, flip."""
-_NOMINAL_HZ: Mapping[str, float] = {"ATT": 10.0, "CTUN": 10.0, "MOT": 10.0, "CURR": 1.0, "PM": 0.1}
-"""Rate at which firmware before 3.1 wrote messages that carried no time (Copter log docs: "medium" is 10 Hz)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,25 +68,9 @@ class Flight:
     settings: Mapping[str, tuple[Setting, ...]]
     facts: Mapping[str, str]
     end_s: float
+    is_telemetry: bool = False
+    """Whether a ground station heard it: then holes are the link's."""
     _known: dict[str, tuple[Table, ...]] = field(default_factory=dict, repr=False)
-
-    @classmethod
-    def of(
-        cls,
-        tables: Mapping[str, Table],
-        settings: Mapping[str, tuple[Setting, ...]],
-        facts: Mapping[str, str],
-        duration_s: float,
-    ) -> Flight:
-        """The flight of decoded tables. A log without any clock gets the rates at which its messages were written."""
-        if duration_s > 0 or not any(name in tables for name in _NOMINAL_HZ):
-            return cls(tables, settings, facts, duration_s)
-        timed = {
-            name: Table(np.arange(len(table)) / _NOMINAL_HZ[name], table.columns)
-            for name, table in tables.items()
-            if name in _NOMINAL_HZ
-        }
-        return cls(timed, settings, facts, max((float(t.t[-1]) for t in timed.values() if len(t)), default=0.0))
 
     def all(self, name: str, *fields: str) -> tuple[Table, ...]:
         """The instances of a message that have these fields."""
@@ -271,9 +253,10 @@ class Flight:
         for start, end in runs(t, far):
             back = runs(t, held & (t > end), gap_s=0.5)
             rest = held[(t > end) & self.during(up, t)]
-            went_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.3
+            went_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
             came_back = went_on or any(b - a > _BACK_S for a, b in back)
-            if (end - start >= 0.5 or end >= t[-1] - 2.0) and not came_back:
+            stays = far[(t >= start) & (t <= start + _CRASH_CHECK_S)].mean() > 0.6  # else it swings
+            if (end - start >= 0.5 or end >= t[-1] - 2.0) and stays and not came_back:
                 return start
         return None
 

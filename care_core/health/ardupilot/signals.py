@@ -37,7 +37,7 @@ _INSTANCE: Mapping[str, tuple[str, ...]] = {
 """The field that numbers the instances of a message, where one message holds them all."""
 
 _FORMER: Mapping[str, Mapping[str, tuple[str, ...]]] = {
-    "ATT": {"DesRoll": ("RollIn",), "DesPitch": ("PitchIn",), "DesYaw": ("YawIn",)},
+    "ATT": {"DesRoll": ("RollIn",), "DesPitch": ("PitchIn",), "DesYaw": ("NavYaw",)},
     "CTUN": {"ThO": ("ThrOut",), "ThI": ("ThrIn",), "BAlt": ("BarAlt",), "DAlt": ("WPAlt",), "CRt": ("CRate",),
              "DCRt": ("DCRate",), "SAlt": ("SonAlt",)},
     "RCOU": {f"C{n}": (f"Ch{n}", f"Chan{n}", f"Mot{n}") for n in range(1, 15)},

@@ -89,7 +89,10 @@ def _drift(flight: Flight, first: Table) -> Floats | None:
     if len(good) < 10:
         return None
     apart = first["Alt"] - aligned(first.t, good.t, good["Alt"])
-    return smooth(first.t, apart - np.median(apart[: max(len(apart) // 20, 3)]), 5.0)
+    nearest = np.interp(first.t, good.t, good.t, left=-np.inf, right=np.inf)
+    apart = np.where(np.abs(nearest - first.t) < 3.0, apart, np.nan)
+    zero = apart[np.isfinite(apart)][: max(len(apart) // 20, 3)]
+    return smooth(first.t, np.nan_to_num(apart - np.median(zero)), 5.0) if len(zero) else None
 
 
 def _severity(flight: Flight, start: float, over: float) -> Severity:

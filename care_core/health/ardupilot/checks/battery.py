@@ -26,7 +26,8 @@ _FAILSAFE_BATT = 6
 _LASTS_S = 2.0
 _ALIVE_V, _HIGHEST_V = 4.0, 120.0
 _BOARD_V = 4.3
-_LOAD_FOR_FULL = 0.9
+_LEAST_FULL = 3.0
+"""A pack whose best moment is below this a cell has fewer cells than the parameter says."""
 _CALIBRATION: Calibration = ((0.001, 0.6), (0.05, 0.9), (0.1, 0.97))
 """By share of a cell's 3.9 V that is missing at rest; on the training table all flights that rest below 3.9 V a cell
 have a drained pack (16 of 16), and no other does."""
@@ -46,11 +47,8 @@ def cells_of(flight: Flight, highest_v: float) -> int:
     """How many cells in series: as the parameters for a full pack say, else the fewest that can give the voltage."""
     full = flight.setting("MOT_BAT_VOLT_MAX", "MOT_V_MAX", "Q_M_BAT_VOLT_MAX")
     fewest = max(math.ceil((highest_v - 0.3) / (FULL + 0.05)), 1)
-    if full is not None and full > 0 and round(full / FULL) >= fewest and full / FULL - highest_v / FULL < 0.35 * full:
-        cells = round(full / FULL)
-        if highest_v / cells >= 2.8:
-            return cells
-    return fewest
+    told = round(full / FULL) if full else 0
+    return told if told >= fewest and highest_v / told >= _LEAST_FULL else fewest
 
 
 def _pack(flight: Flight, table: Table) -> Iterator[Finding]:
@@ -82,7 +80,7 @@ def _pack(flight: Flight, table: Table) -> Iterator[Finding]:
             f"down to {flown * cells:.1f} V, {flown:.2f} V for each of {cells} cells{amps}; {CRITICAL} V is the "
             f"critical level" + _said(failsafe),
             "BAT.Volt; 3.3 V a cell: ArduPilot, Battery Failsafe",
-            probability=0.85 if deep else 0.4,
+            probability=0.4 if deep else 0.25,
         )  # fmt: skip
     elif failsafe is not None:
         limit = flight.setting("BATT_LOW_VOLT", "FS_BATT_VOLTAGE", "LOW_VOLT") or 0.0
@@ -93,7 +91,7 @@ def _pack(flight: Flight, table: Table) -> Iterator[Finding]:
             f"failsafe at {at_v:.1f} V, {at_v / cells:.2f} V for each of {cells} cells"
             + (f"; BATT_LOW_VOLT={limit:g} asks for it at {limit / cells:.2f} V a cell, 3.5 is usual" if early else ""),
             "ERR of the battery failsafe; BAT.Volt", suspect="parameter" if early else "operation",
-            probability=0.3,
+            probability=0.1,
         )  # fmt: skip
 
 

@@ -22,8 +22,9 @@ AXES = ("MagX", "MagY", "MagZ")
 READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",), "XKF3": ("IYAW",)}
 
 APART = 200.0
-MOVED = 100.0
-"""mGauss by which the difference of two compasses may change in flight: half of what arming allows."""
+MOVED = 140.0
+"""mGauss by which the difference of two compasses may change in flight: 70 % of what arming allows, since turning alone
+moves it where their calibrations differ."""
 GREY, TOO_MUCH = 0.3, 0.6
 _SHORTEST, _LONGEST = 185.0, 875.0
 _LASTS_S = 3.0
@@ -35,7 +36,11 @@ _CALIBRATION: Calibration = ((1.0, 0.8), (1.5, 0.95), (3.0, 0.98))
 def find(flight: Flight) -> Iterator[Finding]:
     """What is wrong with the compasses while they matter: the first of these that shows."""
     compasses = [table.where(flight.watch(table.t)) for table in flight.all("MAG", *AXES)]
-    compasses = [table for table in compasses if len(table) >= 3]
+    compasses = [
+        table
+        for n, table in enumerate(compasses, start=1)
+        if len(table) >= 3 and flight.setting("COMPASS_USE" if n == 1 else f"COMPASS_USE{n}") != 0
+    ]
     if not compasses or flight.setting("COMPASS_ENABLE", "MAG_ENABLE") == 0:
         return
     for test in (_dead, _apart, _refused, _by_motors, _implausible):
@@ -191,6 +196,6 @@ def _doubted(flight: Flight) -> Iterator[Finding]:
             yield Finding(
                 "compass", "the estimator rejects the compass", spans[0][0], spans[-1][1], "warning",
                 f"test ratio {np.max(one['SM'][flight.watch(one.t)]):.1f} (limit 1)",
-                "XKF4.SM; 1 is the limit of its innovation test", probability=0.35,
+                "XKF4.SM; 1 is the limit of its innovation test", probability=0.2,
             )  # fmt: skip
             return

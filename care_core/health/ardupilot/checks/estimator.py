@@ -56,7 +56,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     severity: Severity = "critical" if failed else "warning"
     yield Finding(
         "estimator", "the estimator rejects its measurements", start, end, severity, evidence,
-        "XKF4.SV, SP, SH, SM, ERR; limit 1 of AP_NavEKF3, 0.8 of FS_EKF_THRESH", probability=0.3,
+        "XKF4.SV, SP, SH, SM, ERR; limit 1 of AP_NavEKF3, 0.8 of FS_EKF_THRESH", probability=0.2,
     )  # fmt: skip
 
 

@@ -19,13 +19,14 @@ from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
 
 READS: Wanted = {
-    "GPS": ("Status", "NSats", "HDop", "Lat", "Lng", "Spd", "GCrs"),
+    "GPS": ("Status", "NSats", "HDop", "Lat", "Lng", "Spd", "GCrs", "GMS"),
     "GPA": ("HAcc", "SAcc"),
     "XKF4": ("SP", "SV"),
 }
 
 JUMP_M, ACCELERATION = 5.0, 10.0
 FEWEST, FALL = 6, 3
+_TIMES_USUAL = 5.0
 POOR_HDOP, BAD_HDOP = 2.0, 2.5
 _SPEED_MS = 1.0
 _METRES = 111319.5
@@ -69,6 +70,7 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     t = fixed.t
     off, dt = _unexplained(fixed)
     limit = JUMP_M + 0.5 * ACCELERATION * np.minimum(dt, 1.0) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
+    limit = np.maximum(limit, _TIMES_USUAL * float(np.quantile(off, 0.9)))  # a velocity that never fits tells nothing
     beyond = np.flatnonzero((off > limit) & (dt < 3.0) & (dt > 0.01))
     if not len(beyond):
         return
@@ -88,6 +90,10 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
 def _unexplained(table: Table) -> tuple[Floats, Floats]:
     """Metres by which each step leaves what the mean velocity predicts, and the seconds that it took."""
     dt = np.diff(table.t)
+    if "GMS" in table.columns:  # the receiver's own clock: records are written late now and then
+        own = np.diff(table["GMS"]) / 1e3
+        if abs(float(own.sum() - dt.sum())) < 0.05 * float(dt.sum()) + 1.0:
+            dt = np.where(own > 0, own, dt)
     course = np.radians(table["GCrs"])
     north, east = table["Spd"] * np.cos(course), table["Spd"] * np.sin(course)
     d_north = np.diff(table["Lat"]) * _METRES - dt * (north[1:] + north[:-1]) / 2
@@ -164,7 +170,7 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
 
 def _harmed(flight: Flight, start: float) -> bool:
     """Whether the estimator gave up, or arming was refused, for want of a position."""
-    refused = flight.refused_for("gps", "3d fix", "position", "waiting for home", "need alt")
+    refused = flight.refused_for("gps", "3d fix", "position", "ahrs", "ekf", "need alt")
     words = ("position lost", "ekf failsafe", "ekf variance", "gps glitch")
     told = any(t >= start - 1 and any(word in text.casefold() for word in words) for t, text in flight.messages)
     return refused is not None or (told and _upset(flight, start))

@@ -34,6 +34,13 @@ def _holes(flight: Flight) -> Iterator[Finding]:
     holes = np.flatnonzero((steps > limit) & armed)
     if len(holes):
         total = float(steps[holes].sum())
+        if flight.is_telemetry:
+            yield Finding(
+                "radio", "telemetry was interrupted", float(t[holes[0]]), float(t[holes[-1] + 1]), "info",
+                f"{len(holes)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
+                "times of the telemetry", suspect="world", probability=0.3,
+            )  # fmt: skip
+            return
         yield Finding(
             "log", f"the log has {len(holes)} hole{'s' * (len(holes) > 1)}", float(t[holes[0]]),
             float(t[holes[-1] + 1]), "warning", f"{total:.1f} s without any record (limit {limit:.0f} s)",

@@ -28,7 +28,7 @@ ROSE = 10.0
 loose. The noise that a healthy flight gained on the training table stays below 4."""
 _TIMES = 5.0
 _CLIPS = 100
-_LASTS_S = 3.0
+_LASTS_S = 2.0
 _SPIN_UP_S = 4.0
 _FAILSAFE_VIBE = 29
 _CALIBRATION: Calibration = ((0.5, 0.5), (1.0, 0.9), (2.0, 0.97))
