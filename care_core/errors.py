@@ -59,6 +59,10 @@ class ProfileError(CareError):
     """The profile is missing, unsound, or does not fit the log."""
 
 
+class NoMissionError(ProfileError):
+    """The log holds no mission that the profile can read: what happened in it can be told, nothing be judged."""
+
+
 class ConfigError(CareError):
     """A configuration file cannot be read."""
 

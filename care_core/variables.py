@@ -128,3 +128,6 @@ class Change:
     current: float
     suggested: float
     notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.option.name} {self.option.show(self.current)} -> {self.option.show(self.suggested)}"

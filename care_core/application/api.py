@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, choose, open_case, opened, read_case
+from care_core.application.case import Case, Progress, Request, fitting, open_case, opened, read_case
 from care_core.errors import CareError
 
 if TYPE_CHECKING:
@@ -70,13 +70,13 @@ def verify(
         CareError: the report is none or suggests no change, or the log cannot be read.
     """
     from care_core.diagnose.verify import verify_log
-    from care_core.report.reading import read_report
+    from care_core.report.reading import profile_of, read_report
     from care_core.report.verification import promise_of, verify_document
 
     promised = read_report(report)
     promise = promise_of(promised)
     with opened(Path(log)) as (found, sha256):
-        chosen, _ = choose(found, profile or promised.profile.name)
+        chosen, _ = fitting(found, profile or profile_of(promised).name)
         run, verification = verify_log(promise, found, chosen, mission, sha256)
     return verify_document(promised, run, verification)
 

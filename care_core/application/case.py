@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from care_core.diagnose.judging import Judged
     from care_core.diagnose.records import Diagnosis, Fix
     from care_core.diagnose.whatif import Question
+    from care_core.health.records import Health
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
     from care_core.profile.schema import Schema
@@ -98,14 +99,33 @@ class Case:
 
 
 def open_case(request: Request, progress: Progress) -> Case:
-    """Log -> choice of a profile -> judged run -> diagnosis, in this one place. Raises CareError."""
+    """Log -> what happened -> choice of a profile -> judged run -> diagnosis, in this one place.
+
+    Where no profile fits, or the log holds no mission for it, what happened is the answer.
+
+    Raises:
+        CareError: the log cannot be read, or the operator named what is not there.
+    """
     from care_core.configs.loading import read_configs
+    from care_core.errors import NoMissionError
+    from care_core.health.examine import examine
+    from care_core.run import Fit
 
     configs = read_configs(request.configs)
     progress("opening the log", 0.0)
     with opened(request.log) as (log, sha256):
-        reading = _read(log, request, configs, progress, sha256)
-        diagnosis = _diagnose(reading, request, progress)
+        profile, choice = choose(log, request.profile)
+        progress("looking at what happened", 0.1)
+        health = examine(log)
+        reading = None
+        if profile is not None:
+            try:
+                reading = _read(log, profile, choice, request, configs, progress, sha256)
+            except NoMissionError as err:
+                choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, err.message.rstrip("."))))
+        if reading is None:
+            return Case(_unjudged(log, choice, health, sha256), (), log, None, request.configs)
+        diagnosis = _diagnose(reading, health, request, progress)
     return Case(diagnosis, reading.profile.schema.options, log, reading, request.configs)
 
 
@@ -115,7 +135,8 @@ def read_case(request: Request, progress: Progress) -> Reading:
 
     configs = read_configs(request.configs)
     with opened(request.log) as (log, sha256):
-        return _read(log, request, configs, progress, sha256)
+        profile, choice = fitting(log, request.profile)
+        return _read(log, profile, choice, request, configs, progress, sha256)
 
 
 @contextmanager
@@ -130,31 +151,61 @@ def opened(path: Path) -> Iterator[tuple[Log, Sha256]]:
         yield open_as(format, path), sha256
 
 
-def choose(log: Log, name: str | None = None) -> tuple[Profile, ProfileChoice]:
-    """The installed profile that fits a log, or how the one that was named does. Raises CareError where none does."""
-    from care_core.extract.select import fitting_profile, sound_profiles
-    from care_core.profile.store import load_profile
+def choose(log: Log, name: str | None = None) -> tuple[Profile | None, ProfileChoice]:
+    """The installed profile that fits a log best, in the log's own spelling, None where none fits; or how the one that
+    was named does. Raises CareError."""
+    from care_core.extract.select import choose_profile
 
-    if name is not None:
-        return fitting_profile(log, [load_profile(name)])
-    sound, problems = sound_profiles()
-    profile, choice = fitting_profile(log, sound)
-    left_out = "".join(f"; left out as it is not sound: {problem}" for problem in problems)
+    profiles, left_out = _candidates(log, name)
+    profile, choice = choose_profile(log, profiles)
     return profile, replace(choice, reason=f"{choice.reason}{left_out}")
 
 
-def _read(log: Log, request: Request, configs: tuple[ConfigFile, ...], progress: Progress, sha256: Sha256) -> Reading:
+def fitting(log: Log, name: str | None = None) -> tuple[Profile, ProfileChoice]:
+    """As `choose`, for those who can do nothing without a profile: raises ProfileError where none fits."""
+    from care_core.extract.select import fitting_profile
+
+    return fitting_profile(log, _candidates(log, name)[0])
+
+
+def _candidates(log: Log, name: str | None) -> tuple[list[Profile], str]:
+    """Profiles to choose from, in the log's own spelling, and what is to be said of those that are not sound."""
+    from care_core.extract.select import sound_profiles
+    from care_core.extract.spelling import spelled
+    from care_core.profile.store import load_profile
+
+    profiles, problems = ([load_profile(name)], ()) if name is not None else sound_profiles()
+    left_out = "".join(f"; left out as it is not sound: {problem}" for problem in problems)
+    return [replace(profile, schema=spelled(profile.schema, log)) for profile in profiles], left_out
+
+
+def _unjudged(log: Log, choice: ProfileChoice, health: Health, sha256: Sha256) -> Diagnosis:
+    from care_core.diagnose.triage import unjudged
+    from care_core.extract.read import log_info
+
+    settings = {name: history[-1] for name, history in log.settings().items()}
+    return unjudged(log_info(log, sha256()), settings, choice, health)
+
+
+def _read(
+    log: Log,
+    profile: Profile,
+    choice: ProfileChoice,
+    request: Request,
+    configs: tuple[ConfigFile, ...],
+    progress: Progress,
+    sha256: Sha256,
+) -> Reading:
     from care_core.diagnose.judging import read_and_judge
 
-    profile, choice = choose(log, request.profile)
-    progress("reading the log", 0.0)
+    progress("reading the log", 0.2)
     judged = read_and_judge(
         log, profile, configs=configs, thresholds=request.thresholds, mission=request.mission, sha256=sha256
     )
     return Reading(profile, choice, configs, judged)
 
 
-def _diagnose(reading: Reading, request: Request, progress: Progress) -> Diagnosis:
+def _diagnose(reading: Reading, health: Health, request: Request, progress: Progress) -> Diagnosis:
     from care_core.diagnose.triage import triage
     from care_core.logs.opening import open_log
 
@@ -166,6 +217,7 @@ def _diagnose(reading: Reading, request: Request, progress: Progress) -> Diagnos
         configs=reading.configs,
         keep=request.keep,
         since=None if request.since is None else open_log(request.since),
+        health=health,
         top=request.top,
         progress=progress,
     )
@@ -190,7 +242,7 @@ def report_of(diagnosis: Diagnosis, format: ReportFormat) -> str:
 def exit_code(diagnosis: Diagnosis) -> ExitCode:
     """What the diagnosis means for the process that asked for it."""
     statuses = {objective.status for objective in diagnosis.objectives}
-    if "fault" in statuses:
+    if "fault" in statuses or any(finding.severity == "critical" for finding in diagnosis.health.findings):
         return ExitCode.FAULT
     return ExitCode.NOT_EVALUATED if "not_evaluated" in statuses or not statuses else ExitCode.OK
 

@@ -62,12 +62,13 @@ def _suggested(report: TriageDocument, path: Path) -> Side:
     from care_core.configs.compare import Side
     from care_core.configs.driven import readable
     from care_core.profile.store import load_profile
+    from care_core.report.reading import profile_of
     from care_core.run import Setting
 
     config = {name: float(value) for name, value in report.config.items()}
     if report.fix is not None:
         config.update({change.option: float(change.to) for change in report.fix.changes})
-    options = [option for option in load_profile(report.profile.name).schema.options if option.name in config]
+    options = [option for option in load_profile(profile_of(report).name).schema.options if option.name in config]
     keys = {parameter: config[option.name] for option in options for parameter in readable(option)}
     return Side(str(path), {key: Setting(key, value, str(path)) for key, value in keys.items()}, partial=True)
 
@@ -83,7 +84,7 @@ def apply_report(report: Path, configs: Sequence[str], alternative: int = 0) -> 
     """
     from care_core.configs.edit import Wanted, apply_changes
     from care_core.profile.store import load_profile
-    from care_core.report.reading import read_report
+    from care_core.report.reading import profile_of, read_report
 
     document = read_report(report)
     if document.fix is None:
@@ -92,7 +93,7 @@ def apply_report(report: Path, configs: Sequence[str], alternative: int = 0) -> 
     if alternative >= len(sets):
         held = "none" if len(sets) == 1 else f"1 to {len(sets) - 1}"
         raise UsageError(f"There is no alternative {alternative}: the report has {held}.", where="--alternative")
-    variables = load_profile(document.profile.name).schema.variables
+    variables = load_profile(profile_of(document).name).schema.variables
     wanted = []
     for change in sets[alternative].changes:
         option = variables.get(change.option)

@@ -14,9 +14,12 @@ from care_core.causal.mechanisms import columns
 from care_core.causal.model import Summary
 from care_core.diagnose.records import Circumstance
 from care_core.profile.schema import Schema, Side
+from care_core.profile.store import Profile
 from care_core.run import Run, is_known
 from care_core.variables import Role, Variable
 
+BEYOND = 0.1
+"""Share of the range that training saw by which a context may leave it before the profile fits in part only."""
 RARE = 0.025
 """Share of the training runs that lie farther out than what is called unusual."""
 
@@ -28,6 +31,20 @@ def circumstances(run: Run, world: World, schema: Schema) -> tuple[Circumstance,
     for one in sorted(found, key=lambda one: one.share):
         named.setdefault((one.name, one.variable), one)
     return tuple(named.values())
+
+
+def unusual(run: Run, profile: Profile) -> tuple[str, ...]:
+    """What of this mission the profile does not know: another mission, conditions beyond its training."""
+    found = [run.mission.mismatch] if run.mission.mismatch else []
+    for variable in profile.schema.contexts:
+        value, summary = run.context.get(variable.name), profile.model.summaries.get(variable.name)
+        if summary is None or not is_known(value):
+            continue
+        margin = BEYOND * (summary.high - summary.low)
+        if not summary.low - margin <= value <= summary.high + margin:
+            what = f"{variable.doc or variable.name} of {value:.3g} {variable.unit}".rstrip()
+            found.append(f"{what} is outside the training runs ({summary.low:.3g} to {summary.high:.3g})")
+    return tuple(found)
 
 
 def _shown(run: Run, world: World, schema: Schema) -> Iterator[Circumstance]:

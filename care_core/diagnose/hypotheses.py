@@ -12,9 +12,12 @@ run's signals under that cancels out):
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
+from dataclasses import replace
 
-from care_core.diagnose.records import Hypothesis
+from care_core.causal.counterfactual import Config, World
+from care_core.diagnose.ranking import Suspect as Option
+from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.health.records import Finding, Suspect
 from care_core.run import FitVerdict
 
@@ -26,9 +29,51 @@ UNSEEN = 0.05
 """Weight of a failed part, and of something met, that left no signal."""
 DOUBT: Mapping[FitVerdict, float] = {"fits": 1.0, "partly": 0.5, "no": 0.0}
 """Share of what the model says that is believed."""
+UNKNOWN = 0.3
+"""What an option, and chance, weigh for an objective that too few training missions had to learn from."""
 LEAST = 0.005
 """Hypotheses less likely than this are told together with chance."""
 _WHAT: Mapping[Suspect, str] = {"hardware": "hardware", "world": "world", "operation": "world"}
+
+
+def explain(
+    world: World,
+    broken: Sequence[ObjectiveResult],
+    found: Mapping[str, Sequence[Option]],
+    reference: Config,
+    refused: Container[str],
+    findings: Iterable[Finding],
+    verdict: FitVerdict,
+) -> tuple[Hypothesis, ...]:
+    """What explains the broken objectives of a run.
+
+    What an option adds is its share (its weight among the suspects) of the probability that this configuration breaks
+    the objective, over that of the reference; before anything of this run is known, for its outcome is what is to be
+    explained.
+
+    Args:
+        found: per objective the options that may have moved it, with their weights.
+        refused: options that the check reads which refused this mission: they explain it whole.
+    """
+    before = replace(world, observed={})
+    options: dict[str, float] = {}
+    chance = []
+    for name in (result.variable.name for result in broken):
+        excess, by_chance = _added(before, name, reference)
+        chance.append(by_chance)
+        total = sum(max(0.0, suspect.weight) for suspect in found[name])
+        for suspect in found[name] if total else ():
+            options[suspect.option] = max(options.get(suspect.option, 0.0), excess * suspect.weight / max(total, 1.0))
+    options.update({suspect.option: 1.0 for group in found.values() for suspect in group if suspect.option in refused})
+    return weigh(options, min(chance, default=0.0), findings, verdict)
+
+
+def _added(before: World, objective: str, reference: Config) -> tuple[float, float]:
+    """What this configuration adds to the probability that the objective breaks, and what the reference has of it."""
+    if objective not in before.model.outcomes:
+        return UNKNOWN, UNKNOWN
+    here, there = 1.0 - before.predict(objective, [before.config, reference]).p_ok
+    return max(0.0, float(here - there)), float(there)
 
 
 def weigh(

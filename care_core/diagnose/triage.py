@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from care_core.causal.counterfactual import Config, World
 from care_core.configs.loading import ConfigFile
 from care_core.diagnose import provenance
-from care_core.diagnose.circumstances import circumstances
+from care_core.diagnose.advice import believed, speaks_against
+from care_core.diagnose.circumstances import circumstances, unusual
 from care_core.diagnose.evidence import refused_by, said
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
@@ -26,6 +27,7 @@ from care_core.diagnose.fixes import (
     smallest_good,
     to_fix,
 )
+from care_core.diagnose.hypotheses import explain, weigh
 from care_core.diagnose.judging import Judged, check_wishes
 from care_core.diagnose.ranking import (
     Suspect,
@@ -38,9 +40,10 @@ from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix,
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
 from care_core.diagnose.worlds import reference_of, world_of
+from care_core.health.records import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
-from care_core.run import ProfileChoice, Run, is_known
+from care_core.run import LogInfo, MissionInfo, ProfileChoice, Run, Setting, is_known
 
 MIN_CONTRIBUTION = 0.02
 """Odds an option must cost before it is called a cause of this run."""
@@ -79,12 +82,14 @@ def triage(
     configs: Sequence[ConfigFile] = (),
     keep: Collection[str] = (),
     since: Log | None = None,
+    health: Health = NOTHING_SEEN,
     top: int = 5,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Diagnose a run that was read and judged.
 
     Args:
+        health: what happened in the log, with the findings that compete with parameters.
         configs: the configuration files that it was read with.
         keep: options that must stay as they are.
         since: the log of a good run; what changed since then is told as evidence.
@@ -94,7 +99,7 @@ def triage(
         CareError: the profile has no usable model, or no such option.
     """
     check_wishes(profile.schema, keep, {})
-    diagnosis = diagnose(judged, profile, choice, keep=keep, top=top, progress=progress)
+    diagnosis = diagnose(judged, profile, choice, keep=keep, health=health, top=top, progress=progress)
     notes = provenance.notes(profile.schema, judged.run, configs, judged.given)
     diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *notes))
     if since is None:
@@ -110,14 +115,16 @@ def diagnose(
     choice: ProfileChoice,
     *,
     keep: Collection[str] = (),
+    health: Health = NOTHING_SEEN,
     top: int = 5,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Causes and fix of a run that has been judged; the arguments are those of `triage`."""
     report = progress or (lambda _step, _share: None)
     schema, run, objectives, broken = profile.schema, judged.run, judged.results, judged.broken
+    choice = replace(choice, fit=choice.fit.but(*unusual(run, profile)))
     if not broken:
-        return Diagnosis(choice, run, objectives, (), None)
+        return Diagnosis(choice, run, objectives, (), None, health=health)
     report("ranking the causes", 0.7)
     reference = reference_of(run, profile)
     world = world_of(judged, profile)
@@ -134,10 +141,13 @@ def diagnose(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
         for name, result in ((result.variable.name, result) for result in broken)
     )
+    hypotheses = explain(world, broken, weighed, reference, refused_by(run), health.findings, choice.fit.verdict)
     report("searching for a fix", 0.85)
-    fixes = _fixes(case, {s.option for group in found.values() for s in group})
+    fixes = believed(_fixes(case, {s.option for group in found.values() for s in group}), hypotheses)
     out_of_reach = next(filter(None, unheard.values()), None)
     abstained = out_of_reach or _abstains(case, faults, fixes)
+    if abstained is None:
+        abstained = speaks_against(fixes[0], hypotheses, broken)
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     report("done", 1.0)
     return Diagnosis(
@@ -153,7 +163,18 @@ def diagnose(
         tell_more=tell_more(world, faults, run, schema.variables, reference, keep, unranked)
         if unsure and not out_of_reach
         else (),
+        health=health,
+        hypotheses=hypotheses,
     )
+
+
+def unjudged(log: LogInfo, settings: Mapping[str, Setting], choice: ProfileChoice, health: Health) -> Diagnosis:
+    """The answer for a log that no profile fits: what happened in it is all that can be said."""
+    whole = MissionInfo(0, 0, 0.0, log.duration_s, ended=True, fits=False)
+    run = Run({}, {}, {}, {}, settings, log, whole)
+    failed = any(finding.severity == "critical" for finding in health.findings)
+    hypotheses = weigh({}, 0.0, health.findings, "no") if failed else ()
+    return Diagnosis(choice, run, (), (), None, health=health, hypotheses=hypotheses)
 
 
 def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
@@ -206,8 +227,9 @@ def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float)
     A check that refused this run and reads the option's value is worth more than a doubt about the model.
     """
     contribution = suspect.contribution
-    doubtful = not in_support or case.choice.fit.verdict != "fits" or not case.run.mission.fits
-    if doubtful or support < LOW_SUPPORT or contribution < UNSURE:
+    if case.choice.fit.verdict != "fits":
+        return "low"
+    if not in_support or support < LOW_SUPPORT or contribution < UNSURE:
         return "medium" if suspect.option in refused_by(case.run) else "low"
     is_rivalled = bool(case.unranked[suspect.path.nodes[-1]])
     if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled:
@@ -268,7 +290,7 @@ def _has_effect(case: _Case, option: str) -> bool:
     return any(effects[key].identified and effects[key].effect > 0 for key in effects if key[0] == option)
 
 
-def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: list[Fix]) -> str | None:
+def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> str | None:
     names = [fault.objective.variable.name for fault in faults]
     unknown = [name for name in names if name not in case.world.model.outcomes]
     if unknown:

@@ -17,7 +17,7 @@ import care_core.extract.battery
 import care_core.extract.nav2
 import care_core.extract.navigation  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
-from care_core.errors import ProfileError, UsageError, nearest
+from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import Sha256, hashing
@@ -43,7 +43,8 @@ def read_run(
     `sha256` gives the log's digest where the caller has begun to work it out.
 
     Raises:
-        ProfileError: the profile reads no logs, or the log holds no mission of its kind.
+        ProfileError: the profile reads no logs.
+        NoMissionError: the log holds no mission of its kind.
         UsageError: there is no mission of that number.
     """
     source = _Source.read(log, schema, sha256)
@@ -133,7 +134,7 @@ class _Source:
         missions = tuple(one for one in found if math.isfinite(one.start_s) and math.isfinite(one.end_s))
         if not missions:
             nothing = f"The log holds no mission that profile '{schema.name}' can read."
-            raise ProfileError(
+            raise NoMissionError(
                 "No message of the log has a time stamp, so nothing of a mission can be judged." if found else nothing,
                 hint="Look at what was recorded with 'care inspect'.",
                 where=str(log.path),

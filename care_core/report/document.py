@@ -25,6 +25,16 @@ from care_core.diagnose.records import (
     Since,
     Status,
 )
+from care_core.report.happened import (
+    FindingEntry,
+    FitEntry,
+    HypothesisEntry,
+    MomentEntry,
+    account_entries,
+    finding_entries,
+    fit_entry,
+    hypothesis_entries,
+)
 from care_core.run import Evidence, ProfileChoice, Value, is_known
 from care_core.text import clean
 from care_core.variables import Change, Kind, Op
@@ -175,7 +185,9 @@ class TriageDocument(Strict):
     schema_: Literal["care.triage/1"] = Field(
         default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
     )
-    profile: ProfileEntry
+    profile: ProfileEntry | None
+    """None where no profile fits the log."""
+    fit: FitEntry = FitEntry(verdict="fits", reasons=[])
     log: LogEntry
     config: dict[str, int | float]
     context: dict[str, float | None]
@@ -194,6 +206,12 @@ class TriageDocument(Strict):
     rivals: list[CircumstanceEntry] = Field(default_factory=list)
     tell_more: list[str] = Field(default_factory=list)
     dismissed: list[DismissedEntry] = Field(default_factory=list)
+    account: list[MomentEntry] = Field(default_factory=list)
+    """What happened, in order of time."""
+    findings: list[FindingEntry] = Field(default_factory=list)
+    """In the order told, the first cause first."""
+    hypotheses: list[HypothesisEntry] = Field(default_factory=list)
+    """What explains the failure, the likeliest first; empty where nothing failed."""
 
 
 class Report(TriageDocument):
@@ -213,7 +231,8 @@ def build_document(diagnosis: Diagnosis) -> Report:
     run, log = diagnosis.run, diagnosis.run.log
     warnings = tuple(clean(warning) for warning in diagnosis.profile.fit.reasons)
     return Report(
-        profile=profile_entry(diagnosis.profile),
+        profile=profile_entry(diagnosis.profile) if diagnosis.profile.name else None,
+        fit=fit_entry(diagnosis.profile.fit),
         log=LogEntry(
             path=clean(log.path),
             format=log.format,
@@ -244,6 +263,9 @@ def build_document(diagnosis: Diagnosis) -> Report:
         rivals=[_circumstance(rival) for rival in diagnosis.rivals],
         tell_more=[clean(advice) for advice in diagnosis.tell_more],
         dismissed=[DismissedEntry(option=d.option, reason=clean(d.reason)) for d in diagnosis.dismissed],
+        account=account_entries(diagnosis.health),
+        findings=finding_entries(diagnosis.health),
+        hypotheses=hypothesis_entries(diagnosis.hypotheses),
         diff=unified_diff(run, diagnosis.fix.changes) if diagnosis.fix is not None else "",
         apply=apply_commands(diagnosis.fix.changes, format_for(log.format, run.settings))
         if diagnosis.fix is not None

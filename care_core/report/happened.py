@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict
 
 from care_core.diagnose.records import Hypothesis, What
 from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
-from care_core.run import Fit, FitVerdict
+from care_core.run import Fit, FitVerdict, ProfileChoice
 from care_core.text import clean, wrapped
 
 MOMENTS_SHOWN = 24
@@ -112,6 +112,24 @@ def _consequence(finding: Finding) -> ConsequenceEntry:
 
 def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
+
+
+def fit_text(choice: ProfileChoice) -> str:
+    """The first line of every output: which profile, and how well it fits."""
+    named = f"Profile {choice.name} " if choice.name else "No profile fits: "
+    if not choice.name:
+        return f"{named}{'; '.join(choice.fit.reasons)}"
+    caution = {"fits": "", "partly": " (confidence low at most)", "no": " (nothing is advised)"}[choice.fit.verdict]
+    return f"{named}{choice.fit}{caution}"
+
+
+def critical(health: Health) -> list[Finding]:
+    """Findings that would stop a mission, those after the impact left out."""
+    return [one for one in health.findings if one.severity == "critical" and not one.after_impact]
+
+
+def finding_text(finding: Finding) -> str:
+    return f"{finding.title} at {clock(finding.onset_s)}"
 
 
 def clock(time_s: float) -> str:

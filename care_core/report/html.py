@@ -185,7 +185,9 @@ def _footer(report: Report) -> Iterator[str]:
     yield "<footer>"
     yield f"<p>Log <code>{escape(log.path)}</code>, {escape(log.format)}, {log.duration_s:.0f} s,"
     yield f"SHA-256 <code>{escape(log.sha256)}</code>.<br>"
-    yield f"Profile {escape(profile.name)} {escape(profile.version)} ({escape(profile.platform)}).</p>"
+    if profile is not None:
+        yield f"Profile {escape(profile.name)} {escape(profile.version)} ({escape(profile.platform)})."
+    yield "</p>"
     if log.damage:
         yield from _list(f"Damage: {escape(damage.what)}" for damage in log.damage)
     yield "</footer>"

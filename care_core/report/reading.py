@@ -9,8 +9,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from care_core import plain_yaml
-from care_core.errors import ConfigError
-from care_core.report.document import SCHEMA_ID, TriageDocument
+from care_core.errors import ConfigError, UsageError
+from care_core.report.document import SCHEMA_ID, ProfileEntry, TriageDocument
+from care_core.text import clean
 
 _MOST_BYTES = 20_000_000
 
@@ -39,6 +40,13 @@ def read_report(path: str | Path) -> TriageDocument:
         raise ConfigError(
             f"The report is damaged: {key}: {first['msg']}.", hint="Write it again from the log.", where=str(path)
         ) from err
+
+
+def profile_of(report: TriageDocument) -> ProfileEntry:
+    """The profile that a report was made with. Raises UsageError where none fitted its log."""
+    if report.profile is None:
+        raise UsageError(f"No profile fitted the log of this report: {clean('; '.join(report.fit.reasons))}.")
+    return report.profile
 
 
 def _load(path: Path) -> Any:

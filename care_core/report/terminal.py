@@ -8,6 +8,15 @@ from pathlib import Path
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
+from care_core.health.records import Health
+from care_core.report.happened import (
+    account_lines,
+    critical,
+    finding_lines,
+    finding_text,
+    fit_text,
+    hypothesis_lines,
+)
 from care_core.report.together import listed, together
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
@@ -23,6 +32,9 @@ def to_text(diagnosis: Diagnosis) -> str:
     """The diagnosis in lines of at most 80 columns (a diff or command may be longer: it is to be copied)."""
     sections = [
         _headline(diagnosis),
+        hypothesis_lines(diagnosis.hypotheses),
+        finding_lines(diagnosis.health),
+        account_lines(diagnosis.health),
         _origin(diagnosis),
         _objectives(diagnosis),
         *(_causes(faults) for faults in together(diagnosis.faults, _paths)),
@@ -37,14 +49,19 @@ def to_text(diagnosis: Diagnosis) -> str:
 
 
 def _headline(diagnosis: Diagnosis) -> Iterator[str]:
+    yield from wrapped(fit_text(diagnosis.profile))
     broken = [_measured(objective) for objective in diagnosis.objectives if objective.status == "fault"]
     unknown = [objective.variable.name for objective in diagnosis.objectives if objective.status == "not_evaluated"]
     if broken:
         yield from wrapped("; ".join(broken), "FAULT: ")
+    elif diagnosis.profile.fit.verdict == "no":
+        yield from wrapped(_without_profile(diagnosis.health))
     elif unknown:
         yield from wrapped(f"no fault found, but {', '.join(unknown)} could not be evaluated", "NOT EVALUATED: ")
     else:
         yield "OK: all objectives are within their thresholds"
+    if not broken and diagnosis.profile.fit.verdict != "no":
+        yield from (line for one in critical(diagnosis.health) for line in wrapped(finding_text(one), "BUT: "))
     if diagnosis.abstained:
         yield from wrapped(diagnosis.abstained, "No answer: ")
     if diagnosis.fix is not None:
@@ -55,17 +72,19 @@ def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
     causes = [cause for fault in diagnosis.faults for cause in fault.causes]
     changed = {change.option.name for change in fix.changes}
     confidence = next((cause.confidence for cause in causes if cause.option.name in changed), None)
-    changes = _changes(fix)
+    changes = ", ".join(map(str, fix.changes))
     sure = f", {confidence} confidence in the cause" if confidence else ""
-    warnings = "".join(f"; {warning}" for warning in diagnosis.profile.fit.reasons)
-    return f"Change {changes}: {fix.p_fixed:.0%} odds that all objectives are met{sure}{warnings}"
+    return f"Change {changes}: {fix.p_fixed:.0%} odds that all objectives are met{sure}"
 
 
-def _changes(fix: Fix) -> str:
-    return ", ".join(
-        f"{change.option.name} {change.option.show(change.current)} -> {change.option.show(change.suggested)}"
-        for change in fix.changes
-    )
+def _without_profile(health: Health) -> str:
+    """The headline of a log that nothing could be judged in: what is told of it, never that it was fine."""
+    worst = [finding_text(one) for one in critical(health)[:2]]
+    if worst:
+        return f"FAULT: {'; '.join(worst)}"
+    if not health.is_readable:
+        return "NOT EVALUATED: the log holds too little to say what happened"
+    return "NOT EVALUATED: no limit of this mission is known; what happened is told below"
 
 
 def _measured(objective: ObjectiveResult) -> str:
@@ -80,10 +99,10 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     facts = "".join(f", {name} {fact}" for name, fact in run.log.facts.items())
     mission = f"mission {run.mission.index} of {run.mission.count}"
     duration = f"{run.mission.end_s - run.mission.start_s:.0f} s"
-    yield from wrapped(f"{Path(run.log.path).name}, {mission}, {duration}{facts}", "Log      ")
-    yield from wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
-    for warning in profile.fit.reasons:
-        yield from wrapped(warning, "Warning  ")
+    which = f", {mission}" if run.mission.count else ""
+    yield from wrapped(f"{Path(run.log.path).name}{which}, {duration}{facts}", "Log      ")
+    if profile.name:
+        yield from wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
         at = "" if damage.time_s is None else f" at {damage.time_s:.1f} s"
         yield from wrapped(f"{damage.what}{at}", "Damage   ")
@@ -92,6 +111,8 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
+    if not diagnosis.objectives:
+        return
     yield "Objectives"
     name_width = max((len(objective.variable.name) for objective in diagnosis.objectives), default=0)
     for objective in diagnosis.objectives:
@@ -162,7 +183,7 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
         if objective.name in fix.predicted:
             yield from wrapped(_prediction(objective, fix.predicted[objective.name]), "  ", "    ")
     for other in diagnosis.alternatives:
-        yield from wrapped(f"or {_changes(other)}: {other.p_fixed:.0%} odds", "  ", "     ")
+        yield from wrapped(f"or {', '.join(map(str, other.changes))}: {other.p_fixed:.0%} odds", "  ", "     ")
     yield ""
     yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix.changes).splitlines())
     yield ""

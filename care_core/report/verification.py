@@ -28,6 +28,7 @@ from care_core.report.document import (
     objective_entry,
     plain_number,
 )
+from care_core.report.reading import profile_of
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import Run
 from care_core.text import clean, wrapped
@@ -126,7 +127,7 @@ def promise_of(report: TriageDocument) -> Promise:
     return Promise(
         sha256=report.log.sha256,
         start=report.log.start,
-        version=report.profile.version,
+        version=profile_of(report).version,
         config={name: float(value) for name, value in report.config.items()},
         objectives={
             one.name: Before(
@@ -149,7 +150,7 @@ def verify_document(report: TriageDocument, run: Run, found: Verification) -> Ve
     """The document of a report and what became of its promise in a later run."""
     before = {one.name: one for one in report.objectives}
     return VerifyDocument(
-        profile=report.profile,
+        profile=profile_of(report),
         report_log=VerifiedLog(path=report.log.path, sha256=report.log.sha256, start=report.log.start),
         log=VerifiedLog(path=clean(run.log.path), sha256=run.log.sha256, start=run.log.start),
         verdict=found.verdict,

@@ -181,7 +181,8 @@ def _prediction(objective: ObjectiveEntry, predicted: PredictedValue) -> str:
 def _origin(report: Report) -> Iterator[str]:
     log, profile = report.log, report.profile
     yield f"Log {_code(log.path)}, {log.format}, {log.duration_s:.0f} s, SHA-256 `{log.sha256}`."
-    yield f"Profile {profile.name} {profile.version} ({profile.platform})."
+    if profile is not None:
+        yield f"Profile {profile.name} {profile.version} ({profile.platform})."
     for damage in log.damage[:_DAMAGE_SHOWN]:
         yield f"Damage: {_escape(damage.what)}."
     if len(log.damage) > _DAMAGE_SHOWN:

@@ -1,0 +1,43 @@
+"""Which of the fixes that were found is advised, if any: right, or silent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult
+
+ENOUGH = 0.5
+"""A change less likely than this to repair the run is no advice."""
+
+
+def believed(fixes: Sequence[Fix], hypotheses: Sequence[Hypothesis]) -> tuple[Fix, ...]:
+    """The fixes with the probability that something failed which no parameter repairs taken off their promise."""
+    broken = sum(one.probability for one in hypotheses if one.what in ("hardware", "world") and one.name)
+    return tuple(replace(fix, p_fixed=fix.p_fixed * (1.0 - broken)) for fix in fixes)
+
+
+def speaks_against(fix: Fix, hypotheses: Sequence[Hypothesis], broken: Sequence[ObjectiveResult]) -> str | None:
+    """Why a fix is not advised, None where it is."""
+    rival = next((one for one in hypotheses if one.what in ("hardware", "world") and one.name), None)
+    parameters = sum(one.probability for one in hypotheses if one.what == "parameter")
+    if rival is not None and rival.probability > parameters:
+        return f"{rival.name} explains this failure better than any parameter: look at that first"
+    if fix.p_fixed >= ENOUGH:
+        return None
+    changes = ", ".join(map(str, fix.changes))
+    reached = "; ".join(filter(None, (_reached(fix, result) for result in broken)))
+    limit = f"; with it {reached}" if reached else ""
+    return f"no change is likely enough to meet every limit: the best found, {changes}, has {fix.p_fixed:.0%}{limit}"
+
+
+def _reached(fix: Fix, result: ObjectiveResult) -> str:
+    """What the best change brings of an objective whose limit it does not reach."""
+    name, unit, predicted = result.variable.name, result.variable.unit, fix.predicted.get(result.variable.name)
+    if predicted is None or result.threshold is None or result.variable.kind == "functional":
+        return ""
+    if result.threshold.met(predicted.value):
+        return ""
+    likely = predicted.high if result.threshold.op in ("<=", "<") else predicted.low
+    value, limit = (f"{number:.4g} {unit}".rstrip() for number in (likely, result.threshold.value))
+    return f"{name} is 90 % sure to reach {value}, the limit of {limit} is out of reach"
