@@ -20,6 +20,8 @@ from care_core.variables import Role, Variable
 
 BEYOND = 0.1
 """Share of the range that training saw by which a context may leave it before the profile fits in part only."""
+NEAR = 0.02
+"""Share of its value by which a context that hardly varied in training may differ."""
 RARE = 0.025
 """Share of the training runs that lie farther out than what is called unusual."""
 
@@ -40,7 +42,7 @@ def unusual(run: Run, profile: Profile) -> tuple[str, ...]:
         value, summary = run.context.get(variable.name), profile.model.summaries.get(variable.name)
         if summary is None or not is_known(value):
             continue
-        margin = BEYOND * (summary.high - summary.low)
+        margin = max(BEYOND * (summary.high - summary.low), NEAR * abs(summary.high))
         if not summary.low - margin <= value <= summary.high + margin:
             what = f"{variable.doc or variable.name} of {value:.3g} {variable.unit}".rstrip()
             found.append(f"{what} is outside the training runs ({summary.low:.3g} to {summary.high:.3g})")

@@ -56,7 +56,7 @@ def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P | None, Profile
     order = sorted(range(len(fits)), key=lambda i: (_ORDER[fits[i].verdict], *_by_content(covered[i])))
     usable = [i for i in order if fits[i].verdict != "no"]
     if not usable:
-        return None, _none_fits(covered, fits, order)
+        return None, _none_fits(log, covered, fits, order)
     best = usable[0]
     others = [covered[i].schema.name for i in usable[1:] if covered[i].found >= NEARLY_AS_WELL * covered[best].found]
     return candidates[best], _choice(covered[best], fits[best], others)
@@ -87,13 +87,20 @@ def _choice(coverage: Coverage, fit: Fit, others: Sequence[str] = ()) -> Profile
     return ProfileChoice(schema.name, schema.version, schema.platform, f"{coverage}{rivals}", fit)
 
 
-def _none_fits(covered: Sequence[Coverage], fits: Sequence[Fit], order: Sequence[int]) -> ProfileChoice:
-    """Why, by the profiles that come nearest; of those that read other logs nothing needs to be said."""
+def _none_fits(log: Log, covered: Sequence[Coverage], fits: Sequence[Fit], order: Sequence[int]) -> ProfileChoice:
+    """Why, by the profiles that come nearest; of those that have nothing of the log nothing needs to be said."""
     if len(covered) == 1:
         return _choice(covered[0], fits[0])
-    near = [i for i in order if covered[i].found] or list(order)
-    reasons = tuple(f"{covered[i].schema.name}: {'; '.join(fits[i].reasons)}" for i in near)
-    return ProfileChoice("", "", "", "", Fit("no", reasons or ("no profile is installed",)))
+    reasons = tuple(f"{covered[i].schema.name}: {'; '.join(fits[i].reasons)}" for i in order if covered[i].found)
+    readers = [coverage for coverage in covered if log.format.value in coverage.schema.logs]
+    if not covered:
+        reasons = ("no profile is installed",)
+    elif not readers:
+        reasons = (f"none of the {len(covered)} installed profiles reads {log.format.value}",)
+    elif not reasons:
+        names = " and ".join(coverage.schema.name for coverage in readers)
+        reasons = (f"nothing that {names} would read is in the log",)
+    return ProfileChoice("", "", "", "", Fit("no", reasons))
 
 
 def _refuse_unreadable(log: Log) -> None:

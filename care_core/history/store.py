@@ -85,8 +85,8 @@ class History:
     path: Path
 
     def add_triage(self, document: Mapping[str, Any], mission: int) -> None:
-        """Remember a `care.triage/1` document. Raises HistoryError."""
-        log, profile = document["log"], document["profile"]
+        """Remember a `care.triage/1` document; one that no profile fits has the profile "". Raises HistoryError."""
+        log, profile = document["log"], document["profile"] or {"name": "", "version": ""}
         row = (_now(), profile["name"], profile["version"], log["sha256"], log["path"], mission, json.dumps(document))
         self._write(
             "insert into triages (at, profile, version, log_sha256, log_path, mission, document)"

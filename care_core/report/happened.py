@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict
 
 from care_core.diagnose.records import Hypothesis, What
 from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
-from care_core.run import Fit, FitVerdict, ProfileChoice
+from care_core.run import Fit, FitVerdict
 from care_core.text import clean, wrapped
 
 MOMENTS_SHOWN = 24
@@ -114,13 +114,27 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def fit_text(choice: ProfileChoice) -> str:
-    """The first line of every output: which profile, and how well it fits."""
-    named = f"Profile {choice.name} " if choice.name else "No profile fits: "
-    if not choice.name:
-        return f"{named}{'; '.join(choice.fit.reasons)}"
-    caution = {"fits": "", "partly": " (confidence low at most)", "no": " (nothing is advised)"}[choice.fit.verdict]
-    return f"{named}{choice.fit}{caution}"
+def fit_text(profile: str, fit: Fit | FitEntry) -> str:
+    """The first line of every output: which profile (empty: none), and how well it fits."""
+    reasons = "; ".join(fit.reasons)
+    if not profile:
+        return f"No profile fits: {reasons}"
+    said, caution = _FIT_WORDS[fit.verdict]
+    return f"Profile {profile} {said}{f': {reasons}' if reasons else ''}{caution}"
+
+
+_FIT_WORDS: dict[FitVerdict, tuple[str, str]] = {
+    "fits": ("fits", ""),
+    "partly": ("fits in part", " (confidence low at most)"),
+    "no": ("does not fit", " (nothing is advised)"),
+}
+
+
+def finding_sentence(finding: FindingEntry) -> str:
+    """A finding of a document with its numbers and what it led to."""
+    late = ", after the impact" if finding.after_impact else ""
+    led = f" Led to: {'; '.join(one.title for one in finding.consequences)}." if finding.consequences else ""
+    return f"{finding.title}, at {clock(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
 
 
 def critical(health: Health) -> list[Finding]:
@@ -132,9 +146,9 @@ def finding_text(finding: Finding) -> str:
     return f"{finding.title} at {clock(finding.onset_s)}"
 
 
-def clock(time_s: float) -> str:
+def clock(time_s: float | None) -> str:
     """Seconds of a log as an operator reads them: 61.3 s, from ten minutes on 12:05."""
-    if not math.isfinite(time_s):
+    if time_s is None or not math.isfinite(time_s):
         return "?"
     return f"{time_s:.1f} s" if abs(time_s) < 600 else f"{int(time_s // 60)}:{int(time_s % 60):02d}"
 
@@ -187,7 +201,7 @@ def _led_to(finding: Finding, indent: str) -> Iterator[str]:
         yield from wrapped(f"led to: {'; '.join(titles[:LED_TO_SHOWN])}{more}", indent)
 
 
-def hypothesis_text(one: Hypothesis) -> str:
+def hypothesis_text(one: Hypothesis | HypothesisEntry) -> str:
     """An explanation in a clause."""
     if one.what == "parameter":
         return f"the parameter {one.name}"

@@ -19,7 +19,8 @@ _SPARKS = 30
 
 
 class PastTriage(Strict):
-    """`verdict` says in words how the run went; `options` are those the suggested fix changes, none without a fix."""
+    """`profile` is empty where none fitted; `verdict` says in words how the run went; `options` are those that the
+    suggested fix changes, none without a fix."""
 
     at: str
     log: str
@@ -87,7 +88,7 @@ def _past(triaged: Triaged) -> PastTriage:
         at=triaged.at,
         log=clean(triaged.log_path),
         mission=triaged.mission,
-        profile=document["profile"]["name"],
+        profile=document["profile"]["name"] if document["profile"] else "",
         faults=[fault["objective"] for fault in document["faults"]],
         verdict=verdict_of(document),
         cause=causes[0] if causes else None,
@@ -133,7 +134,7 @@ def _lines(document: HistoryDocument, ascii: bool) -> Iterator[str]:
     for past in document.triages:
         when = past.at[:16].replace("T", " ")
         fix = "" if past.p_fixed is None else f"  change {', '.join(past.options)} ({past.p_fixed:.0%})"
-        yield clean(f"{when}  {Path(past.log).name}  {past.profile}  {past.verdict}{fix}")
+        yield clean(f"{when}  {Path(past.log).name}  {past.profile or '-'}  {past.verdict}{fix}")
     if document.trends:
         yield ""
         yield "Trends, oldest to newest"

@@ -19,6 +19,7 @@ from care_core.report.document import (
     SinceEntry,
     ThresholdEntry,
 )
+from care_core.report.happened import SEVERITY_WORDS, clock, finding_sentence, fit_text, hypothesis_text
 from care_core.report.together import listed, together
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import shown
@@ -38,6 +39,7 @@ ins { color: var(--ok); text-decoration: none; } del { color: var(--fault); text
 footer { border-top: 1px solid var(--line); margin-top: 2rem; font-size: 14px; overflow-wrap: anywhere; }
 """
 _SIGNS = {"ok": "✓", "fault": "✗", "not_evaluated": "?"}
+_SEVERITY_CLASSES = {"critical": "fault", "warning": "not_evaluated", "info": "ok"}
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
@@ -52,9 +54,12 @@ def _page(report: Report) -> Iterator[str]:
     yield f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
     yield f"<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>"
+    yield f"<p>{escape(fit_text(report.profile.name if report.profile else '', report.fit))}.</p>"
     yield f"<p>{_verdict(report)}</p>"
-    yield "<h2>Objectives</h2>"
-    yield from _table(("Objective", "Value", "Wanted", "Status", "Why"), map(_objective_row, report.objectives))
+    yield from _happened(report)
+    if report.objectives:
+        yield "<h2>Objectives</h2>"
+        yield from _table(("Objective", "Value", "Wanted", "Status", "Why"), map(_objective_row, report.objectives))
     for faults in together(report.faults, lambda fault: [cause.path for cause in fault.causes]):
         fault = faults[-1]
         yield f"<h2>Causes of {listed([f'<code>{escape(one.objective)}</code>' for one in faults])}</h2>"
@@ -83,10 +88,30 @@ def _page(report: Report) -> Iterator[str]:
     yield "</body>\n</html>"
 
 
+def _happened(report: Report) -> Iterator[str]:
+    if report.hypotheses:
+        yield "<h2>What explains it</h2>"
+        yield from _list(f"{h.probability:.0%}: {escape(hypothesis_text(h))}" for h in report.hypotheses)
+    if report.findings:
+        yield "<h2>Findings, the first cause first</h2>"
+        yield from _list(
+            f'<span class="status {_SEVERITY_CLASSES[f.severity]}">{SEVERITY_WORDS[f.severity]}</span> '
+            f"{escape(finding_sentence(f))}"
+            for f in report.findings
+        )
+    if report.account:
+        yield "<h2>What happened</h2>"
+        rows = ((clock(one.time_s), escape(one.text), escape(one.source)) for one in report.account)
+        yield from _table(("Time", "What", "Source"), rows)
+
+
 def _verdict(report: Report) -> str:
+    worst = [escape(one.title) for one in report.findings if one.severity == "critical" and not one.after_impact]
     broken = ", ".join(
         f"<code>{escape(objective.name)}</code>" for objective in report.objectives if objective.status == "fault"
     )
+    if not broken and (worst or not report.objectives):
+        return f"<strong>Fault</strong>: {'; '.join(worst)}." if worst else "<strong>Not evaluated.</strong>"
     found = f"<strong>Fault</strong>: {broken}." if broken else "<strong>No fault found.</strong>"
     if not broken and any(objective.status == "not_evaluated" for objective in report.objectives):
         found += " Not everything could be evaluated."

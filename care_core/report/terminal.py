@@ -49,7 +49,7 @@ def to_text(diagnosis: Diagnosis) -> str:
 
 
 def _headline(diagnosis: Diagnosis) -> Iterator[str]:
-    yield from wrapped(fit_text(diagnosis.profile))
+    yield from wrapped(fit_text(diagnosis.profile.name, diagnosis.profile.fit))
     broken = [_measured(objective) for objective in diagnosis.objectives if objective.status == "fault"]
     unknown = [objective.variable.name for objective in diagnosis.objectives if objective.status == "not_evaluated"]
     if broken:

@@ -21,6 +21,7 @@ from care_core.report.document import (
     SinceEntry,
     TriageDocument,
 )
+from care_core.report.happened import SEVERITY_WORDS, clock, finding_sentence, fit_text, hypothesis_text
 from care_core.report.together import listed, together
 from care_core.run import shown
 
@@ -62,11 +63,19 @@ def to_markdown(report: Report) -> str:
 def _markdown(report: Report) -> Iterator[str]:
     yield f"# Triage of {_escape(Path(report.log.path).name)}"
     yield ""
+    yield _escape(fit_text(report.profile.name if report.profile else "", report.fit)) + "."
+    yield ""
     yield _verdict(report)
-    yield ""
-    yield "## Objectives"
-    yield ""
-    yield from _table(("Objective", "Value", "Wanted", "Status", "Why"), map(_objective_row, report.objectives))
+    yield from _listed("What explains it", (f"{h.probability:.0%}: {hypothesis_text(h)}" for h in report.hypotheses))
+    told = (f"{SEVERITY_WORDS[one.severity]}: {finding_sentence(one)}" for one in report.findings)
+    yield from _listed("Findings, the first cause first", told)
+    if report.account:
+        yield from ("", "## What happened", "")
+        rows = ((clock(one.time_s), _escape(one.text), f"`{one.source}`") for one in report.account)
+        yield from _table(("Time", "What", "Source"), rows)
+    if report.objectives:
+        yield from ("", "## Objectives", "")
+        yield from _table(("Objective", "Value", "Wanted", "Status", "Why"), map(_objective_row, report.objectives))
     for faults in together(report.faults, lambda fault: [cause.path for cause in fault.causes]):
         fault = faults[-1]
         yield ""
@@ -102,6 +111,11 @@ def _verdict(report: Report) -> str:
     if report.abstained:
         found = f"**Fault**: {names}. " if broken else ""
         return f"{found}**No answer**: {_escape(report.abstained)}"
+    worst = [_escape(one.title) for one in report.findings if one.severity == "critical" and not one.after_impact]
+    if not broken and worst:
+        return f"**Fault**: {'; '.join(worst)}."
+    if not broken and report.fit.verdict == "no":
+        return "**Not evaluated**: no limit of this mission is known; what happened is told below."
     if not broken:
         unknown = any(objective.status == "not_evaluated" for objective in report.objectives)
         return "**No fault found**, but not everything could be evaluated." if unknown else "**No fault found.**"
