@@ -1,8 +1,16 @@
-"""A diagnosis made by hand, with text in it that tries to steer a terminal."""
+"""A diagnosis and a log made by hand, with text in it that tries to steer a terminal."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
+from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.run import Damage, Evidence, Fit, LogInfo, MissionInfo, ProfileChoice, Run, Setting, Unavailable
 from care_core.variables import Change, Role, Threshold, Variable
 
@@ -15,6 +23,35 @@ LAND_SPEED = Variable(
 SUCCESS = Variable("success", Role.OBJECTIVE, "bool", kind="functional", threshold=Threshold(">=", 1.0))
 TIME = Variable("mission_time", Role.OBJECTIVE, unit="s", kind="non-functional", threshold=Threshold("<=", 150.0))
 ENERGY = Variable("energy", Role.OBJECTIVE, unit="Wh", kind="non-functional", threshold=Threshold("<=", 14.0))
+
+
+T = np.linspace(0.0, 100.0, 201)
+"""Times of the messages of a `MadeLog`, in seconds."""
+
+
+@dataclass
+class MadeLog:
+    """Tables as a log."""
+
+    tables: Mapping[str, Mapping[str, Any]]
+    types: Mapping[str, str] = field(default_factory=dict)
+    path: Path = Path("made.BIN")
+    format: LogFormat = LogFormat.DATAFLASH_BIN
+    start: str | None = None
+    duration_s: float = 100.0
+    damage: tuple[Damage, ...] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+    def channels(self) -> tuple[Channel, ...]:
+        return tuple(Channel(name, self.types.get(name, name), len(T)) for name in self.tables)
+
+    def settings(self) -> Mapping[str, tuple[Setting, ...]]:
+        return {}
+
+    def read(self, wanted: Wanted) -> Mapping[str, Table]:
+        found = {name: {f: self.tables[name][f] for f in fields if f in self.tables[name]}
+                 for name, fields in wanted.items() if name in self.tables}  # fmt: skip
+        return {name: Table(T, columns) for name, columns in found.items()}
 
 
 def made_run() -> Run:

@@ -58,10 +58,6 @@ LEVELS = {1: "debug", 2: "info", 4: "WARN", 8: "ERROR", 16: "FATAL", 10: "debug"
 """Levels of ROS 1 and ROS 2 log messages."""
 
 
-SELECTORS = {"Inst", "Instance", "I", "C"}
-"""Fields that say which of several sensors a value is from: no signals."""
-
-
 @dataclass(frozen=True, slots=True)
 class LogMessage:
     """Something the robot's software said, `time_s` after the start of the log."""
@@ -71,7 +67,8 @@ class LogMessage:
     text: str
 
 
-def _log(case: Case) -> Log:
+def log_of(case: Case) -> Log:
+    """The log of a case, which is open. Raises CareError where there is none."""
     if case.log is None:
         raise CareError("There is no log to look into.", hint="Open one.")
     return case.log
@@ -79,7 +76,7 @@ def _log(case: Case) -> Log:
 
 def messages_of(case: Case) -> list[LogMessage]:
     """Everything that the log holds in words, and what was found in its numbers, in time order."""
-    tables = _log(case).read(TEXTS)
+    tables = log_of(case).read(TEXTS)
     if "/rosout" in tables:
         tables = {name: table for name, table in tables.items() if name != "/rosout_agg"}
     found = []
@@ -114,82 +111,6 @@ def _error(subsystem: int, code: int) -> tuple[str, str]:
     named = ERR_SUBSYSTEMS.get(subsystem, (SUBSYSTEMS.get(subsystem, f"subsystem {subsystem}"),))
     name = ": ".join(dict.fromkeys(named))
     return ("over", name) if code == 0 else ("ERR", f"{name}, code {code}")
-
-
-@dataclass(frozen=True, slots=True)
-class Signal:
-    """A number over time in a log, and the variables of the profile that are read from it."""
-
-    channel: str
-    field: str
-    used_by: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        return f"{self.channel} {self.field}"
-
-
-@dataclass(frozen=True, slots=True)
-class Trace:
-    """A signal squeezed into columns: per column its least and its greatest value, None where there is none."""
-
-    start_s: float
-    end_s: float
-    columns: tuple[tuple[float, float] | None, ...]
-    low: float
-    high: float
-    count: int
-
-
-def signals_of(case: Case) -> list[Signal]:
-    """The signals that the profile reads from this log, those of objectives and of causal paths first."""
-    from care_core.extract.registry import find_extractor
-
-    if case.schema is None:
-        return []
-    present = {channel.name for channel in _log(case).channels()}
-    users: dict[tuple[str, str], list[str]] = {}
-    for variable in case.schema.variables.values():
-        if variable.extract is None:
-            continue
-        needs = find_extractor(variable.extract.kind).needs(variable.extract.args)
-        for channel, fields in needs.items():
-            for field in fields:
-                if channel in present and channel not in TEXTS and field not in SELECTORS:
-                    users.setdefault((channel, field), []).append(variable.name)
-    matters = {result.variable.name for result in case.diagnosis.objectives}
-    matters |= {node.name for fault in case.diagnosis.faults for cause in fault.causes for node in cause.path}
-    signals = [
-        Signal(channel, field, tuple(sorted(names, key=lambda name: name not in matters)))
-        for (channel, field), names in users.items()
-    ]
-    # What every variable needs, such as to find the mission, tells least about any of them.
-    return sorted(signals, key=lambda signal: -len(matters & set(signal.used_by)) / len(signal.used_by))
-
-
-def trace_of(case: Case, signal: Signal, columns: int) -> Trace:
-    """The signal over the mission, in so many columns.
-
-    Raises:
-        CareError: the log holds no number there.
-    """
-    import numpy as np
-
-    run = case.diagnosis.run
-    table = _log(case).read({signal.channel: (signal.field,)}).get(signal.channel)
-    if table is None or signal.field not in table.columns or table[signal.field].dtype.kind not in "fiub":
-        raise CareError(f"The log holds no numbers in {signal.name}.", hint="Choose another signal.")
-    table = table.between(run.mission.start_s, run.mission.end_s)
-    values = table[signal.field].astype(float)
-    good = np.isfinite(values)
-    t, values = table.t[good], values[good]
-    if not len(values):
-        raise CareError(f"{signal.name} has no value during the mission.", hint="Choose another signal.")
-    span = max(float(t[-1] - t[0]), 1e-9)
-    place = np.minimum(((t - t[0]) / span * columns).astype(int), columns - 1)
-    parts = (values[place == column] for column in range(columns))
-    squeezed = tuple((float(part.min()), float(part.max())) if len(part) else None for part in parts)
-    return Trace(float(t[0]), float(t[-1]), squeezed, float(values.min()), float(values.max()), len(values))
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ class AccountPage(StepPage):
     )
     ENTER = "Objectives"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"pick", "again"})
-    LIST_FIRST = True
+    LIST = "most"
 
     _told: tuple[Health, list[Told]] | None = None
 
@@ -53,8 +53,19 @@ class AccountPage(StepPage):
         index = self.screen.choices.highlighted
         return None if index is None else self._lines[index].time_s
 
+    def leads_to(self) -> str:
+        return "Plots" if self._is_the_answer else self.ENTER
+
+    @property
+    def _is_the_answer(self) -> bool:
+        """Whether the account is all there is: no profile fits, so nothing is judged."""
+        return self.session.diagnosis.profile.fit.verdict == "no"
+
     def open(self, index: int | None) -> None:
-        self.walk.action_go(2)
+        if self._is_the_answer:
+            self.walk.action_view("signals")
+        else:
+            self.walk.action_go(2)
 
     def pick(self) -> None:
         """Choose another log."""

@@ -23,16 +23,18 @@ class MessagesPage(Page):
     name = "Messages"
     HELP = (
         "Messages of the log in time order; ! marks warnings and errors, > what the diagnosis rests on. n goes to the "
-        "next marked one, / filters, Esc leaves."
+        "next marked one, Enter to its moment in the plots, / filters, Esc leaves."
     )
+    ENTER = "Plot"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"next_marked"})
 
-    LIST_FIRST = True
+    LIST = "most"
 
     def __init__(self, screen: PanesScreen, case: Case) -> None:
         super().__init__(screen)
         self._case = case
         self._found: Fetch[list[LogMessage]] = Fetch(self, "messages")
+        self._wanted: float | None = None
         self._placed = False
 
     def enter(self) -> None:
@@ -51,8 +53,21 @@ class MessagesPage(Page):
             lambda i: f"{messages[i].kind} {messages[i].text}",
         )
         index = None if self._placed else self._moment(messages)
-        self._placed = True
+        if self._wanted is not None:
+            wanted = self._wanted
+            index = min(range(len(messages)), key=lambda i: abs(messages[i].time_s - wanted))
+        self._placed, self._wanted = True, None
         return View(title, lambda i: self._detail(None if i is None else messages[i]), listing, index)
+
+    def look_at(self, moment_s: float) -> None:
+        self._wanted = moment_s
+
+    def moment_s(self) -> float | None:
+        messages, index = self._found.answer, self.screen.choices.highlighted
+        return messages[index].time_s if isinstance(messages, list) and messages and index is not None else None
+
+    def open(self, index: int | None) -> None:
+        self.walk.action_view("signals")
 
     def _span(self) -> str:
         mission = self._case.diagnosis.run.mission

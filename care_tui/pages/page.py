@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, ClassVar, Generic, Literal, TypeVar, cast
 
 from textual.content import Content
 
@@ -14,6 +14,7 @@ from care_tui.widgets.choices import NOTHING, Listing
 
 if TYPE_CHECKING:
     from care_tui.screens.panes import PanesScreen
+    from care_tui.screens.walk import WalkScreen
 
 T = TypeVar("T")
 
@@ -41,11 +42,16 @@ class Page:
     ENTER: ClassVar[str] = ""
     """Where Enter leads, in a word for the line of keys; empty where it does nothing."""
     ACTIONS: ClassVar[frozenset[str]] = frozenset()
-    LIST_FIRST: ClassVar[bool] = False
-    """Whether the list is what the page is read for: it gets most of the room."""
+    LIST: ClassVar[Literal["half", "most", "least"]] = "half"
+    """How much of the room the list gets."""
 
     def __init__(self, screen: PanesScreen) -> None:
         self.screen = screen
+
+    @property
+    def walk(self) -> WalkScreen:
+        """The screen as what leads from page to page."""
+        return cast("WalkScreen", self.screen)
 
     @property
     def is_shown(self) -> bool:
@@ -62,6 +68,10 @@ class Page:
 
     def enter(self) -> None:
         """The page comes into view."""
+
+    def leads_to(self) -> str:
+        """Where Enter leads now."""
+        return self.ENTER
 
     def works(self, action: str) -> bool:
         """Whether a key of this page can do something now."""

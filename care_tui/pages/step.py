@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, cast
+from typing import ClassVar
 
 from textual.content import Content
 
@@ -10,16 +10,9 @@ from care_tui.pages.page import Page, View, sentence
 from care_tui.render.rows import Rows, error_rows, labelled, progress_bar
 from care_tui.session import Session
 
-if TYPE_CHECKING:
-    from care_tui.screens.walk import WalkScreen
-
 
 class StepPage(Page):
     """One step of the walk."""
-
-    @property
-    def walk(self) -> WalkScreen:
-        return cast("WalkScreen", self.screen)
 
     @property
     def session(self) -> Session:

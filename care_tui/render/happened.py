@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from textual.content import Content
@@ -113,6 +114,44 @@ def warnings_of(diagnosis: Diagnosis) -> list[str]:
     found += [run.mission.mismatch] if run.mission.mismatch else []
     found += [damage(part) for part in run.log.damage]
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something that happened, as a sign on the axis of time; the gravest have the least `rank`."""
+
+    time_s: float
+    sign: str
+    words: str
+    rank: int
+
+
+MARKED: dict[str, tuple[str, int]] = {
+    "crash": ("C", 0),
+    "failsafe": ("F", 1),
+    "error": ("E", 1),
+    "arming": ("A", 3),
+    "mode": ("M", 3),
+    "goal": ("G", 3),
+    "recovery": ("R", 2),
+    "parameter": ("P", 3),
+}
+"""Kinds of moments that are marked on plots; the others are too many."""
+
+
+def marks_of(diagnosis: Diagnosis, glyphs: Glyphs) -> list[Mark]:
+    """What happened, in order of time: findings, the moments that matter, and what the diagnosis rests on."""
+    signs: dict[Severity, tuple[str, int]] = {"critical": (glyphs.fault, 0), "warning": ("!", 1), "info": ("i", 4)}
+    findings = [one.what for one in told(diagnosis.health) if isinstance(one.what, Finding)]
+    found = [Mark(f.onset_s, signs[f.severity][0], f.title, signs[f.severity][1]) for f in findings]
+    found += [
+        Mark(one.time_s, MARKED[one.kind][0], one.text, MARKED[one.kind][1])
+        for one in diagnosis.health.account
+        if one.kind in MARKED
+    ]
+    said = {mark.words for mark in found}
+    found += [Mark(part.time_s, "!", part.text, 1) for part in diagnosis.run.evidence if part.text not in said]
+    return sorted((mark for mark in found if math.isfinite(mark.time_s)), key=lambda mark: mark.time_s)
 
 
 def fit_rows(diagnosis: Diagnosis) -> list[Row]:

@@ -97,7 +97,8 @@ class PanesScreen(CareScreen):
         self.choices.filter("")
         self.text.filter("")
         self.page.enter()
-        self.set_class(self.page.LIST_FIRST, "-list-first")
+        for share in ("most", "least"):
+            self.set_class(share == self.page.LIST, f"-list-{share}")
         view = self.page.view()
         self._put(view, view.index if index is None else index)
         self.take_focus()
@@ -127,12 +128,12 @@ class PanesScreen(CareScreen):
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         if action == "open":
-            return bool(self.page.ENTER)
+            return bool(self.page.leads_to())
         return self.page.works(str(parameters[0])) if action == "do" else True
 
     def described(self, binding: Binding) -> str:
         """What a key does here, in a word or two."""
-        return self.page.ENTER if binding.action == "open" else binding.description
+        return self.page.leads_to() if binding.action == "open" else binding.description
 
     def action_do(self, name: str) -> None:
         """Call an action of the page; keys of another page do nothing here."""

@@ -78,6 +78,8 @@ class WalkScreen(PanesScreen):
         Binding("f6,b", "view('profiles')", "Profiles", show=False, id="view.profiles"),
         Binding("f7,v", "view('contents')", "Contents of the log", show=False, id="view.contents"),
         Binding("left,h,backspace", "do('step_back')", "Back a step", key_display="h", id="graph.back"),
+        Binding("plus,right_square_bracket", "do('closer')", "Closer", key_display="+", id="signals.closer"),
+        Binding("minus,left_square_bracket", "do('farther')", "Farther", key_display="-", id="signals.farther"),
         Binding("x", "do('mark')", "Compare", id="history.mark"),
         Binding("n", "do('next_marked')", "Next marked", id="messages.next"),
         Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from textual.widgets import Static
 
-from care_core.application.case import Request
+from care_core.application.case import Case, Request
 from care_core.files import bundled
 from care_tui.app import CareApp
 from care_tui.pages.history import HistoryPage
@@ -16,8 +17,9 @@ from care_tui.render.plot import dots_across, plot
 from care_tui.screens.walk import WalkScreen
 from care_tui.settings import Settings
 from care_tui.widgets.choices import Choices
+from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample
-from tests.tui.conftest import MakeApp, settle
+from tests.tui.conftest import LOG, MakeApp, fake_engine, settle
 from tests.tui.test_walk import hints, items, text, title, walk
 
 SAMPLE = bundled("samples", "arducopter_failed.BIN")
@@ -81,6 +83,53 @@ async def test_an_effect_has_the_same_sign_on_its_path_and_in_the_graph() -> Non
             (line,) = [line for line in items(app).splitlines() if after.name in line.split()]
             assert f"{node.effect:+.2f}" in line.split()
             await settle(pilot, "slash", *after.name, "enter", "enter")
+
+
+@needs_sample
+async def test_a_message_leads_to_its_moment_in_the_plots_where_what_was_wanted_is_drawn_too() -> None:
+    app = real()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "m", "slash", *"4 WP", "enter")
+        assert "62.8 s" in items(app)
+        await settle(pilot, "enter")
+        assert walk(app).page.name == "Signals"
+        assert title(app) == "Signals from 30.5 s to 195.2 s  at 62.8 s"
+        assert "to follow D" in items(app).splitlines()[0]
+        assert "(wanted)" in text(app)
+        column = {line.index("│") for line in text(app).splitlines() if "│" in line}
+        assert len(column) == 1, "the moment is a line from top to bottom"
+        await settle(pilot, "plus", "plus")
+        assert title(app) == "Signals from 42.2 s to 83.4 s  at 62.8 s"
+        await settle(pilot, "minus", "minus", "minus")
+        assert title(app) == "Signals from 0.0 s to 195.6 s  at 62.8 s", "never more than the log holds"
+        await settle(pilot, "v", "m")
+        assert items(app).splitlines()[walk(app).choices.highlighted or 0].split()[0] == "62.8"
+        await settle(pilot, "k", "p")
+        assert "at 62." in title(app)
+
+
+async def test_what_happened_is_marked_on_the_axis_of_time_and_n_goes_from_mark_to_mark() -> None:
+    marked = Case(sample.crashed(), log=MadeLog({"ATT": {"Roll": T, "DesRoll": T}}))
+    app = CareApp(Request(LOG), engine=fake_engine(lambda *_: marked), settings=Settings(places=()))
+    async with app.run_test(size=(80, 40)) as pilot:
+        await settle(pilot, "p")
+        lines = text(app).splitlines()
+        axis = next(place for place, line in enumerate(lines) if "12.4 s" in line and "199.7 s" in line)
+        assert {"A", "M", "E", "✗"} <= set(lines[axis - 1])
+        assert any("motor 2 lost thrust" in line for line in lines[axis:])
+        await settle(pilot, "n")
+        first = title(app)
+        await settle(pilot, "n", "n")
+        assert title(app) != first
+        assert "  at " in title(app)
+        await settle(pilot, "1", "p")
+        assert title(app).endswith("at 91.3 s"), "p on a finding leads to its onset"
+    quiet_run = replace(sample.RUN, evidence=())
+    unmarked = Case(replace(sample.all_ok(), run=quiet_run), log=MadeLog({"ATT": {"Roll": T}}))
+    app = CareApp(Request(LOG), engine=fake_engine(lambda *_: unmarked), settings=Settings(places=()))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "p", "n")
+        assert "Nothing is marked" in hints(app)
 
 
 @needs_sample
@@ -186,11 +235,11 @@ async def test_a_view_that_cannot_read_the_log_says_so(make_app: MakeApp) -> Non
 
 def test_a_plot_is_as_wide_and_as_high_as_asked_for() -> None:
     columns = [(float(x), float(x)) for x in range(40)]
-    braille = plot(columns, 0.0, 39.0, 5, ascii=False)
+    braille = [line.plain for line in plot(columns, 0.0, 39.0, 5, ascii=False)]
     assert [len(line) for line in braille] == [20] * 5
     assert braille[0].strip() == braille[0].lstrip()
     assert braille[-1].startswith("⣀") or braille[-1][0] != " "
     stars = plot([None, (0.0, 1.0), (1.0, 1.0)], 0.0, 1.0, 3, ascii=True)
-    assert stars == [" **", " * ", " * "]
+    assert [line.plain for line in stars] == [" **", " * ", " * "]
     assert dots_across(20, ascii=False) == 40
     assert dots_across(20, ascii=True) == 20
