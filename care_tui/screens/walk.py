@@ -123,6 +123,8 @@ class WalkScreen(PanesScreen):
         self._view: Page | None = None
         self._views: dict[str, Page] = {"logs": self._pages[0]}
         """Views of this log that were opened before: what they read of it is kept."""
+        self._left_at: dict[str, int | None] = {}
+        """The item that was under the cursor when a view was left."""
         self._visited: list[Place] = []
         self._request = request
 
@@ -152,7 +154,13 @@ class WalkScreen(PanesScreen):
             return super().check_action(action, parameters) and self.focused is self.choices
         return super().check_action(action, parameters)
 
+    @property
+    def _index(self) -> int | None:
+        """The item under the cursor, None where the page has no list."""
+        return self.choices.highlighted if self.choices.display else None
+
     def _show(self, place: Place) -> None:
+        self._left_at |= {name: self._index for name, view in self._views.items() if view is self._view}
         self.step, self._view = place.step, place.view
         with self.app.batch_update():
             self._mark()
@@ -171,7 +179,7 @@ class WalkScreen(PanesScreen):
 
     def _go(self, place: Place) -> None:
         """Show another place; Esc leads back to this one, as it is now."""
-        self._visited.append(Place(self.step, self._view, self.choices.highlighted if self.choices.display else None))
+        self._visited.append(Place(self.step, self._view, self._index))
         self._show(place)
 
     def action_go(self, step: int) -> None:
@@ -199,7 +207,9 @@ class WalkScreen(PanesScreen):
             view = self._view_of(name)
             if moment_s is not None:
                 view.look_at(moment_s)
-            self._go(Place(self.step, view))
+            self._go(
+                Place(self.step, view, self._left_at.get(name) if moment_s is None and name not in FOLLOW else None)
+            )
 
     def _view_of(self, name: str) -> Page:
         from care_tui.pages.views import view_of
@@ -253,6 +263,7 @@ class WalkScreen(PanesScreen):
         self._request = request
         self.session = Session(path=request.log.absolute(), progress=("starting", 0.0), looked_at=objective)
         self._visited.clear()
+        self._left_at.clear()
         self._views = {"logs": self._pages[0]}
         self._show(Place(step))
         # After the first frame, which the imports of the work would hold up.

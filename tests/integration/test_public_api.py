@@ -52,11 +52,12 @@ def test_what_if_takes_parameters_and_refuses_strangers(case: care_core.Case) ->
 
 
 def test_a_case_keeps_its_log_open_and_reads_the_same_from_it(case: care_core.Case) -> None:
-    from care_core.application.viewing import messages_of, signals_of, trace_of
+    from care_core.application.signals import signals_of, trace_of, whole_of
+    from care_core.application.viewing import messages_of
 
     assert case.log is not None
     assert case.log.path == SAMPLE
     assert messages_of(case)
-    trace = trace_of(case, signals_of(case)[0], 40)
+    trace = trace_of(case, signals_of(case)[0], whole_of(case), 40)
     assert trace.count > 0
     assert len(trace.columns) == 40
