@@ -10,7 +10,7 @@ from care_core.health.telling import Leads, told
 LEADS: Leads = {
     "battery": frozenset({"battery", "drive", "commands", "topics", "laser", "cpu"}),
     "cpu": frozenset({"cpu", "control", "tf", "topics", "commands"}),
-    "radio": frozenset({"topics", "laser", "localisation", "commands", "tf", "imu"}),
+    "radio": frozenset({"topics", "laser", "localisation", "commands", "drive", "tf", "imu"}),
     "laser": frozenset({"laser", "localisation", "planner", "blocked", "control", "tf", "software"}),
     "localisation": frozenset({"localisation", "planner", "blocked", "control", "tf"}),
     "drive": frozenset({"drive", "planner", "control"}),

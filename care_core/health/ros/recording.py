@@ -31,8 +31,8 @@ OPEN_S = 30.0
 STREAM_MESSAGES, STEADY = 10, 3.0
 """A stream has so many messages, and nine in ten of its pauses are below so many times the usual one."""
 
-_CLOCK_AGREES_S = 2.0
-"""A stamp this near to the time of recording is of the same clock."""
+PUNCTUAL_S, MOSTLY = 0.25, 0.6
+"""Where this share of messages is recorded so soon after it was made, both clocks run alike."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +41,8 @@ class Odometry:
 
     topic: str
     t: Floats
+    dt: Floats
+    """Time since the sample before by the robot's own clock, which a slow simulation slows; 0 for the first."""
     x: Floats
     y: Floats
     yaw: Floats
@@ -48,11 +50,6 @@ class Odometry:
     """Forward, negative backwards."""
     sideways: Floats
     turn: Floats
-
-    @property
-    def dt(self) -> Floats:
-        """Time since the sample before, shape (n,), 0 for the first."""
-        return np.diff(self.t, prepend=self.t[:1])
 
     @property
     def tells_speed(self) -> bool:
@@ -230,14 +227,29 @@ def _odometry(topic: str, table: Table) -> Odometry | None:
     good[1:] &= np.diff(t) > 0
     if np.count_nonzero(good) < 3:
         return None
-    return Odometry(topic, *(np.asarray(one[good]) for one in (t, x, y, yaw, speed, sideways, turn)))
+    own = _clock(table)
+    step = np.diff((t if own is None else own)[good], prepend=np.nan)
+    dt = np.where(step > 0, step, 0.0)
+    return Odometry(topic, t[good], dt, *(np.asarray(one[good]) for one in (x, y, yaw, speed, sideways, turn)))
+
+
+def _clock(table: Table) -> Floats | None:
+    """The stamps of messages, where they are set and run forward."""
+    stamp = np.asarray(table["header.stamp"], np.float64)
+    return stamp if np.isfinite(stamp).all() and stamp[-1] > stamp[0] and np.all(np.diff(stamp) >= 0) else None
 
 
 def _when(table: Table) -> Floats:
-    """When messages were made, where their stamps are of the recorder's clock; else when they were recorded."""
-    stamp = np.asarray(table["header.stamp"], np.float64)
-    agrees = np.isfinite(stamp).all() and float(np.median(np.abs(stamp - table.t))) < _CLOCK_AGREES_S
-    return stamp if agrees else table.t
+    """When messages were made, in the recorder's time: by their stamps where that clock runs as the recorder's does.
+
+    What a link held back was recorded later than it was made, and comes in a burst.
+    """
+    stamp = _clock(table)
+    if stamp is None:
+        return table.t
+    late: Floats = table.t - stamp
+    usual = float(np.percentile(late, 10))
+    return stamp + usual if float(np.mean(late - usual < PUNCTUAL_S)) >= MOSTLY else table.t
 
 
 def _commands(topic: str, table: Table) -> Commands | None:

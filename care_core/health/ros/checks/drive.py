@@ -176,7 +176,9 @@ def _pulling(recording: Recording, asked: Following, source: str) -> Iterator[Fi
             evidence = (
                 f"turns {abs(middle):.2f} rad more per metre than commanded, in {agree:.0%} of {PULL_SAMPLES} samples"
             )
-            start = float(t[first])
+            # It began where the sum of what is beyond half of it turns upwards.
+            above = np.cumsum(pull[: first + PULL_SAMPLES] * np.sign(middle) - abs(middle) / 2)
+            start = float(t[int(np.argmin(above))])
             yield Finding("drive", f"the drive pulls to the {side}", start, float(t[-1]), recording.severity(start),
                           evidence, source, probability=0.8)  # fmt: skip
             return
