@@ -9,7 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
+from care_core.diagnose.records import (
+    Cause,
+    Diagnosis,
+    Fault,
+    Fix,
+    Hypothesis,
+    ObjectiveResult,
+    PathNode,
+    Prediction,
+)
+from care_core.health.records import Finding, Health, Moment
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.run import Damage, Evidence, Fit, LogInfo, MissionInfo, ProfileChoice, Run, Setting, Unavailable
 from care_core.variables import Change, Role, Threshold, Variable
@@ -52,6 +62,14 @@ class MadeLog:
         found = {name: {f: self.tables[name][f] for f in fields if f in self.tables[name]}
                  for name, fields in wanted.items() if name in self.tables}  # fmt: skip
         return {name: Table(T, columns) for name, columns in found.items()}
+
+
+_LOST = Finding("attitude", "control was lost", 61.5, 70.0, "critical", "80 degrees off", "ATT")
+HEALTH = Health(
+    "ArduCopter V4.5.4, quad X",
+    (Moment(1.0, "arming", "armed", "ARM"), Moment(3.0, "message", HOSTILE, "MSG")),
+    (Finding("motor", f"motor 2 {HOSTILE}", 61.0, 70.0, "critical", f"93 % {HOSTILE}", "RCOU", consequences=(_LOST,)),),
+)
 
 
 def made_run() -> Run:
@@ -116,4 +134,10 @@ def made_diagnosis() -> Diagnosis:
         fix=fix,
         alternatives=(fix,),
         notes=("time and energy move together",),
+        health=HEALTH,
+        hypotheses=(
+            Hypothesis("parameter", "land_speed", 0.7),
+            Hypothesis("hardware", f"motor 2 {HOSTILE}", 0.2),
+            Hypothesis("chance", "", 0.1),
+        ),
     )

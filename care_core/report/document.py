@@ -187,7 +187,6 @@ class TriageDocument(Strict):
     )
     profile: ProfileEntry | None
     """None where no profile fits the log."""
-    fit: FitEntry = FitEntry(verdict="fits", reasons=[])
     log: LogEntry
     config: dict[str, int | float]
     context: dict[str, float | None]
@@ -196,6 +195,13 @@ class TriageDocument(Strict):
     faults: list[FaultEntry]
     fix: FixEntry | None
     abstained: str | None
+    fit: FitEntry = FitEntry(verdict="fits", reasons=[])
+    account: list[MomentEntry] = Field(default_factory=list)
+    """What happened, in order of time."""
+    findings: list[FindingEntry] = Field(default_factory=list)
+    """In the order told, the first cause first."""
+    hypotheses: list[HypothesisEntry] = Field(default_factory=list)
+    """What explains the failure, the likeliest first; empty where nothing failed."""
     notes: list[str] = []
     """What the operator should know of the log, the configuration and the profile."""
     sources: dict[str, str] = {}
@@ -206,12 +212,6 @@ class TriageDocument(Strict):
     rivals: list[CircumstanceEntry] = Field(default_factory=list)
     tell_more: list[str] = Field(default_factory=list)
     dismissed: list[DismissedEntry] = Field(default_factory=list)
-    account: list[MomentEntry] = Field(default_factory=list)
-    """What happened, in order of time."""
-    findings: list[FindingEntry] = Field(default_factory=list)
-    """In the order told, the first cause first."""
-    hypotheses: list[HypothesisEntry] = Field(default_factory=list)
-    """What explains the failure, the likeliest first; empty where nothing failed."""
 
 
 class Report(TriageDocument):

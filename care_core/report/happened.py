@@ -182,7 +182,7 @@ def finding_lines(health: Health) -> Iterator[str]:
     if not health.account and not health.findings:
         return
     if not health.findings:
-        yield "Findings: nothing out of the ordinary was found by the checks that this log allows"
+        yield "Findings: nothing out of the ordinary, as far as this log lets itself be checked"
         return
     yield "Findings, the first cause first"
     for finding in health.findings:

@@ -17,13 +17,14 @@ import pytest
 from care_core.application import api
 from care_core.application.case import Case, Request
 from care_core.diagnose.records import Diagnosis
+from care_core.health.records import NOTHING_SEEN
 from care_core.profile.store import load_profile
 from care_core.tables.rows import ABOUT
 from care_tui import __version__, console
 from care_tui.cli import route
 from care_tui.commands.opening import newest_log
 from tests.conftest import Care
-from tests.made import made_diagnosis
+from tests.made import HEALTH, made_diagnosis
 
 COMMANDS = ("triage", "inspect", "params", "ingest", "train", "demo", "profiles", "schema")
 ROOT = Path(__file__).parents[2]
@@ -144,7 +145,7 @@ def test_the_newest_log_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[s
 def test_triage_prints_data_on_stdout_alone(care: Care, made: dict[str, Any]) -> None:
     outcome = care("triage", "a.BIN")
     assert outcome.code == 1
-    assert outcome.stdout.startswith("FAULT: mission_time")
+    assert "\nFAULT: mission_time" in outcome.stdout
     assert outcome.stderr == ""
     assert json.loads(care("triage", "a.BIN", "--json").stdout)["schema"] == "care.triage/1"
     assert "diff: |" in care("triage", "a.BIN", "--yaml").stdout
@@ -171,8 +172,15 @@ def test_triage_passes_its_options_on(care: Care, made: dict[str, Any]) -> None:
 def test_the_exit_code_says_what_was_found(care: Care, made: dict[str, Any]) -> None:
     fault: Diagnosis = made["answer"]
     ok, _, unknown = fault.objectives
-    for objectives, code in (((ok,), 0), (fault.objectives, 1), ((ok, unknown), 3)):
-        made["answer"] = replace(fault, objectives=objectives, faults=(), fix=None)
+    for objectives, health, code in (
+        ((ok,), NOTHING_SEEN, 0),
+        (fault.objectives, NOTHING_SEEN, 1),
+        ((ok, unknown), NOTHING_SEEN, 3),
+        ((), NOTHING_SEEN, 3),
+        ((ok,), HEALTH, 1),
+        ((), HEALTH, 1),
+    ):
+        made["answer"] = replace(fault, objectives=objectives, health=health, faults=(), fix=None)
         assert care("triage", "a.BIN").code == code
 
 
@@ -325,7 +333,8 @@ def test_profiles_are_listed_and_shown(care: Care) -> None:
 def test_the_demo_finds_its_fault(care: Care) -> None:
     outcome = care("demo")
     assert outcome.code == 1, outcome.stderr
-    assert outcome.stdout.startswith("FAULT: ")
+    assert outcome.stdout.startswith("Profile arducopter fits")
+    assert "\nFAULT: " in outcome.stdout
     assert max(map(len, outcome.stdout.splitlines())) <= 80
 
 

@@ -15,18 +15,21 @@ from ruamel.yaml import YAML
 
 from care_core.diagnose.records import Fault, ObjectiveResult, ParameterChange, PathNode, Prediction, Since
 from care_core.diagnose.since import with_evidence
+from care_core.diagnose.triage import unjudged
 from care_core.errors import UsageError
 from care_core.files import write_atomically
+from care_core.health.records import NOTHING_SEEN
 from care_core.report.document import build_document, json_schema
 from care_core.report.html import to_html
 from care_core.report.terminal import to_text
 from care_core.report.writers import to_json, to_markdown, to_yaml
-from care_core.run import Damage
+from care_core.run import Damage, Fit, ProfileChoice
 from care_core.text import clean
 from tests.made import DRIVEN, ENERGY, HOSTILE, LAND_SPEED, made_diagnosis
 
 KEYS = ["schema", "profile", "log", "config", "context", "metrics", "objectives", "faults", "fix", "abstained"]
-ADDED = ["notes", "sources", "since", "evidence", "rivals", "tell_more", "dismissed"]
+HAPPENED = ["fit", "account", "findings", "hypotheses"]
+ADDED = [*HAPPENED, "notes", "sources", "since", "evidence", "rivals", "tell_more", "dismissed"]
 
 
 def test_the_document_has_exactly_the_published_keys() -> None:
@@ -94,9 +97,8 @@ def test_no_text_of_a_log_can_steer_a_terminal_or_a_table() -> None:
 
 def test_markdown_can_be_pasted_into_a_ticket() -> None:
     text = to_markdown(build_document(made_diagnosis()))
-    assert text.startswith(
-        "# Triage of a.BIN\n\n**Fault**: `mission_time`. Change `land_speed` from 16 to 50: 90% odds"
-    )
+    assert text.startswith("# Triage of a.BIN\n\nProfile arducopter fits in part: firmware")
+    assert "\n\n**Fault**: `mission_time`. Change `land_speed` from 16 to 50: 90% odds" in text
     assert "land_speed → land_time → mission_time" in text
     assert "```diff\n--- as driven" in text
 
@@ -104,8 +106,9 @@ def test_markdown_can_be_pasted_into_a_ticket() -> None:
 def test_the_terminal_text_answers_first_and_fits_80_columns() -> None:
     text = to_text(made_diagnosis())
     lines = text.splitlines()
-    assert lines[0] == "FAULT: mission_time = 190, wanted <= 150 s"
-    assert "land_speed 16 -> 50" in lines[1]
+    assert lines[0].startswith("Profile arducopter fits in part: firmware Arm:")
+    assert lines[2] == "FAULT: mission_time = 190, wanted <= 150 s"
+    assert "land_speed 16 -> 50" in lines[3]
     assert max(map(len, lines)) <= 80
     for part in (
         "OK ",
@@ -139,16 +142,47 @@ def test_alternatives_are_offered_with_their_odds() -> None:
 
 
 def test_the_other_headlines() -> None:
-    diagnosis = replace(made_diagnosis(), faults=(), fix=None)
+    diagnosis = replace(made_diagnosis(), faults=(), fix=None, health=NOTHING_SEEN)
     fine = replace(diagnosis, objectives=diagnosis.objectives[:1])
     unknown = replace(diagnosis, objectives=diagnosis.objectives[2:])
     lost = replace(made_diagnosis(), fix=None, abstained="nothing in the profile explains this run")
-    assert to_text(fine).startswith("OK: ")
-    assert to_text(unknown).startswith("NOT EVALUATED: ")
+    assert "\nOK: " in to_text(fine)
+    assert "\nNOT EVALUATED: " in to_text(unknown)
     assert "No answer: nothing in the profile" in to_text(lost)
     assert "**No fault found.**" in to_markdown(build_document(fine))
     assert "not everything" in to_markdown(build_document(unknown))
     assert "**Fault**: `mission_time`. **No answer**: nothing" in to_markdown(build_document(lost))
+
+
+def test_a_crash_is_never_called_fine() -> None:
+    diagnosis = replace(made_diagnosis(), faults=(), fix=None)
+    fine = replace(diagnosis, objectives=diagnosis.objectives[:1])
+    assert "BUT: motor 2" in to_text(fine)
+    assert "**Fault**: motor 2" in to_markdown(build_document(fine))
+    assert "<strong>Fault</strong>: motor 2" in to_html(build_document(fine))
+
+
+def test_a_log_without_a_profile_tells_what_happened() -> None:
+    made = made_diagnosis()
+    choice = ProfileChoice("", "", "", "", Fit("no", ("none of the 5 installed profiles reads px4-ulg",)))
+    diagnosis = unjudged(made.run.log, made.run.settings, choice, made.health)
+    document = json.loads(to_json(build_document(diagnosis)))
+    jsonschema.validate(document, json_schema())
+    assert document["profile"] is None
+    assert document["fit"] == {"verdict": "no", "reasons": ["none of the 5 installed profiles reads px4-ulg"]}
+    assert document["objectives"] == document["faults"] == []
+    assert document["findings"][0]["kind"] == "motor"
+    assert sum(one["probability"] for one in document["hypotheses"]) == pytest.approx(1.0)
+    text = to_text(diagnosis)
+    assert text.startswith("No profile fits: none of the 5 installed profiles reads px4-ulg\nFAULT: motor 2")
+    assert to_markdown(build_document(diagnosis)).count("**Fault**: motor 2") == 1
+
+
+def test_what_explains_the_failure_comes_before_the_parameters() -> None:
+    text = to_text(made_diagnosis())
+    explained, found, happened, causes = map(text.index, ("What explains it", "Findings", "What happened", "Causes of"))
+    assert explained < found < happened < causes
+    assert "led to: control was lost" in text
 
 
 def test_markdown_gives_odds_for_a_yes_or_no_objective_and_a_unit_for_a_measured_one() -> None:
