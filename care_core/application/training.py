@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from care_core.errors import UsageError
 from care_core.profile.model import write_model
 from care_core.profile.schema import parse_schema, read_schema
-from care_core.profile.store import PROFILE_FILE, load_profile
+from care_core.profile.store import CARD_FILE, PROFILE_FILE, load_profile
 from care_core.tables.rows import INSTALL_LEARN
 
 if TYPE_CHECKING:
@@ -107,7 +107,6 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
 def _write(out: Path, schema: Schema, model: Model, schema_text: str) -> None:
     from care_core.files import write_atomically
     from care_core.learn.card import model_card
-    from care_core.learn.recheck import CARD_FILE
 
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -121,7 +120,7 @@ def _write(out: Path, schema: Schema, model: Model, schema_text: str) -> None:
 def relearned_problems(profile: Profile) -> tuple[str, ...] | None:
     """What recomputing with the learning libraries finds; None where they are not installed."""
     try:
-        from care_core.learn.recheck import recomputed
+        from care_core.learn.card import recomputed
     except ModuleNotFoundError:
         return None
     return recomputed(profile)

@@ -134,8 +134,13 @@ def installed_profiles() -> list[Installed]:
 
 
 def _card(folder: Path) -> str:
-    card = folder / "MODEL_CARD.md"
-    return card.read_text(encoding="utf-8") if card.is_file() else "It has no model card.\n"
+    """The model card, and behind it what became of the fixes."""
+    from care_core.history.track_record import RECORD_FILE
+    from care_core.profile.store import CARD_FILE
+
+    files = [folder / name for name in (CARD_FILE, RECORD_FILE)]
+    texts = [file.read_text(encoding="utf-8") for file in files if file.is_file()]
+    return "\n".join(texts) if texts else "It has no model card.\n"
 
 
 @dataclass(frozen=True)

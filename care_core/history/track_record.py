@@ -6,11 +6,16 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
+from care_core.files import write_atomically
 from care_core.history.store import Triaged, Verified
 
 EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 """Promises are compared with outcomes in these bins of odds."""
+
+RECORD_FILE = "VERIFIED_FIXES.md"
+"""The model card is the training's, and the same model gives the same card: what came after has its own file."""
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _ASCII = "_.-~=*#@"
@@ -73,3 +78,28 @@ def sparkline(values: Sequence[float], *, ascii: bool = False) -> str:
     if high <= low:
         return marks[len(marks) // 2 - 1] * len(values)
     return "".join(marks[round((value - low) / (high - low) * (len(marks) - 1))] for value in values)
+
+
+def write_record(folder: Path, record: TrackRecord) -> Path:
+    """Write the verified outcomes into a file of their own beside the model card. Returns it.
+
+    Raises:
+        UsageError: the folder may not be written to.
+    """
+    path = folder / RECORD_FILE
+    write_atomically(path, _as_markdown(record))
+    return path
+
+
+def _as_markdown(record: TrackRecord) -> str:
+    lines = [
+        "# Verified fixes",
+        "",
+        f"Of {record.count} fixes that were made and verified after the next run, {record.worked} worked; the odds"
+        f" promised {record.expected:.1f}.",
+        "",
+        "| promised | fixes | mean promise | worked |",
+        "|---|---|---|---|",
+        *(f"| {b.low:.0%} to {b.high:.0%} | {b.count} | {b.promised:.0%} | {b.worked} |" for b in record.bins),
+    ]
+    return "\n".join(lines) + "\n"

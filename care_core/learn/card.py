@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from care_core.causal.model import EffectRecord, Model, SkillRecord
+from care_core.learn.identification import identify
 from care_core.profile.schema import Schema
+from care_core.profile.store import CARD_FILE, Profile
 
 TOP = 10
 BAR = 20
@@ -26,6 +28,24 @@ def model_card(schema: Schema, model: Model) -> str:
         _limits(schema, model),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def recomputed(profile: Profile) -> tuple[str, ...]:
+    """What the learning libraries find otherwise than a profile's files hold, one sentence each: identification of
+    every effect, and the model card. Raises ProfileError where the profile cannot be read."""
+    model = profile.model
+    found = []
+    for (option, objective), effect in model.effects.items():
+        answer = identify(model.graph, option, objective)
+        stored = (effect.identified, effect.functional, tuple(effect.adjustment))
+        if stored != (answer.identified, answer.functional, tuple(answer.adjustment)):
+            found.append(f"Identification of {option} on {objective} gives another answer than the model holds.")
+    card = profile.path / CARD_FILE
+    if not card.is_file():
+        found.append(f"There is no {CARD_FILE}.")
+    elif card.read_text(encoding="utf-8") != model_card(profile.schema, model):
+        found.append(f"{CARD_FILE} is not what the model gives.")
+    return tuple(found)
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

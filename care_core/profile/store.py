@@ -12,7 +12,7 @@ from care_core.files import bundled
 from care_core.profile.model import read_model
 from care_core.profile.schema import Schema, read_schema
 
-PROFILE_FILE = "profile.yaml"
+PROFILE_FILE, CARD_FILE = "profile.yaml", "MODEL_CARD.md"
 
 
 @dataclass(frozen=True, eq=False)

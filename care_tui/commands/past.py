@@ -29,14 +29,16 @@ def history(
     json: AsJson = False,
     ascii: Annotated[bool, typer.Option("--ascii", help="Draw trends without block characters.")] = False,
     card: Annotated[
-        Path | None, typer.Option("--card", metavar="FOLDER", help="Write the verified fixes into this profile's card.")
+        Path | None,
+        typer.Option(
+            "--card", metavar="FOLDER", help="Write the verified fixes into a file beside this profile's card."
+        ),
     ] = None,
     out: Out = None,
 ) -> None:
     """List past triages and verified fixes. With the trend of each objective, and how often fixes worked."""
-    from care_core.history.card import update_card
     from care_core.history.store import SWITCH, History, history_path
-    from care_core.history.track_record import track_record
+    from care_core.history.track_record import track_record, write_record
     from care_core.profile.store import load_profile
     from care_core.report.history import history_document, history_json, history_text
 
@@ -46,7 +48,7 @@ def history(
     store = History(path)
     if card is not None:
         chosen = load_profile(card)
-        written = update_card(chosen.path, track_record(store.verifications(chosen.schema.name)))
+        written = write_record(chosen.path, track_record(store.verifications(chosen.schema.name)))
         say(f"wrote {written}")
     document = history_document(store.triages(profile, limit), store.verifications(profile))
     emit(history_json(document) if json or is_json(out) else history_text(document, ascii=ascii), out)

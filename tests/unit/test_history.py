@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sqlite3
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -16,16 +17,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.errors import CareError
-from care_core.history.card import update_card
 from care_core.history.store import History, HistoryError, Verified, history_path
-from care_core.history.track_record import sparkline, track_record, trends
+from care_core.history.track_record import sparkline, track_record, trends, write_record
 from care_core.report.document import build_document
 from care_core.report.history import history_document, history_json, history_schema, history_text, verdict_of
 from care_core.report.writers import published
 from tests.conftest import Care
 from tests.made import made_diagnosis
 
-SAMPLE = Path(__file__).parents[2] / "samples/arducopter_failed.BIN"
+ROOT = Path(__file__).parents[2]
+SAMPLE = ROOT / "samples/arducopter_failed.BIN"
 DOCUMENT = published(build_document(made_diagnosis()))
 
 
@@ -182,19 +183,17 @@ def test_only_a_run_without_any_fault_is_told_to_have_none(
     assert verdict_of({"objectives": objectives, **more}) == verdict
 
 
-def test_a_model_card_keeps_what_it_says_besides(history: History, tmp_path: Path) -> None:
-    card = tmp_path / "MODEL_CARD.md"
-    card.write_text("# Card\n\nBefore.\n\n## Limits\n\nAfter.\n", encoding="utf-8")
+def test_verified_fixes_have_a_file_of_their_own_and_the_profile_stays_sound(
+    history: History, tmp_path: Path, care: Care
+) -> None:
+    shutil.copytree(ROOT / "profiles" / "husky-care", tmp_path / "husky")
     for number, (p, worked) in enumerate(((0.9, True), (0.85, True), (0.5, False), (0.7, None))):
         history.add_verification(verification_of(number, p, worked))
-        update_card(tmp_path, track_record(history.verifications()))
-    text = card.read_text(encoding="utf-8")
-    assert text.count("## Verified fixes") == 1
-    assert "Before." in text
-    assert "## Limits\n\nAfter." in text
+    text = write_record(tmp_path / "husky", track_record(history.verifications())).read_text(encoding="utf-8")
     assert "Of 3 fixes that were made and verified after the next run, 2 worked; the odds promised 2.2" in text
+    assert care("profiles", "check", tmp_path / "husky").code == 0
     with pytest.raises(CareError):
-        update_card(tmp_path / "none", track_record(()))
+        write_record(tmp_path / "none", track_record(()))
 
 
 # Commands
