@@ -4,7 +4,7 @@
 
 The profile is trained on that many missions. Every fault is a random configuration that misses an objective; its fix is
 flown twice: with the suggested values and with the same options back at their reference. The next mission meets
-`PERSISTENCE` of the noise of the failed one, as the engine assumes.
+a share of the noise of the failed one, as the engine assumes.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from care_core.causal.counterfactual import PERSISTENCE
+from care_core.causal.model import UNKNOWN_PERSISTENCE
 from care_core.diagnose.judging import judge
 from care_core.diagnose.triage import diagnose
 from care_core.learn.skill import calibration_error, reliability
@@ -26,6 +26,7 @@ from care_core.profile.store import Profile
 from care_core.run import ProfileChoice
 from tests.planted import DEFAULTS, SCHEMA, SETTINGS, draw_config, draw_noise, fly, fly_many, run_of
 
+SAME = UNKNOWN_PERSISTENCE.same
 CHOICE = ProfileChoice("planted", "1", "Simulated robot", "named by the benchmark")
 
 
@@ -36,9 +37,7 @@ def meets_all(config: Mapping[str, float], noise: Mapping[str, float]) -> bool:
 
 def next_noise(noise: Mapping[str, float], rng: np.random.Generator) -> dict[str, float]:
     """What the next mission meets: alike, not equal."""
-    return {
-        name: np.sqrt(PERSISTENCE) * value + np.sqrt(1 - PERSISTENCE) * rng.normal() for name, value in noise.items()
-    }
+    return {name: SAME * value + np.sqrt(1 - SAME**2) * rng.normal() for name, value in noise.items()}
 
 
 def measure(runs: int, faults: int) -> None:

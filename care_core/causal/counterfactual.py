@@ -1,27 +1,29 @@
 """What this run would have done under other options: abduct its noise, intervene, predict.
 
 Every objective is predicted from the options alone (its mechanism solved for the exogenous variables, which is what
-interventions set); what the run met, its noise, is read off this run's own outcome and carried over. Noise persists in
-part: the wind and the clutter of the next run are like, not equal to, those of this one (`PERSISTENCE`).
+interventions set); what the run met, its noise, is read off this run's own outcome and carried over (`abduction`). How
+much of it the next run meets again was estimated from repeated runs where training had them, for the same conditions
+and for another day apart (`Model.training.persistence`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from care_core.causal.abduction import kinship, next_passes, next_value
 from care_core.causal.mechanisms import LEAST, TAIL, FloatArray, Mechanism, columns, restored, transformed
-from care_core.causal.model import Model, OutcomeRecord, StageRecord
+from care_core.causal.model import UNKNOWN_PERSISTENCE, Model, OutcomeRecord, StageRecord
 from care_core.run import is_known
 from care_core.variables import Threshold
 
-PERSISTENCE = 0.7
-"""Share of a run's noise variance that the next run under the same conditions meets again."""
 INTERVAL = (0.1, 0.9)
 
 Config = Mapping[str, float]
+Conditions = Literal["same", "another day"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +46,10 @@ class World:
     observed: Mapping[str, object]
     """Metrics and objectives of the run; unknown ones are absent or `Unavailable`."""
     thresholds: Mapping[str, Threshold]
+    repeats: Sequence[Mapping[str, object]] = ()
+    """Metrics and objectives of other runs of the same configuration under the same conditions."""
+    conditions: Conditions = "same"
+    """Which next run is promised: one under the conditions of this run, or one on another day."""
 
     def predict(self, objective: str, configs: Sequence[Config]) -> Predicted:
         """The objective under each configuration, given what this run met."""
@@ -54,13 +60,22 @@ class World:
         """Odds that every objective keeps its threshold, shape (m,).
 
         Objectives that move together (DESIGN: time and energy) share one cause: the least likely of a group counts
-        once; the rest multiply.
+        once; the rest multiply. What no mechanism predicts counts with its base rate.
         """
         p_ok = {name: self.predict(name, configs).p_ok for name in self.model.outcomes if name in self.thresholds}
-        total = np.ones(len(configs))
+        total = np.full(len(configs), float(np.prod(list(self.base_rates().values()))))
         for group in self._groups(p_ok):
             total *= np.min([p_ok[name] for name in group], axis=0)
         return total
+
+    def base_rates(self) -> dict[str, float]:
+        """Share of the training runs that kept the threshold, of the objectives that no mechanism predicts."""
+        rates = {}
+        for name, bound in self.thresholds.items():
+            summary = self.model.summaries.get(name)
+            if name not in self.model.outcomes and summary is not None:
+                rates[name] = summary.share_meeting(bound)
+        return rates
 
     def ignorance(self, configs: Sequence[Config]) -> FloatArray:
         """How little training says about the objectives there: 0 (known) to 1, the least known one's; shape (m,)."""
@@ -81,39 +96,43 @@ class World:
 
     def known(self, name: str) -> float | None:
         """This run's value of a metric or an objective, None where it has none."""
-        value = self.observed.get(name)
-        return float(value) if is_known(value) else None  # type: ignore[arg-type]
+        return known_value(self.observed, name)
+
+    def _persistence(self, objective: str) -> float:
+        persistence = self.model.training.persistence.get(objective, UNKNOWN_PERSISTENCE)
+        return persistence.same if self.conditions == "same" else persistence.another
 
     def _functional(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
         p_ok = np.ones(len(configs))
-        reached = True
+        runs = [(seen, True) for seen in (self.observed, *self.repeats)]
         for stage in outcome.stages:
-            passed = self._passed(outcome.objective, stage)
-            if not reached and (passed or stage.variable == outcome.objective):
-                passed = None  # what came after the failure says nothing about this stage
-            p_ok *= self._stage_odds(stage, passed, configs)
-            reached = reached and passed is not False
+            passed = []
+            for i, (seen, reached) in enumerate(runs):
+                ok = self._passed(outcome.objective, stage, seen)
+                if not reached and (ok or stage.variable == outcome.objective):
+                    ok = None  # what came after the failure says nothing about this stage
+                passed += [] if ok is None else [ok]
+                runs[i] = seen, reached and ok is not False
+            p_ok *= self._stage_odds(outcome.objective, stage, passed, configs)
         zero, one = np.zeros_like(p_ok), np.ones_like(p_ok)
         return Predicted(p_ok, np.where(p_ok > INTERVAL[1], one, zero), np.where(p_ok < INTERVAL[0], zero, one), p_ok)
 
-    def _stage_odds(self, stage: StageRecord, passed: bool | None, configs: Sequence[Config]) -> FloatArray:
-        """Odds of passing one stage, given whether this run passed it (None: it never came to it).
-
-        A run passes when its propensity exceeds its noise (a monotone threshold model), so with the noise of this run
-        the odds given that it passed are min(1, q'/q), given that it failed max(0, (q' - q)/(1 - q)).
-        """
+    def _stage_odds(
+        self, objective: str, stage: StageRecord, passed: Sequence[bool], configs: Sequence[Config]
+    ) -> FloatArray:
+        """Probability of passing one stage, given which runs of this configuration passed it."""
         mechanism = self.model.mechanisms[stage.mechanism]
         chance = self._chance(mechanism, stage.passes, configs)
-        here = self._chance(mechanism, stage.passes, [self.config])[0]
-        if passed is None:
+        if not passed:
             return chance
-        same_noise = np.minimum(1.0, chance / here) if passed else np.maximum(0.0, (chance - here) / (1.0 - here))
-        blended: FloatArray = PERSISTENCE * same_noise + (1 - PERSISTENCE) * chance
-        return np.clip(blended, TAIL, 1 - TAIL)
+        here = columns([self.config], mechanism.inputs)
+        kin = kinship(mechanism, columns(configs, mechanism.inputs), here, self._persistence(objective))
+        expected = float(self._chance(mechanism, stage.passes, [self.config])[0])
+        return np.clip(next_passes(kin, chance, expected, passed), TAIL, 1 - TAIL)
 
-    def _passed(self, objective: str, stage: StageRecord) -> bool | None:
-        """Whether this run passed the stage, None where it never came to it."""
-        seen = self.known(stage.variable)
+    def _passed(self, objective: str, stage: StageRecord, observed: Mapping[str, object]) -> bool | None:
+        """Whether a run passed the stage, None where it never came to it."""
+        seen = known_value(observed, stage.variable)
         if seen is None:
             return None
         bound = self.thresholds.get(objective) if stage.variable == objective else None
@@ -127,19 +146,26 @@ class World:
     def _continuous(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
         mechanism = self.model.mechanisms[outcome.mechanism]
         x = columns(configs, mechanism.inputs)
-        seen = self.known(outcome.objective)
-        if seen is not None and seen > LEAST[mechanism.transform]:
-            # This run's noise is carried over, y' = y + f(x') - f(x), but for the share that does not persist.
-            change, unsure = mechanism.change(x, columns([self.config], mechanism.inputs))
-            centre = float(transformed(np.array(seen), mechanism.transform)) + change
-            spread = np.sqrt(unsure**2 + 2 * (1 - PERSISTENCE) * mechanism.noise_spread**2)
+        least = LEAST[mechanism.transform]
+        values = [known_value(seen, outcome.objective) for seen in (self.observed, *self.repeats)]
+        seen = transformed(np.array([v for v in values if v is not None and v > least]), mechanism.transform)
+        latent = mechanism.latent(x)
+        if len(seen):
+            here = columns([self.config], mechanism.inputs)
+            kin = kinship(mechanism, x, here, self._persistence(outcome.objective))
+            centre, spread = next_value(kin, latent, float(mechanism.latent(here)[0]), seen)
         else:
-            centre = mechanism.latent(x)
-            spread = np.sqrt(mechanism.latent_spread(x) ** 2 + mechanism.noise_spread**2)
+            centre, spread = latent, np.sqrt(mechanism.latent_spread(x) ** 2 + mechanism.noise_spread**2)
         bound = self.thresholds.get(outcome.objective)
         low, high = (restored(centre + mechanism.error_quantile(q) * spread, mechanism.transform) for q in INTERVAL)
         p_ok = np.full(len(configs), np.nan) if bound is None else _odds_of(mechanism, bound, centre, spread)
         return Predicted(restored(centre, mechanism.transform), low, high, p_ok)
+
+
+def known_value(observed: Mapping[str, object], name: str) -> float | None:
+    """A run's value of a metric or an objective, None where it has none."""
+    value = observed.get(name)
+    return float(value) if is_known(value) else None  # type: ignore[arg-type]
 
 
 def _odds_of(mechanism: Mechanism, bound: Threshold, centre: FloatArray, spread: FloatArray) -> FloatArray:

@@ -155,6 +155,16 @@ class Mechanism:
         mean: FloatArray = self.scale * (cross @ self.weights)
         return mean + self._carried_over(x) - self._carried_over(here), self._spread(prior, cross)
 
+    def shared(self, x: FloatArray, here: FloatArray) -> FloatArray:
+        """Posterior covariance of the noise-free values at x (m, p) and at here (1, p), shape (m,).
+
+        What is not known of the mechanism at one place is partly what is not known at the other.
+        """
+        z, origin = self.scaled(x), self.scaled(here)
+        explained = self.kernel(z, self.points) @ (self._inverse @ self.kernel(origin, self.points)[0])
+        covariance: FloatArray = self.scale**2 * (self.kernel(z, origin)[:, 0] - explained)
+        return covariance
+
     def _spread(self, prior: FloatArray, cross: FloatArray) -> FloatArray:
         explained = ((cross @ self._inverse) * cross).sum(axis=1)
         spread: FloatArray = self.scale * np.sqrt(np.maximum(prior - explained, 1e-12))

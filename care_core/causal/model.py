@@ -14,7 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import Mechanism
+from care_core.causal.mechanisms import TAIL, Mechanism
+from care_core.variables import Threshold
 
 
 class Record(BaseModel):
@@ -87,6 +88,13 @@ class Summary(Record):
         """Share (0 to 1) of the training runs with a smaller value."""
         return float(np.interp(value, self.quantiles, np.linspace(0, 1, len(self.quantiles))))
 
+    def share_meeting(self, bound: Threshold) -> float:
+        """Share (0 to 1) of the training runs that kept a threshold, by the quantiles; kept off 0 and 1."""
+        levels = np.interp(np.linspace(0, 1, 201), np.linspace(0, 1, len(self.quantiles)), self.quantiles)
+        if bound.op == "==":
+            levels = np.round(levels)
+        return float(np.clip(np.mean([bound.met(float(level)) for level in levels]), TAIL, 1 - TAIL))
+
     def quantile(self, share: float) -> float:
         """The value that this share of the training runs stays below."""
         return float(np.interp(share, np.linspace(0, 1, len(self.quantiles)), self.quantiles))
@@ -122,6 +130,22 @@ class SkillRecord(Record):
     """Calibration: mean predicted odds, share that met the threshold, runs; a row a tenth of the odds that has any."""
 
 
+class Persistence(Record):
+    """Share of an objective's noise variance that a run of the same configuration meets again.
+
+    `same`: under the same conditions. `another`: on another day. `pairs`: of repeated training runs that say so, for
+    each; where there are none the value is the middle of what is possible.
+    """
+
+    same: float
+    another: float
+    pairs: tuple[int, int] = (0, 0)
+
+
+UNKNOWN_PERSISTENCE = Persistence(same=0.5, another=0.25)
+"""Where no configuration was run twice: the middle of what is possible, on another day of none to that."""
+
+
 class Training(Record):
     """Where the model came from."""
 
@@ -135,6 +159,8 @@ class Training(Record):
     """Option -> objective edges that the metrics do not explain, with the p-value that kept them."""
     moves_together: tuple[tuple[str, ...], ...] = ()
     """Groups of non-functional objectives that rise and fall together (rank correlation above 0.9)."""
+    persistence: Mapping[str, Persistence] = {}
+    """Per objective, where training runs were repeated."""
     notes: tuple[str, ...] = ()
 
 

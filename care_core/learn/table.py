@@ -19,12 +19,15 @@ FloatArray = NDArray[np.float64]
 MIN_RUNS = 30
 """Below this, Fisher's z at the default alpha sees only correlations above 0.5."""
 FORMATS = (".csv", ".parquet")
+CONDITIONS, STARTED = "conditions", "log_start"
+"""What runs of one site and day share (any value); when the log of a run began."""
 
 
 def read_table(path: Path, schema: Schema) -> pd.DataFrame:
     """Read a runs table (CSV or Parquet) and keep the schema's variables, in the schema's order, as floats.
 
-    Other columns (the log's name, provenance) are dropped. Metrics and objectives may be missing in a row: a mission
+    `CONDITIONS` is kept, made from the date of the log where the table has none; other columns (the log's name,
+    provenance) are dropped. Metrics and objectives may be missing in a row: a mission
     that was refused or failed does not have them. Options and contexts may not.
 
     Raises:
@@ -49,6 +52,10 @@ def check_table(frame: pd.DataFrame, schema: Schema, where: str = "") -> pd.Data
         )
     columns = {name: _numbers(frame[name], variable, where) for name, variable in schema.variables.items()}
     checked: pd.DataFrame = pd.DataFrame(columns)
+    if CONDITIONS in frame:
+        checked[CONDITIONS] = frame[CONDITIONS].to_numpy()
+    elif STARTED in frame:
+        checked[CONDITIONS] = frame[STARTED].astype(str).str[:10].where(frame[STARTED].notna()).to_numpy()
     return checked
 
 

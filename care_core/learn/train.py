@@ -23,6 +23,7 @@ from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME
 from care_core.learn.identification import identify, is_answered_by
 from care_core.learn.knowledge import with_known
 from care_core.learn.outcomes import badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
+from care_core.learn.repeats import persistence
 from care_core.learn.skill import cross_validated_skill
 from care_core.learn.structure import Structure, learn_structure
 from care_core.profile.schema import Schema
@@ -75,7 +76,9 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Prog
     report("fitting mechanisms", 0.4)
     outcomes, mechanisms = fit_outcomes(frame, schema, graph, rng, effort=OUTCOME)
     mechanisms |= _metric_mechanisms(frame, schema, graph, settings)
-    learned = Learned(graph, support, outcomes, mechanisms, _training(frame, schema, structure, settings))
+    training = _training(frame, schema, structure, settings)
+    training = training.model_copy(update={"persistence": persistence(frame, schema, outcomes, mechanisms)})
+    learned = Learned(graph, support, outcomes, mechanisms, training)
     return assemble(frame, schema, learned, settings, rng, report)
 
 

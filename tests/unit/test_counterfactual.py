@@ -66,11 +66,11 @@ def test_predictions_do_not_depend_on_the_order_of_configurations(
     np.testing.assert_allclose(here.odds(configs), alone, atol=1e-9)
 
 
-def test_without_a_change_the_run_repeats_its_own_outcome(planted: Profile) -> None:
-    run = planted_run(reserve=58)
-    p = world(planted, reserve=58).predict("time", [run.config])
-    assert p.value[0] == pytest.approx(run.objectives["time"])
-    assert p.low[0] < p.value[0] < p.high[0]
+def test_without_a_change_the_next_run_is_between_this_one_and_what_was_expected(planted: Profile) -> None:
+    expected = float(world(planted, {}).predict("time", [DEFAULTS]).value[0])
+    again = world(planted, {"time": expected + 20}).predict("time", [DEFAULTS])
+    assert expected + 5 < again.value[0] < expected + 19
+    assert again.low[0] < again.value[0] < again.high[0]
 
 
 def test_what_the_run_met_is_carried_over(planted: Profile) -> None:
@@ -79,7 +79,31 @@ def test_what_the_run_met_is_carried_over(planted: Profile) -> None:
     slow = world(planted, {"time": expected + 20})
     faster = {**DEFAULTS, "speed": 8.0}
     usual = float(world(planted, {}).predict("time", [faster]).value[0])
-    assert float(slow.predict("time", [faster]).value[0]) > usual + 10
+    assert float(slow.predict("time", [faster]).value[0]) > usual + 5
+
+
+def test_on_another_day_less_of_it_is_met_again(planted: Profile) -> None:
+    expected = float(world(planted, {}).predict("time", [DEFAULTS]).value[0])
+    slow = world(planted, {"time": expected + 20})
+    another = replace(slow, conditions="another day")
+    assert expected < another.predict("time", [DEFAULTS]).value[0] < slow.predict("time", [DEFAULTS]).value[0]
+
+
+def test_a_second_failure_is_evidence_against_chance(planted: Profile) -> None:
+    once = world(planted, {"armed": 1.0, "success": 0.0})
+    twice = replace(once, repeats=({"armed": 1.0, "success": 0.0},))
+    rescued = replace(once, repeats=({"armed": 1.0, "success": 1.0},))
+    odds = [w.predict("success", [DEFAULTS]).p_ok[0] for w in (twice, once, rescued)]
+    assert odds[0] < odds[1] < odds[2]
+
+
+def test_an_objective_without_a_mechanism_counts_with_its_base_rate(planted: Profile) -> None:
+    outcomes = {name: record for name, record in planted.model.outcomes.items() if name != "time"}
+    blind = replace(world(planted, {}), model=replace(planted.model, outcomes=outcomes))
+    rate = blind.base_rates()["time"]
+    assert 0 < rate < 1
+    others = world(planted, {}, {name: BOUNDS[name] for name in outcomes}).odds([DEFAULTS])[0]
+    assert blind.odds([DEFAULTS])[0] == pytest.approx(rate * others)
 
 
 def test_an_unknown_outcome_is_predicted_from_the_options_alone(planted: Profile) -> None:

@@ -1,0 +1,99 @@
+"""What a run's own outcome says about the next one: one correlation for centre and spread.
+
+Around its mechanism f every run has noise. Two runs of configurations x and x' have values whose errors go together for
+two reasons: what is not known of f at x is partly what is not known at x' (the posterior covariance of f), and what the
+first run met the second meets again (the persistence rho, of the noise variance). So with noise variance s2
+
+    cov(y', y) = cov(f(x'), f(x)) + rho s2,    var(y) = var f(x) + s2
+
+and the next outcome is the conditional of a joint Gaussian (Rasmussen and Williams 2006, Eq. A.6), for yes-or-no
+outcomes of a probit: a run passes where a standard normal stays below the quantile of its predicted probability.
+Several runs of one configuration are conditioned on together; a second failure is evidence against chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
+
+import numpy as np
+
+from care_core.causal.mechanisms import FloatArray, Mechanism
+
+_Z = np.linspace(-6.0, 6.0, 2401)
+_CDF = np.array([NormalDist().cdf(z) for z in _Z])
+_NODES = np.linspace(-5.0, 5.0, 101)
+"""Values of what the runs of one configuration share."""
+_DENSITY = np.exp(-(_NODES**2) / 2) / np.exp(-(_NODES**2) / 2).sum()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Kinship:
+    """How the errors of outcomes at m configurations go together with those at this run's, for one mechanism.
+
+    Attributes:
+        variance: of an outcome around the prediction at each configuration, shape (m,), on the transformed scale.
+        covariance: with an outcome here, shape (m,).
+        here: variance of an outcome here. repeated: covariance of two outcomes here.
+    """
+
+    variance: FloatArray
+    covariance: FloatArray
+    here: float
+    repeated: float
+
+
+def kinship(mechanism: Mechanism, x: FloatArray, here: FloatArray, persistence: float) -> Kinship:
+    """How outcomes at x go together with those here.
+
+    Args:
+        x: shape (m, p). here: shape (1, p). persistence: share of the noise variance, 0 to 1.
+    """
+    noise = mechanism.noise_spread**2
+    unsure = float(mechanism.latent_spread(here)[0] ** 2)
+    return Kinship(
+        variance=mechanism.latent_spread(x) ** 2 + noise,
+        covariance=mechanism.shared(x, here) + persistence * noise,
+        here=unsure + noise,
+        repeated=unsure + persistence * noise,
+    )
+
+
+def next_value(kin: Kinship, latent: FloatArray, expected: float, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Centre and standard deviation of the next outcome, both of shape (m,), on the transformed scale.
+
+    Args:
+        latent: predictions at the m configurations. expected: prediction here. seen: outcomes here, shape (k,), k > 0.
+    """
+    mean_variance = (kin.here + (len(seen) - 1) * kin.repeated) / len(seen)
+    centre = latent + kin.covariance / mean_variance * (float(seen.mean()) - expected)
+    return centre, np.sqrt(np.maximum(kin.variance - kin.covariance**2 / mean_variance, 1e-12))
+
+
+def next_passes(kin: Kinship, chance: FloatArray, here: float, passed: Sequence[bool]) -> FloatArray:
+    """Probability that the next run passes, shape (m,).
+
+    What runs of this configuration share is integrated out, weighed by how well it explains which of them passed.
+
+    Args:
+        chance: predicted probability at the m configurations. here: predicted probability here. passed: per run.
+    """
+    shared = kin.repeated / kin.here
+    to_shared = kin.covariance / np.sqrt(kin.variance * kin.here) / np.sqrt(shared)
+    alike = _cdf((_quantile(np.array(here)) - np.sqrt(shared) * _NODES) / np.sqrt(max(1.0 - shared, 1e-9)))
+    weight = _DENSITY * np.prod([alike if ok else 1.0 - alike for ok in passed], axis=0)
+    if weight.sum() <= 0:
+        return chance
+    left = np.sqrt(np.maximum(1.0 - to_shared**2, 1e-9))[:, None]
+    passes = _cdf((_quantile(chance)[:, None] - to_shared[:, None] * _NODES) / left)
+    probability: FloatArray = passes @ weight / weight.sum()
+    return probability
+
+
+def _cdf(z: FloatArray) -> FloatArray:
+    return np.asarray(np.interp(z, _Z, _CDF))
+
+
+def _quantile(p: FloatArray) -> FloatArray:
+    return np.asarray(np.interp(p, _CDF, _Z))
