@@ -13,6 +13,8 @@ class Unavailable:
 
     reason: str
     hint: str = ""
+    channel: str = ""
+    """The channel that is not in the log, where that is why."""
 
 
 Value = float | Unavailable

@@ -15,6 +15,7 @@ from care_core.diagnose.records import (
     Fault,
     Fix,
     Hypothesis,
+    Note,
     ObjectiveResult,
     PathNode,
     Prediction,
@@ -113,7 +114,7 @@ def made_diagnosis() -> Diagnosis:
         p_fixed=0.9,
         confidence="high",
         in_support=True,
-        notes=(f"note {HOSTILE}",),
+        notes=(Note(f"note {HOSTILE}"),),
     )
     fix = Fix(
         (Change(LAND_SPEED, DRIVEN, 50.0),),

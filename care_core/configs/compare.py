@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from care_core.configs import yaml_tree
+from care_core.configs.driven import same_value
 from care_core.configs.formats import ConfigFormat
 from care_core.configs.loading import ConfigFile, resolve
 from care_core.run import Setting, shown
 from care_core.vehicles.self_written import is_self_written
-
-FLOAT32 = 1e-6
-"""Vehicles hold parameters in 32 bits, files in seven digits."""
-
-_WORDS = {"true": 1.0, "false": 0.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,21 +69,3 @@ def _named_like(side: Side, other: Side) -> dict[str, Setting]:
     found = resolve((ConfigFile("", side.format, side.settings),), other.settings)
     used = {setting.name for setting in found.values()}
     return {**{name: setting for name, setting in side.settings.items() if name not in used}, **found}
-
-
-def same_value(a: float | str, b: float | str) -> bool:
-    """Equal as far as a vehicle or a file holds a value: `true` is 1, and 0.1 is 0.1 in 32 bits."""
-    one, other = _number(a), _number(b)
-    if one is None or other is None:
-        return bool(yaml_tree.plain(str(a).strip()) == yaml_tree.plain(str(b).strip()))  # lists, however quoted
-    return math.isclose(one, other, rel_tol=FLOAT32, abs_tol=1e-12) or (math.isnan(one) and math.isnan(other))
-
-
-def _number(value: float | str) -> float | None:
-    if not isinstance(value, str):
-        return float(value)
-    word = value.strip().casefold()
-    try:
-        return _WORDS[word] if word in _WORDS else float(word)
-    except ValueError:
-        return None

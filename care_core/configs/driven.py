@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from care_core.configs import yaml_tree
 from care_core.run import Setting, shown
 from care_core.text import clean
 from care_core.variables import Variable
@@ -13,8 +14,33 @@ from care_core.vehicles.self_written import is_self_written
 SIMULATOR_PREFIX = "SIM_"
 """Parameters of a simulated world: a real vehicle has none, so they are never options."""
 
+SEVEN_DIGITS = 1e-6
+"""Vehicles hold parameters in 32 bits (24 of mantissa: 6e-8 of a value), files and reports in seven digits (5e-7)."""
+
 _TRUE = frozenset({"true", "yes", "on"})
 _FALSE = frozenset({"false", "no", "off"})
+
+
+def same_value(a: float | str | None, b: float | str | None) -> bool:
+    """The one answer to "the same parameter value": equal as far as a vehicle or a file holds it, `true` is 1."""
+    if a is None or b is None:
+        return a is b
+    one, other = _as_number(a), _as_number(b)
+    if one is None or other is None:
+        return bool(yaml_tree.plain(str(a).strip()) == yaml_tree.plain(str(b).strip()))  # lists, however quoted
+    return math.isclose(one, other, rel_tol=SEVEN_DIGITS, abs_tol=1e-12) or (math.isnan(one) and math.isnan(other))
+
+
+def _as_number(value: float | str) -> float | None:
+    if not isinstance(value, str):
+        return float(value)
+    word = value.strip().casefold()
+    if word in ("true", "false"):
+        return float(word == "true")
+    try:
+        return float(word)
+    except ValueError:
+        return None
 
 
 def in_force(history: Sequence[Setting], at_s: float) -> Setting:
@@ -37,7 +63,10 @@ def differing(
         name: history
         for name, history in histories.items()
         if (everything or not is_self_written(name))
-        and (len(history) > 1 or (history[-1].default is not None and history[-1].value != history[-1].default))
+        and (
+            len(history) > 1
+            or (history[-1].default is not None and not same_value(history[-1].value, history[-1].default))
+        )
     }
 
 
@@ -48,7 +77,7 @@ def remark(history: Sequence[Setting], *, source: bool = False) -> str:
     if later:
         steps = "".join(f" -> {shown(one.value)} at {clock(one.changed_at_s)}" for one in later)
         parts.append(f"{shown(first.value)}{steps}")
-    if history[-1].default is not None and history[-1].value != history[-1].default:
+    if history[-1].default is not None and not same_value(history[-1].value, history[-1].default):
         parts.append(f"default {shown(history[-1].default)}")
     if source:
         parts.append(f"from {history[-1].source}")
@@ -136,7 +165,7 @@ def disagreements(
             if ours is None or theirs is None or ours is theirs:
                 continue
             value, wanted = option_value(option, ours), option_value(option, theirs)
-            if value is None or wanted is None or math.isclose(wanted, value, rel_tol=1e-4, abs_tol=1e-9):
+            if value is None or wanted is None or same_value(wanted, value):
                 continue
             named = f"{option.name} ({parameter})" if several else option.name
             sentences.append(

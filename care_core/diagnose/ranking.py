@@ -12,6 +12,7 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, columns
 from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, rank_paths
+from care_core.configs.driven import same_value
 from care_core.diagnose.records import PathNode
 from care_core.diagnose.symptoms import pointers
 from care_core.profile.schema import Schema
@@ -21,7 +22,6 @@ FELT = 0.05
 """Effect times support, in spreads, from which an edge is taken to carry something of this run."""
 PERMUTATIONS = 12
 """Orders of reset per Shapley estimate, each also taken backwards."""
-SAME = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +66,7 @@ def reference_config(schema: Schema, model: Model) -> dict[str, float]:
 
 def deviating(config: Config, reference: Config) -> tuple[str, ...]:
     """Options whose value in this run is not the reference's."""
-    return tuple(
-        name
-        for name, value in reference.items()
-        if name in config and abs(config[name] - value) > SAME * max(abs(value), abs(config[name]), 1e-9)
-    )
+    return tuple(n for n, value in reference.items() if n in config and not same_value(config[n], value))
 
 
 def suspects(

@@ -57,6 +57,17 @@ class PathNode:
     """Share of bootstrap resamples that hold the edge to the next node; None on the last node."""
 
 
+NoteKind = Literal["outside_training", "in_the_log", "other"]
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A sentence about a cause: what weakens it, what the log itself says of it, what a change of it needs."""
+
+    text: str
+    kind: NoteKind = "other"
+
+
 @dataclass(frozen=True, slots=True)
 class Cause:
     """An option with the path by which it moved a faulty objective in this run.
@@ -78,7 +89,7 @@ class Cause:
     p_fixed: float | None
     confidence: Confidence
     in_support: bool
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     is_lead: bool = False
     """Not shown to cost this run anything, only not ruled out: what to look at next when no cause convinces."""
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from care_core.configs.driven import readable
+from care_core.configs.driven import readable, same_value
 from care_core.diagnose.judging import Judged, read_and_judge
-from care_core.diagnose.records import Cause, Diagnosis, ParameterChange, Since
+from care_core.diagnose.records import Cause, Diagnosis, Note, ParameterChange, Since
 from care_core.errors import CareError
 from care_core.extract.read import log_info
 from care_core.logs.base import Log
@@ -53,7 +52,7 @@ def with_evidence(diagnosis: Diagnosis, since: Since) -> Diagnosis:
 def _noted(cause: Cause, since: Since) -> Cause:
     name = Path(since.log).name
     notes = [f"changed since {name}: {change.text}" for change in since.changes if change.option is cause.option]
-    return replace(cause, notes=(*cause.notes, *dict.fromkeys(notes)))
+    return replace(cause, notes=(*cause.notes, *map(Note, dict.fromkeys(notes))))
 
 
 def _changes(run: Run, before: Mapping[str, Setting], profile: Profile) -> tuple[ParameterChange, ...]:
@@ -70,14 +69,8 @@ def _differences(
     for name in names:
         old = before[name].value if name in before else None
         new = after[name].value if name in after else None
-        if not _same(old, new):
+        if not same_value(old, new):
             yield ParameterChange(name, options.get(name), old, new)
-
-
-def _same(a: float | str | None, b: float | str | None) -> bool:
-    if isinstance(a, (int, float)) and isinstance(b, (int, float)):
-        return math.isclose(a, b, rel_tol=1e-6) or (math.isnan(a) and math.isnan(b))
-    return a == b
 
 
 def _strange(run: Run, other: LogInfo, before: Mapping[str, Setting]) -> Iterator[str]:

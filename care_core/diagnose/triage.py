@@ -36,7 +36,7 @@ from care_core.diagnose.ranking import (
     not_ruled_out,
     suspects,
 )
-from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, ObjectiveResult
+from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Note, ObjectiveResult
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
 from care_core.diagnose.worlds import reference_of, world_of
@@ -237,23 +237,25 @@ def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float)
     return "medium"
 
 
-def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float) -> tuple[str, ...]:
-    notes = []
+def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float) -> tuple[Note, ...]:
+    notes: list[Note] = []
     if suspect.effect is None:
-        notes.append(f"no effect on {suspect.path.nodes[-1]} was seen in training: not ruled out")
+        notes.append(Note(f"no effect on {suspect.path.nodes[-1]} was seen in training: not ruled out"))
     elif suspect.contribution < MIN_CONTRIBUTION:
-        notes.append("costs this run little: not ruled out")
+        notes.append(Note("costs this run little: not ruled out"))
     if suspect.symptom is not None and suspect.contribution < MIN_CONTRIBUTION <= suspect.weight:
-        notes.append(f"this run's {suspect.symptom} points at it")
+        notes.append(Note(f"this run's {suspect.symptom} points at it"))
     if not in_support:
         summary = case.world.model.summaries[suspect.option]
-        notes.append(f"outside the training support ({summary.low:g} to {summary.high:g})")
+        notes.append(Note(f"outside the training support ({summary.low:g} to {summary.high:g})", "outside_training"))
     if suspect.effect is not None and support < LOW_SUPPORT:
-        notes.append(f"a path to {suspect.path.nodes[-1]} was found in only {support:.0%} of resamples")
+        notes.append(Note(f"a path to {suspect.path.nodes[-1]} was found in only {support:.0%} of resamples"))
     if suspect.option in case.keep:
-        notes.append("pinned by --keep: not changed")
-    notes += change_notes(case.profile.schema.variables[suspect.option])
-    notes += [said(evidence) for evidence in case.run.evidence if suspect.option in evidence.options]
+        notes.append(Note("pinned by --keep: not changed"))
+    notes += map(Note, change_notes(case.profile.schema.variables[suspect.option]))
+    notes += [
+        Note(said(evidence), "in_the_log") for evidence in case.run.evidence if suspect.option in evidence.options
+    ]
     return tuple(notes)
 
 

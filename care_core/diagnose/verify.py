@@ -5,12 +5,11 @@ The report is plain data (`Promise`), so this module knows no file format; `care
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from care_core.configs.driven import option_value, readable
+from care_core.configs.driven import option_value, readable, same_value
 from care_core.diagnose.judging import Judged, read_and_judge, thresholds_in_force
 from care_core.diagnose.records import ObjectiveResult, Status
 from care_core.logs.base import Log
@@ -23,9 +22,6 @@ from care_core.variables import Threshold, Variable
 Made = Literal["made", "not_made", "other_value", "unknown"]
 Outcome = Literal["recovered", "kept", "unchanged", "better", "worse", "broken", "unknown"]
 Verdict = Literal["fixed_as_promised", "fixed_although", "not_fixed", "change_not_made", "cannot_tell"]
-
-FLOAT32 = 1e-5
-"""Vehicles hold parameters in 32 bits, files in seven digits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,14 +178,14 @@ def _made(option: Variable, before: float, wanted: float, run: Run) -> MadeChang
     values = {key: value for key, setting in settings.items() if (value := option_value(option, setting)) is not None}
     if not values and option.name in run.config:
         values = {option.name: run.config[option.name]}
-    off = {key: value for key, value in values.items() if not same(value, wanted)}
+    off = {key: value for key, value in values.items() if not same_value(value, wanted)}
     if not values:
         return MadeChange(option, before, wanted, None, "unknown", "the log does not hold it")
     if not off:
         return MadeChange(option, before, wanted, wanted, "made")
     note = f"{', '.join(off)} was left" if len(off) < len(values) else ""
     driven = next(iter(off.values()))
-    return MadeChange(option, before, wanted, driven, "not_made" if same(driven, before) else "other_value", note)
+    return MadeChange(option, before, wanted, driven, "not_made" if same_value(driven, before) else "other_value", note)
 
 
 def _share_made(changes: Sequence[MadeChange]) -> float:
@@ -199,13 +195,13 @@ def _share_made(changes: Sequence[MadeChange]) -> float:
 def _others(promise: Promise, chosen: PromisedSet, run: Run, schema: Schema) -> Iterator[OtherChange]:
     for option in schema.options:
         before, driven = promise.config.get(option.name), run.config.get(option.name)
-        if option.name not in chosen.changes and before is not None and driven is not None and not same(before, driven):
+        if (
+            option.name not in chosen.changes
+            and before is not None
+            and driven is not None
+            and not same_value(before, driven)
+        ):
             yield OtherChange(option, before, driven)
-
-
-def same(a: float, b: float) -> bool:
-    """Equal as far as a vehicle or a file holds a parameter."""
-    return math.isclose(a, b, rel_tol=FLOAT32, abs_tol=1e-9)
 
 
 def _check(before: Before, after: ObjectiveResult, interval: tuple[float, float] | None) -> ObjectiveCheck:

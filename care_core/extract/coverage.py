@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 
@@ -15,8 +14,6 @@ from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
 from care_core.run import MissionInfo, Run, Unavailable
 from care_core.variables import Role, Variable
-
-_WORD = re.compile(r"[\w/]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,10 +143,5 @@ def _missed_values(schema: Schema, absent: Collection[str], run: Run | None) -> 
         if run is None and lacking:
             yield Missed(variable, f"no {' or '.join(lacking)} in the log", f"record {', '.join(lacking)}")
         value = None if run is None else run.value(variable.name)
-        if isinstance(value, Unavailable) and (lacking or _names(value) & set(absent)):
+        if isinstance(value, Unavailable) and (lacking or value.channel in absent):
             yield Missed(variable, value.reason, value.hint or f"record {', '.join(lacking)}")
-
-
-def _names(value: Unavailable) -> set[str]:
-    """The words of a reason and its hint that may be channels."""
-    return set(_WORD.findall(f"{value.reason} {value.hint}"))

@@ -180,13 +180,10 @@ class _Source:
         """The value, where it is a number; else why there is none: a dead source, or telemetry, which lacks much."""
         if not isinstance(value, Unavailable):
             return value if math.isfinite(value) else Unavailable("what the log says of it is no number", _LOOK)
-        dead = next((why for name, why in self.dead.items() if value.reason.startswith(f"no {name} ")), None)
-        if dead is not None:
-            return Unavailable(dead, "check the sensor and its driver")
+        if value.channel in self.dead:
+            return Unavailable(self.dead[value.channel], "check the sensor and its driver")
         is_telemetry = self.log.format == LogFormat.MAVLINK_TLOG.value
-        return (
-            Unavailable(value.reason, _TELEMETRY_ADVICE) if is_telemetry and value.reason.startswith("no ") else value
-        )
+        return replace(value, hint=_TELEMETRY_ADVICE) if is_telemetry and value.channel else value
 
 
 _TELEMETRY_ADVICE = "telemetry does not carry it: use the .BIN of the vehicle's memory card"

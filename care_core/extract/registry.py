@@ -186,4 +186,5 @@ def has(table: Table | None, *fields: str) -> TypeGuard[Table]:
 
 def missing(channel: str, hint: str = "") -> Unavailable:
     """The answer of an extractor whose channel is not in the log."""
-    return Unavailable(f"no {channel} in the log", hint or how_to_record(channel))
+    name = channel.partition(" ")[0]  # "ARM with Forced" is a field that an old ARM lacks
+    return Unavailable(f"no {channel} in the log", hint or how_to_record(channel), name)

@@ -140,11 +140,9 @@ class Px4Log:
         times = self._seconds(np.array([one.timestamp for one in ulog.dropouts]))
         dropouts = [Damage(f"{one.duration} ms were not recorded (dropout)", None, t)
                     for one, t in zip(ulog.dropouts, times.tolist(), strict=True)]  # fmt: skip
-        broken = _first_break(self.path)
+        broken = _first_break(self.path, self.duration_s)
         if broken is None and ulog.file_corruption:
             broken = Damage("records that fit no declaration")
-        if broken is not None and broken.time_s is None and broken.what.startswith("cut"):
-            broken = Damage(broken.what, broken.byte, self.duration_s)
         return (*summarised(dropouts, "dropouts"), *([broken] if broken else ()))
 
 
@@ -197,8 +195,8 @@ def _believable(t: NDArray[np.float64]) -> NDArray[np.bool_]:
     return np.asarray(near)
 
 
-def _first_break(path: Path) -> Damage | None:
-    """Where the chain of records breaks for the first time."""
+def _first_break(path: Path, end_s: float) -> Damage | None:
+    """Where the chain of records breaks for the first time; a cut ends the log at `end_s`."""
     data = path.read_bytes()
     place, size = _HEADER_BYTES, len(data)
     while place + 3 <= size:
@@ -208,7 +206,7 @@ def _first_break(path: Path) -> Damage | None:
         if place + 3 + length > size:
             break
         place += 3 + length
-    return Damage(f"cut in a record, {size - place} bytes of it are there", place) if place < size else None
+    return Damage(f"cut in a record, {size - place} bytes of it are there", place, end_s) if place < size else None
 
 
 def _version(ulog: Any) -> str:

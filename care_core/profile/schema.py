@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from care_core import plain_yaml
+from care_core.configs.driven import same_value
 from care_core.errors import ProfileError, nearest
 from care_core.logs.base import LogFormat
 from care_core.variables import Extract, Kind, Op, Role, Threshold, ValueType, Variable
@@ -180,8 +181,12 @@ class EvidenceRule:
             name
             for name, bound in self.options.items()
             if name not in config
-            or (bound.met(config[name]) if bound is not None else config[name] != variables[name].default)
+            or (bound.met(config[name]) if bound is not None else not _is_default(variables[name], config[name]))
         )
+
+
+def _is_default(option: Variable, value: float) -> bool:
+    return option.default is not None and same_value(value, option.default)
 
 
 @dataclass(frozen=True, slots=True)

@@ -349,7 +349,7 @@ def _circumstance(one: Circumstance) -> CircumstanceEntry:
 
 
 def _cause(cause: Cause, warnings: tuple[str, ...]) -> CauseEntry:
-    notes = [clean(note) for note in cause.notes]
+    notes = [clean(note.text) for note in cause.notes]
     return CauseEntry(
         rank=cause.rank,
         option=cause.option.name,

@@ -158,7 +158,7 @@ def _cause(cause: Cause) -> Iterator[str]:
         if node.value is not None or node.expected is not None:
             yield from wrapped(_node(node), "       ", "         ")
     for note in cause.notes:
-        yield from wrapped(note, "     ! ")
+        yield from wrapped(note.text, "     ! ")
 
 
 def _node(node: PathNode) -> str:

@@ -30,9 +30,7 @@ def history(
     ascii: Annotated[bool, typer.Option("--ascii", help="Draw trends without block characters.")] = False,
     card: Annotated[
         Path | None,
-        typer.Option(
-            "--card", metavar="FOLDER", help="Write the verified fixes into a file beside this profile's card."
-        ),
+        typer.Option("--card", metavar="FOLDER", help="Write this profile's verified fixes beside its card."),
     ] = None,
     out: Out = None,
 ) -> None:

@@ -56,9 +56,9 @@ class CausesPage(DiagnosisPage):
         if one.cause is None:
             assert one.hypothesis is not None
             return hypothesis_item(one.hypothesis, self._finding(one.hypothesis))
-        aside, evidence = self.session.dismissed.get(one.cause.option.name), self.session.diagnosis.run.evidence
+        aside = self.session.dismissed.get(one.cause.option.name)
         share = None if one.hypothesis is None else one.hypothesis.probability
-        return cause_item(one.cause, share, aside, evidence, self.glyphs)
+        return cause_item(one.cause, share, aside, self.glyphs)
 
     def _finding(self, hypothesis: Hypothesis) -> Finding | None:
         """The finding that an explanation is named after."""

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from textual.content import Content
 
 from care_core.diagnose.records import Cause, Diagnosis, ObjectiveResult, PathNode
-from care_core.run import Evidence
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.render.fix import prediction
@@ -36,9 +35,7 @@ FEW_RESAMPLES = 0.5
 """Edges that fewer bootstrap resamples hold are flagged."""
 
 
-def cause_item(
-    cause: Cause, share: float | None, dismissed: str | None, evidence: Sequence[Evidence], glyphs: Glyphs
-) -> tuple[Content, Content]:
+def cause_item(cause: Cause, share: float | None, dismissed: str | None, glyphs: Glyphs) -> tuple[Content, Content]:
     """One cause of the ranked list: the option with its change, then what it is worth, with its caveats beside it.
 
     `share` is its probability beside whatever else may explain the failure, None where nothing else was weighed.
@@ -59,17 +56,16 @@ def cause_item(
     if cause.is_lead:  # its one caveat is that it is no more than a lead
         return head, Content(below + ", ".join(worth))
     worth.append(f"costs {percent(cause.contribution)}")
-    caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause, evidence))
+    caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
     return head, Content(below + ", ".join(worth) + caveats)
 
 
-def caveats_of(cause: Cause, evidence: Sequence[Evidence]) -> tuple[str, ...]:
+def caveats_of(cause: Cause) -> tuple[str, ...]:
     """What weakens a cause; a value outside the training support is always said, what the log says stands apart."""
-    said = [part.text for part in evidence if cause.option.name in part.options]
-    notes = tuple(note for note in cause.notes if not any(text in note for text in said))
-    if cause.in_support or any("support" in note for note in notes):
-        return notes
-    return ("outside the training support", *notes)
+    notes = tuple(note for note in cause.notes if note.kind != "in_the_log")
+    texts = tuple(note.text for note in notes)
+    is_said = any(note.kind == "outside_training" for note in notes)
+    return texts if cause.in_support or is_said else ("outside the training support", *texts)
 
 
 def path_rows(cause: Cause, objective: ObjectiveResult, glyphs: Glyphs) -> list[Row]:
@@ -128,7 +124,7 @@ def cause_detail(
     rows.append(labelled("Confidence", f"{cause.confidence}{gain}"))
     said = [part.text + meaning(part) for part in evidence if option.name in part.options]
     rows += [labelled("" if place else "The log says", line) for place, line in enumerate(said)]
-    rows += [warning("Caveat", note) for note in caveats_of(cause, evidence)]
+    rows += [warning("Caveat", note) for note in caveats_of(cause)]
     if not cause.is_lead:
         rows.append(labelled("Contribution", f"costs {percent(cause.contribution)} of this run's odds of no fault"))
         rows += _runner_up(cause, rivals)

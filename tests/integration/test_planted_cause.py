@@ -148,7 +148,7 @@ def test_a_pinned_option_stays_and_is_still_named(planted: Profile) -> None:
     pinned = next(c for c in diagnosis.faults[0].causes if c.option.name == "speed")
     assert pinned.suggested is None
     assert pinned.p_fixed is None
-    assert any("--keep" in note for note in pinned.notes)
+    assert any("--keep" in note.text for note in pinned.notes)
 
 
 def test_with_the_only_cause_pinned_the_engine_abstains(planted: Profile) -> None:
@@ -241,7 +241,7 @@ def test_a_value_outside_the_support_lowers_the_confidence(planted: Profile) -> 
     assert cause.option.name == "reserve"
     assert not cause.in_support
     assert cause.confidence == "low"
-    assert any("support" in note for note in cause.notes)
+    assert any(note.kind == "outside_training" for note in cause.notes)
 
 
 def test_options_that_no_source_holds_are_assumed_and_said_so(planted: Profile) -> None:

@@ -13,6 +13,7 @@ from care_core.diagnose.records import (
     Fault,
     Fix,
     Hypothesis,
+    Note,
     ObjectiveResult,
     PathNode,
     Prediction,
@@ -126,7 +127,7 @@ FLIES_SLOWLY = Cause(
     p_fixed=0.02,
     confidence="low",
     in_support=True,
-    notes=("edge seen in few resamples",),
+    notes=(Note("edge seen in few resamples"),),
 )
 SWITCHED = replace(
     FLIES_SLOWLY,

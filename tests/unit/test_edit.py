@@ -8,7 +8,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from care_core.configs.compare import Side, compare, same_value
+from care_core.configs.compare import Side, compare
+from care_core.configs.driven import same_value
 from care_core.configs.edit import Wanted, apply_changes
 from care_core.configs.loading import read_config
 from care_core.errors import ConfigError

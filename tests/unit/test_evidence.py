@@ -100,7 +100,7 @@ def test_a_refusing_check_puts_its_option_first_and_is_quoted(planted: Profile) 
     (fault,) = diagnosis.faults
     assert refused_by(run) == {"min_sats"}
     assert fault.causes[0].option.name == "min_sats"
-    assert any("too few satellites" in note for note in fault.causes[0].notes)
+    assert any("too few satellites" in note.text for note in fault.causes[0].notes)
 
 
 def test_a_refusing_check_names_an_option_that_the_model_knows_nothing_of(planted: Profile) -> None:

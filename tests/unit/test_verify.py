@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
+from care_core.configs.driven import same_value
 from care_core.diagnose.judging import judge
-from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, same, verify
+from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, verify
 from care_core.errors import ConfigError
 from care_core.report.document import build_document
 from care_core.report.reading import read_report
@@ -134,7 +135,7 @@ def test_an_option_of_two_keys_is_made_when_both_are() -> None:
 def test_a_value_is_the_same_after_a_trip_through_32_bits(value: float) -> None:
     import numpy as np
 
-    assert same(value, float(np.float32(value))) or abs(value) < 1e-9
+    assert same_value(value, float(np.float32(value))) or abs(value) < 1e-9
 
 
 # Reports on disk
