@@ -234,31 +234,38 @@ class Flight:
 
     @cached_property
     def lost_control_s(self) -> float | None:
-        """When a copter in the air stopped following its attitude demand for good: it never came back within limits
-        before the end, the ground, or the disarming."""
+        """When a copter in the air, or about to lift, stopped following its attitude demand for good: it never came
+        back within limits before the end, the ground, or the disarming."""
         if not self.is_copter or self.lean_error is None or self.tilt is None:
             return None
         t, error = self.lean_error
-        far = (error > _OUT_OF_CONTROL_DEG) | (self.tilt[1] > _OVER_DEG)
-        far &= self.during(self.armed, t)
-        if self.throttle is not None:
-            far &= np.interp(t, *self.throttle) > _LIFTING
-        if self.modes:
-            codes = np.array([mode for _, mode in self.modes])
-            at = np.searchsorted([s for s, _ in self.modes], t, side="right") - 1
-            far &= ~(np.isin(codes[np.maximum(at, 0)], tuple(_ACRO)) & (at >= 0))
+        off = (error > _OUT_OF_CONTROL_DEG) | (self.tilt[1] > _OVER_DEG)
         up = self.airborne
-        far &= self.during(((start - 1.0, end) for start, end in up), t) | (t < (up[0][0] if up else math.inf))
-        held = (error < _HELD_DEG) & self.during(up, t)
-        for start, end in runs(t, far):
-            back = runs(t, held & (t > end), gap_s=0.5)
-            rest = held[(t > end) & self.during(up, t)]
-            went_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
-            came_back = went_on or any(b - a > _BACK_S for a, b in back)
-            stays = far[(t >= start) & (t <= start + _CRASH_CHECK_S)].mean() > 0.6  # else it swings
-            if (end - start >= 0.5 or end >= t[-1] - 2.0) and stays and not came_back:
+        before_flight = t < (up[0][0] if up else math.inf)
+        matters = self.during(((start - 1.0, end) for start, end in up), t) | before_flight
+        flying = self.during(up, t)
+        held = (error < _HELD_DEG) & flying
+        back = runs(t, held, gap_s=0.5)
+        for start, end in runs(t, off & matters & self._is_driven(t)):
+            stays = off[(t >= start) & (t <= start + _CRASH_CHECK_S)].mean() > 0.6  # else it swings
+            if not stays or (end - start < 0.5 and end < t[-1] - 2.0 and end < self.armed[-1][1] - 2.0):
+                continue
+            rest = held[flying & (t > end)]
+            flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
+            if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
                 return start
         return None
+
+    def _is_driven(self, t: Floats) -> Mask:
+        """Where the motors were to lift it, in a mode in which not every attitude is meant."""
+        driven = self.during(self.armed, t)
+        if self.throttle is not None:
+            driven &= np.interp(t, *self.throttle) > _LIFTING
+        if self.modes:
+            codes = np.array([mode for _, mode in self.modes])
+            at = np.searchsorted([start for start, _ in self.modes], t, side="right") - 1
+            driven &= ~(np.isin(codes[np.maximum(at, 0)], tuple(_ACRO)) & (at >= 0))
+        return driven
 
     @cached_property
     def impact_s(self) -> float | None:

@@ -69,7 +69,7 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
         return
     t = fixed.t
     off, dt = _unexplained(fixed)
-    limit = JUMP_M + 0.5 * ACCELERATION * np.minimum(dt, 1.0) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
+    limit = JUMP_M + 0.25 * ACCELERATION * np.minimum(dt, 1.5) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
     limit = np.maximum(limit, _TIMES_USUAL * float(np.quantile(off, 0.9)))  # a velocity that never fits tells nothing
     beyond = np.flatnonzero((off > limit) & (dt < 3.0) & (dt > 0.01))
     if not len(beyond):

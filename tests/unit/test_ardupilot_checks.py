@@ -1,0 +1,437 @@
+"""Each health check on a made flight: silent where nothing fails, at any rate; what fails is named with its onset."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from care_core.health.ardupilot import find
+from care_core.health.ardupilot.checks import CHECKS
+from care_core.health.ardupilot.flight import Flight, runs
+from care_core.health.ardupilot.signals import expanded, instances
+from care_core.health.records import Finding
+from care_core.logs.base import Table
+from care_core.run import Setting
+from tests.flights import ARMED_S, DOWN_S, END_S, UP_S, Made
+
+RATES = (0.5, 1.0, 2.5, 10.0, 50.0)
+FAILS_S = 50.0
+METRE = 1 / 111319.5
+
+
+def first(made: Made) -> Finding:
+    findings = made.find()
+    assert findings, "nothing was found"
+    return findings[0]
+
+
+@pytest.mark.parametrize("rate_hz", RATES)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_healthy_flight_is_silent(rate_hz: float, seed: int) -> None:
+    assert Made(rate_hz, seed).find() == ()
+
+
+def test_the_course_of_a_flight() -> None:
+    flight = Made().flight()
+    assert flight.armed == ((ARMED_S, DOWN_S + 5),)
+    (span,) = flight.airborne
+    assert span == pytest.approx((UP_S + 0.5, DOWN_S - 1.0), abs=0.6)
+    assert flight.lost_control_s is None
+    assert flight.impact_s is None
+
+
+@pytest.mark.parametrize("rate_hz", RATES)
+def test_a_weak_motor_is_named(rate_hz: float) -> None:
+    made = Made(rate_hz)
+    made.table["RCOU"]["C3"][made.after(FAILS_S, DOWN_S)] += 250
+    finding = first(made)
+    assert (finding.kind, finding.title) == ("motor", "motor 3 (front left) lost thrust")
+    assert finding.onset_s == pytest.approx(FAILS_S, abs=2.0 + 1 / rate_hz)
+    assert finding.probability > 0.9
+
+
+def test_an_uneven_load_moves_motors_in_pairs_and_is_no_lost_motor() -> None:
+    made = Made()
+    for output in ("C1", "C3"):
+        made.table["RCOU"][output][made.after(UP_S, DOWN_S)] += 120
+    assert made.find() == ()
+
+
+def test_a_motor_that_is_up_now_and_then_is_not_weak() -> None:
+    made = Made()
+    for start in range(30, 90, 12):
+        made.table["RCOU"]["C2"][made.after(start, start + 5)] += 300
+    assert not [one for one in made.find() if one.kind == "motor"]
+
+
+def falling(made: Made, roll: float, pitch: float) -> None:
+    """Control is lost at FAILS_S: it falls to one side within a second, then to the ground, and stays there."""
+    t, lost = made.t, made.after(FAILS_S)
+    grow = np.clip((t - FAILS_S) / 0.5, 0, 1)[lost]
+    made.table["ATT"]["Roll"][lost] = roll * grow
+    made.table["ATT"]["Pitch"][lost] = pitch * grow
+    ground = np.clip(12.0 - 5 * np.maximum(t - FAILS_S, 0) ** 2, 0, None)
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[name][field][lost] = ground[lost]
+    made.rows["ERR"] = [(FAILS_S + 4.0, {"Subsys": 12.0, "ECode": 1.0})]
+    made.rows["ARM"][1] = (FAILS_S + 4.0, {"ArmState": 0.0, "Forced": 0.0})
+
+
+def test_a_motor_that_stops_leads_the_crash_it_makes() -> None:
+    made = Made()
+    falling(made, -60.0, 40.0)  # to the rear left, where motor 2 is
+    lost = made.after(FAILS_S, FAILS_S + 2)
+    made.table["RCOU"]["C2"][lost] = 1950
+    made.table["RCOU"]["C1"][lost] = 1100
+    finding = first(made)
+    assert finding.title == "motor 2 (rear left) gave no thrust"
+    assert finding.onset_s == pytest.approx(FAILS_S, abs=1.0)
+    assert {"attitude", "crash"} <= {one.kind for one in finding.consequences}
+
+
+def test_an_impact_is_after_the_loss_of_control_and_what_follows_it_is_marked() -> None:
+    made = Made()
+    falling(made, -60.0, 40.0)
+    made.rows["MSG"].append((FAILS_S + 10, {"Message": "Battery 1 failsafe"}))
+    flight = made.flight()
+    assert flight.lost_control_s == pytest.approx(FAILS_S + 0.3, abs=0.4)
+    assert flight.impact_s is not None
+    assert flight.lost_control_s is not None
+    assert flight.lost_control_s < flight.impact_s <= FAILS_S + 2.5
+    assert all(one.after_impact for one in made.find() if one.onset_s > flight.impact_s)
+
+
+def test_a_stopped_controller_is_told_by_its_speed() -> None:
+    made = Made()
+    t = made.t
+    rpm = np.where(np.repeat(t, 4) > UP_S, 5000.0, 0.0)
+    rpm[(np.repeat(t, 4) > FAILS_S) & (np.tile(np.arange(4), len(t)) == 3)] = 0.0
+    tables = {**made.tables(), "ESC": Table(np.repeat(t, 4), {"Instance": np.tile(np.arange(4.0), len(t)), "RPM": rpm})}
+    flight = made.flight()
+    finding = find(Flight(tables, flight.settings, flight.facts, END_S))[0]
+    assert finding.title == "motor 4 (rear right) stopped"
+
+
+@pytest.mark.parametrize("rate_hz", RATES)
+def test_vibration(rate_hz: float) -> None:
+    made = Made(rate_hz)
+    for number in ("", "#2"):
+        made.table[f"VIBE{number}"]["VibeZ"][made.after(FAILS_S, DOWN_S)] = 45.0
+    finding = first(made)
+    assert (finding.kind, finding.severity) == ("vibration", "warning")
+    assert finding.onset_s == pytest.approx(FAILS_S, abs=2.0 + 1 / rate_hz)
+
+
+def test_vibration_that_upsets_the_estimator_is_critical() -> None:
+    made = Made()
+    made.table["VIBE"]["VibeZ"][made.after(FAILS_S, DOWN_S)] = 45.0
+    made.table["XKF4"]["SV"][made.after(FAILS_S + 5, DOWN_S)] = 1.5
+    finding = first(made)
+    assert (finding.kind, finding.severity) == ("vibration", "critical")
+    assert [one.kind for one in finding.consequences] == ["estimator"]
+
+
+def test_clipping() -> None:
+    made = Made()
+    made.table["VIBE"]["Clip"] = np.where(made.t > FAILS_S, (made.t - FAILS_S) * 10, 0.0)
+    assert "clips" in first(made).evidence
+
+
+@pytest.mark.parametrize("rate_hz", RATES)
+@pytest.mark.parametrize("metres", [9.0, 25.0])
+def test_a_gps_jump(rate_hz: float, metres: float) -> None:
+    made = Made(rate_hz)
+    made.table["GPS"]["Lat"][made.after(FAILS_S)] += metres * METRE
+    if rate_hz < 1 and metres < 10:  # in two seconds a vehicle could have moved so far
+        pytest.skip("too few records")
+    finding = first(made)
+    assert finding.kind == "gps"
+    assert finding.onset_s == pytest.approx(FAILS_S, abs=1 / rate_hz + 0.1)
+
+
+def test_a_receiver_whose_velocity_never_fits_tells_of_no_jump() -> None:
+    made = Made()
+    made.table["GPS"]["Lat"] += made.noise(6.0) * METRE
+    assert not [one for one in made.find() if "jumps" in one.title]
+
+
+def test_few_satellites() -> None:
+    made = Made()
+    made.table["GPS"]["NSats"][made.after(FAILS_S)] = 5
+    finding = first(made)
+    assert (finding.kind, finding.title) == ("gps", "only 5 satellites")
+    assert finding.onset_s == pytest.approx(FAILS_S, abs=0.2)
+
+
+def test_a_fix_lost_in_the_air_counts_and_one_lost_before_arming_does_not() -> None:
+    made = Made()
+    made.table["GPS"]["Status"][made.after(0.0, 3.0)] = 0
+    assert made.find() == ()
+    made.table["GPS"]["Status"][made.after(FAILS_S, FAILS_S + 20)] = 1
+    assert (first(made).kind, first(made).severity) == ("gps", "critical")
+
+
+@pytest.mark.parametrize("rate_hz", RATES)
+def test_a_compass_that_goes_off(rate_hz: float) -> None:
+    made = Made(rate_hz)
+    made.table["MAG"]["MagX"][made.after(FAILS_S)] += 260
+    made.table["XKF4"]["SM"][made.after(FAILS_S + 2)] = 1.6
+    finding = first(made)
+    assert (finding.kind, finding.title, finding.severity) == ("compass", "compass 1 is disturbed", "critical")
+    assert finding.onset_s == pytest.approx(FAILS_S, abs=3.0)
+
+
+def test_a_compass_that_is_not_used_is_nobodys_business() -> None:
+    made = Made()
+    made.table["MAG#2"]["MagX"][made.after(FAILS_S)] += 260
+    made.settings["COMPASS_USE2"] = 0
+    assert made.find() == ()
+
+
+def test_motors_that_disturb_a_compass() -> None:
+    made = Made()
+    for number in ("", "#2"):
+        made.table[f"MAG{number}"]["MagZ"] += 700 * made.table["CTUN"]["ThO"]
+    assert first(made).title == "the motors' currents disturb the compass"
+
+
+def test_a_dead_compass() -> None:
+    made = Made()
+    for axis in "XYZ":
+        made.table["MAG"][f"Mag{axis}"][made.after(FAILS_S)] = 0.0
+    assert first(made).title == "the compass reads nothing"
+
+
+def test_a_refusal_that_names_the_compass_is_the_compass() -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    made.rows["MSG"] = [(t, {"Message": f"Arm: Check mag field (xy diff:{180 + t:.0f}>100)"}) for t in range(5, 105, 5)]
+    finding = first(made)
+    assert (finding.kind, finding.severity) == ("compass", "critical")
+    assert [one.kind for one in finding.consequences] == ["prearm"]
+
+
+def test_a_refusal_is_told_by_its_words() -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    words = ["Arm: Gyros inconsistent"] * 3 + ["Arm: Check ANGLE_MAX"] * 20
+    made.rows["MSG"] = [(5.0 * n, {"Message": text}) for n, text in enumerate(words)]
+    finding = first(made)
+    assert (finding.kind, finding.title) == ("prearm", "arming was refused: Check ANGLE_MAX")
+
+
+@pytest.mark.parametrize("rate_hz", RATES[1:])
+def test_a_noisy_barometer(rate_hz: float) -> None:
+    made = Made(rate_hz)
+    bad = made.after(FAILS_S)
+    made.table["BARO"]["Alt"][bad] += made.noise(1.5)[bad]
+    finding = first(made)
+    assert finding.kind == "barometer"
+    assert finding.onset_s == pytest.approx(FAILS_S, abs=6.0)
+
+
+def test_a_drifting_barometer_is_told_by_the_second_one() -> None:
+    made = Made()
+    made.table["BARO"]["Alt"] += np.maximum(made.t - FAILS_S, 0) * 0.2
+    finding = first(made)
+    assert finding.kind == "barometer"
+    assert finding.onset_s == pytest.approx(FAILS_S + 15, abs=3.0)
+
+
+@pytest.mark.parametrize("rate_hz", RATES)
+def test_noisy_gyros_are_told_from_an_oscillation(rate_hz: float) -> None:
+    made = Made(rate_hz)
+    bad = made.after(FAILS_S)
+    for axis in "XYZ":
+        made.table["IMU"][f"Gyr{axis}"][bad] += np.radians(made.noise(8.0)[bad])
+    finding = first(made)
+    assert (finding.kind, finding.title) == ("imu", "the gyros are noisy")
+    assert finding.onset_s == pytest.approx(FAILS_S, abs=5.0 + 4 / rate_hz)
+    swinging = Made(rate_hz)
+    swing = np.radians(120 * np.sin(2 * np.pi * 4.3 * swinging.t))
+    swinging.table["IMU"]["GyrX"] += swing
+    swinging.table["IMU#2"]["GyrX"] += 0.95 * swing
+    assert not [one for one in swinging.find() if one.kind == "imu"]
+
+
+def test_a_failed_gyro() -> None:
+    made = Made()
+    made.table["IMU"]["GH"][made.after(FAILS_S)] = 0
+    assert first(made).title == "gyro 1 failed"
+
+
+def test_a_battery_that_was_not_charged() -> None:
+    made = Made()
+    made.table["BAT"]["Volt"] -= 1.5
+    finding = first(made)
+    assert (finding.kind, finding.title, finding.severity) == ("battery", "the battery was not charged", "warning")
+    assert "3 cells" in finding.evidence
+    made.rows["ERR"] = [(40.0, {"Subsys": 6.0, "ECode": 1.0})]
+    assert first(made).severity == "critical"
+
+
+def test_a_failsafe_above_what_a_battery_needs_is_a_parameter() -> None:
+    made = Made()
+    made.settings["BATT_LOW_VOLT"] = 11.9
+    made.rows["ERR"] = [(40.0, {"Subsys": 6.0, "ECode": 1.0})]
+    finding = first(made)
+    assert (finding.kind, finding.suspect) == ("battery", "parameter")
+    assert "BATT_LOW_VOLT=11.9" in finding.evidence
+
+
+def test_a_sagging_battery() -> None:
+    made = Made()
+    made.table["BAT"]["Volt"][made.after(FAILS_S, DOWN_S)] = 8.7
+    assert first(made).title == "the battery sags under its load"
+    assert first(made).severity == "critical"
+
+
+def test_a_board_that_loses_its_supply() -> None:
+    made = Made()
+    made.table["POWR"]["Vcc"][made.after(FAILS_S, FAILS_S + 3)] = 4.1
+    assert first(made).title == "the autopilot's own supply dips"
+
+
+def test_a_monitor_that_does_not_move() -> None:
+    made = Made()
+    made.table["BAT"]["Volt"][:] = 12.0
+    assert (first(made).kind, first(made).severity) == ("battery", "info")
+
+
+def test_too_little_thrust_and_an_option_that_keeps_it_down() -> None:
+    made = Made()
+    high = made.after(30.0, DOWN_S)
+    made.table["CTUN"]["ThO"][high] = 0.98
+    made.table["CTUN"]["Alt"][high] -= 6.0
+    finding = first(made)
+    assert (finding.kind, finding.severity, finding.suspect) == ("thrust", "critical", "hardware")
+    made.settings["MOT_SPIN_MAX"] = 0.6
+    assert first(made).suspect == "parameter"
+
+
+def test_a_radio_that_comes_back_at_once_explains_little() -> None:
+    made = Made()
+    made.rows["ERR"] = [(50.0, {"Subsys": 5.0, "ECode": 1.0}), (50.2, {"Subsys": 5.0, "ECode": 0.0})]
+    assert (first(made).kind, first(made).severity) == ("radio", "warning")
+    made.rows["ERR"][1] = (80.0, {"Subsys": 5.0, "ECode": 0.0})
+    assert first(made).severity == "critical"
+
+
+def test_an_oscillation_is_a_parameter() -> None:
+    made = Made()
+    t = made.t
+    swing = np.where(made.after(30.0, 90.0), 120 * np.sin(2 * np.pi * 3.1 * t), 0.0)
+    made.table["RATE"] = {"R": swing, "P": made.noise(1), "RDes": made.noise(2), "PDes": made.noise(2)}
+    finding = first(made)
+    assert (finding.kind, finding.title, finding.suspect) == ("tuning", "roll oscillates", "parameter")
+
+
+def test_an_attitude_that_does_not_follow() -> None:
+    made = Made()
+    made.table["ATT"]["DesRoll"][made.after(FAILS_S, FAILS_S + 5)] += 22
+    assert first(made).title == "the attitude does not follow its demand"
+
+
+def test_a_tip_over_at_take_off() -> None:
+    made = Made()
+    made.table["POS"]["RelHomeAlt"][:] = 0.1
+    made.table["CTUN"]["Alt"][:] = made.table["CTUN"]["BAlt"][:] = 0.1 + made.noise(0.05)
+    made.table["ATT"]["Roll"][made.after(UP_S + 1)] = 85.0
+    made.rows["ERR"] = [(UP_S + 4, {"Subsys": 12.0, "ECode": 1.0})]
+    assert first(made).kind == "takeoff"
+
+
+def test_a_descent_into_the_ground_by_the_stick_is_no_failure() -> None:
+    made = Made()
+    made.rows["ERR"] = [(DOWN_S, {"Subsys": 12.0, "ECode": 1.0})]
+    made.table["RCIN"] = {"C3": np.where(made.t > DOWN_S - 12, 1000.0, 1500.0)}
+    finding = first(made)
+    assert (finding.kind, finding.suspect) == ("crash", "operation")
+
+
+def test_a_log_that_ends_in_the_air_and_one_with_a_hole() -> None:
+    made = Made()
+    made.rows["ARM"].pop()
+    tables = {name: table.between(0.0, 70.0) for name, table in made.tables().items()}
+    flight = made.flight()
+    (finding,) = find(Flight(tables, flight.settings, flight.facts, 70.0))
+    assert (finding.kind, finding.title, finding.severity) == ("log", "the log ends in the air", "warning")
+    holed = {name: table.where((table.t < 40) | (table.t > 48)) for name, table in Made().tables().items()}
+    (finding,) = find(Flight(holed, flight.settings, flight.facts, END_S))
+    assert finding.title == "the log has 1 hole"
+
+
+def test_an_overloaded_autopilot() -> None:
+    made = Made()
+    made.table["PM"]["NLon"][made.after(FAILS_S)] = 1500
+    assert first(made).kind == "cpu"
+
+
+def test_parameters_changed_in_the_air() -> None:
+    made = Made()
+    flight = made.flight()
+    changed = {**flight.settings, "ATC_RAT_RLL_P": (
+        Setting("ATC_RAT_RLL_P", 0.135, "PARM"), Setting("ATC_RAT_RLL_P", 0.4, "PARM", changed_at_s=60.0),
+    )}  # fmt: skip
+    (finding,) = find(Flight(made.tables(), changed, flight.facts, END_S))
+    assert (finding.title, finding.severity) == ("parameters were changed in the air", "info")
+
+
+def test_old_names_and_units_are_read() -> None:
+    t = np.arange(5.0)
+    old = {
+        "CURR": Table(t, {"Volt": np.full(5, 1153.0), "Curr": np.full(5, 297.0)}),
+        "CTUN": Table(t, {"ThrOut": np.full(5, 730.0), "BarAlt": t}),
+        "MOT": Table(t, {"Mot1": np.full(5, 1500.0)}),
+        "MAG2": Table(t, {"MagX": t}),
+        "MAG": Table(t, {"MagX": t}),
+    }
+    assert instances(old, "BAT")[0]["Volt"][0] == pytest.approx(11.53)
+    assert instances(old, "CTUN")[0]["ThO"][0] == pytest.approx(0.73)
+    assert instances(old, "RCOU")[0]["C1"][0] == 1500
+    assert len(instances(old, "MAG")) == 2
+    assert {"ThrOut", "ThO"} <= set(expanded({"CTUN": ("ThO",)})["CTUN"])
+
+
+def test_spans_of_a_mask() -> None:
+    t = np.arange(10.0)
+    mask = np.isin(t, [1, 2, 4, 8])
+    assert runs(t, mask) == [(1.0, 2.0), (4.0, 4.0), (8.0, 8.0)]
+    assert runs(t, mask, gap_s=2.0) == [(1.0, 4.0), (8.0, 8.0)]
+    assert runs(t, t < 0) == []
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    drop=st.lists(st.sampled_from(sorted(Made(0.5).tables())), max_size=12),
+    keep_rows=st.integers(0, 6),
+    damage=st.sampled_from(["none", "nan", "constant", "short", "huge"]),
+    which=st.sampled_from(sorted(Made(0.5).tables())),
+)
+def test_whatever_is_missing_or_broken_nothing_is_raised(
+    drop: list[str], keep_rows: int, damage: str, which: str
+) -> None:
+    made = Made(2.5)
+    tables = {name: table for name, table in made.tables().items() if name not in drop}
+    if which in tables:
+        table = tables[which]
+        if damage == "short":
+            tables[which] = table.where(slice(0, keep_rows))
+        elif damage in ("nan", "constant", "huge"):
+            value = {"nan": np.nan, "constant": 1.0, "huge": 1e30}[damage]
+            broken = {f: c if c.dtype == object else np.full(len(c), value) for f, c in table.columns.items()}
+            tables[which] = Table(table.t, broken)
+    flight = made.flight()
+    for facts in (flight.facts, {}, {"firmware": "ArduRover V4.5.4", "vehicle": "rover"}):
+        for finding in find(Flight(tables, flight.settings if keep_rows else {}, facts, END_S)):
+            assert 0.0 <= finding.probability <= 1.0
+            assert np.isfinite(finding.onset_s)
+
+
+def test_every_check_says_what_it_reads() -> None:
+    for check in CHECKS:
+        assert all(isinstance(fields, tuple) for fields in check.READS.values())
