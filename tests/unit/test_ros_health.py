@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from care_core.health.records import Health
@@ -11,7 +12,7 @@ from care_core.health.ros.examining import examine
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 from tests.ros_drives import ABORTED, FAILS_AT_S, SUCCEEDED, Drive
-from tests.ros_samples import START_NS, McapFile, write_db3, write_mcap
+from tests.ros_samples import ROS2, START_NS, McapFile, cdr, random_message, write_db3, write_mcap
 
 WARN, ERROR, FATAL = 30, 40, 50
 
@@ -130,3 +131,32 @@ def test_times_and_samples_of_a_recording(tmp_path: Path) -> None:
     assert times[1] - times[0] == pytest.approx(0.2)
     few = log.read({"/front/scan": ("range_max",)}, {"/front/scan": 50})["/front/scan"]
     assert few.t.tolist() == times[::4].tolist()
+
+
+KINDS_READ = (
+    "nav_msgs/msg/Odometry", "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped", "sensor_msgs/msg/LaserScan",
+    "sensor_msgs/msg/BatteryState", "sensor_msgs/msg/Imu", "rcl_interfaces/msg/Log", "tf2_msgs/msg/TFMessage",
+    "diagnostic_msgs/msg/DiagnosticArray", "action_msgs/msg/GoalStatusArray", "lifecycle_msgs/msg/TransitionEvent",
+)  # fmt: skip
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+@pytest.mark.parametrize("seed", range(12))
+def test_whatever_messages_hold_a_look_at_them_succeeds(seed: int, tmp_path: Path) -> None:
+    rng = np.random.default_rng(seed)
+    with McapFile(tmp_path / "random.mcap") as log:
+        for row in range(240):
+            for kind in KINDS_READ:
+                if rng.random() < 0.5:
+                    topic = (
+                        "/cmd_vel"
+                        if kind.endswith("/Twist")
+                        else "/a/_action/status"
+                        if "Status" in kind
+                        else f"/{kind}"
+                    )
+                    when = START_NS + row * 50_000_000 + int(rng.integers(0, 20_000_000))
+                    log.add(topic, kind, when, cdr(random_message(ROS2, kind, rng)))
+    health = examine(open_log(tmp_path / "random.mcap"))
+    assert all(one.title and one.evidence for one in health.findings)
+    assert len(health.account) <= 60

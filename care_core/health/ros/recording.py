@@ -28,6 +28,9 @@ _ROS2_LEVELS = {10: 1, 20: 2, 30: WARN, 40: ERROR, 50: FATAL}
 OPEN_S = 30.0
 """A goal without an answer for longer than this at the end of a recording was not being reached."""
 
+FAR_M, FAST, VOLTS = 1e7, 1e3, 1e4
+"""Positions (UTM northings reach 1e7 m), speeds in m/s and rad/s, volts and amperes beyond which none are."""
+
 STREAM_MESSAGES, STEADY = 10, 3.0
 """A stream has so many messages, and nine in ten of its pauses are below so many times the usual one."""
 
@@ -209,9 +212,16 @@ def _plainness(topic: str, name: str) -> tuple[bool, int, str]:
     return topic.rpartition("/")[2] != name, topic.count("/"), topic
 
 
+def believable(column: NDArray[Any], most: float) -> Floats:
+    """A column of numbers with nan for what is larger than anything of its kind can be: a damaged one."""
+    values = np.asarray(column, np.float64)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.abs(values) <= most, values, np.nan)
+
+
 def yaw_of(table: Table, prefix: str) -> Floats:
     """Heading of a unit quaternion, rad."""
-    x, y, z, w = (np.asarray(table[f"{prefix}.{axis}"], np.float64) for axis in "xyzw")
+    x, y, z, w = (believable(table[f"{prefix}.{axis}"], 2.0) for axis in "xyzw")
     yaw: Floats = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return yaw
 
@@ -219,9 +229,9 @@ def yaw_of(table: Table, prefix: str) -> Floats:
 def _odometry(topic: str, table: Table) -> Odometry | None:
     if not set(plan.FIELDS[plan.ODOMETRY]) <= set(table.columns) or len(table) < 3:
         return None
-    x, y = table["pose.pose.position.x"], table["pose.pose.position.y"]
-    speed, sideways = table["twist.twist.linear.x"], table["twist.twist.linear.y"]
-    turn, yaw = table["twist.twist.angular.z"], yaw_of(table, "pose.pose.orientation")
+    x, y = (believable(table[f"pose.pose.position.{axis}"], FAR_M) for axis in "xy")
+    speed, sideways = (believable(table[f"twist.twist.linear.{axis}"], FAST) for axis in "xy")
+    turn, yaw = believable(table["twist.twist.angular.z"], FAST), yaw_of(table, "pose.pose.orientation")
     t = _when(table)
     good = np.isfinite(x + y + speed + sideways + turn + yaw + t)
     good[1:] &= np.diff(t) > 0
@@ -257,7 +267,7 @@ def _commands(topic: str, table: Table) -> Commands | None:
     names = [f"{prefix}{name}" for name in plan.FIELDS[plan.TWIST]]
     if not set(names) <= set(table.columns):
         return None
-    columns = [np.asarray(table[name], np.float64) for name in names]
+    columns = [believable(table[name], FAST) for name in names]
     good = np.isfinite(sum(columns))
     return Commands(topic, table.t[good], *(column[good] for column in columns)) if good.any() else None
 
@@ -274,10 +284,12 @@ def _scans(topic: str, table: Table) -> Scans | None:
     raw = table["ranges"][good]
     ranges = np.stack(list(raw)).astype(np.float32)
     low, high = float(np.median(table["range_min"])), float(np.median(table["range_max"]))
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         # A range beyond its limits is none (REP 117); some drivers give the highest one for no return.
         ranges[~((ranges >= low) & (ranges < high * (1 - 1e-6)))] = np.nan
-    first, step = float(table["angle_min"][good][0]), float(table["angle_increment"][good][0])
+    first, step = (float(believable(table[name], FAR_M)[good][0]) for name in ("angle_min", "angle_increment"))
+    if not np.isfinite(first + step):
+        return None
     angles: Floats = first + np.arange(rays, dtype=np.float64) * step
     return Scans(topic, _when(table)[good], ranges, angles, raw, high)
 
@@ -286,15 +298,15 @@ def _battery(topic: str, table: Table) -> Battery | None:
     """A battery whose voltage is one: finite, positive and not ever the same."""
     if not {"voltage", "current"} <= set(table.columns):
         return None
-    voltage = np.asarray(table["voltage"], np.float64)
-    current = np.asarray(table["current"], np.float64)
+    voltage, current = believable(table["voltage"], VOLTS), believable(table["current"], VOLTS)
     good = np.isfinite(voltage)
     alive = np.count_nonzero(good) >= 5 and float(voltage[good].min()) >= 0 and float(voltage[good].max()) > 2
     if not alive or np.ptp(voltage[good]) == 0:
         return None
     drawn = current[good]
     # sensor_msgs/BatteryState says negative when discharging; many drivers give the magnitude.
-    drawn = -drawn if np.nanmedian(drawn) < 0 else drawn
+    measured = drawn[np.isfinite(drawn)]
+    drawn = -drawn if len(measured) and np.median(measured) < 0 else drawn
     return Battery(topic, table.t[good], voltage[good], drawn)
 
 

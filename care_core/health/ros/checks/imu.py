@@ -8,11 +8,12 @@ import numpy as np
 
 from care_core.health.records import Finding
 from care_core.health.ros import plan
-from care_core.health.ros.recording import Floats, Recording
+from care_core.health.ros.recording import Floats, Recording, believable
 from care_core.logs.base import Table
 
 SHOCK_MPS2 = 25.0
 """Beyond gravity. Kerbs and rough ground give a wheeled robot 5 to 15 m/s^2; a collision gives tens."""
+HARDEST_MPS2 = 1e4
 TIP_DEG = 30.0
 """Slope that wheeled robots are built to climb at most (Husky A200: 45 deg at most, 30 deg across)."""
 _GRAVITY = (7.8, 11.8)
@@ -28,7 +29,7 @@ def check(recording: Recording) -> Iterator[Finding]:
 
 
 def _felt(recording: Recording, topic: str, table: Table) -> Iterator[Finding]:
-    felt = np.sqrt(sum(np.asarray(table[f"linear_acceleration.{axis}"], np.float64) ** 2 for axis in "xyz"))
+    felt = np.sqrt(sum(believable(table[f"linear_acceleration.{axis}"], HARDEST_MPS2) ** 2 for axis in "xyz"))
     good = np.isfinite(felt)
     if not good.any() or not _GRAVITY[0] <= float(np.median(felt[good])) <= _GRAVITY[1]:
         return
@@ -50,7 +51,7 @@ def _felt(recording: Recording, topic: str, table: Table) -> Iterator[Finding]:
 
 def _tilt(table: Table) -> Floats:
     """Angle of the robot's upward axis to what it was at first, deg, shape (n,); zero without an orientation."""
-    x, y, z, w = (np.asarray(table[f"orientation.{axis}"], np.float64) for axis in "xyzw")
+    x, y, z, w = (believable(table[f"orientation.{axis}"], 2.0) for axis in "xyzw")
     length = x * x + y * y + z * z + w * w
     if not np.all(np.abs(length[np.isfinite(length)] - 1) < 0.1) or not np.isfinite(length).all():
         return np.zeros(len(table))

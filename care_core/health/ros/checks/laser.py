@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -52,7 +53,7 @@ def _dead(recording: Recording, topic: str, last_s: float, period_s: float) -> F
 
 
 def _frozen(recording: Recording, scans: Scans) -> Iterator[Finding]:
-    same = np.array([a is b or a.tobytes() == b.tobytes() for a, b in zip(scans.raw[1:], scans.raw[:-1], strict=True)])
+    same = np.array([a.tobytes() == b.tobytes() for a, b in pairwise(scans.raw)], bool)
     for start, end in stretches(scans.t[1:], same, 2.5 * _period(scans)):
         rows = (scans.t >= start) & (scans.t <= end)
         if np.count_nonzero(rows) < FROZEN_SCANS or not _moved(recording, start, end):
