@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
+from codecs import getincrementaldecoder
 from pathlib import Path
 from typing import Literal
 
 from care_core.errors import UsageError
+from care_core.logs.finding import LOG_SUFFIXES
 from care_core.logs.opening import is_recording
 
 _PACKAGE = Path(__file__).parent
+_HEAD_BYTES = 4096
+_OWN_DOCUMENT = re.compile(r'\{\s*"(schema": "care\.|\$defs"|\$schema")')
+_KINDS = {
+    "html": re.compile(r"<!doctype html|<html", re.IGNORECASE),
+    "markdown": re.compile(r"# \S"),
+    "comment": re.compile(r"#|--- "),
+    "parameters": re.compile(r"[A-Z][A-Z0-9_]*(\s*,\s*|\s+)[-+.\w]+$"),
+    "yaml": re.compile(r"[\w/.-]+:(\s|$)"),
+    "table": re.compile(r"[^,\s]+(,[^,\s]+)+$"),
+}
+"""How the first line of a text shows what it is."""
 
 
 def bundled(kind: Literal["profiles", "samples"], name: str = "") -> Path:
@@ -73,6 +87,42 @@ def sync_folder(folder: Path) -> None:
         pass
     finally:
         os.close(handle)
+
+
+def check_replaceable(path: Path, text: str) -> None:
+    """Raise UsageError for a file that is there and is not of the kind of the text that is to replace it.
+
+    A log whose head is damaged is no log to look at, so an ending that logs have counts as well.
+    """
+    if not path.is_file() or not path.stat().st_size:
+        return
+    with path.open("rb") as stream:
+        head = stream.read(_HEAD_BYTES)
+    if path.suffix.lower() in LOG_SUFFIXES or b"\0" in head or _kind(_decoded(head)) != _kind(text):
+        raise UsageError(
+            "There is a file of another kind, which is kept.",
+            hint="Name another file, or replace it with --force.",
+            where=str(path),
+        )
+
+
+def _decoded(head: bytes) -> str:
+    """The first bytes of a file as text, which may end inside a character; empty where they are none."""
+    try:
+        return getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return ""
+
+
+def _kind(text: str) -> str:
+    """What a text is, by its first line that is not empty; of a document of this program, whose it is."""
+    start = text.lstrip("\ufeff \t\r\n")
+    if not start:
+        return "no text"
+    line = start.partition("\n")[0].rstrip()
+    if start[:1] in ("{", "["):
+        return "care document" if _OWN_DOCUMENT.match(start) else "json"
+    return next((kind for kind, shape in _KINDS.items() if shape.match(line)), "text")
 
 
 def refuse_recording(path: Path) -> None:

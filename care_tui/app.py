@@ -26,9 +26,12 @@ from care_tui.screens.base import CareScreen
 from care_tui.screens.help import HelpScreen, Keys
 from care_tui.screens.panes import PanesScreen
 from care_tui.screens.walk import VIEWS, WalkScreen
-from care_tui.settings import Settings
+from care_tui.settings import SERVER, Settings
 from care_tui.themes import DEFAULT, HIGH_CONTRAST
 from care_tui.widgets.step_bar import STEPS
+
+_LOOK_S = 2.0
+"""How often an app in a browser looks for its server."""
 
 
 class PlainScrollBar(ScrollBarRender):
@@ -77,6 +80,8 @@ class CareApp(App[int], inherit_bindings=False):
 
     def on_mount(self) -> None:
         self._end_on_signals()
+        if SERVER in os.environ:
+            self.set_interval(_LOOK_S, self._end_with_server)
         self.push_screen(self._walk)
 
     def _end_on_signals(self) -> None:
@@ -85,6 +90,12 @@ class CareApp(App[int], inherit_bindings=False):
         if threading.current_thread() is threading.main_thread():  # no other thread may be told of signals
             for number in (signal.SIGHUP, signal.SIGTERM):
                 loop.add_signal_handler(number, self.action_interrupt)
+
+    def _end_with_server(self) -> None:
+        """In a browser, end when the server is gone, however it ended: nobody could close the app any more."""
+        server = os.environ.get(SERVER)
+        if server is not None and os.getppid() != int(server):
+            self.exit()
 
     def note(self, answer: Case | CareError) -> None:
         """Remember what the last diagnosis means for the exit code."""

@@ -23,11 +23,13 @@ _COLOURS = {"FAULT": "\x1b[1;31m", "NOT EVALUATED": "\x1b[33m", "OK": "\x1b[32m"
 _RESET = "\x1b[0m"
 
 
-def emit(text: str, out: Path | None = None) -> None:
-    """Write data: to the file `out`, whole or not at all, else to stdout."""
+def emit(text: str, out: Path | None = None, *, force: bool = False) -> None:
+    """Write data: to the file `out`, whole or not at all, else to stdout. `force` replaces a file of another kind."""
     if out is not None:
-        from care_core.files import write_atomically
+        from care_core.files import check_replaceable, write_atomically
 
+        if not force:
+            check_replaceable(out, text)
         write_atomically(out, text)
         say(f"wrote {out}")
         return

@@ -14,6 +14,9 @@ from typing import Any
 from care_core.errors import ConfigError, UsageError, nearest
 from care_tui.places import PLACES
 
+SERVER = "CARE_SERVER"
+"""Environment variable that 'care serve' sets for the apps that it starts: its own process."""
+
 SIGNS = "▸✓⣿"
 """What the app draws with where it may."""
 COLORS = ("auto", "truecolor", "256", "16", "none")

@@ -74,13 +74,13 @@ def check_table_path(path: Path) -> None:
 def _write_parquet(path: Path, rows: Sequence[Row], columns: list[str]) -> None:
     import pandas as pd
 
-    temporary = path.with_name(f".{path.name}.part")
+    from care_core.files import replace_file
+
+    content = io.BytesIO()
+    pd.DataFrame(rows, columns=columns).to_parquet(content, index=False)
     try:
-        pd.DataFrame(rows, columns=columns).to_parquet(temporary, index=False)
-        temporary.replace(path)
+        replace_file(path, content.getvalue())
     except OSError as err:
         raise UsageError(
             f"Cannot write the table: {err.strerror}.", hint="Choose another place.", where=str(path)
         ) from err
-    finally:
-        temporary.unlink(missing_ok=True)

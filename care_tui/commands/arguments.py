@@ -40,6 +40,7 @@ def is_json(out: Path | None) -> bool:
 Out = Annotated[
     Path | None, typer.Option("--out", "-o", callback=_writable, help="Write to this file instead of stdout.")
 ]
+Force = Annotated[bool, typer.Option("--force", help="Replace a file of another kind with --out; never a log.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Thresholds = Annotated[
     list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")

@@ -14,6 +14,7 @@ from care_core.errors import UsageError
 from care_tui.commands.arguments import (
     AsJson,
     ConfigPaths,
+    Force,
     LogPath,
     Mission,
     Out,
@@ -40,6 +41,7 @@ def whatif(
     mission: Mission = None,
     json: AsJson = False,
     out: Out = None,
+    force: Force = False,
 ) -> None:
     """Predict what a run would have done with other options. Ends with 0, whatever the odds."""
     from care_core.diagnose.whatif import parse_change
@@ -51,7 +53,7 @@ def whatif(
     with Progress() as progress:
         question = read_case(request, progress).question
     answer = question.ask(dict(parse_change(text, question.schema) for text in set_))
-    emit((whatif_json if json or is_json(out) else whatif_text)(question, answer), out)
+    emit((whatif_json if json or is_json(out) else whatif_text)(question, answer), out, force=force)
 
 
 @app.command()
@@ -62,6 +64,7 @@ def verify(
     mission: Mission = None,
     json: AsJson = False,
     out: Out = None,
+    force: Force = False,
     no_history: NoHistory = False,
 ) -> None:
     """Tell whether a fix did what it promised. Ends with 0 recovered, 1 still a fault, 3 cannot tell."""
@@ -75,5 +78,5 @@ def verify(
     if not no_history:
         verified = document.model_dump(by_alias=True, mode="json")
         mention(remember(lambda history: history.add_verification(verified)))
-    emit((verify_json if json or is_json(out) else verify_text)(document), out)
+    emit((verify_json if json or is_json(out) else verify_text)(document), out, force=force)
     raise typer.Exit(EXIT_CODES[document.verdict])

@@ -11,6 +11,7 @@ import typer
 import care_core
 from care_core.errors import ExitCode, UsageError
 from care_core.text import clean
+from care_tui.commands.arguments import Force
 from care_tui.console import emit, say
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def apply(
     ],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="The new file; a folder for several.")] = None,
     in_place: Annotated[bool, typer.Option("--in-place", help="Change the files, each kept as FILE.bak.")] = False,
+    force: Force = False,
     alternative: Annotated[int, typer.Option("--alternative", min=0, help="Another of the report's fixes.")] = 0,
 ) -> None:
     """Put a report's fix into configuration files. Comments and order stay. Without -o, print the patch."""
@@ -64,7 +66,7 @@ def apply(
         for file in changed:
             _replace(file)
     else:
-        _write_to(out or Path(), edited)
+        _write_to(out or Path(), edited, force=force)
 
 
 def _told(edited: Sequence[EditedFile]) -> Iterator[str]:
@@ -82,8 +84,9 @@ def _replace(file: EditedFile) -> None:
     from care_core.files import write_atomically
 
     backup = next(path for path in _backups(file.path) if not path.exists())
-    write_atomically(backup, file.before)
-    write_atomically(file.path, file.after)
+    mode = file.path.stat().st_mode & 0o777
+    write_atomically(backup, file.before, mode)
+    write_atomically(file.path, file.after, mode)
     say(f"wrote {file.path}, the old one is {backup}")
 
 
@@ -95,8 +98,8 @@ def _backups(path: Path) -> Iterator[Path]:
         number += 1
 
 
-def _write_to(out: Path, edited: Sequence[EditedFile]) -> None:
-    from care_core.files import write_atomically
+def _write_to(out: Path, edited: Sequence[EditedFile], *, force: bool) -> None:
+    from care_core.files import check_replaceable, write_atomically
 
     targets = [out / file.path.name if len(edited) > 1 or out.is_dir() else out for file in edited]
     if len(set(targets)) < len(targets):
@@ -106,5 +109,7 @@ def _write_to(out: Path, edited: Sequence[EditedFile]) -> None:
     if len(edited) > 1:
         out.mkdir(parents=True, exist_ok=True)
     for target, file in zip(targets, edited, strict=True):
-        write_atomically(target, file.after)
+        if not force:
+            check_replaceable(target, file.after)
+        write_atomically(target, file.after, file.path.stat().st_mode & 0o777)
         say(f"wrote {target}")

@@ -14,6 +14,7 @@ from care_core.errors import LogError, UsageError
 from care_tui.commands.arguments import (
     AsJson,
     ConfigPaths,
+    Force,
     Keep,
     LogPath,
     Mission,
@@ -43,6 +44,7 @@ def triage(
     yaml: Annotated[bool, typer.Option("--yaml", help="Print YAML, with the diff and its commands.")] = False,
     markdown: Annotated[bool, typer.Option("--markdown", help="Print Markdown for a ticket.")] = False,
     out: Out = None,
+    force: Force = False,
     top: Annotated[int, typer.Option("--top", min=1, help="How many causes a fault may have.")] = 5,
     keep: Keep = None,
     threshold: Thresholds = None,
@@ -69,7 +71,7 @@ def triage(
         case = care_core.triage(request, progress)
     if not no_history:
         mention(remember_triage(case.diagnosis))
-    emit(_written(case, formats[0] if formats else _format_of(out), to_file=out is not None), out)
+    emit(_written(case, formats[0] if formats else _format_of(out), to_file=out is not None), out, force=force)
     raise typer.Exit(exit_code(case.diagnosis))
 
 

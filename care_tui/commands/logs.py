@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from care_core.errors import ExitCode, LogError
-from care_tui.commands.arguments import AsJson, LogPath, Out, ProfileName
+from care_tui.commands.arguments import AsJson, Force, LogPath, Out, ProfileName
 from care_tui.console import Progress, check_writable, emit, say
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def params(
     ] = False,
     sources: Annotated[bool, typer.Option("--sources", help="Say of each value where it came from.")] = False,
     out: Out = None,
+    force: Force = False,
 ) -> None:
     """Print the configuration as driven. It is a file that the robot's software reads."""
     from care_core.configs.driven import differing, remark
@@ -63,7 +64,7 @@ def params(
         histories = chosen
     remarks = {name: remark(history, source=sources) for name, history in histories.items() if changed or sources}
     settings = {name: history[-1] for name, history in histories.items()}
-    emit(write_params(settings, format_for(opened.format.value, settings), remarks), out)
+    emit(write_params(settings, format_for(opened.format.value, settings), remarks), out, force=force)
 
 
 @app.command()

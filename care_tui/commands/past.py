@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from care_core.errors import CareError, UsageError
-from care_tui.commands.arguments import AsJson, Out, is_json
+from care_tui.commands.arguments import AsJson, Force, Out, is_json
 from care_tui.console import emit, say
 
 app = typer.Typer()
@@ -33,6 +33,7 @@ def history(
         typer.Option("--card", metavar="FOLDER", help="Write this profile's verified fixes beside its card."),
     ] = None,
     out: Out = None,
+    force: Force = False,
 ) -> None:
     """List past triages and verified fixes. With the trend of each objective, and how often fixes worked."""
     from care_core.history.store import SWITCH, History, history_path
@@ -49,4 +50,4 @@ def history(
         written = write_record(chosen.path, track_record(store.verifications(chosen.schema.name)))
         say(f"wrote {written}")
     document = history_document(store.triages(profile, limit), store.verifications(profile))
-    emit(history_json(document) if json or is_json(out) else history_text(document, ascii=ascii), out)
+    emit(history_json(document) if json or is_json(out) else history_text(document, ascii=ascii), out, force=force)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import secrets
 import shlex
 import socket
@@ -14,6 +15,7 @@ import typer
 from care_core.errors import UsageError
 from care_tui.commands.arguments import ConfigPaths, ProfileName
 from care_tui.console import emit, say
+from care_tui.settings import SERVER
 
 app = typer.Typer()
 
@@ -33,10 +35,12 @@ def serve(
         raise UsageError(f"'{err.name}' is not installed.", hint=hint) from err
 
     _check_free(HOST, port)
+    os.environ[SERVER] = str(os.getpid())
     words = [sys.executable, "-m", "care_tui", *([str(log.absolute())] if log else [])]
     words += ["--profile", profile] if profile else []
     words += [word for path in config or () for word in ("--config", path)]
-    server = TokenServer(shlex.join(words), port, secrets.token_urlsafe(24))
+    replaced = "exec " if os.name == "posix" else ""  # the app is to be the server's own child, not a shell's
+    server = TokenServer(f"{replaced}{shlex.join(words)}", port, secrets.token_urlsafe(24))
     emit(f"{server.address}\n")
     say("Open this address in a browser of this machine. Ctrl+C ends it.")
     server.serve()

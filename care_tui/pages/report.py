@@ -64,7 +64,7 @@ class ReportPage(DiagnosisPage):
         if self.session.state != "data":
             return
         suffix = next(suffix for suffix, format in SUFFIXES.items() if format == self.session.format)
-        name = f"{Path(self.session.diagnosis.run.log.path).stem}.care{suffix}"
+        name = f"{clean(Path(self.session.diagnosis.run.log.path).stem)}.care{suffix}"
         self.screen.app.push_screen(ExportDialog(self.session.decided(), Path(name), self.walk.engine), self._exported)
 
     def _exported(self, path: str | None) -> None:

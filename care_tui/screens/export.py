@@ -17,6 +17,7 @@ from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError, UsageError
 from care_core.text import clean
 from care_tui.jobs import SUFFIXES, Engine, as_care_error
+from care_tui.widgets.line_input import LineInput
 
 NAMES = ".yaml, .md, .html, .json or .patch"
 
@@ -51,7 +52,7 @@ class ExportDialog(ModalScreen[str | None]):
         self._engine = engine
 
     def compose(self) -> ComposeResult:
-        box = Input(str(self._default), select_on_focus=False, compact=True, classes="box")
+        box = LineInput(str(self._default), select_on_focus=False, compact=True, classes="box")
         box.cursor_blink = False
         with Vertical(classes="dialog small"):
             yield Static("Write the report to", classes="title", markup=False)

@@ -16,6 +16,7 @@ from textual.widgets import Input, Static
 from care_tui.places import as_path, entries, is_openable
 from care_tui.render.rows import Glyphs, text
 from care_tui.widgets.choices import Choices, Listing
+from care_tui.widgets.line_input import LineInput
 
 
 class OpenLogDialog(ModalScreen[Path | None]):
@@ -35,7 +36,7 @@ class OpenLogDialog(ModalScreen[Path | None]):
         self._entries: list[Path] = []
 
     def compose(self) -> ComposeResult:
-        box = Input(f"{self._start}/", select_on_focus=False, compact=True, classes="box")
+        box = LineInput(f"{self._start}/", select_on_focus=False, compact=True, classes="box")
         box.cursor_blink = False
         with Vertical(classes="dialog"):
             yield Static("Open a log", classes="title", markup=False)

@@ -14,6 +14,7 @@ from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
 from care_core.text import clean
+from care_tui.widgets.line_input import LineInput
 
 Check = Callable[[str], str]
 
@@ -31,7 +32,7 @@ class Prompt(ModalScreen[str | None]):
         self._check = check
 
     def compose(self) -> ComposeResult:
-        box = Input(self._value, select_on_focus=True, compact=True, classes="box")
+        box = LineInput(self._value, select_on_focus=True, compact=True, classes="box")
         box.cursor_blink = False
         with Vertical(classes="dialog small"):
             yield Static(Content(clean(self._title)), classes="title")

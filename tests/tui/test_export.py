@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -110,3 +111,20 @@ async def _write_to(make_app: MakeApp, tmp_path: Path, target: Path, problem: st
         box.value = str(tmp_path / "mine.yaml")
         await settle(pilot, "enter")
         assert (tmp_path / "mine.yaml").read_text().startswith("report: yaml")
+
+
+async def test_the_name_of_a_log_does_not_steer_the_terminal(make_app: MakeApp) -> None:
+    hostile = "a\x1b]52;c;aGk=\x07b"
+    faulty = sample.faulty()
+    app = make_app(
+        replace(faulty, run=replace(faulty.run, log=replace(faulty.run.log, path=f"/flights/{hostile}.BIN")))
+    )
+    async with app.run_test(size=(120, 24)) as pilot:
+        await settle(pilot, "6", "e")
+        box = app.screen.query_one(Input)
+        assert box.value == "a\\x1b]52;c;aGk=\\x07b.care.yaml"
+        box.value = hostile
+        await settle(pilot)
+        drawn = "".join(segment.text for y in range(box.size.height) for segment in box.render_line(y))
+        assert "\x1b" not in drawn
+        assert "\x07" not in drawn

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -24,18 +25,25 @@ pytest.importorskip("textual_serve", reason="needs the extra 'serve'")
 
 
 @pytest.fixture
-def address(tmp_path: Path) -> Iterator[str]:
+def address() -> Iterator[str]:
+    server, address = _serve()
+    with server:
+        yield address
+        server.terminate()
+
+
+def _serve() -> tuple[subprocess.Popen[str], str]:
+    """A server, and the address that it says."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     sample = str(bundled("samples", "arducopter_failed.BIN"))
     command = [sys.executable, "-m", "care_tui", "serve", sample, "--port", str(port)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
-        assert server.stdout is not None
-        address = server.stdout.readline().strip()
-        _wait_for(port)
-        yield address
-        server.terminate()
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    assert server.stdout is not None
+    address = server.stdout.readline().strip()
+    _wait_for(port)
+    return server, address
 
 
 def _wait_for(port: int) -> None:
@@ -160,3 +168,71 @@ async def _causes_in(socket_address: str, address: str) -> bytes:
         await asyncio.sleep(0.5)  # for the page to draw what it got
         taken = await browser.ask("Page.captureScreenshot", session, format="png")
         return base64.b64decode(taken["data"])
+
+
+def _status(address: str, path: str, **headers: str) -> int:
+    """The answer to a request with the token's cookie."""
+    base, token = address.split("/?token=")
+    request = urllib.request.Request(base + path, headers={"Cookie": f"care_token={token}"} | headers)
+    try:
+        with urllib.request.urlopen(request) as answer:
+            return int(answer.status)
+    except urllib.error.HTTPError as err:
+        return err.code
+
+
+def test_only_the_apps_own_page_and_name_are_served(address: str) -> None:
+    own = address.split("/?token=", maxsplit=1)[0]
+    assert _status(address, "/") == 200
+    assert _status(address, "/", Origin=own) == 200
+    for origin in ("http://127.0.0.1:9", "http://evil.example", "null", own.replace("http", "https")):
+        assert _status(address, "/ws?width=80&height=24", Origin=origin) == 403, origin
+    for host in ("evil.example", "127.0.0.1:9", "127.0.0.1"):
+        assert _status(address, "/", Host=host) == 403, host
+
+
+@pytest.mark.parametrize("size", ["width=99999999&height=24", "width=80&height=0", "width=-1", "width=x", "height=9e9"])
+def test_the_size_of_a_page_is_bounded(address: str, size: str) -> None:
+    assert _status(address, f"/ws?{size}") == 400
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="looks for processes in /proc")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_sessions_end_with_the_server(tmp_path: Path, number: signal.Signals) -> None:
+    """Also where it is killed; and what no page sends does not end them before."""
+    import aiohttp
+
+    process, address = _serve()
+
+    hostile = ("[]", "5", "{}", '["resize", {"width": 99999999, "height": 1}]', '["resize"]', '["stdin", 5]')
+
+    async def talk() -> list[int]:
+        base, token = address.split("/?token=")
+        async with (
+            aiohttp.ClientSession(cookies={"care_token": token}) as session,
+            session.ws_connect(f"{base}/ws?width=80&height=24") as page,
+        ):
+            for text in hostile:
+                await page.send_str(text)
+            await page.send_json(["ping", 1])
+            async for message in page:
+                if message.type == aiohttp.WSMsgType.TEXT and "pong" in message.data:
+                    break
+            apps = _children(process.pid)
+            process.send_signal(number)
+            return apps
+
+    apps = asyncio.run(asyncio.wait_for(talk(), 60))
+    assert apps
+    process.wait(20)
+    deadline = time.monotonic() + 20
+    while any(Path(f"/proc/{app}").exists() for app in apps) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not [app for app in apps if Path(f"/proc/{app}").exists()]
+
+
+def _children(process: int) -> list[int]:
+    """Processes that a process has started, and theirs."""
+    tasks = Path(f"/proc/{process}/task").iterdir()
+    own = [int(one) for task in tasks for one in (task / "children").read_text().split()]
+    return [*own, *(grandchild for child in own for grandchild in _children(child))]

@@ -1,0 +1,105 @@
+"""What the command writes over, leaves behind, and does when it is ended: nothing of the operator's is lost."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import zstandard
+
+from care_core.errors import ExitCode
+from care_core.files import bundled
+from tests.conftest import Care
+
+SAMPLE = bundled("samples", "arducopter_failed.BIN")
+DATA = Path(__file__).parents[1] / "data"
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("flight.BIN", b"\0\xff" * 40 + SAMPLE.read_bytes()[80:200_000]),
+        ("flight.json", b"\0\xff" * 40 + SAMPLE.read_bytes()[80:200_000]),
+        ("flight.log", b"x, broken\nMSG, 100, ArduCopter\n" * 50),
+        ("notes.json", b'{"my": "notes"}\n'),
+        ("notes.md", b"Buy batteries.\n"),
+        ("thesis.json", "über\n".encode("latin-1")),
+    ],
+)
+def test_a_file_of_another_kind_is_kept(care: Care, tmp_path: Path, name: str, content: bytes) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    command = ("triage", SAMPLE, "--no-history", "--markdown" if name.endswith(".md") else "--json", "--out", path)
+    code, _, err = care(*command)
+    assert code == ExitCode.USAGE
+    assert "--force" in err or "never overwritten" in err
+    assert path.read_bytes() == content
+    assert care(*command, "--force").code in (ExitCode.FAULT, ExitCode.USAGE)
+
+
+@pytest.mark.parametrize("flag", ["--json", "--yaml", "--markdown"])
+def test_a_report_replaces_its_like(care: Care, tmp_path: Path, flag: str) -> None:
+    path = tmp_path / "report"
+    path.write_bytes(b"")
+    for _ in range(2):
+        assert care("triage", SAMPLE, "--no-history", flag, "--out", path).code == ExitCode.FAULT
+    assert path.stat().st_size
+
+
+def test_a_sound_log_is_kept_whatever_is_asked(care: Care, tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_bytes(SAMPLE.read_bytes())
+    assert "never overwritten" in care("triage", SAMPLE, "--json", "--out", path, "--force").stderr
+    assert path.read_bytes() == SAMPLE.read_bytes()
+
+
+def test_the_backup_is_as_private_as_the_file(care: Care, tmp_path: Path) -> None:
+    config, report = tmp_path / "vehicle.param", tmp_path / "report.yaml"
+    assert care("params", SAMPLE, "--out", config).code == ExitCode.OK
+    assert care("triage", SAMPLE, "--no-history", "--yaml", "--out", report).code == ExitCode.FAULT
+    config.chmod(0o600)
+    assert care("apply", report, config, "--in-place").code == ExitCode.OK
+    assert care("apply", report, config, "-o", tmp_path / "new.param").code == ExitCode.OK
+    for name in ("vehicle.param", "vehicle.param.bak", "new.param"):
+        assert (tmp_path / name).stat().st_mode & 0o777 == 0o600, name
+
+
+def test_a_polite_kill_leaves_no_temporary_files(tmp_path: Path) -> None:
+    log = tmp_path / "a.mcap.zstd"
+    with log.open("wb") as stream, zstandard.ZstdCompressor().stream_writer(stream) as packer:
+        packer.write(b"\x89MCAP0\r\n")
+        for _ in range(4000):
+            packer.write(bytes(range(256)) * 200)
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    environment = {"PATH": "/usr/bin:/bin", "TMPDIR": str(temporary), "HOME": str(tmp_path)}
+    command = [sys.executable, "-m", "care_tui", "inspect", str(log)]
+    folder = Path(__file__).parents[2]
+    process = subprocess.Popen(command, env=environment, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    deadline = time.monotonic() + 20
+    while not any(temporary.iterdir()) and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.001)
+    assert process.poll() is None, "the log was read before it could be ended"
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 128 + signal.SIGTERM
+    assert b"Traceback" not in err
+    assert not list(temporary.iterdir())
+
+
+@pytest.mark.parametrize("delay_ms", [60, 100, 150, 250, 400])
+def test_an_interruption_at_any_time_is_no_traceback(delay_ms: int, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "care_tui", "triage", str(SAMPLE), "--no-history", "--json"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=Path(__file__).parents[2]
+    )
+    time.sleep(delay_ms / 1000)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode in (ExitCode.FAULT, ExitCode.INTERRUPTED, -signal.SIGINT)
+    # Before its first line runs, nothing of this program can help.
+    assert b"Traceback" not in err or b"care_" not in err
