@@ -94,6 +94,7 @@ def check_replaceable(path: Path, text: str) -> None:
 
     A log whose head is damaged is no log to look at, so an ending that logs have counts as well.
     """
+    refuse_recording(path)
     if not path.is_file() or not path.stat().st_size:
         return
     with path.open("rb") as stream:
