@@ -63,10 +63,10 @@ class Made:
                 made[name] = Table(self.t, dict(columns))
         for name, rows in self.rows.items():
             ordered = sorted(rows, key=lambda row: row[0])
-            columns = {
-                field: np.array([row[field] for _, row in ordered], dtype=object if field == "Message" else np.float64)
-                for field in ordered[0][1]
-            }
+            columns = {}
+            for field in ordered[0][1]:
+                kind = object if field in ("Message", "Name") else np.float64
+                columns[field] = np.array([row[field] for _, row in ordered], dtype=kind)
             made[name] = Table(np.array([t for t, _ in ordered]), columns)
         return made
 

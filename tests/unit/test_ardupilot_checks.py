@@ -103,6 +103,16 @@ def test_an_impact_is_after_the_loss_of_control_and_what_follows_it_is_marked() 
     assert all(one.after_impact for one in made.find() if one.onset_s > flight.impact_s)
 
 
+def test_a_blow_before_control_is_lost_blames_no_motor() -> None:
+    made = Made()
+    falling(made, -60.0, 40.0)
+    made.table["RCOU"]["C2"][made.after(FAILS_S, FAILS_S + 2)] = 1950
+    made.table["IMU"]["AccX"][made.after(FAILS_S - 0.2, FAILS_S)] = 60.0
+    findings = made.find()
+    assert not any(one.kind == "motor" for one in findings)
+    assert made.flight().impact_s == pytest.approx(FAILS_S - 0.2, abs=0.05)
+
+
 def test_a_stopped_controller_is_told_by_its_speed() -> None:
     made = Made()
     t = made.t
@@ -202,6 +212,17 @@ def test_a_dead_compass() -> None:
     for axis in "XYZ":
         made.table["MAG"][f"Mag{axis}"][made.after(FAILS_S)] = 0.0
     assert first(made).title == "the compass reads nothing"
+
+
+def test_a_calibration_that_is_no_number_is_the_dead_compass() -> None:
+    made = Made()
+    for number in ("", "#2"):
+        for axis in "XYZ":
+            made.table[f"MAG{number}"][f"Mag{axis}"][made.after(FAILS_S)] = 0.0
+    made.rows["PARM"] = [(0.0, {"Name": "COMPASS_MOT_X", "Value": float("nan")})]
+    finding = first(made)
+    assert (finding.severity, finding.suspect) == ("critical", "parameter")
+    assert "COMPASS_MOT_X" in finding.evidence
 
 
 def test_a_refusal_that_names_the_compass_is_the_compass() -> None:
@@ -360,6 +381,10 @@ def test_a_log_that_ends_in_the_air_and_one_with_a_hole() -> None:
     flight = made.flight()
     (finding,) = find(Flight(tables, flight.settings, flight.facts, 70.0))
     assert (finding.kind, finding.title, finding.severity) == ("log", "the log ends in the air", "warning")
+    made.table["POWR"]["Vcc"][made.after(69.5)] = 4.5
+    tables = {name: table.between(0.0, 70.0) for name, table in made.tables().items()}
+    finding = find(Flight(tables, flight.settings, flight.facts, 70.0))[0]
+    assert (finding.kind, finding.title) == ("battery", "power was lost in the air")
     holed = {name: table.where((table.t < 40) | (table.t > 48)) for name, table in Made().tables().items()}
     (finding,) = find(Flight(holed, flight.settings, flight.facts, END_S))
     assert finding.title == "the log has 1 hole"

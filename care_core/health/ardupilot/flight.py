@@ -54,6 +54,8 @@ _AIRBORNE_M = 1.0
 _REFUSED_S = 30.0
 """The firmware repeats its complaints at least as often (AP_Arming: every 30 s)."""
 _GROUND_M = 2.0
+_STRUCK_S = 1.0
+"""A blow so shortly before control was lost is what took it."""
 _SHOCK = 30.0
 """m/s^2: three times gravity is no flight."""
 _ACRO = frozenset((1, 13, 14))
@@ -277,7 +279,7 @@ class Flight:
         first = lost if lost is not None and (crash is None or lost < crash) else crash
         assert first is not None
         candidates = [] if crash is None else [max(crash - _CRASH_CHECK_S, first)]
-        shock = self._shock_after(first)
+        shock = self.shock_after(first - _STRUCK_S)
         if shock is not None:
             candidates.append(shock)
         ground = self._ground_after(first)
@@ -285,7 +287,8 @@ class Flight:
             candidates.append(ground)
         return min(candidates, default=None)
 
-    def _shock_after(self, first: float) -> float | None:
+    def shock_after(self, first: float) -> float | None:
+        """When it was first shaken beyond what flight does, from a time on; None where it was not."""
         table = self.one("IMU", "AccX", "AccY", "AccZ")
         if table is None:
             return None
@@ -298,6 +301,14 @@ class Flight:
         t, height = self.height
         low = (t >= first) & (height < _GROUND_M)
         return float(t[low][0]) if low.any() else None
+
+    @cached_property
+    def was_struck(self) -> bool:
+        """Whether a blow came before control was lost: it hit something while its attitude was still followed."""
+        lost, shock = self.lost_control_s, None
+        if lost is not None:
+            shock = self.shock_after(lost - _STRUCK_S)
+        return lost is not None and shock is not None and shock < lost
 
     @cached_property
     def was_refused(self) -> bool:

@@ -19,7 +19,7 @@ from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
 
 AXES = ("MagX", "MagY", "MagZ")
-READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",), "XKF3": ("IYAW",)}
+READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",), "PARM": ("Name", "Value")}
 
 APART = 200.0
 MOVED = 140.0
@@ -27,7 +27,7 @@ MOVED = 140.0
 moves it where their calibrations differ."""
 GREY, TOO_MUCH = 0.3, 0.6
 _SHORTEST, _LONGEST = 185.0, 875.0
-_LASTS_S = 3.0
+_LASTS_S, _SILENT_S = 3.0, 1.0
 _EKF_YAW_RESET = 62
 _CALIBRATION: Calibration = ((1.0, 0.8), (1.5, 0.95), (3.0, 0.98))
 """By millligauss over the limit; on the training table all flights over it have a failing compass, and no other."""
@@ -52,29 +52,36 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
-    """The first compass, which is the one in use, gives nothing or always the same."""
+    """The first compass, which is the one in use, gives nothing; critical where no other takes its place, or what
+    followed was lost."""
     first = compasses[0]
-    strength = length(first[axis] for axis in AXES)
-    silent = ~(strength > 1.0)
-    if "Health" in first.columns:
-        silent |= first["Health"] == 0
-    spans = lasting(first.t, silent, 0.5)
-    if (spans and not silent.all()) or (spans and flight.armed):
-        broken = _nan_compensation(flight)
-        yield Finding(
-            "compass", "the compass reads nothing", spans[0][0], spans[-1][1], "critical",
-            "the field of compass 1 is zero or marked unhealthy" + (f"; {broken} is not a number" if broken else ""),
-            "MAG", suspect="parameter" if broken else "hardware", probability=0.95,
-        )  # fmt: skip
+    spans = lasting(first.t, _silent(first), _SILENT_S)
+    if not spans:
+        return
+    start, end = spans[0][0], spans[-1][1]
+    others = [other.between(start, end) for other in compasses[1:]]
+    replaced = any(len(other) and float(_silent(other).mean()) < 0.5 for other in others)
+    broken = _not_a_number(flight)
+    yield Finding(
+        "compass", "the compass reads nothing", start, end,
+        "critical" if not replaced or flight.lost_control_s is not None or _rejected(flight, start) else "warning",
+        "the field of compass 1 is zero or marked unhealthy" + (f"; {broken} is not a number" if broken else ""),
+        "MAG", suspect="parameter" if broken else "hardware", probability=0.95,
+    )  # fmt: skip
 
 
-def _nan_compensation(flight: Flight) -> str:
-    """A compensation parameter that is no number, which makes every field one."""
-    for name in ("COMPASS_MOT_X", "COMPASS_MOT_Y", "COMPASS_MOT_Z", "COMPASS_OFS_X", "COMPASS_OFS_Y", "COMPASS_OFS_Z"):
-        values = flight.settings.get(name, ())
-        if any(isinstance(one.value, float) and not np.isfinite(one.value) for one in values):
-            return name
-    return ""
+def _silent(compass: Table) -> Mask:
+    silent = ~(length(compass[axis] for axis in AXES) > 1.0)
+    return silent | (compass["Health"] == 0) if "Health" in compass.columns else silent
+
+
+def _not_a_number(flight: Flight) -> str:
+    """A calibration of the compass that is no number, which makes every field none; "" where there is no such."""
+    table = flight.one("PARM", "Name", "Value")
+    if table is None:
+        return ""
+    names = table["Name"][~np.isfinite(table["Value"])].tolist()
+    return next((name for name in names if str(name).startswith("COMPASS_")), "")
 
 
 def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:

@@ -38,10 +38,13 @@ def find(flight: Flight) -> Iterator[Finding]:
     elif told is not None or said is not None or impact is not None:
         first = min(t for t in (told, said, impact) if t is not None)
         steered = _steered(flight, first)
+        what = "it hit something" if flight.was_struck else "it crashed"
+        what = "it flew into the ground as steered" if steered else what
         yield Finding(
-            "crash", "it flew into the ground as steered" if steered else "it crashed", first, first, "critical",
+            "crash", what, first, first, "critical",
             ("the firmware says: crash" if told is not None or said is not None else "control was lost, then it hit")
-            + (f"; {steered}" if steered else ""),
+            + (f"; {steered}" if steered else "")
+            + ("; a blow came before control was lost" if flight.was_struck else ""),
             "ERR 12, MSG, ATT, IMU", suspect="operation" if steered else "hardware", probability=0.1,
         )  # fmt: skip
 

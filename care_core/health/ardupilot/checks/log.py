@@ -10,11 +10,13 @@ from care_core.health.ardupilot.flight import Flight
 from care_core.health.records import Finding
 from care_core.logs.base import Wanted
 
-READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "BAT": ("Volt",)}
+READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "POWR": ("Vcc",)}
 
 _STEADY = ("ATT", "RCOU", "CTUN", "IMU")
 _HOLE_S, _TIMES = 2.0, 20.0
 _HIGH_M = 2.0
+_FALLS_V = 0.3
+"""Twice the swing that ArduPilot's page on brown-outs calls normal."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -54,10 +56,23 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         return
     high = flight.height is not None and float(np.median(flight.height[1][-3:])) > _HIGH_M
     up = flight.throttle is not None and float(np.median(flight.throttle[1][-3:])) > 0.2
-    if flight.is_copter and high and (up or flight.throttle is None):
-        height = f" {float(np.median(flight.height[1][-3:])):.0f} m up" if flight.height is not None else ""
-        yield Finding(
-            "log", "the log ends in the air", flight.end_s, flight.end_s, "warning",
-            f"armed{height} at the last record: power was lost or the recording was stopped", "EV, ARM, CTUN, POS",
-            probability=0.4,
-        )  # fmt: skip
+    if not (flight.is_copter and high and (up or flight.throttle is None)):
+        return
+    height = f" {float(np.median(flight.height[1][-3:])):.0f} m up" if flight.height is not None else ""
+    sagging = _supply_falls(flight)
+    yield Finding(
+        "battery" if sagging else "log", "power was lost in the air" if sagging else "the log ends in the air",
+        flight.end_s, flight.end_s, "critical" if sagging else "warning",
+        f"armed{height} at the last record: " + (sagging or "power was lost or the recording was stopped"),
+        "EV, ARM, CTUN, POS, POWR", probability=0.7 if sagging else 0.4,
+    )  # fmt: skip
+
+
+def _supply_falls(flight: Flight) -> str:
+    """What shows that the autopilot's supply fell away at the end; "" where nothing does."""
+    table = flight.one("POWR", "Vcc")
+    if table is None or len(table) < 10:
+        return ""
+    volts = np.where(table["Vcc"] > 100, table["Vcc"] / 1000, table["Vcc"])
+    usual, last = float(np.median(volts)), float(np.min(volts[-3:]))
+    return f"Vcc fell from {usual:.2f} to {last:.2f} V" if usual - last > _FALLS_V and last > 1.0 else ""

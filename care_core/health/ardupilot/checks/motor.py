@@ -175,7 +175,7 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     """Control was lost towards a motor that was asked for more than the others, at or near its limit."""
     lost = flight.lost_control_s
     table = flight.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
-    if lost is None or table is None or not flight.airborne or not _was_calm(flight, lost):
+    if lost is None or table is None or not flight.airborne or flight.was_struck or not _was_calm(flight, lost):
         return
     rows = (table.t >= lost - 0.3) & (table.t <= lost + _FALL_S)
     if not rows.any():
