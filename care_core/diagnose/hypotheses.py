@@ -12,6 +12,7 @@ run's signals under that cancels out):
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -31,6 +32,9 @@ DOUBT: Mapping[FitVerdict, float] = {"fits": 1.0, "partly": 0.5, "no": 0.0}
 """Share of what the model says that is believed."""
 UNKNOWN = 0.3
 """What an option, and chance, weigh for an objective that too few training missions had to learn from."""
+LATE, LATE_S = 0.1, 5.0
+"""The most that a part weighs which failed so many seconds after the run was failing already, by a finding that speaks
+of how it was set."""
 LEAST = 0.005
 """Hypotheses less likely than this are told together with chance."""
 _WHAT: Mapping[Suspect, str] = {"hardware": "hardware", "world": "world", "operation": "world"}
@@ -72,8 +76,14 @@ def _added(before: World, objective: str, reference: Config) -> tuple[float, flo
     """What this configuration adds to the probability that the objective breaks, and what the reference has of it."""
     if objective not in before.model.outcomes:
         return UNKNOWN, UNKNOWN
-    here, there = 1.0 - before.predict(objective, [before.config, reference]).p_ok
-    return max(0.0, float(here - there)), float(there)
+    asked = [before.config, reference]
+    here, there = 1.0 - before.predict(objective, asked).p_ok
+    added = float(here - there)
+    if before.model.outcomes[objective].stages:
+        # What makes a mission late or costly makes it fail as well, and then its time and energy are not known.
+        here, all_there = 1.0 - before.odds(asked)
+        added = max(added, float(here - all_there))
+    return max(0.0, added), float(there)
 
 
 def weigh(
@@ -97,17 +107,14 @@ def weigh(
     for option, share in options.items():
         if share * trust > 0:
             weights["parameter", option] = share * trust
-    for finding in findings:
-        key = _named(finding)
-        if key is not None:
-            weights[key] = max(weights.get(key, 0.0), _odds(finding))
+    seen = [finding for finding in findings if not finding.after_impact and finding.severity != "info"]
+    failing_s = min((one.onset_s for one in seen if one.suspect == "parameter"), default=math.inf)
+    for finding in seen:
+        if finding.suspect in _WHAT:
+            key = _WHAT[finding.suspect], finding.title
+            is_late = finding.onset_s > failing_s + LATE_S
+            weights[key] = max(weights.get(key, 0.0), min(_odds(finding), LATE) if is_late else _odds(finding))
     return _normalised(weights)
-
-
-def _named(finding: Finding) -> tuple[str, str] | None:
-    if finding.after_impact or finding.severity == "info" or finding.suspect not in _WHAT:
-        return None
-    return _WHAT[finding.suspect], finding.title
 
 
 def _odds(finding: Finding) -> float:

@@ -13,8 +13,9 @@ from care_core.profile.schema import Schema
 from care_core.run import FITS, Fit
 from care_core.vehicles import Vehicle, vehicle_of
 
-MOST = 0.8
-"""Share of a profile's options, and of its sources, that a log holds when it fits."""
+MOST = 0.7
+"""Share of a profile's options, and of its sources, that a log holds when it fits: some sources stand in for others,
+some speak only when something happens."""
 LEAST = 0.3
 """Share of the sources below which hardly anything of a run can be seen."""
 _VEHICLES = {"px4": "a PX4 vehicle", "sub": "a submarine", "heli": "a helicopter", "tracker": "an antenna tracker"}
