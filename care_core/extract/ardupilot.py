@@ -36,8 +36,6 @@ Floats = NDArray[np.float64]
 
 _EV_ARMED, _EV_DISARMED = 10, 11
 _REFUSAL = re.compile(r"(?:Pre)?Arm: (.*)")
-# A pre-arm check repeats its complaints every 30 s, an arming attempt once.
-_REFUSAL_REPEAT_S = 35.0
 _WAYPOINT_TOLERANCE_M = 5.0
 _MIN_ROWS = 5
 _AUTO = 3  # ArduCopter's flight mode number
@@ -155,10 +153,8 @@ def _last_refusals(mission: Mission) -> list[tuple[float, str]]:
         return []
     standing: dict[str, tuple[float, str]] = {}
     for t, text in refusals:
-        is_check = text.startswith("PreArm:") and t >= attempts[-1] - _REFUSAL_REPEAT_S
-        reason = _REFUSAL.sub(r"\1", text)
-        if t >= attempts[-1] - 0.5 or (is_check and reason in standing):
-            standing[reason] = (t, text)
+        if t >= attempts[-1] - 0.5:
+            standing[_REFUSAL.sub(r"\1", text)] = (t, text)
     return sorted(standing.values())
 
 

@@ -216,6 +216,15 @@ def test_a_log_without_arming_or_refusal_holds_no_mission() -> None:
     assert KIND.missions({"MSG": table([(1.0, "ArduCopter V4.5.4")], "Message")}, 9.0, SPEC) == ()
 
 
+def test_statistics_of_a_hundred_and_one_values() -> None:
+    """Each of its own, so that none stands for another."""
+    ramp = np.arange(101.0) - 20.0
+    found = {name: ardupilot._statistic(ramp, name) for name in ("mean", "max", "min", "std", "rms", "peak")}
+    assert found == pytest.approx(
+        {"mean": 30, "max": 80, "min": -20, "std": 29.155, "rms": 41.833, "peak": 75}, rel=1e-4
+    )
+
+
 def test_another_mission_is_named() -> None:
     other = flight()["CMD"]
     far = Table(other.t, {**other.columns, "Lat": np.array([0.0, north(160), 0.0])})

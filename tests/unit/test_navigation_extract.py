@@ -221,6 +221,17 @@ def test_a_robot_that_swings_on_the_spot() -> None:
     assert "to turn on the spot 100%" in KIND.evidence(one)[1].text
 
 
+@pytest.mark.parametrize(
+    ("speed", "turn", "order"),
+    [(-0.3, 0.0, "reverse"), (0.3, 0.0, None), (0.0, 0.4, "spot_turn"), (0.0, 0.0, "stand")],
+    ids=["back", "on", "round", "still"],
+)
+def test_what_was_commanded_is_one_thing_at_a_time(speed: float, turn: float, order: str | None) -> None:
+    one = mission(drive(cmd_vel=commands(speed, [turn])))
+    shares = {name: value("commanded_share", one, order=name) for name in ("stand", "spot_turn", "reverse")}
+    assert shares == {name: pytest.approx(float(name == order)) for name in shares}
+
+
 def test_a_robot_that_is_held() -> None:
     held = drive(odom=odometry({0: 0, 100: 0}), cmd_vel=commands(0.3, [0.0]))
     assert value("blocked_share", mission(held)) == pytest.approx(1)

@@ -39,3 +39,8 @@ def test_a_position_off_the_planet_is_left_out() -> None:
 def test_other_messages_pass() -> None:
     tables = {"XYZ": Table(np.arange(2.0), {"Volt": np.array([1e38, 0.0])})}
     assert len(plausible(tables)["XYZ"]) == 2
+
+
+def test_a_dilution_of_precision_that_no_receiver_can_send_is_left_out() -> None:
+    satellites = {"GPS": Table(np.arange(4.0), {"HDop": np.array([0.8, 655.35, 655.36, -0.1])})}
+    np.testing.assert_array_equal(plausible(satellites)["GPS"]["HDop"], [0.8, 655.35])

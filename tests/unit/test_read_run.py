@@ -203,6 +203,18 @@ def test_every_objective_is_read_and_none_judged(log: MadeLog) -> None:
     assert (run.mission.ended, run.mission.fits, run.mission.mismatch) == (False, False, "it has 3 waypoints, not 5")
 
 
+@pytest.mark.parametrize(
+    ("end_s", "damage_s", "ended"),
+    [(20.0, 19.5, False), (20.0, None, False), (20.0, 18.5, True), (19.0, 18.5, True)],
+    ids=["in_its_last_second", "no_one_knows_where", "long_before_its_end", "the_log_goes_on"],
+)
+def test_a_log_that_breaks_off_while_a_mission_lasts_does_not_end_it(
+    log: MadeLog, end_s: float, damage_s: float | None, ended: bool
+) -> None:
+    log.spans, log.damage = ((0.0, end_s, True),), (Damage("cut", 7, damage_s),)
+    assert read_run(log, made_schema()).mission.ended is ended
+
+
 def test_the_last_mission_is_taken_unless_another_is_named(log: MadeLog) -> None:
     log.spans = ((0.0, 5.0, True), (6.0, 9.0, True))
     schema = made_schema()

@@ -89,6 +89,20 @@ def test_a_run_that_became_worse_or_broke_something_else() -> None:
     assert outcomes["energy"] == "broken"
 
 
+@pytest.mark.parametrize(
+    ("time_s", "outcome"),
+    [(230.0, "unchanged"), (215.0, "unchanged"), (245.0, "unchanged"), (205.0, "better"), (255.0, "worse")],
+    ids=str,
+)
+def test_a_move_within_what_runs_differ_by_is_none(time_s: float, outcome: str) -> None:
+    """Half of the promised interval, 20 s here, either way."""
+    run = planted_run(speed=5.0)
+    driven = replace(run, objectives={**run.objectives, "time": time_s})
+    within = replace(PROMISED, intervals={"time": (130.0, 170.0)})
+    found = verify(replace(promise(), sets=(within,)), judge(driven, SCHEMA, {}), SCHEMA)
+    assert {check.variable.name: check.outcome for check in found.objectives}["time"] == outcome
+
+
 def test_a_recovery_with_other_changes_says_so() -> None:
     found = checked(speed=5.0, accel=1.0)
     assert found.verdict == "fixed_although"
