@@ -71,6 +71,15 @@ class Evidence:
 
 
 @dataclass(frozen=True, slots=True)
+class Check:
+    """A plain question to a run that flew no mission: did it take off, did it land. 1 is yes and well, 0 is no."""
+
+    name: str
+    value: Value
+    doc: str
+
+
+@dataclass(frozen=True, slots=True)
 class LogInfo:
     """Where a run came from."""
 
@@ -130,7 +139,7 @@ class MissionInfo:
     start_s: float
     end_s: float
     ended: bool
-    """False when the log stops before the mission does: nothing about its end is known."""
+    """False when the log stops before the mission is decided: nothing about its end is known."""
     fits: bool
     mismatch: str = ""
     """Why it is not the profile's mission, in one sentence; empty when it fits."""
@@ -150,6 +159,10 @@ class Run:
     evidence: tuple[Evidence, ...] = ()
     changes: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
     """Per parameter that changed during the mission: the value it began with, and each later one until its end."""
+    checks: tuple[Check, ...] = ()
+    """What a run without a mission is judged by; empty where there was one."""
+    modes: tuple[str, ...] = ()
+    """The modes that were in force during the mission; empty where the log does not say."""
     sources: Mapping[str, str] = field(default_factory=dict)
     """Per option of `config` where its value came from: a record or topic of the log, or file:line."""
 

@@ -70,6 +70,8 @@ class Variable:
     scale: float = 1.0
     """A value under its parameters is this times the option's: firmware that renamed cm/s to m/s counts in 0.01."""
     reboot_required: bool = False
+    modes: tuple[str, ...] = ()
+    """The modes that read an option; empty where every mode does, or nothing is known."""
     safety: bool = False
     kind: Kind | None = None
     threshold: Threshold | None = None

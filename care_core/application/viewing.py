@@ -13,6 +13,7 @@ from care_core.errors import CareError
 if TYPE_CHECKING:
     from care_core.history.store import Triaged
     from care_core.logs.base import Log
+    from care_core.vehicles import Kind
 
 TEXTS = {
     "MSG": ("Message",),
@@ -22,37 +23,6 @@ TEXTS = {
     "/rosout_agg": ("level", "name", "msg"),
 }
 """Channels that hold what the robot's software said, and their fields."""
-
-EVENTS = {
-    10: "armed",
-    11: "disarmed",
-    15: "armed by the autopilot",
-    17: "may have landed",
-    18: "landed",
-    19: "lost GPS",
-    25: "home set",
-    28: "flies",
-    54: "motors stopped in an emergency",
-    56: "motor interlock off",
-    57: "motor interlock on",
-    62: "EKF reset its yaw",
-}
-"""Events of an ArduPilot EV record that operators ask for; the others keep their number."""
-
-SUBSYSTEMS = {
-    2: "radio",
-    3: "compass",
-    11: "GPS",
-    15: "parachute",
-    18: "barometer",
-    19: "processor",
-    21: "terrain data",
-    22: "navigation",
-    30: "internal error",
-}
-"""Subsystems of an ERR record that are no failure of a flight by themselves."""
-_MODE_CHANGE = 10
-"""The one whose code is the flight mode that was refused."""
 
 LEVELS = {1: "debug", 2: "info", 4: "WARN", 8: "ERROR", 16: "FATAL", 10: "debug", 20: "info", 30: "WARN", 40: "ERROR"}
 """Levels of ROS 1 and ROS 2 log messages."""
@@ -76,41 +46,36 @@ def log_of(case: Case) -> Log:
 
 def messages_of(case: Case) -> list[LogMessage]:
     """Everything that the log holds in words, and what was found in its numbers, in time order."""
+    from care_core.vehicles import vehicle_of
+
     tables = log_of(case).read(TEXTS)
     if "/rosout" in tables:
         tables = {name: table for name, table in tables.items() if name != "/rosout_agg"}
     found = []
+    vehicle = vehicle_of(log_of(case).facts, {}).kind
     for name, table in tables.items():
         fields = [table.columns[field] for field in TEXTS[name] if field in table.columns]
         for time_s, *values in zip(table.t, *fields, strict=True):
-            found.append(LogMessage(float(time_s), *_worded(name, values)))
+            found.append(LogMessage(float(time_s), *_worded(name, values, vehicle)))
     said = {message.text for message in found}
     evidence = case.diagnosis.run.evidence
     found += [LogMessage(part.time_s, part.kind, part.text) for part in evidence if part.text not in said]
     return sorted(found, key=lambda message: message.time_s)
 
 
-def _worded(channel: str, values: list[object]) -> tuple[str, str]:
+def _worded(channel: str, values: list[object], vehicle: Kind) -> tuple[str, str]:
+    """Kind and text of a message. The code of an ERR record 0 says that the trouble is over."""
+    from care_core.vehicles import error_words, event_words, is_over
+
     if channel.startswith("/rosout"):
         level, name, text = (*values, "", "")[:3]
         return LEVELS.get(int(float(str(level))), "?"), f"{name}: {text}"
-    if channel == "ERR":
-        return _error(*(int(float(str(value))) for value in values)) if len(values) == 2 else ("ERR", str(values))
-    if channel == "EV":
-        number = int(float(str(values[0]))) if values else -1
-        return "event", EVENTS.get(number, f"number {number}")
+    if channel == "ERR" and len(values) == 2:
+        subsystem, code = (int(float(str(value))) for value in values)
+        return "over" if is_over(subsystem, code) else "ERR", error_words(subsystem, code, vehicle)
+    if channel == "EV" and values:
+        return "event", event_words(int(float(str(values[0]))))
     return "message", str(values[0]) if values else ""
-
-
-def _error(subsystem: int, code: int) -> tuple[str, str]:
-    """An ERR record in words; code 0 says that the trouble is over."""
-    from care_core.extract.ardupilot import ERR_SUBSYSTEMS
-
-    if subsystem == _MODE_CHANGE:
-        return "ERR", f"flight mode {code} was refused"
-    named = ERR_SUBSYSTEMS.get(subsystem, (SUBSYSTEMS.get(subsystem, f"subsystem {subsystem}"),))
-    name = ": ".join(dict.fromkeys(named))
-    return ("over", name) if code == 0 else ("ERR", f"{name}, code {code}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,16 +8,17 @@ from dataclasses import dataclass, field, replace
 from care_core.causal.model import Summary
 from care_core.configs.driven import readable
 from care_core.configs.loading import ConfigFile, resolve
-from care_core.diagnose.records import ObjectiveResult, Status
+from care_core.diagnose.records import MissionVerdict, ObjectiveResult, Status
 from care_core.errors import UsageError, nearest
-from care_core.extract.read import read_run
+from care_core.extract.read import mission_number, read_runs
 from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
-from care_core.run import Run, Setting, Unavailable, Value, is_known
-from care_core.variables import Threshold, Variable
+from care_core.run import Check, Run, Setting, Unavailable, Value, is_known
+from care_core.variables import Role, Threshold, Variable
 
+_YES = Threshold("==", 1.0)
 _FEW = 10
 """As many names can be listed in a sentence."""
 
@@ -32,8 +33,12 @@ class Judged:
     own: Mapping[str, float]
     """The operator's."""
     results: tuple[ObjectiveResult, ...]
+    checks: tuple[ObjectiveResult, ...] = ()
+    """What a run without a mission is judged by."""
     given: Mapping[str, Setting] = field(default_factory=dict)
     """What the operator's files say of the profile's parameters."""
+    missions: tuple[MissionVerdict, ...] = ()
+    """Every mission of the log, this one among them."""
 
     @property
     def broken(self) -> tuple[ObjectiveResult, ...]:
@@ -63,8 +68,23 @@ def read_and_judge(
     schema = profile.schema
     check_wishes(schema, (), thresholds or {})
     given = resolve(configs, (parameter for option in schema.options for parameter in readable(option)))
-    run = read_run(log, schema, overrides=given, mission=mission, sha256=sha256)
-    return replace(judge(run, schema, profile.model.summaries, thresholds), given=given)
+    runs = read_runs(log, schema, overrides=given, sha256=sha256)
+    judged = [judge(run, schema, profile.model.summaries, thresholds) for run in runs]
+    verdicts = tuple(verdict(one) for one in judged)
+    return replace(judged[mission_number(mission, len(runs)) - 1], given=given, missions=verdicts)
+
+
+def verdict(judged: Judged) -> MissionVerdict:
+    """What became of a mission, in short: what was broken, else why it could not be judged."""
+    everything = (*judged.results, *judged.checks)
+    broken = [result.variable.name for result in everything if result.status == "fault"]
+    if broken:
+        return MissionVerdict(judged.run.mission, "fault", ", ".join(broken))
+    if judged.checks:
+        return MissionVerdict(judged.run.mission, "ok", "no mission was flown")
+    unknown = [result for result in judged.results if result.status == "not_evaluated"]
+    reason = unknown[0].reason if unknown else ""
+    return MissionVerdict(judged.run.mission, "not_evaluated" if unknown else "ok", reason)
 
 
 def judge(
@@ -79,10 +99,12 @@ def judge(
     bounds = thresholds_in_force(schema, own)
     run = replace(run, objectives=meaningful(run, schema, bounds, own))
     results = tuple(
-        _judge_one(objective, run, bounds.get(objective.name), summaries.get(objective.name))
+        _judge_one(
+            objective, run.objectives.get(objective.name), bounds.get(objective.name), summaries.get(objective.name)
+        )
         for objective in schema.objectives
     )
-    return Judged(run, bounds, own, results)
+    return Judged(run, bounds, own, results, tuple(map(_judge_check, run.checks)))
 
 
 def meaningful(
@@ -99,12 +121,18 @@ def meaningful(
         if objective.kind == "functional" or not is_known(found.get(name)):
             continue
         if not accomplished:
-            reason = "mission was not accomplished, so its value means nothing"
-            found[name] = Unavailable(reason, "repair the mission first")
+            found[name] = _meaningless(run)
         elif run.mission.mismatch and name not in judged_anyway:
             hint = f"give this mission's bound with --threshold {name}=VALUE"
             found[name] = Unavailable(run.mission.mismatch, hint)
     return found
+
+
+def _meaningless(run: Run) -> Unavailable:
+    """Why the value of a mission that was not accomplished is withheld."""
+    if run.checks:
+        return Unavailable("no mission was flown, so its value means nothing", "judge a flight of the mission")
+    return Unavailable("mission was not accomplished, so its value means nothing", "repair the mission first")
 
 
 def _accomplished(run: Run, schema: Schema, bounds: Mapping[str, Threshold]) -> bool:
@@ -149,8 +177,9 @@ def _known(name: str, variables: Iterable[Variable], what: str, where: str, prof
     return by_name[name]
 
 
-def _judge_one(objective: Variable, run: Run, bound: Threshold | None, summary: Summary | None) -> ObjectiveResult:
-    value = run.objectives.get(objective.name)
+def _judge_one(
+    objective: Variable, value: Value | None, bound: Threshold | None, summary: Summary | None = None
+) -> ObjectiveResult:
     if value is None:
         return ObjectiveResult(
             objective, None, bound, "not_evaluated", "the profile does not say how to read it from a log"
@@ -164,3 +193,8 @@ def _judge_one(objective: Variable, run: Run, bound: Threshold | None, summary: 
     # A yes-or-no result has no place among others.
     percentile = summary.percentile(value) if summary and objective.kind == "non-functional" else None
     return ObjectiveResult(objective, value, bound, status, percentile=percentile)
+
+
+def _judge_check(check: Check) -> ObjectiveResult:
+    variable = Variable(check.name, Role.OBJECTIVE, type="bool", doc=check.doc, kind="functional", threshold=_YES)
+    return _judge_one(variable, check.value, _YES)

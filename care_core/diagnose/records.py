@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from care_core.health.records import NOTHING_SEEN, Health
-from care_core.run import ProfileChoice, Run, shown
+from care_core.run import MissionInfo, ProfileChoice, Run, shown
 from care_core.variables import Change, Threshold, Variable
 
 Status = Literal["ok", "fault", "not_evaluated"]
@@ -26,6 +26,16 @@ class ObjectiveResult:
     reason: str = ""
     percentile: float | None = None
     """Share (0 to 1) of the profile's training runs with a smaller value."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionVerdict:
+    """One mission of a log with what became of it."""
+
+    mission: MissionInfo
+    status: Status
+    reason: str
+    """What was broken, or why it could not be judged; empty where all is well."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,6 +216,8 @@ class Diagnosis:
     tell_more: tuple[str, ...] = ()
     """What would tell more: a metric to record, an experiment; only where no cause is sure."""
     dismissed: tuple[Dismissal, ...] = ()
+    missions: tuple[MissionVerdict, ...] = ()
+    """Every mission of the log, this one among them."""
     health: Health = NOTHING_SEEN
     hypotheses: tuple[Hypothesis, ...] = ()
     """What explains the failure, the likeliest first; empty where nothing failed."""

@@ -39,7 +39,7 @@ from care_core.diagnose.ranking import (
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Note, ObjectiveResult
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
-from care_core.diagnose.worlds import reference_of, world_of
+from care_core.diagnose.worlds import reference_of, unread_options, world_of
 from care_core.health.records import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
@@ -121,10 +121,11 @@ def diagnose(
 ) -> Diagnosis:
     """Causes and fix of a run that has been judged; the arguments are those of `triage`."""
     report = progress or (lambda _step, _share: None)
-    schema, run, objectives, broken = profile.schema, judged.run, judged.results, judged.broken
+    schema, run, broken = profile.schema, judged.run, judged.broken
+    objectives = (*judged.results, *judged.checks)
     choice = replace(choice, fit=choice.fit.but(*unusual(run, profile)))
     if not broken:
-        return Diagnosis(choice, run, objectives, (), None, health=health)
+        return Diagnosis(choice, run, objectives, (), None, missions=judged.missions, health=health)
     report("ranking the causes", 0.7)
     reference = reference_of(run, profile)
     world = world_of(judged, profile)
@@ -159,6 +160,7 @@ def diagnose(
         alternatives=() if abstained else tuple(fixes[1:]),
         abstained=abstained,
         notes=_notes(case, broken),
+        missions=judged.missions,
         rivals=circumstances(run, world, schema) if unsure else (),
         tell_more=tell_more(world, faults, run, schema.variables, reference, keep, unranked)
         if unsure and not out_of_reach
@@ -347,6 +349,10 @@ def _new_way_to_fail(case: _Case) -> str | None:
     return None
 
 
+def _off(case: _Case) -> frozenset[str]:
+    return frozenset(deviating(case.run.config, case.reference))
+
+
 def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
     notes = list(case.choice.fit.reasons)
     for name in (result.variable.name for result in broken):
@@ -355,6 +361,9 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
             notes.append(f"not ranked, as the training runs cannot tell their effect on {name}: {unknown}")
     if not case.run.mission.fits:
         notes.append(case.run.mission.mismatch)
+    unread = [name for name in unread_options(case.profile.schema, case.run) if name in _off(case)]
+    if unread:
+        notes.append(f"no suspect, as no mode that reads it was entered: {', '.join(unread)}")
     if case.assumed:
         names = sorted(case.assumed)
         shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_core.extract.asked import asked
-from care_core.extract.flight import NEEDS, Flight, analyse, messages, waypoint_offsets
+from care_core.extract.flight import AIRBORNE_M, NEEDS, Flight, analyse, messages, waypoint_offsets
+from care_core.extract.modes import flew_automatically, kind_flown, mode_names
 from care_core.extract.registry import (
     MISSION_KINDS,
     Args,
@@ -30,7 +31,8 @@ from care_core.extract.registry import (
 )
 from care_core.logs.base import Table, Wanted
 from care_core.logs.plausible import is_alive, plausible
-from care_core.run import Evidence, Unavailable, Value, is_known
+from care_core.run import Check, Evidence, Unavailable, Value, is_known
+from care_core.vehicles import error_kind, error_words, motor_outputs
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +40,11 @@ _EV_ARMED, _EV_DISARMED = 10, 11
 _REFUSAL = re.compile(r"(?:Pre)?Arm: (.*)")
 _WAYPOINT_TOLERANCE_M = 5.0
 _MIN_ROWS = 5
-_AUTO = 3  # ArduCopter's flight mode number
+_SAID_AFTER_S = 0.6
+"""A crash disarms first and is said then; telemetry knows a disarming to half a second (its heartbeats)."""
+_TOOK_OFF, _LANDED = (16, 28), (18,)
+"""EV records of the land detector."""
+_GROUNDED = frozenset(("rover", "sub", "tracker"))
 _PHASE_ARGS = {
     "phase": one_of(
         "only this part of the flight: takeoff, leg, return, return_climb, return_cruise, descent, touchdown",
@@ -48,14 +54,8 @@ _PHASE_ARGS = {
 }
 _STATISTIC = one_of("mean, max, min, std, rms or peak (95th percentile)", "mean", "max", "min", "std", "rms", "peak")
 
-# Subsystems of an ERR record by the kind of event; code 0 means that the fault went away.
-ERR_SUBSYSTEMS: dict[int, tuple[str, str]] = {
-    5: ("failsafe", "radio"), 6: ("failsafe", "battery"), 8: ("failsafe", "ground station"),
-    9: ("failsafe", "fence"), 12: ("crash", "crash check"), 16: ("ekf", "EKF check"),
-    17: ("failsafe", "EKF"), 20: ("failsafe", "ADSB"), 23: ("failsafe", "terrain"), 24: ("ekf", "EKF primary changed"),
-    25: ("thrust", "thrust loss check"), 26: ("failsafe", "sensors"), 27: ("failsafe", "leak"),
-    29: ("vibration", "vibration compensation"), 31: ("failsafe", "dead reckoning"),
-}  # fmt: skip
+HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
+"""Where heights are told: above home, else above some other ground."""
 
 _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
     (re.compile(r"crash", re.IGNORECASE), "crash"),
@@ -77,7 +77,7 @@ class ArduPilotFlight(MissionKind):
     }
 
     def needs(self, spec: Args) -> Wanted:
-        return NEEDS
+        return merge_needs((NEEDS, HEIGHTS))
 
     def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
         spans = _armed_spans(tables, duration_s)
@@ -105,12 +105,21 @@ class ArduPilotFlight(MissionKind):
         found = [Evidence(t, text, kind) for t, text, kind in _telling(mission)]
         spoken = {one.kind for one in found}
         for t, subsystem, code in _errors(mission):
-            kind, what = ERR_SUBSYSTEMS.get(subsystem, ("", ""))
+            kind = error_kind(subsystem)
             if kind and code and kind not in spoken:
-                found.append(Evidence(t, f"ERR {what}, code {code}", kind))
+                found.append(Evidence(t, f"ERR: {error_words(subsystem, code, kind_flown(mission))}", kind))
         if _forced(mission):
             found.append(Evidence(mission.end_s, "Disarmed by force in flight", "forced"))
         return tuple(sorted(found, key=lambda one: one.time_s))
+
+    def is_decided(self, mission: Mission) -> bool:
+        return mission.ended or (_is_armed(mission) and _failed(mission))
+
+    def checks(self, mission: Mission) -> tuple[Check, ...]:
+        return () if not _is_armed(mission) or flew_automatically(mission) else tuple(_plain_checks(mission))
+
+    def modes(self, mission: Mission) -> tuple[str, ...]:
+        return mode_names(mission)
 
 
 MISSION_KINDS[ArduPilotFlight.name] = ArduPilotFlight()
@@ -175,7 +184,7 @@ def _errors(mission: Mission) -> list[tuple[float, int, int]]:
 def _telling(mission: Mission) -> list[tuple[float, str, str]]:
     """Messages of the flight that speak about a failure: time, text and kind."""
     found = []
-    for t, text in messages(mission.tables.get("MSG"), mission.start_s, mission.end_s):
+    for t, text in messages(mission.tables.get("MSG"), mission.start_s, mission.end_s + _SAID_AFTER_S):
         kind = next((kind for pattern, kind in _MESSAGE_KINDS if pattern.search(text)), None)
         if kind is not None and not _REFUSAL.match(text):
             found.append((t, text, kind))
@@ -189,6 +198,7 @@ def _forced(mission: Mission) -> bool:
     return bool(np.any((arm["ArmState"] == 0) & (arm["Forced"] == 1)))
 
 
+_CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
 _NOT_FLOWN = Unavailable("the vehicle never armed", "see why arming was refused")
 _EVENTS: Wanted = {name: NEEDS[name] for name in ("MSG", "ARM", "EV", "ERR")}
 
@@ -203,8 +213,7 @@ def _has_event(mission: Mission, kind: str, about: str = "") -> float:
         return 0.0
     word = about.casefold()
     for _, subsystem, code in _errors(mission):
-        err_kind, what = ERR_SUBSYSTEMS.get(subsystem, ("", ""))
-        if code and err_kind == kind and word in what.casefold():
+        if code and error_kind(subsystem) == kind and word in error_words(subsystem, code).casefold():
             return 1.0
     return float(any(known == kind and word in text.casefold() for _, text, known in _telling(mission)))
 
@@ -217,25 +226,68 @@ def _in_flight(mission: Mission, kind: str, about: str = "") -> Value:
     return _has_event(mission, kind, about) if _is_armed(mission) else _NOT_FLOWN
 
 
+def _failed(mission: Mission) -> bool:
+    """Whether something ended the flight for good: no landing after it makes the mission a success."""
+    return _forced(mission) or bool(_has_event(mission, "crash")) or bool(_has_event(mission, "failsafe"))
+
+
 def _nothing_to_judge(mission: Mission, flight: Flight) -> Unavailable | None:
     """Why a flight says nothing about a mission, None when it does."""
     if not flight.waypoints:
         return Unavailable("the log names no waypoints", "record CMD")
     if "MSG" not in mission.tables:
         return Unavailable("the log does not say which waypoints were reached", "record MSG")
-    if not _flew_automatically(mission):
-        return Unavailable("the mission was never started (no Auto mode in flight)", "judge a flight of the mission")
     return None
 
 
-def _flew_automatically(mission: Mission) -> bool:
-    """Whether Auto mode was in force at any time of the mission; a log without its number is given the benefit."""
-    modes = mission.tables.get("MODE")
-    if modes is None or not has(modes, "ModeNum"):
-        return True
-    until = np.append(modes.t[1:], np.inf)
-    in_force = (modes.t <= mission.end_s) & (until > mission.start_s)
-    return bool((modes["ModeNum"][in_force] == _AUTO).any())
+def _plain_checks(mission: Mission) -> Iterator[Check]:
+    """What a flight that flew no mission is judged by."""
+    failed = bool(_has_event(mission, "crash"))
+    yield Check("armed", 1.0, "the vehicle armed")
+    flies = kind_flown(mission) not in _GROUNDED
+    if flies:
+        yield Check("took_off", _took_off(mission, failed=failed), "it left the ground")
+    yield Check("no_crash", 1.0 - failed, "the autopilot reported no crash")
+    yield Check("no_failsafe", 1.0 - _has_event(mission, "failsafe"), "no failsafe acted")
+    if flies:
+        yield Check("landed", _landed(mission), "it was on the ground at the end")
+    at_end: Value = 1.0 - _forced(mission) if mission.ended else _CUT
+    yield Check("disarmed", at_end, "it was disarmed, and not by force in flight")
+
+
+def _took_off(mission: Mission, *, failed: bool) -> Value:
+    heights = _heights(mission)
+    flew = bool(heights.max() > AIRBORNE_M) if len(heights) else _detected(mission, _TOOK_OFF)
+    if flew or failed:
+        return float(flew)
+    return Unavailable("it never left the ground" if len(heights) else "the log holds no height")
+
+
+def _landed(mission: Mission) -> Value:
+    if not is_known(_took_off(mission, failed=False)):
+        return _took_off(mission, failed=False)
+    if not mission.ended:
+        return _CUT
+    heights = _heights(mission)
+    return float(heights[-1] <= AIRBORNE_M if len(heights) else _detected(mission, _LANDED))
+
+
+def _heights(mission: Mission) -> Floats:
+    """Heights above home while armed, shape (n,); none where the log does not tell any."""
+    for channel, fields in HEIGHTS.items():
+        table = mission.table(channel)
+        for field in fields:
+            if table is not None and has(table, field):
+                heights = table[field][np.isfinite(table[field])]
+                if len(heights) and np.ptp(heights) > 0:
+                    return np.asarray(heights - (0.0 if channel == "POS" else heights[0]), dtype=np.float64)
+    return np.empty(0)
+
+
+def _detected(mission: Mission, events: tuple[int, ...]) -> bool:
+    """Whether the land detector said so."""
+    table = mission.table("EV")
+    return table is not None and has(table, "Id") and bool(np.isin(table["Id"], events).any())
 
 
 @extractor("mission_success", needs=NEEDS, unit="")
@@ -244,10 +296,15 @@ def mission_success(mission: Mission, args: Args) -> Value:
     disarmed by itself, with no crash and no failsafe; else 0. A refused arming is 0."""
     if not _is_armed(mission):
         return 0.0
-    if not mission.ended:
-        return Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
-    if _forced(mission) or _has_event(mission, "crash") or _has_event(mission, "failsafe"):
+    if not flew_automatically(mission):
+        return Unavailable("no mission was flown", "judge a flight of the mission")
+    if _failed(mission):
         return 0.0
+    return _mission_flown(mission) if mission.ended else _CUT
+
+
+def _mission_flown(mission: Mission) -> Value:
+    """1 when every waypoint was reached and the vehicle landed where the mission ends, else 0."""
     flight = mission.shared(analyse)
     unknown = _nothing_to_judge(mission, flight)
     if unknown is not None:
@@ -567,13 +624,18 @@ def _wrapped(degrees: Floats) -> Floats:
 def _register(
     name: str, wanted: Wanted, unit: str, doc: str, measure: Callable[[Table, Mission, Args], Floats],
     *, stat: str, args: Mapping[str, str] | None = None,
+    columns: Callable[[Mission], Sequence[str]] | None = None,
 ) -> None:  # fmt: skip
-    """Register an extractor that is a statistic of one channel over a part of the flight."""
+    """Register an extractor that is a statistic of one channel over a part of the flight.
+
+    Args:
+        columns: which of the wanted fields this vehicle's log must have; all of them when None.
+    """
     ((channel, fields),) = wanted.items()
     required = [field for field in fields if field not in ("I", "IMU", "C")]
 
     def compute(mission: Mission, given: Args) -> Value:
-        table = _series(mission, channel, required, given)
+        table = _series(mission, channel, required if columns is None else columns(mission), given)
         if isinstance(table, Unavailable):
             return table
         return _statistic(measure(table, mission, given), str(given.get("stat", stat)))
@@ -606,22 +668,28 @@ def _lean(table: Table) -> Floats:
     return np.asarray(np.degrees(np.arccos(np.cos(np.radians(table["Roll"])) * np.cos(np.radians(table["Pitch"])))))
 
 
-def _motors(table: Table) -> Floats:
-    """Outputs of the motors, shape (rows, 4), as a share of their range of 1000 to 2000 microseconds."""
-    return np.asarray((np.column_stack([table[name] for name in ("C1", "C2", "C3", "C4")]) - 1000.0) / 1000.0)
+def _motor_columns(mission: Mission) -> tuple[str, ...]:
+    """The columns of RCOU that drive motors; the first four where no parameter says which."""
+    outputs = motor_outputs(mission.settings).values() or range(1, 5)
+    return tuple(f"C{output}" for output in sorted(outputs))
+
+
+def _motors(table: Table, mission: Mission) -> Floats:
+    """Outputs of the motors, shape (rows, motors), as a share of their range of 1000 to 2000 microseconds."""
+    return np.asarray((np.column_stack([table[name] for name in _motor_columns(mission)]) - 1000.0) / 1000.0)
 
 
 def _at_limit(table: Table, mission: Mission, _args: Args) -> Floats:
     limit = mission.settings.get("MOT_SPIN_MAX", 0.95)
     top = float(limit) if isinstance(limit, (int, float)) else 0.95
-    return np.asarray(_motors(table).max(axis=1) >= top - 0.005, dtype=np.float64)
+    return np.asarray(_motors(table, mission).max(axis=1) >= top - 0.005, dtype=np.float64)
 
 
 _ATTITUDE = {"ATT": ("DesRoll", "Roll", "DesPitch", "Pitch", "DesYaw", "Yaw")}
 _RATE = {"RATE": ("R", "RDes", "ROut", "P", "PDes", "POut", "Y", "YDes", "YOut")}
 _LEAN = {"ATT": ("Roll", "Pitch")}
 _SINK = {"PSCD": ("VD",)}
-_OUTPUTS = {"RCOU": ("C1", "C2", "C3", "C4")}
+_OUTPUTS = {"RCOU": tuple(f"C{output}" for output in range(1, 15))}
 
 _register("attitude_error", _ATTITUDE, "deg", "Wanted minus flown attitude.", _attitude_error, stat="rms", args=_TILT)
 _register("rate_error", _RATE, "deg/s", "Wanted minus flown rotation rate: slack or oscillation of one axis.",
@@ -641,11 +709,11 @@ _register("vertical_acceleration_error", {"PSCD": ("TAD", "AD")}, "m/s/s", "Want
 _register("climb_rate", _SINK, "m/s", "Speed upwards.", lambda t, _m, _a: -t["VD"], stat="peak")
 _register("descent_rate", _SINK, "m/s", "Speed downwards.", lambda t, _m, _a: t["VD"], stat="peak")
 _register("motor_saturation", _OUTPUTS, "", "Share of the time in which a motor is at MOT_SPIN_MAX.",
-          _at_limit, stat="mean")  # fmt: skip
+          _at_limit, stat="mean", columns=_motor_columns)  # fmt: skip
 _register("motor_output", _OUTPUTS, "", "Mean output of the motors, as a share of their range.",
-          lambda t, _m, _a: _motors(t).mean(axis=1), stat="mean")  # fmt: skip
+          lambda t, m, _a: _motors(t, m).mean(axis=1), stat="mean", columns=_motor_columns)  # fmt: skip
 _register("motor_spread", _OUTPUTS, "", "How far the motors differ from each other, as a share of their range.",
-          lambda t, _m, _a: np.ptp(_motors(t), axis=1), stat="mean")  # fmt: skip
+          lambda t, m, _a: np.ptp(_motors(t, m), axis=1), stat="mean", columns=_motor_columns)  # fmt: skip
 _register("throttle", {"CTUN": ("ThO",)}, "", "Throttle out of the attitude controller, 0 to 1.",
           lambda t, _m, _a: t["ThO"], stat="mean")  # fmt: skip
 _register("vibration", {"VIBE": ("IMU", "VibeX", "VibeY", "VibeZ")}, "m/s/s", "Vibration of the first IMU, all axes.",

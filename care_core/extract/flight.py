@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.extract.asked import ITEMS, Asked, Item, asked, home_of, items_of
+from care_core.extract.modes import MODES, modes_in_force
 from care_core.extract.registry import Mission, has, merge_needs
 from care_core.logs.base import Table, Wanted
 from care_core.run import Unavailable
@@ -26,7 +27,7 @@ NEEDS: Wanted = merge_needs(
         ITEMS,
         {
             "POS": ("RelHomeAlt",),
-            "MODE": ("ModeNum",),
+            **MODES,
             "MSG": ("Message",),
             "ARM": ("ArmState", "Forced"),
             "EV": ("Id",),
@@ -46,7 +47,6 @@ AIRBORNE_M = 2.0
 _METRES_PER_DEGREE = 111_319.49
 _NAV_WAYPOINT = 16
 _HOMEWARD = (20, 21)  # MAV_CMD_NAV_RETURN_TO_LAUNCH, MAV_CMD_NAV_LAND
-_MODE_RTL, _MODE_LAND = 6, 9
 _AT_HEIGHT_M = 0.5
 _STARTED = re.compile(r"Mission: (\d+) ")
 _REACHED = re.compile(r"Reached command #(\d+)")
@@ -257,9 +257,8 @@ def _homeward(mission: Mission, started: Mapping[int, float]) -> float | None:
     """When the vehicle set out for home: by a mission item, a failsafe or the operator."""
     items = _items(mission)
     times = [t for number, t in started.items() if number in items and items[number].command in _HOMEWARD]
-    modes = mission.table("MODE")
-    if modes is not None and has(modes, "ModeNum"):
-        times += modes.t[np.isin(modes["ModeNum"], (_MODE_RTL, _MODE_LAND))].tolist()
+    entered = mission.shared(modes_in_force)
+    times += [mode.t for mode in entered if mode.way in ("return", "land") and mode.t >= mission.start_s]
     return min(times, default=None)
 
 

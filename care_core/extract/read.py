@@ -48,17 +48,23 @@ def read_run(
         UsageError: there is no mission of that number.
     """
     source = _Source.read(log, schema, sha256)
-    count = len(source.missions)
-    if mission is not None and not 1 <= mission <= count:
+    return source.run(mission_number(mission, len(source.missions)) - 1, overrides or {})
+
+
+def mission_number(asked: int | None, count: int) -> int:
+    """The mission that is meant of so many: the last where none is asked for. Raises UsageError."""
+    if asked is not None and not 1 <= asked <= count:
         held = "holds one mission" if count == 1 else f"holds missions 1 to {count}"
-        raise UsageError(f"There is no mission {mission}: the log {held}.", hint="Name one of them.", where="--mission")
-    return source.run((mission or count) - 1, overrides or {})
+        raise UsageError(f"There is no mission {asked}: the log {held}.", hint="Name one of them.", where="--mission")
+    return asked or count
 
 
-def read_runs(log: Log, schema: Schema) -> tuple[Run, ...]:
-    """Read every mission of a log, in time order. Raises as `read_run` does."""
-    source = _Source.read(log, schema)
-    return tuple(source.run(index, {}) for index in range(len(source.missions)))
+def read_runs(
+    log: Log, schema: Schema, *, overrides: Mapping[str, Setting] | None = None, sha256: Sha256 | None = None
+) -> tuple[Run, ...]:
+    """Read every mission of a log, in time order; arguments and errors are those of `read_run`."""
+    source = _Source.read(log, schema, sha256)
+    return tuple(source.run(index, overrides or {}) for index in range(len(source.missions)))
 
 
 def mission_kind(schema: Schema) -> MissionKind:
@@ -147,7 +153,9 @@ class _Source:
         found = replace(found, ended=found.ended and not _cut_short(found, self.log))
         driven = {name: in_force(history, found.end_s) for name, history in self.settings.items()}
         config, sources, settings = configuration(self.schema.options, driven, overrides)
-        mission = replace(found, settings={name: setting.value for name, setting in driven.items()})
+        mission = replace(
+            found, facts=self.log.facts, settings={name: setting.value for name, setting in driven.items()}
+        )
         mismatch = self.kind.mismatch(mission)
         return Run(
             config=config,
@@ -162,12 +170,14 @@ class _Source:
                 count=len(self.missions),
                 start_s=mission.start_s,
                 end_s=mission.end_s,
-                ended=mission.ended,
+                ended=self.kind.is_decided(mission),
                 fits=not mismatch,
                 mismatch=mismatch,
             ),
             evidence=tuple(_pointed(evidence, self.schema, config) for evidence in self.kind.evidence(mission)),
             changes=_changes(self.settings, mission),
+            checks=() if self.doubts[index] else self.kind.checks(mission),
+            modes=self.kind.modes(mission),
         )
 
     def _values(self, role: Role, mission: Mission, doubt: str) -> dict[str, Value]:

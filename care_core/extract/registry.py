@@ -14,7 +14,7 @@ from typing import Any, TypeGuard, TypeVar
 from care_core.errors import ProfileError, nearest
 from care_core.extract.how_to_record import how_to_record
 from care_core.logs.base import Table, Wanted
-from care_core.run import Evidence, Unavailable, Value
+from care_core.run import Check, Evidence, Unavailable, Value
 
 Args = Mapping[str, Any]
 T = TypeVar("T")
@@ -73,6 +73,8 @@ class Mission:
     spec: Mapping[str, Any]
     settings: Mapping[str, float | str] = field(default_factory=dict)
     """Parameters as driven in this mission, by their name in the log."""
+    facts: Mapping[str, str] = field(default_factory=dict)
+    """What the log says of its robot."""
     cache: dict[Any, Any] = field(default_factory=dict)
 
     def table(self, channel: str) -> Table | None:
@@ -126,6 +128,18 @@ class MissionKind(ABC):
     @abstractmethod
     def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
         """Messages that speak about a failure of this mission, in time order."""
+
+    def is_decided(self, mission: Mission) -> bool:
+        """Whether the log says how the mission came out: it holds its end, or what made it fail for good."""
+        return mission.ended
+
+    def checks(self, mission: Mission) -> tuple[Check, ...]:
+        """What a run that had no mission is judged by; none where there was one."""
+        return ()
+
+    def modes(self, mission: Mission) -> tuple[str, ...]:
+        """The modes in force during the mission, by name; none where the log does not say."""
+        return ()
 
 
 EXTRACTORS: dict[str, Extractor] = {}

@@ -46,6 +46,7 @@ class _Variable(_Strict):
     values: dict[float, str] = Field(default_factory=dict)
     parameter: str | list[str] = Field(default_factory=list)
     reboot_required: bool = False
+    modes: list[str] = Field(default_factory=list)
     safety: bool = False
     kind: Kind | None = None
     threshold: _Threshold | None = None
@@ -60,6 +61,8 @@ class _Variable(_Strict):
             raise ValueError("only objectives have a 'threshold'")
         if self.role is not Role.OPTION and self.parameter:
             raise ValueError("only options have a 'parameter'")
+        if self.role is not Role.OPTION and self.modes:
+            raise ValueError("only options have 'modes', those that read it")
         if self.safety and self.default is None:
             raise ValueError("a 'safety' option needs 'default', the value past which it is never moved")
         if self.range is not None and self.range[0] >= self.range[1]:
@@ -328,6 +331,7 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         labels=tuple(v.values.items()),
         parameters=(v.parameter,) if isinstance(v.parameter, str) else tuple(v.parameter),
         reboot_required=v.reboot_required,
+        modes=tuple(v.modes),
         safety=v.safety,
         kind=v.kind,
         threshold=None if v.threshold is None else Threshold(v.threshold.op, v.threshold.value),

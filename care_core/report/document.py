@@ -20,6 +20,7 @@ from care_core.diagnose.records import (
     Confidence,
     Diagnosis,
     Fix,
+    MissionVerdict,
     ObjectiveResult,
     Prediction,
     Since,
@@ -177,6 +178,18 @@ class DismissedEntry(Strict):
     reason: str
 
 
+class MissionEntry(Strict):
+    """A mission of the log with what became of it; `judged` is the one that the document is about."""
+
+    index: int
+    start_s: float | None
+    end_s: float | None
+    ended: bool
+    status: Status
+    reason: str
+    judged: bool
+
+
 class TriageDocument(Strict):
     """The answer for one run, as `care triage --json` prints it."""
 
@@ -208,6 +221,8 @@ class TriageDocument(Strict):
     """Where the value of each option came from: a record or topic of the log, or file:line."""
     since: SinceEntry | None = None
     """Only with `--since`."""
+    missions: list[MissionEntry] = Field(default_factory=list)
+    """Every mission of the log."""
     evidence: list[EvidenceEntry] = Field(default_factory=list)
     rivals: list[CircumstanceEntry] = Field(default_factory=list)
     tell_more: list[str] = Field(default_factory=list)
@@ -259,6 +274,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
         notes=list(dict.fromkeys((*warnings, *(clean(note) for note in diagnosis.notes)))),
         sources={name: clean(source) for name, source in run.sources.items()},
         since=None if diagnosis.since is None else _since(diagnosis.since),
+        missions=[_mission(verdict, run.mission.index) for verdict in diagnosis.missions],
         evidence=[_evidence(evidence) for evidence in run.evidence],
         rivals=[_circumstance(rival) for rival in diagnosis.rivals],
         tell_more=[clean(advice) for advice in diagnosis.tell_more],
@@ -323,6 +339,19 @@ def objective_entry(result: ObjectiveResult) -> ObjectiveEntry:
         threshold=None if threshold is None else ThresholdEntry(op=threshold.op, value=threshold.value),
         status=result.status,
         reason=clean(result.reason) or None,
+    )
+
+
+def _mission(verdict: MissionVerdict, judged: int) -> MissionEntry:
+    mission = verdict.mission
+    return MissionEntry(
+        index=mission.index,
+        start_s=_finite(mission.start_s),
+        end_s=_finite(mission.end_s),
+        ended=mission.ended,
+        status=verdict.status,
+        reason=clean(verdict.reason),
+        judged=mission.index == judged,
     )
 
 

@@ -36,6 +36,7 @@ def to_text(diagnosis: Diagnosis) -> str:
         finding_lines(diagnosis.health),
         account_lines(diagnosis.health),
         _origin(diagnosis),
+        _missions(diagnosis),
         _objectives(diagnosis),
         *(_causes(faults) for faults in together(diagnosis.faults, _paths)),
         _fix(diagnosis),
@@ -56,6 +57,8 @@ def _headline(diagnosis: Diagnosis) -> Iterator[str]:
         yield from wrapped("; ".join(broken), "FAULT: ")
     elif diagnosis.profile.fit.verdict == "no":
         yield from wrapped(_without_profile(diagnosis.health))
+    elif diagnosis.run.checks:
+        yield from wrapped("no mission was flown, and nothing failed in the flight itself", "NO MISSION: ")
     elif unknown:
         yield from wrapped(f"no fault found, but {', '.join(unknown)} could not be evaluated", "NOT EVALUATED: ")
     else:
@@ -108,6 +111,19 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
         yield from wrapped(f"{damage.what}{at}", "Damage   ")
     if len(run.log.damage) > DAMAGE_SHOWN:
         yield f"Damage   and {len(run.log.damage) - DAMAGE_SHOWN} more places, 'care inspect' lists them"
+
+
+def _missions(diagnosis: Diagnosis) -> Iterator[str]:
+    """Every mission of a log that holds several, with its verdict."""
+    if len(diagnosis.missions) < 2:
+        return
+    yield "Missions of this log"
+    for verdict in diagnosis.missions:
+        one = verdict.mission
+        here = "  <- this report" if one.index == diagnosis.run.mission.index else ""
+        span = f"{one.start_s:.0f} to {one.end_s:.0f} s"
+        reason = f": {verdict.reason}" if verdict.reason else ""
+        yield from wrapped(f"{STATUS_WORDS[verdict.status]}, {span}{reason}{here}", f"  {one.index:>2}  ")
 
 
 def _objectives(diagnosis: Diagnosis) -> Iterator[str]:

@@ -29,7 +29,7 @@ from tests.made import DRIVEN, ENERGY, HOSTILE, LAND_SPEED, made_diagnosis
 
 KEYS = ["schema", "profile", "log", "config", "context", "metrics", "objectives", "faults", "fix", "abstained"]
 HAPPENED = ["fit", "account", "findings", "hypotheses"]
-ADDED = [*HAPPENED, "notes", "sources", "since", "evidence", "rivals", "tell_more", "dismissed"]
+ADDED = [*HAPPENED, "notes", "sources", "since", "missions", "evidence", "rivals", "tell_more", "dismissed"]
 
 
 def test_the_document_has_exactly_the_published_keys() -> None:

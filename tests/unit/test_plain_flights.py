@@ -1,0 +1,194 @@
+"""Flights are judged by what was flown: by their own modes, and by checks of their own where no mission was."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from care_core.diagnose.judging import judge, verdict
+from care_core.diagnose.worlds import unread_options
+from care_core.extract.modes import mode_names
+from care_core.extract.registry import Mission
+from care_core.profile.schema import read_schema
+from care_core.report.terminal import to_text
+from care_core.run import Check, MissionInfo, Unavailable, Value, is_known
+from tests.made import made_diagnosis, made_run
+from tests.unit.test_ardupilot_extract import HOME, KIND, METRES, flight, north, table, value
+
+PROFILE = Path(__file__).parents[2] / "profiles" / "arducopter" / "profile.yaml"
+COPTER = {"firmware": "ArduCopter V4.5.4 (fd1bcc61)", "vehicle": "multicopter"}
+ROVER = {"firmware": "ArduRover V4.5.4 (fd1bcc61)", "vehicle": "rover"}
+PLANE = {"firmware": "ArduPlane V4.4.0", "vehicle": "fixed wing"}
+
+
+def flown(facts: Mapping[str, str] = COPTER, *, mode: int = 5, **replaced: Any) -> Mission:
+    """The flight of `tests/unit/test_ardupilot_extract.py`, in one mode."""
+    tables = flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced)
+    (mission,) = KIND.missions(tables, 75.0, {})
+    return replace(mission, facts=facts)
+
+
+def checks(mission: Mission) -> dict[str, Value]:
+    return {check.name: check.value for check in KIND.checks(mission)}
+
+
+def test_a_flight_in_loiter_is_no_mission_and_has_checks_of_its_own() -> None:
+    mission = flown(mode=5)
+    found = value(mission, "mission_success")
+    assert isinstance(found, Unavailable)
+    assert found.reason == "no mission was flown"
+    assert checks(mission) == {
+        "armed": 1.0, "took_off": 1.0, "no_crash": 1.0, "no_failsafe": 1.0, "landed": 1.0, "disarmed": 1.0,
+    }  # fmt: skip
+
+
+def test_a_flown_mission_has_none() -> None:
+    mission = flown(mode=3)
+    assert value(mission, "mission_success") == 1.0
+    assert KIND.checks(mission) == ()
+
+
+@pytest.mark.parametrize(
+    ("facts", "mode", "is_mission"),
+    [(COPTER, 3, True), (COPTER, 10, False), (ROVER, 10, True), (ROVER, 3, False), (PLANE, 10, True), ({}, 3, True)],
+)
+def test_auto_is_the_vehicles_own(facts: Mapping[str, str], mode: int, *, is_mission: bool) -> None:
+    assert (KIND.checks(flown(facts, mode=mode)) == ()) == is_mission
+
+
+def test_a_rover_neither_takes_off_nor_lands() -> None:
+    assert checks(flown(ROVER, mode=0)).keys() == {"armed", "no_crash", "no_failsafe", "disarmed"}
+
+
+def test_a_crash_in_stabilize_is_a_crash_and_no_failed_mission() -> None:
+    mission = flown(mode=0, ERR=table([(69.9, 12, 1)], "Subsys", "ECode"))
+    assert checks(mission)["no_crash"] == 0.0
+    assert not is_known(value(mission, "mission_success"))
+
+
+def test_a_crash_that_is_said_after_it_disarmed_belongs_to_its_flight() -> None:
+    said = table([(70.3, "Crash: Disarming")], "Message")
+    assert checks(flown(mode=0, MSG=said))["no_crash"] == 0.0
+    later = table([(74.0, "Crash: Disarming")], "Message")
+    assert checks(flown(mode=0, MSG=later))["no_crash"] == 1.0
+
+
+CUT = table([(10.0, 1, 0)], "ArmState", "Forced")
+
+
+def test_a_failure_counts_before_the_log_ends() -> None:
+    """What made a mission fail for good decides it, though the log ends before the vehicle disarmed."""
+    failed = flown(mode=3, ARM=CUT, ERR=table([(40.0, 6, 1)], "Subsys", "ECode"))
+    assert not failed.ended
+    assert KIND.is_decided(failed)
+    assert value(failed, "mission_success") == 0.0
+    going_on = flown(mode=3, ARM=CUT)
+    assert not KIND.is_decided(going_on)
+    assert not is_known(value(going_on, "mission_success"))
+
+
+def test_a_flight_without_a_mission_that_is_cut_off_has_no_landing() -> None:
+    found = checks(flown(mode=5, ARM=CUT))
+    assert found["took_off"] == found["no_crash"] == 1.0
+    assert not is_known(found["landed"])
+    assert not is_known(found["disarmed"])
+
+
+def test_a_disarming_by_force_in_the_air_fails() -> None:
+    at = np.arange(0.0, 75.0, 0.5)
+    level = np.full_like(at, HOME[1])
+    up = {"Lat": np.full_like(at, north(0)), "Lng": level, "RelHomeAlt": np.where(at > 12, 20.0, 0.0)}
+    forced = table([(10.0, 1, 0), (70.0, 0, 1)], "ArmState", "Forced")
+    found = checks(flown(mode=5, ARM=forced, POS=replace(flight()["POS"], t=at, columns=up)))
+    assert found["landed"] == found["disarmed"] == 0.0
+
+
+def test_armed_on_the_ground_alone_is_neither_good_nor_bad() -> None:
+    at = np.arange(0.0, 75.0, 0.5)
+    still = {"Lat": np.full_like(at, north(0)), "Lng": np.full_like(at, HOME[1]), "RelHomeAlt": 0.01 * np.sin(at)}
+    found = checks(flown(mode=0, POS=replace(flight()["POS"], t=at, columns=still)))
+    assert not is_known(found["took_off"])
+    assert not is_known(found["landed"])
+
+
+def test_old_logs_tell_heights_otherwise_and_modes_by_name() -> None:
+    at = np.arange(0.0, 75.0, 0.5)
+    height = np.interp(at, [10, 20, 60, 70], [0, 30, 30, 0])
+    barometer = replace(flight()["POS"], t=at, columns={"BarAlt": 412.0 + height})
+    named = table([(0.0, "STABILIZE")], "Mode")
+    tables = flight(MODE=named, POS=None, CTUN=barometer)
+    (mission,) = KIND.missions(tables, 75.0, {})
+    mission = replace(mission, facts={"firmware": "ArduCopter V3.1"})
+    assert mode_names(mission) == ("Stabilize",)
+    assert checks(mission)["took_off"] == checks(mission)["landed"] == 1.0
+
+
+def test_without_heights_the_land_detector_is_believed() -> None:
+    events = table([(10.0, 10), (12.0, 28), (69.0, 18), (70.0, 11)], "Id")
+    assert checks(flown(mode=0, POS=None, EV=events))["took_off"] == 1.0
+    assert checks(flown(mode=0, POS=None, EV=events))["landed"] == 1.0
+    assert not is_known(checks(flown(mode=0, POS=None))["took_off"])
+
+
+def test_home_is_no_waypoint() -> None:
+    """A real vehicle writes its home, with coordinates, as item 0."""
+    items = [(0.0, 0, 16, HOME[0], HOME[1], 584.0), (0.0, 1, 22, 0.0, 0.0, 20.0),
+             (0.0, 2, 16, HOME[0] + 100 / METRES, HOME[1], 20.0), (0.0, 3, 20, 0.0, 0.0, 0.0)]  # fmt: skip
+    mission = flown(mode=3, CMD=table(items, "CNum", "CId", "Lat", "Lng", "Alt"))
+    assert value(mission, "mission_success") == 1.0
+
+
+def test_motors_are_those_of_the_vehicle() -> None:
+    """A hexacopter has six; its fifth at the limit is saturation, which four columns do not show."""
+    at = np.arange(0.0, 75.0, 0.5)
+    outputs = {f"C{n}": np.full_like(at, 1500.0) for n in range(1, 9)} | {"C5": np.full_like(at, 1960.0)}
+    tables = flight(RCOU=replace(flight()["POS"], t=at, columns=outputs))
+    (mission,) = KIND.missions(tables, 75.0, {})
+    assert value(mission, "motor_saturation") == 0.0
+    hexa = {f"SERVO{n}_FUNCTION": 32.0 + n for n in range(1, 7)}
+    assert value(replace(mission, settings=hexa, cache={}), "motor_saturation") == 1.0
+
+
+def test_an_option_is_no_suspect_where_no_mode_read_it() -> None:
+    schema = read_schema(PROFILE)
+    run = made_run()
+    assert unread_options(schema, run) == frozenset()
+    landing = replace(run, modes=("Stabilize", "Land"))
+    unread = unread_options(schema, landing)
+    assert {"WPNAV_SPEED", "RTL_ALT"} <= unread
+    assert not {"LAND_SPEED", "WPNAV_SPEED_DN", "ATC_RAT_RLL_P"} & unread
+    assert not unread_options(schema, replace(run, modes=("Auto",)))
+
+
+def test_checks_are_judged_and_withhold_what_a_mission_would_mean() -> None:
+    schema = read_schema(PROFILE)
+    plain = (Check("no_crash", 0.0, "no crash"), Check("landed", Unavailable("the log ends"), "landed"))
+    objectives: dict[str, Value] = {
+        "mission_success": Unavailable("no mission was flown"), "mission_time": 61.0, "energy": 3.0,
+    }  # fmt: skip
+    judged = judge(replace(made_run(), objectives=objectives, checks=plain), schema, {})
+    assert [(one.variable.name, one.status) for one in judged.checks] == [
+        ("no_crash", "fault"), ("landed", "not_evaluated"),
+    ]  # fmt: skip
+    assert not judged.broken
+    assert "no mission was flown" in next(r.reason for r in judged.results if r.variable.name == "mission_time")
+    assert (verdict(judged).status, verdict(judged).reason) == ("fault", "no_crash")
+
+
+def test_several_missions_are_listed_with_their_verdicts() -> None:
+    schema = read_schema(PROFILE)
+    run = made_run()
+    missions = []
+    for index, crashed in enumerate((1.0, 0.0), start=1):
+        one = replace(run, mission=MissionInfo(index, 2, 100.0 * index, 100.0 * index + 50, ended=True, fits=True),
+                      checks=(Check("no_crash", crashed, ""),), objectives={})  # fmt: skip
+        missions.append(verdict(judge(one, schema, {})))
+    shown = to_text(replace(made_diagnosis(), missions=tuple(missions)))
+    assert "   1  OK, 100 to 150 s: no mission was flown  <- this report" in shown
+    assert "   2  FAULT, 200 to 250 s: no_crash" in shown
+    assert "Missions of this log" not in to_text(made_diagnosis())
