@@ -1,13 +1,14 @@
 """What explains this failure: a parameter, a part that failed, what the robot met, or chance, in one ranking.
 
-All compete on one scale, the odds against "nothing failed and the configuration is innocent" (the likelihood of this
-run's signals under that cancels out):
+Each weighs the probability that it is there and would fail such a mission by itself:
 
-- a parameter weighs what it adds to the probability of this failure, over what the reference configuration has;
-- a part, or what was met, weighs the odds that it really failed, seeing this run's signals, times the probability that
-  a mission fails with it;
-- chance weighs the probability that the reference configuration fails as well;
-- what no signal shows can still have failed: a rest, larger where the profile fits in part.
+- a parameter: what it adds to the probability of this failure, over what the reference configuration has;
+- a part, or what was met: the probability that it really failed, seeing this run's signals and that the run failed,
+  times the probability that a mission fails with it;
+- chance: the probability that the reference configuration fails as well;
+- what no signal shows: a rest, larger where the profile fits in part.
+
+Where two would each have done alone, both are told; the weights are brought to add up to 1.
 """
 
 from __future__ import annotations
@@ -19,13 +20,11 @@ from dataclasses import replace
 from care_core.causal.counterfactual import Config, World
 from care_core.diagnose.ranking import Suspect as Option
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
-from care_core.health.records import Finding, Suspect
+from care_core.health.records import Finding, Severity, Suspect
 from care_core.run import FitVerdict
 
-MISSION_LOST: Mapping[str, float] = {"critical": 0.9, "warning": 0.5, "info": 0.05}
+MISSION_LOST: Mapping[Severity, float] = {"critical": 0.95, "warning": 0.6, "info": 0.05}
 """Probability that a mission fails with what a finding shows, by how severe it is."""
-SURE = 0.98
-"""No finding is believed more than this: signals are second-hand."""
 UNSEEN = 0.05
 """Weight of a failed part, and of something met, that left no signal."""
 DOUBT: Mapping[FitVerdict, float] = {"fits": 1.0, "partly": 0.5, "no": 0.0}
@@ -33,8 +32,11 @@ DOUBT: Mapping[FitVerdict, float] = {"fits": 1.0, "partly": 0.5, "no": 0.0}
 UNKNOWN = 0.3
 """What an option, and chance, weigh for an objective that too few training missions had to learn from."""
 LATE, LATE_S = 0.1, 5.0
-"""The most that a part weighs which failed so many seconds after the run was failing already, by a finding that speaks
-of how it was set."""
+"""Share of its weight that a part keeps which failed so many seconds after the run was failing already, by a finding
+that speaks of how it was set."""
+POINTED, MOST_POINTED = 0.05, 4.0
+"""A finding that speaks of how the robot was set speaks for options that add this much together, and raises them by
+this factor at most: which option it is it does not say."""
 LEAST = 0.005
 """Hypotheses less likely than this are told together with chance."""
 _WHAT: Mapping[Suspect, str] = {"hardware": "hardware", "world": "world", "operation": "world"}
@@ -104,22 +106,39 @@ def weigh(
     weights: dict[tuple[str, str], float] = {("chance", ""): max(chance * trust, UNSEEN)}
     for what in ("hardware", "world"):
         weights[what, ""] = UNSEEN * (1.0 if verdict == "fits" else 3.0)
-    for option, share in options.items():
+    seen = [finding for finding in findings if not finding.after_impact and finding.severity != "info"]
+    set_wrong = [finding for finding in seen if finding.suspect == "parameter"]
+    for option, share in _raised(options, set_wrong).items():
         if share * trust > 0:
             weights["parameter", option] = share * trust
-    seen = [finding for finding in findings if not finding.after_impact and finding.severity != "info"]
-    failing_s = min((one.onset_s for one in seen if one.suspect == "parameter"), default=math.inf)
+    other = 1.0 - (1.0 - min(1.0, sum(options.values()))) * (1.0 - chance)
+    failing_s = min((one.onset_s for one in set_wrong), default=math.inf)
     for finding in seen:
         if finding.suspect in _WHAT:
             key = _WHAT[finding.suspect], finding.title
-            is_late = finding.onset_s > failing_s + LATE_S
-            weights[key] = max(weights.get(key, 0.0), min(_odds(finding), LATE) if is_late else _odds(finding))
+            late = LATE if finding.onset_s > failing_s + LATE_S else 1.0
+            weights[key] = max(weights.get(key, 0.0), late * _lost_by(finding, other))
     return _normalised(weights)
 
 
-def _odds(finding: Finding) -> float:
-    sure = min(finding.probability, SURE)
-    return sure / (1.0 - sure) * MISSION_LOST[finding.severity]
+def _raised(options: Mapping[str, float], set_wrong: Sequence[Finding]) -> dict[str, float]:
+    """What the options add, raised to what the findings say that speak of how the robot was set."""
+    total = sum(options.values())
+    said = max((one.probability * MISSION_LOST[one.severity] for one in set_wrong), default=0.0)
+    factor = min(max(1.0, said / total), MOST_POINTED) if total >= POINTED else 1.0
+    return {name: min(1.0, factor * share) for name, share in options.items()}
+
+
+def _lost_by(finding: Finding, other: float) -> float:
+    """Probability that what a finding shows is there and fails the mission, given that the run failed.
+
+    Args:
+        other: probability that the run fails without it.
+    """
+    lost = MISSION_LOST[finding.severity]
+    with_it = finding.probability * (1.0 - (1.0 - lost) * (1.0 - other))
+    without = (1.0 - finding.probability) * max(other, UNSEEN)
+    return lost * with_it / (with_it + without)
 
 
 def _normalised(weights: Mapping[tuple[str, str], float]) -> tuple[Hypothesis, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -51,7 +53,21 @@ def test_a_configuration_that_fails_leads_where_no_part_speaks() -> None:
 def test_a_part_that_surely_failed_leads_over_a_doubtful_parameter() -> None:
     found = weigh({"LAND_SPEED": 0.3}, 0.02, [finding(0.9)], "fits")
     assert lead(found) == ("hardware", "motor 2 lost thrust")
-    assert found[0].probability > 0.8
+    assert weigh({"LAND_SPEED": 0.03}, 0.02, [finding(0.9)], "fits")[0].probability > 0.8
+
+
+def test_a_part_that_failed_after_the_run_was_failing_explains_little() -> None:
+    stuck = Finding("planner", "the planner makes no way", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
+    assert lead(weigh({"occdist_scale": 0.6}, 0.3, [stuck, finding(0.98)], "fits")) == ("parameter", "occdist_scale")
+    sooner = replace(stuck, onset_s=60.0)
+    assert lead(weigh({"occdist_scale": 0.6}, 0.3, [sooner, finding(0.98)], "fits"))[0] == "hardware"
+
+
+def test_a_finding_that_speaks_of_how_it_was_set_raises_the_options() -> None:
+    stuck = Finding("planner", "the planner makes no way", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
+    assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, [], "fits"))[0] == "chance"
+    assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, [stuck], "fits")) == ("parameter", "a")
+    assert lead(weigh({"a": 0.01}, 0.3, [stuck], "fits"))[0] == "chance"
 
 
 def test_what_comes_after_the_impact_explains_nothing() -> None:
