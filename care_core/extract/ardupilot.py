@@ -250,7 +250,8 @@ def _plain_checks(mission: Mission) -> Iterator[Check]:
     yield Check("no_crash", 1.0 - failed, "the autopilot reported no crash")
     yield Check("no_failsafe", 1.0 - _has_event(mission, "failsafe"), "no failsafe acted")
     if flies:
-        yield Check("landed", _landed(mission), "it was on the ground at the end")
+        landed = Unavailable("it crashed") if failed else _landed(mission)
+        yield Check("landed", landed, "it was on the ground at the end")
     at_end: Value = 1.0 - _forced(mission) if mission.ended else _CUT
     yield Check("disarmed", at_end, "it was disarmed, and not by force in flight")
 

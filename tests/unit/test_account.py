@@ -241,3 +241,10 @@ def test_a_vehicle_that_says_nothing_is_not_called_a_copter() -> None:
     assert texts(told({}, facts={"vehicle": "rover"})) == [
         "rover, neither ArduPilot nor PX4 by what it says of itself",
     ]  # fmt: skip
+
+
+def test_terrain_that_is_missing_before_arming_is_every_start() -> None:
+    missing = rows((7.5, 21, 2), names=("Subsys", "ECode"))
+    assert not texts(told({"ARM": ARMED, "ERR": missing}), "error")
+    flown = rows((30.0, 21, 2), names=("Subsys", "ECode"))
+    assert texts(told({"ARM": ARMED, "ERR": flown}), "error") == ["terrain data missing"]

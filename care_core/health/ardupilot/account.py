@@ -67,7 +67,7 @@ _QUIET_EVENTS = frozenset((_ARMED, _DISARMED, 15, 16, 17, 18, 25, 26, 27, 28, 29
 _AT_START = frozenset((54, 55, 60, 62, 67, 164))
 """Events that mean nothing while disarmed: estimators and switches finding their place."""
 _INTERLOCK_OFF, _YAW_RESET = 56, 62
-_EKF_PRIMARY = 24
+_EKF_PRIMARY, _TERRAIN = 24, 21
 _SPOOL_DOWN_S = 6.0
 """A landing switches the interlock off itself before it disarms."""
 _FLURRY_S, _FLURRY = 1.0, 4
@@ -217,6 +217,8 @@ def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Moment]:
     lasted: dict[tuple[int, int], list[tuple[float, float]]] = {}
     lanes: list[tuple[float, int]] = []
     for at, (t, subsystem, code) in enumerate(rows):
+        if subsystem == _TERRAIN and not any(start <= t <= end for start, end in flight.armed):
+            continue  # every start, until the map is loaded
         if subsystem == _EKF_PRIMARY:
             lanes.append((t, code))
             continue
@@ -228,7 +230,6 @@ def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Moment]:
     for (subsystem, code), times in lasted.items():
         kind = {"failsafe": "failsafe", "crash": "crash"}.get(error_kind(subsystem), "error")
         yield Moment(times[0][0], kind, error_words(subsystem, code, vehicle.kind) + _lasting(times), "ERR")
-
     if lanes:
         t, code = lanes[0]
         told = error_words(_EKF_PRIMARY, code, vehicle.kind)
