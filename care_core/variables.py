@@ -130,6 +130,8 @@ class Change:
     current: float
     suggested: float
     notes: tuple[str, ...] = ()
+    in_support: bool = True
+    """False for a value that no training run came near: what is predicted of it is a guess."""
 
     def __str__(self) -> str:
         return f"{self.option.name} {self.option.show(self.current)} -> {self.option.show(self.suggested)}"

@@ -38,6 +38,12 @@ class Answer:
     p_ok: float
     p_ok_now: float
 
+    @property
+    def guessed(self) -> str:
+        """What is said beside every probability where a value leaves the training runs; '' where none does."""
+        names = [change.option.name for change in self.changes if not change.in_support]
+        return f"a guess: {', '.join(names)} outside the training runs" if names else ""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Question:
@@ -58,7 +64,13 @@ class Question:
         odds = world.odds([config, world.config])
         return Answer(
             changes=tuple(
-                Change(self.schema.variables[name], world.config[name], value, self.warnings(name, value))
+                Change(
+                    self.schema.variables[name],
+                    world.config[name],
+                    value,
+                    self.warnings(name, value),
+                    world.model.supports(name, value),
+                )
                 for name, value in changes.items()
             ),
             outlooks=tuple(

@@ -19,6 +19,7 @@ from care_core.report.document import (
     predicted_objective,
     profile_entry,
 )
+from care_core.report.happened import fit_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
 
@@ -99,10 +100,9 @@ def whatif_text(question: Question, answer: Answer) -> str:
 
 
 def _lines(question: Question, answer: Answer) -> Iterator[str]:
+    yield from wrapped(fit_text(question.profile.name, question.profile.fit))
     log = Path(question.run.log.path).name
     yield from wrapped(f"{log}, profile {question.profile.name} {question.profile.version}", "Log  ")
-    for warning in question.profile.fit.reasons:
-        yield from wrapped(warning, "     ! ")
     yield ""
     for change in answer.changes:
         option = change.option
@@ -111,14 +111,15 @@ def _lines(question: Question, answer: Answer) -> Iterator[str]:
         yield from wrapped("; ".join((f"{option.name}  {values}", *change.notes)), "", "  ")
     yield ""
     width = max((len(outlook.objective.variable.name) for outlook in answer.outlooks), default=0)
+    guess = f"; {answer.guessed}" if answer.guessed else ""
     for outlook in answer.outlooks:
-        yield from wrapped(_outlook(outlook), f"{outlook.objective.variable.name:<{width}}  ")
+        yield from wrapped(_outlook(outlook) + guess, f"{outlook.objective.variable.name:<{width}}  ")
     if any(o.objective.variable.kind == "functional" and o.predicted.status() == "fault" for o in answer.outlooks):
         yield from wrapped("The mission is likely to fail; the other values are those of a mission that does not.")
     yield ""
     yield from wrapped(
         f"Odds that all objectives are met: {answer.p_ok:.0%} with the change, "
-        f"{answer.p_ok_now:.0%} if the same configuration runs again"
+        f"{answer.p_ok_now:.0%} if the same configuration runs again{guess}"
     )
 
 

@@ -69,7 +69,9 @@ class FixPage(DiagnosisPage):
             return Content.assemble("Odds of no fault ", (odds, "bold"), " as driven", ("  nothing ticked", "dim"))
         changes = f"{count} change{'' if count == 1 else 's'}"
         now = "" if session.unchanged is None else f"  (as driven {percent(session.unchanged.p_fixed)})"
-        return Content.assemble("Odds of no fault ", (odds, "bold"), now, (f"  {changes}", "dim"))
+        guess = shown is not None and not all(change.in_support for change in shown.changes)
+        outside = " a guess, outside the training runs" if guess else ""
+        return Content.assemble("Odds of no fault ", (odds, "bold"), outside, now, (f"  {changes}", "dim"))
 
     def _detail(self, option: Variable | None) -> Rows:
         session = self.session
