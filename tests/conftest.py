@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from fcntl import LOCK_EX, flock
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,10 +24,16 @@ class Outcome(NamedTuple):
 
 
 Care = Callable[..., Outcome]
+LONGEST_ID = 40
 
 # How long an example takes says more of the machine's other work than of the code.
 settings.register_profile("care", deadline=None)
 settings.load_profile("care")
+
+
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """A long text gives its test a short name."""
+    return f"{argname}_of_{len(val)}" if isinstance(val, (str, bytes)) and len(val) > LONGEST_ID else None
 
 
 @pytest.fixture(autouse=True)
@@ -58,8 +65,14 @@ def planted(tmp_path_factory: pytest.TempPathFactory) -> Profile:
     from care_core.profile.store import Profile
     from tests.planted import SCHEMA, SETTINGS, fly_many
 
-    folder = tmp_path_factory.mktemp("planted")
-    write_model(train(fly_many(250), SCHEMA, SETTINGS), folder)
+    # Workers share the folder above their own: the first to come trains, the others wait for it.
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "planted"
+    folder.mkdir(exist_ok=True)
+    with (folder / "lock").open("w") as lock:
+        flock(lock, LOCK_EX)
+        if not (folder / "mechanisms.npz").is_file():  # what is written last
+            write_model(train(fly_many(250), SCHEMA, SETTINGS), folder)
     return Profile(folder, SCHEMA)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import xlogy
 
-from care_core.causal.graph import CausalGraph, Edge
+from care_core.causal.graph import Edge
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import Mark, Pag, PagEdge
 from care_core.learn.table import FloatArray
@@ -205,8 +205,3 @@ def exogenous_entropy(joint: FloatArray) -> float:
         left[np.arange(len(left)), largest] -= mass
         masses.append(mass)
     return entropy(np.array(masses))
-
-
-def mixed_graph(nodes: Sequence[str], resolved: Resolved) -> CausalGraph:
-    """The resolved edges as a graph over `nodes`."""
-    return CausalGraph(tuple(nodes), resolved.directed, resolved.bidirected)

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import fdtrc, ndtri, stdtr
+from scipy.stats import false_discovery_control
 
 from care_core.learn.table import FloatArray, normal_scores
 from care_core.profile.schema import Schema
@@ -68,10 +69,9 @@ def dependence(sources: FloatArray, targets: FloatArray) -> FloatArray:
 
 def discoveries(p: FloatArray, rate: float) -> NDArray[np.bool_]:
     """Benjamini-Hochberg: which of the p-values are discoveries at this false discovery rate. Any shape."""
-    ordered = np.sort(p, axis=None)
-    below = ordered <= rate * np.arange(1, ordered.size + 1) / max(ordered.size, 1)
-    cut = ordered[np.flatnonzero(below)[-1]] if below.any() else -1.0
-    return np.asarray(p <= cut)
+    if not p.size:
+        return np.zeros(p.shape, dtype=bool)
+    return np.asarray(false_discovery_control(p, axis=None) <= rate).reshape(p.shape)
 
 
 def pairwise_correlation(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
+from sklearn.metrics import roc_auc_score
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.counterfactual import World
@@ -110,16 +110,9 @@ def score(odds: FloatArray, truth: FloatArray) -> SkillRecord | None:
         log_loss=float(-(y * np.log(clipped) + (1 - y) * np.log(1 - clipped)).mean()),
         brier=float(((p - y) ** 2).mean()),
         calibration_error=calibration_error(p, y),
-        auc=None if y.min() == y.max() else _auc(p, y == 1.0),
+        auc=None if y.min() == y.max() else float(roc_auc_score(y, p)),
         curve=tuple(reliability(p, y)),
     )
-
-
-def _auc(p: FloatArray, positive: NDArray[np.bool_]) -> float:
-    """Share of (met, missed) pairs in which the met run had the higher odds; ties count half."""
-    ranks = pd.Series(p).rank().to_numpy()
-    n = int(positive.sum())
-    return float((ranks[positive].sum() - n * (n + 1) / 2) / (n * (len(p) - n)))
 
 
 def reliability(p: FloatArray, y: FloatArray) -> list[tuple[float, float, int]]:

@@ -38,7 +38,6 @@ _FOOTER = struct.Struct("<QQI")
 _CHUNK_INDEX = struct.Struct("<QQQ")
 _SIZE = struct.Struct("<Q")
 _INDEX = struct.Struct("<HI")
-_TEXT_SIZE = struct.Struct("<I")
 _LONGEST_NAME = 64
 _PIECE = 1 << 20
 

@@ -21,8 +21,6 @@ from care_core.logs.base import LogFormat
 from care_core.variables import Extract, Kind, Op, Role, Threshold, ValueType, Variable
 from care_core.vehicles import Kind as VehicleKind
 
-SCHEMA_VERSION = 1
-
 Side = Literal["low", "high"]
 """On which side of what training saw a value is bad."""
 

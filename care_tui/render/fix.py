@@ -8,7 +8,7 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Fix, ObjectiveResult, Prediction
 from care_core.text import clean
-from care_core.variables import Change, Variable
+from care_core.variables import Variable
 from care_tui.basket import acceptable
 from care_tui.render.rows import (
     Glyphs,
@@ -62,21 +62,6 @@ def option_rows(option: Variable, notes: Sequence[str], glyphs: Glyphs) -> list[
     if option.parameters and option.parameters != (option.name,):
         rows.append(Row(text(f"  sets {', '.join(option.parameters)}"), 4))
     return rows + [warning("Caveat", note) for note in notes]
-
-
-def change_rows(change: Change, glyphs: Glyphs) -> list[Row]:
-    option = change.option
-    line = Content.assemble(
-        "  ", text(option.name, "bold"), "  ", change_text(option, change.current, change.suggested, glyphs)
-    )
-    if option.reboot_required:
-        line += Content.styled("  ! reboot needed", "$text-warning")
-    rows = [Row(line, 4)]
-    keys = tuple(key for key in option.parameters if key != option.name)
-    if keys:
-        rows.append(Row(Content.styled(f"    sets {clean(', '.join(keys))}", "dim"), 6))
-    rows += [Row(Content.styled(f"    ! {clean(note)}", "$text-warning"), 6) for note in change.notes]
-    return rows
 
 
 def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs) -> Content:

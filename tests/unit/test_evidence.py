@@ -199,7 +199,12 @@ def test_every_recorded_refusal_names_the_option_that_set_its_check_off(recorded
     seen: list[str] = []
     for path in sorted((recorded / "data/arducopter/faults").glob("*.BIN")):
         log = open_log(path)
-        diagnosis = triage(read_and_judge(log, profile), profile, choose_profile(log, [profile])[1])
+        judged = read_and_judge(log, profile)
+        if not any(
+            e.kind == "refusal" for e in judged.run.evidence
+        ):  # explaining the others would take most of the time
+            continue
+        diagnosis = triage(judged, profile, choose_profile(log, [profile])[1])
         refusals = [e for e in diagnosis.run.evidence if e.kind == "refusal"]
         for evidence in refusals:
             check = next(check for check in REFUSED if check in evidence.text)
