@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import ast
-import copy
 import os
 import random
 import re
@@ -45,21 +44,19 @@ class Mutant:
     source: str
 
 
-def mutants_of(path: Path) -> list[Mutant]:
-    """Every mutant of a module."""
+def places_in(path: Path) -> list[tuple[Path, int, int]]:
+    """Every mutant of a module as (module, number of the node, which of the node's mutants)."""
     tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
-    nodes = list(ast.walk(tree))
-    found = []
-    for index, node in enumerate(nodes):
-        for number, _ in enumerate(_mutated(node)):
-            changed = copy.deepcopy(tree)
-            place = list(ast.walk(changed))[index]
-            before = ast.unparse(place)
-            new = list(_mutated(place))[number]
-            vars(place).update(new)
-            line = getattr(node, "lineno", 0)
-            found.append(Mutant(path, line, f"{before}  ->  {ast.unparse(place)}", ast.unparse(changed)))
-    return found
+    return [(path, index, n) for index, node in enumerate(ast.walk(tree)) for n, _ in enumerate(_mutated(node))]
+
+
+def mutant_at(path: Path, index: int, number: int) -> Mutant:
+    """The mutant of a place."""
+    tree = ast.parse((ROOT / path).read_text(encoding="utf-8"))
+    node = list(ast.walk(tree))[index]
+    before, line = ast.unparse(node), getattr(node, "lineno", 0)
+    vars(node).update(list(_mutated(node))[number])
+    return Mutant(path, line, f"{before}  ->  {ast.unparse(node)}", ast.unparse(tree))
 
 
 def _mutated(node: ast.AST) -> Iterator[dict[str, object]]:
@@ -112,8 +109,9 @@ def sample(rooms: Sequence[str], count: int, seed: int) -> list[Mutant]:
     drawn: list[Mutant] = []
     for place, room in enumerate(rooms):
         paths = sorted((ROOT / "care_core" / room).glob("*.py"))
-        every = [mutant for path in paths for mutant in mutants_of(path.relative_to(ROOT))]
-        drawn += rng.sample(every, min(len(every), count // len(rooms) + (place < count % len(rooms))))
+        every = [one for path in paths for one in places_in(path.relative_to(ROOT))]
+        chosen = rng.sample(every, min(len(every), count // len(rooms) + (place < count % len(rooms))))
+        drawn += [mutant_at(*one) for one in chosen]
     return drawn
 
 

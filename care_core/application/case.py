@@ -214,7 +214,6 @@ def _diagnose(reading: Reading, health: Health, request: Request, progress: Prog
         reading.judged,
         reading.profile,
         reading.choice,
-        configs=reading.configs,
         keep=request.keep,
         since=None if request.since is None else open_log(request.since),
         health=health,

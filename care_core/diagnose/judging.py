@@ -35,8 +35,10 @@ class Judged:
     results: tuple[ObjectiveResult, ...]
     checks: tuple[ObjectiveResult, ...] = ()
     """What a run without a mission is judged by."""
+    configs: tuple[ConfigFile, ...] = ()
+    """The operator's configuration files, in the order they are loaded."""
     given: Mapping[str, Setting] = field(default_factory=dict)
-    """What the operator's files say of the profile's parameters."""
+    """What they say of the profile's parameters."""
     missions: tuple[MissionVerdict, ...] = ()
     """Every mission of the log, this one among them."""
 
@@ -71,7 +73,9 @@ def read_and_judge(
     runs = read_runs(log, schema, overrides=given, sha256=sha256)
     judged = [judge(run, schema, profile.model.summaries, thresholds) for run in runs]
     verdicts = tuple(verdict(one) for one in judged)
-    return replace(judged[mission_number(mission, len(runs)) - 1], given=given, missions=verdicts)
+    return replace(
+        judged[mission_number(mission, len(runs)) - 1], configs=tuple(configs), given=given, missions=verdicts
+    )
 
 
 def verdict(judged: Judged) -> MissionVerdict:

@@ -10,7 +10,6 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import Config, World
-from care_core.configs.loading import ConfigFile
 from care_core.diagnose import provenance
 from care_core.diagnose.advice import believed, speaks_against
 from care_core.diagnose.circumstances import circumstances, unusual
@@ -79,7 +78,6 @@ def triage(
     profile: Profile,
     choice: ProfileChoice,
     *,
-    configs: Sequence[ConfigFile] = (),
     keep: Collection[str] = (),
     since: Log | None = None,
     health: Health = NOTHING_SEEN,
@@ -90,7 +88,6 @@ def triage(
 
     Args:
         health: what happened in the log, with the findings that compete with parameters.
-        configs: the configuration files that it was read with.
         keep: options that must stay as they are.
         since: the log of a good run; what changed since then is told as evidence.
         top: most causes to report per fault.
@@ -100,7 +97,7 @@ def triage(
     """
     check_wishes(profile.schema, keep, {})
     diagnosis = diagnose(judged, profile, choice, keep=keep, health=health, top=top, progress=progress)
-    notes = provenance.notes(profile.schema, judged.run, configs, judged.given)
+    notes = provenance.notes(profile.schema, judged.run, judged.configs, judged.given)
     diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *notes))
     if since is None:
         return diagnosis
