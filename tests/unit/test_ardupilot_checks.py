@@ -49,7 +49,7 @@ def test_a_weak_motor_is_named(rate_hz: float) -> None:
     finding = first(made)
     assert (finding.kind, finding.title) == ("motor", "motor 3 (front left) lost thrust")
     assert finding.onset_s == pytest.approx(FAILS_S, abs=2.0 + 1 / rate_hz)
-    assert finding.probability > 0.9
+    assert finding.probability > 0.8
 
 
 def test_an_uneven_load_moves_motors_in_pairs_and_is_no_lost_motor() -> None:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.health.ardupilot.flight import Flight, Mask
+from care_core.health.ardupilot.flight import Flight, Mask, Span
 from care_core.health.ardupilot.measure import Calibration, aligned, lasting, length, likely, smooth
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
@@ -77,8 +77,8 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     spans = lasting(t, over > 1.0, _LASTS_S, gap_s=3.0)
     if not spans:
         return
-    start, end = spans[0][0], spans[-1][1]
-    inside = (t >= start) & (t <= end)
+    start, end = _beginning(t, over, spans[0]), spans[-1][1]
+    inside = (t >= spans[0][0]) & (t <= end)
     ratio = float(np.quantile(over[inside], 0.9))
     is_noise = float(np.max((noise / limit)[inside])) > 1.0
     size = float(np.quantile((noise if is_noise else offset)[inside], 0.9))
@@ -90,6 +90,13 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
         if is_noise else f"gyros 1 and 2 differ by {size:.1f} degrees/s (limit {OFFSET_DPS:g})",
         "IMU.GyrX, GyrY, GyrZ of both; AP_Arming allows 5 degrees/s at rest", probability=likely(ratio, _CALIBRATION),
     )  # fmt: skip
+
+
+def _beginning(t: Floats, over: Floats, span: Span) -> float:
+    """When what fills a span first rose to a third of it: it may stay below the limit for long."""
+    third = float(np.median(over[(t >= span[0]) & (t <= span[1])])) / 3
+    before = [start for start, end in lasting(t, over > third, _LASTS_S, gap_s=5.0) if start <= span[0] <= end]
+    return min([span[0], *before])
 
 
 def _shaken(table: Table) -> Mask:
