@@ -40,7 +40,7 @@ def _drops(recording: Recording, battery: Battery) -> Iterator[Finding]:
                 "battery", "the battery's voltage drops", at, float(t[-1]), severity,
                 f"{before:.1f} V to {now:.1f} V within {max(float(t[row] - at), 1.0):.0f} s, more than its load"
                 " explains",
-                f"{battery.topic}; healthy missions fall by 0.1 % a second at most", probability=0.95,
+                f"{battery.topic}; healthy missions fall by 0.1 % a second at most", probability=0.9,
             )  # fmt: skip
             return
 
