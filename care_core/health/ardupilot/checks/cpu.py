@@ -1,7 +1,8 @@
 """An autopilot that cannot keep up: long loops, a load at its limit, records that were dropped.
 
-ArduPilot's docs call a share of long loops (NLon) above a few per cent a concern; the scheduler is out of time where
-Load reaches 100 %. "Internal error" and the CPU failsafe (ERR 19) are the firmware's own word.
+Load is the scheduler's own share of time in use, in tenths of a per cent (PM.Load). NLon counts loops that took half as
+long again as they should (AP_Scheduler::PerfInfo); that one of seven does is our limit, no healthy training flight has
+one long loop in a hundred. The CPU failsafe (ERR 19) is the firmware's own word.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """GPS: jumps against its own velocity, glitches that the firmware saw, lost fixes, few satellites, a poor geometry.
 
-Limits: a position may leave what its velocity and 10 m/s^2 predict by 5 m (AP_InertialNav's GPSGLITCH_RADIUS of 5 m and
-GPSGLITCH_ACCEL of 10 m/s^2, as EK2 and EK3 had them at first); the estimator wants 6 satellites
-(AP_NavEKF3_VehicleStatus.cpp) and an HDop below 2.5; HDop below 1.5 is good, over 2 poor (ArduPilot, Diagnosing
-problems using logs). The largest jump of 97.5 % of the healthy training flights is 0.4 m.
+Limits: a position may leave what its velocity and 10 m/s^2 predict by 5 m (AP_GPS_Glitch of Copter 3.1:
+GPSGLITCH_RADIUS 5 m, GPSGLITCH_ACCEL 10 m/s^2); the estimator wants 6 satellites and an HDop below 2.5
+(AP_NavEKF3_VehicleStatus.cpp); HDop below 1.5 is good, over 2 poor (ArduPilot, Diagnosing problems using logs). The
+largest jump of 97.5 % of the healthy training flights is 0.4 m.
 """
 
 from __future__ import annotations

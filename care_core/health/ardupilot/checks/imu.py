@@ -2,7 +2,8 @@
 
 Limits: gyros that differ by more than 5 degrees/s and accelerometers by more than 0.75 m/s^2 refuse arming (AP_Arming:
 gyros consistent, ARMING_ACCTHRESH). In flight vibration makes both differ: only noise that the measured vibration does
-not explain counts. 97.5 % of the healthy training flights differ by less than 0.02 degrees/s.
+not explain counts. 97.5 % of the healthy training flights differ by less than 0.02 degrees/s on their quietest
+axis.
 """
 
 from __future__ import annotations

@@ -28,8 +28,9 @@ READS: Wanted = {
 }
 
 ALONE = 0.08
-"""Share of an output's range by which one motor alone stands above the middle of its peers. 97.5 % of the healthy
-training flights stay below 0.03; a bent arm or a battery off the middle moves motors in pairs."""
+"""Share of an output's range by which one motor alone stands above the middle of its peers. In nine of ten healthy
+training flights none does by 0.02, and the rest swing; a twisted arm or a battery off the middle moves motors in pairs.
+"""
 _NEXT = 0.6
 """The next motor must stand below this share of that."""
 _ROOM, _ROOM_FLYING = 0.7, 0.85

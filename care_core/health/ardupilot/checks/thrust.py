@@ -1,7 +1,7 @@
 """Too little thrust: all that the motors have is used, or hovering takes most of it.
 
 The firmware learns a hover throttle up to 0.6875 (AP_MotorsMulticopter.h: AP_MOTORS_THST_HOVER_MAX); a vehicle that
-needs more has too little in hand to keep its attitude. 97.5 % of the healthy training flights hover below 0.62.
+needs more has too little in hand to keep its attitude. 97.5 % of the healthy training flights hover below 0.68.
 """
 
 from __future__ import annotations
