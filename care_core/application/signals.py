@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from care_core.logs.base import Log, Table
+    from care_core.logs.base import Channel, Log, Table
 
 Source = tuple[str, str]
 """Channel and field."""
@@ -22,51 +22,54 @@ Source = tuple[str, str]
 SELECTORS = ("I", "Inst", "Instance", "C")
 """Fields that say which of several sensors a value is from: no signals. The first sensor is drawn."""
 
-KNOWN: Mapping[str, Mapping[str, str | None]] = {
-    "ATT": {"Roll": "DesRoll", "Pitch": "DesPitch", "Yaw": "DesYaw"},
-    "CTUN": {"Alt": "DAlt", "BarAlt": "WPAlt", "CRt": "DCRt", "ThO": None, "ThrOut": None},
-    "RATE": {"R": "RDes", "P": "PDes", "Y": "YDes"},
-    "PSCN": {"PN": "TPN", "VN": "TVN"},
-    "PSCE": {"PE": "TPE", "VE": "TVE"},
-    "PSCD": {"PD": "TPD", "VD": "TVD"},
-    "STER": {"TurnRate": "DesTurnRate"},
-    "THR": {"Speed": "DesSpeed"},
-    "BAT": {"Volt": None, "Curr": None},
-    "CURR": {"Volt": None, "Curr": None},
-    "VIBE": {"VibeX": None, "VibeY": None, "VibeZ": None},
-    "GPS": {"NSats": None, "HDop": None, "Spd": None},
-    "RCOU": {f"C{number}": None for number in range(1, 9)},
-    "XKF4": {"SV": None, "SP": None, "SH": None, "SM": None},
-    "NKF4": {"SV": None, "SP": None, "SH": None, "SM": None},
-    "ATTITUDE": {"roll": None, "pitch": None, "yaw": None},
-    "VFR_HUD": {"alt": None, "groundspeed": None, "throttle": None, "climb": None},
-    "SYS_STATUS": {"voltage_battery": None, "current_battery": None},
-    "GPS_RAW_INT": {"satellites_visible": None, "eph": None},
-    "VIBRATION": {"vibration_x": None, "vibration_y": None, "vibration_z": None},
-    "SERVO_OUTPUT_RAW": {f"servo{number}_raw": None for number in range(1, 9)},
-    "vehicle_local_position": {"x": "x", "y": "y", "z": "z", "vx": "vx", "vy": "vy", "vz": "vz"},
-    "battery_status": {"voltage_v": None, "current_a": None, "remaining": None},
-    "cpuload": {"load": None},
-    "sensor_gps": {"satellites_used": None, "eph": None},
+NO_SIGNALS = {"ARM", "CMD", "ERR", "EV", "MODE", "MSG", "ORGN", "PARM", "VER", *TEXTS}
+"""Records of what was done and said: there is nothing to draw."""
+
+KNOWN: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "ATT": {"Roll": ("DesRoll", "RollIn"), "Pitch": ("DesPitch", "PitchIn"), "Yaw": ("DesYaw", "YawIn")},
+    "CTUN": {"Alt": ("DAlt",), "BarAlt": ("WPAlt",), "CRt": ("DCRt",), "ThO": (), "ThrOut": ()},
+    "RATE": {"R": ("RDes",), "P": ("PDes",), "Y": ("YDes",)},
+    "PSCN": {"PN": ("TPN",), "VN": ("TVN",)},
+    "PSCE": {"PE": ("TPE",), "VE": ("TVE",)},
+    "PSCD": {"PD": ("TPD",), "VD": ("TVD",)},
+    "STER": {"TurnRate": ("DesTurnRate",)},
+    "THR": {"Speed": ("DesSpeed",)},
+    "BAT": {"Volt": (), "Curr": ()},
+    "CURR": {"Volt": (), "Curr": ()},
+    "VIBE": {"VibeX": (), "VibeY": (), "VibeZ": ()},
+    "GPS": {"NSats": (), "HDop": (), "Spd": ()},
+    "RCOU": {f"C{number}": () for number in range(1, 9)},
+    "XKF4": {"SV": (), "SP": (), "SH": (), "SM": ()},
+    "NKF4": {"SV": (), "SP": (), "SH": (), "SM": ()},
+    "ATTITUDE": {"roll": (), "pitch": (), "yaw": ()},
+    "VFR_HUD": {"alt": (), "groundspeed": (), "throttle": (), "climb": ()},
+    "SYS_STATUS": {"voltage_battery": (), "current_battery": ()},
+    "GPS_RAW_INT": {"satellites_visible": (), "eph": ()},
+    "VIBRATION": {"vibration_x": (), "vibration_y": (), "vibration_z": ()},
+    "SERVO_OUTPUT_RAW": {f"servo{number}_raw": () for number in range(1, 9)},
+    "vehicle_local_position": {"x": ("x",), "y": ("y",), "z": ("z",), "vx": ("vx",), "vy": ("vy",), "vz": ("vz",)},
+    "battery_status": {"voltage_v": (), "current_a": (), "remaining": ()},
+    "cpuload": {"load": ()},
+    "sensor_gps": {"satellites_used": (), "eph": ()},
 }
-"""Per record the numbers that tell most, each with the one of the same record that was wanted of it.
+"""Per record the numbers that tell most, each with what was wanted of it, by its names in newer and older logs.
 
 ArduPilot: docs "Log messages"; MAVLink common.xml; PX4 msg/ (`VehicleLocalPositionSetpoint` beside the position).
 """
 DEMANDS = {"vehicle_local_position": "vehicle_local_position_setpoint"}
 """Records whose demand is in a record of its own."""
 
-KNOWN_TYPES: Mapping[str, Mapping[str, str | None]] = {
+KNOWN_TYPES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "Odometry": {
-        "twist.twist.linear.x": "linear.x",
-        "twist.twist.angular.z": "angular.z",
-        "pose.pose.position.x": None,
-        "pose.pose.position.y": None,
+        "twist.twist.linear.x": ("linear.x",),
+        "twist.twist.angular.z": ("angular.z",),
+        "pose.pose.position.x": (),
+        "pose.pose.position.y": (),
     },
-    "Twist": {"linear.x": None, "angular.z": None},
-    "BatteryState": {"voltage": None, "percentage": None},
-    "Imu": {"linear_acceleration.z": None, "angular_velocity.z": None},
-    "PoseWithCovarianceStamped": {"pose.pose.position.x": None, "pose.pose.position.y": None},
+    "Twist": {"linear.x": (), "angular.z": ()},
+    "BatteryState": {"voltage": (), "percentage": ()},
+    "Imu": {"linear_acceleration.z": (), "angular_velocity.z": ()},
+    "PoseWithCovarianceStamped": {"pose.pose.position.x": (), "pose.pose.position.y": ()},
 }
 """The same by the type of a ROS message; what odometry was to follow is a velocity command."""
 
@@ -117,22 +120,24 @@ def signals_of(case: Case) -> list[Signal]:
     What another signal was to follow is no signal of its own: it is drawn with that.
     """
     log = log_of(case)
-    known = {(one.channel, one.field): one for one in _known(log)}
-    found = {}
-    for source, used_by in _read_by_profile(case, log).items():
-        follows = known[source].wanted if source in known else None
-        found[source] = Signal(*source, follows, used_by)
-    every = [*found.values(), *(one for source, one in known.items() if source not in found)]
+    present = {channel.name: channel for channel in log.channels() if channel.count}
+    users = _read_by_profile(case, present)
+    held = _held(log, present, users)
+    known = {(one.channel, one.field): one for one in _known(present, held)}
+    found = [replace(known.get(source, Signal(*source)), used_by=names) for source, names in users.items()]
+    every = [
+        *(one for one in found if (one.channel, one.field) in held),
+        *(known[key] for key in known if key not in users),
+    ]
     demands = {one.wanted for one in every}
     left = [one for one in every if (one.channel, one.field) not in demands]
     return sorted(left, key=lambda one: one.wanted is None)
 
 
-def _read_by_profile(case: Case, log: Log) -> dict[Source, tuple[str, ...]]:
+def _read_by_profile(case: Case, present: Collection[str]) -> dict[Source, tuple[str, ...]]:
     """What the profile's extractors read, with the variables it is read for, those that matter most first."""
     from care_core.extract.registry import find_extractor
 
-    present = {channel.name for channel in log.channels()}
     users: dict[Source, list[str]] = {}
     for variable in case.schema.variables.values() if case.schema else ():
         if variable.extract is None:
@@ -140,7 +145,7 @@ def _read_by_profile(case: Case, log: Log) -> dict[Source, tuple[str, ...]]:
         needs = find_extractor(variable.extract.kind).needs(variable.extract.args)
         for channel, fields in needs.items():
             for field in fields:
-                if channel in present and channel not in TEXTS and field not in SELECTORS:
+                if channel in present and channel not in NO_SIGNALS and field not in SELECTORS:
                     users.setdefault((channel, field), []).append(variable.name)
     matters = {result.variable.name for result in case.diagnosis.objectives}
     matters |= {node.name for fault in case.diagnosis.faults for cause in fault.causes for node in cause.path}
@@ -149,24 +154,33 @@ def _read_by_profile(case: Case, log: Log) -> dict[Source, tuple[str, ...]]:
     return {source: tuple(sorted(users[source], key=lambda name: name not in matters)) for source in ranked}
 
 
-def _known(log: Log) -> Iterable[Signal]:
+def _held(log: Log, present: Mapping[str, Channel], read: Iterable[Source]) -> set[Source]:
+    """Which of the fields that are known or read the log really has. A ROS message has the fields of its type."""
+    asked: dict[str, set[str]] = {}
+    for name in present:
+        for record in (name, DEMANDS.get(name, name)):
+            for field, wanted in KNOWN.get(name, {}).items():
+                asked.setdefault(record, set()).update((field, *wanted))
+    for channel, field in read:
+        asked.setdefault(channel, set()).add(field)
+    topics = {(channel, field) for channel in asked if channel.startswith("/") for field in asked[channel]}
+    records = {name: sorted(fields) for name, fields in asked.items() if name in present and not name.startswith("/")}
+    return topics | {(name, field) for name, table in log.read(records).items() for field in table.columns}
+
+
+def _known(present: Mapping[str, Channel], held: Collection[Source]) -> Iterator[Signal]:
     """The signals that every log of its kind has, as far as this one has them."""
-    channels = {channel.name: channel for channel in log.channels() if channel.count}
-    commands = sorted((name for name, one in channels.items() if _of_type(one.type) == "Twist"), key=len)
-    for name, channel in channels.items():
+    commands = sorted((name for name, one in present.items() if _of_type(one.type) == "Twist"), key=len)
+    command = next((name for name in commands if name.endswith("cmd_vel")), "")
+    for name, channel in present.items():
         if name.startswith("/"):
             for field, wanted in KNOWN_TYPES.get(_of_type(channel.type), {}).items():
-                command = next((one for one in commands if one.endswith("cmd_vel")), None)
-                yield Signal(name, field, (command, wanted) if command and wanted else None)
-    recorded = {name: fields for name, fields in KNOWN.items() if name in channels}
-    asked = {name: {*fields, *filter(None, fields.values())} for name, fields in recorded.items()}
-    asked |= {DEMANDS[name]: asked[name] for name in recorded if DEMANDS.get(name) in channels}
-    held = {name: set(table.columns) for name, table in log.read({k: sorted(v) for k, v in asked.items()}).items()}
-    for name, fields in recorded.items():
-        source = DEMANDS.get(name, name)
-        for field, wanted in fields.items():
-            if field in held.get(name, ()):
-                yield Signal(name, field, (source, wanted) if wanted and wanted in held.get(source, ()) else None)
+                yield Signal(name, field, (command, wanted[0]) if command and wanted else None)
+            continue
+        for field, wanted in KNOWN.get(name, {}).items():
+            demands = ((DEMANDS.get(name, name), one) for one in wanted)
+            if (name, field) in held:
+                yield Signal(name, field, next((demand for demand in demands if demand in held), None))
 
 
 def _of_type(type: str) -> str:

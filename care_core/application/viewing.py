@@ -11,6 +11,7 @@ from care_core.application.case import Case
 from care_core.errors import CareError
 
 if TYPE_CHECKING:
+    from care_core.diagnose.records import ObjectiveResult
     from care_core.history.store import Triaged
     from care_core.logs.base import Log
     from care_core.vehicles import Kind
@@ -19,6 +20,7 @@ TEXTS = {
     "MSG": ("Message",),
     "ERR": ("Subsys", "ECode"),
     "EV": ("Id",),
+    "logged_messages": ("message", "level"),
     "/rosout": ("level", "name", "msg"),
     "/rosout_agg": ("level", "name", "msg"),
 }
@@ -26,6 +28,8 @@ TEXTS = {
 
 LEVELS = {1: "debug", 2: "info", 4: "WARN", 8: "ERROR", 16: "FATAL", 10: "debug", 20: "info", 30: "WARN", 40: "ERROR"}
 """Levels of ROS 1 and ROS 2 log messages."""
+PX4_LEVELS = {"emergency": "FATAL", "alert": "FATAL", "critical": "FATAL", "error": "ERROR", "warning": "WARN"}
+"""Levels of PX4's logged messages that ask for attention."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,36 +50,68 @@ def log_of(case: Case) -> Log:
 
 def messages_of(case: Case) -> list[LogMessage]:
     """Everything that the log holds in words, and what was found in its numbers, in time order."""
+    from care_core.logs.telemetry import as_dataflash
     from care_core.vehicles import vehicle_of
 
-    tables = log_of(case).read(TEXTS)
+    log = as_dataflash(log_of(case))
+    tables = log.read(TEXTS)
     if "/rosout" in tables:
         tables = {name: table for name, table in tables.items() if name != "/rosout_agg"}
+    kind = vehicle_of(log.facts, case.diagnosis.run.settings).kind
     found = []
-    vehicle = vehicle_of(log_of(case).facts, {}).kind
     for name, table in tables.items():
         fields = [table.columns[field] for field in TEXTS[name] if field in table.columns]
         for time_s, *values in zip(table.t, *fields, strict=True):
-            found.append(LogMessage(float(time_s), *_worded(name, values, vehicle)))
+            found.append(LogMessage(float(time_s), *_worded(name, values, kind)))
     said = {message.text for message in found}
     evidence = case.diagnosis.run.evidence
     found += [LogMessage(part.time_s, part.kind, part.text) for part in evidence if part.text not in said]
     return sorted(found, key=lambda message: message.time_s)
 
 
-def _worded(channel: str, values: list[object], vehicle: Kind) -> tuple[str, str]:
-    """Kind and text of a message. The code of an ERR record 0 says that the trouble is over."""
+def _worded(channel: str, values: list[object], kind: Kind) -> tuple[str, str]:
+    """Kind and words of a message of this channel."""
     from care_core.vehicles import error_words, event_words, is_over
 
     if channel.startswith("/rosout"):
         level, name, text = (*values, "", "")[:3]
         return LEVELS.get(int(float(str(level))), "?"), f"{name}: {text}"
-    if channel == "ERR" and len(values) == 2:
-        subsystem, code = (int(float(str(value))) for value in values)
-        return "over" if is_over(subsystem, code) else "ERR", error_words(subsystem, code, vehicle)
-    if channel == "EV" and values:
-        return "event", event_words(int(float(str(values[0]))))
+    if channel == "logged_messages":
+        text, level = (*values, "")[:2]
+        return PX4_LEVELS.get(str(level).casefold(), "message"), str(text)
+    if channel == "ERR":
+        subsystem, code = (int(float(str(value))) for value in (*values, 0, 0)[:2])
+        return ("over" if is_over(subsystem, code) else "ERR"), error_words(subsystem, code, kind)
+    if channel == "EV":
+        return "event", event_words(int(float(str(values[0])))) if values else ""
     return "message", str(values[0]) if values else ""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionVerdict:
+    """One mission of a log, and how it went."""
+
+    index: int
+    start_s: float
+    end_s: float
+    ended: bool
+    results: tuple[ObjectiveResult, ...]
+
+
+def missions_of(case: Case) -> list[MissionVerdict]:
+    """Every mission of the log, judged as the one of the case was; none where no profile fits."""
+    from care_core.diagnose.judging import judge
+    from care_core.extract.read import read_runs
+
+    if case.reading is None:
+        return []
+    profile, own = case.reading.profile, case.reading.judged.own
+    summaries = profile.model.summaries
+    return [
+        MissionVerdict(run.mission.index, run.mission.start_s, run.mission.end_s, run.mission.ended, judged.results)
+        for run in read_runs(log_of(case), profile.schema)
+        for judged in [judge(run, profile.schema, summaries, own)]
+    ]
 
 
 @dataclass(frozen=True, slots=True)

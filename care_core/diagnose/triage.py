@@ -147,6 +147,8 @@ def diagnose(
     if abstained is None:
         abstained = speaks_against(fixes[0], hypotheses, broken)
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
+    if abstained is None:
+        faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)
     report("done", 1.0)
     return Diagnosis(
         profile=choice,
@@ -217,6 +219,21 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         notes=_cause_notes(case, suspect, in_support, support),
         is_lead=suspect.weight < MIN_CONTRIBUTION and name not in refused_by(case.run),
     )
+
+
+def _as_in_fix(case: _Case, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
+    """The causes with the values that the fix gives their options: nobody is told two values for one option."""
+    values = {change.option.name: change.suggested for change in fix.changes}
+
+    def as_in_fix(cause: Cause) -> Cause:
+        value = values.get(cause.option.name, cause.suggested)
+        if value is None or value == cause.suggested:
+            return cause
+        changed = {**case.world.config, cause.option.name: value}
+        promised = prediction(case.world, fault.objective.variable.name, changed)
+        return replace(cause, suggested=value, predicted=promised, p_fixed=float(case.world.odds([changed])[0]))
+
+    return tuple(map(as_in_fix, fault.causes))
 
 
 def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float) -> Confidence:

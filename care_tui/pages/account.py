@@ -39,8 +39,7 @@ class AccountPage(StepPage):
     def view(self) -> View:
         diagnosis, glyphs, lines = self.session.diagnosis, self.glyphs, self._lines
         listing = Listing(len(lines), lambda i, _width: (told_item(lines[i], glyphs),), lambda i: lines[i].words)
-        start = Content("No profile fits. ") if diagnosis.profile.fit.verdict == "no" else Content()
-        return View(start + verdict_line(diagnosis.health, glyphs), self._detail, listing)
+        return View(verdict_line(diagnosis.health, glyphs), self._detail, listing)
 
     def _detail(self, index: int | None) -> Rows:
         diagnosis = self.session.diagnosis

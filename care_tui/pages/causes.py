@@ -44,7 +44,7 @@ class CausesPage(DiagnosisPage):
     def ranked(self) -> list[Explanation]:
         """Parts, parameters, what was met and chance in one ranking, then the causes that it does not name."""
         causes = {cause.option.name: cause for cause in self.session.causes}
-        if not self.session.causes and self.session.fault is None:
+        if self.session.fault is None and self.session.diagnosis.objectives:
             return []
         found = [
             Explanation(causes.pop(one.name, None) if one.what == "parameter" else None, one)
@@ -70,10 +70,17 @@ class CausesPage(DiagnosisPage):
         cause = None if index is None else self.ranked()[index].cause
         return None if cause is None else cause.option.name
 
+    @property
+    def _is_empty(self) -> bool:
+        return super()._is_empty and not self.session.diagnosis.hypotheses
+
     def _title(self) -> Content:
         result, faults, fault = self.session.result, self.session.diagnosis.faults, self.session.fault
         if result is None:
-            return Content("No objective")
+            explained = bool(self.session.diagnosis.hypotheses)
+            return Content(
+                "What explains it; no profile fits, so no parameter is judged" if explained else "No objective"
+            )
         title = Content.assemble("Causes of ", (clean(result.variable.name), "bold"), self._alike(fault))
         if fault is not None and fault.causes and all(cause.is_lead for cause in fault.causes):
             title += Content(f": none found, {len(fault.causes)} not ruled out")
@@ -95,10 +102,10 @@ class CausesPage(DiagnosisPage):
 
     def _detail(self, index: int | None) -> Rows:
         session, result = self.session, self.session.result
-        if index is None or result is None or session.case is None:
+        if index is None or session.case is None:
             return no_cause_rows(session.diagnosis, result)
         cause, hypothesis = self.ranked()[index]
-        if cause is None:
+        if cause is None or result is None:
             assert hypothesis is not None
             return Rows(hypothesis_rows(hypothesis, self._finding(hypothesis)))
         model = session.case.model

@@ -44,7 +44,7 @@ class MessagesPage(Page):
         return self._found.view("Messages of the log", self._show)
 
     def _show(self, messages: list[LogMessage]) -> View:
-        title = Content.assemble("Messages of the log", (f"  {len(messages)}; mission {self._span()}", "dim"))
+        title = Content.assemble("Messages of the log", (f"  {len(messages)}{self._span()}", "dim"))
         if not messages:
             return View(Content("Messages of the log"), lambda _: sentence("The log holds no message in words."))
         listing = Listing(
@@ -71,7 +71,8 @@ class MessagesPage(Page):
 
     def _span(self) -> str:
         mission = self._case.diagnosis.run.mission
-        return f"{mission.start_s:.1f} to {mission.end_s:.1f} s"
+        fits = self._case.diagnosis.profile.fit.verdict != "no"
+        return f"; mission {mission.start_s:.1f} to {mission.end_s:.1f} s" if fits else ""
 
     def _moment(self, messages: list[LogMessage]) -> int:
         """The first message that the diagnosis rests on, else the last of the mission."""

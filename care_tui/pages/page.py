@@ -45,6 +45,9 @@ class Page:
     LIST: ClassVar[Literal["half", "most", "least"]] = "half"
     """How much of the room the list gets."""
 
+    FITS: ClassVar[bool] = False
+    """Whether the text is made for the size of its pane."""
+
     def __init__(self, screen: PanesScreen) -> None:
         self.screen = screen
 

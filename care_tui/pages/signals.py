@@ -39,6 +39,7 @@ class SignalsPage(Page):
     )
     ENTER = "Messages"
     LIST = "least"
+    FITS = True
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"closer", "farther", "next_marked"})
 
     def __init__(self, screen: PanesScreen, case: Case) -> None:

@@ -6,6 +6,7 @@ from care_tui.pages.contents import ContentsPage
 from care_tui.pages.graph import GraphPage
 from care_tui.pages.history import HistoryPage
 from care_tui.pages.messages import MessagesPage
+from care_tui.pages.missions import MissionsPage
 from care_tui.pages.page import Page
 from care_tui.pages.profiles import ProfilesPage
 from care_tui.pages.signals import SignalsPage
@@ -24,6 +25,8 @@ def view_of(name: str, screen: PanesScreen, session: Session, subject: str | Non
         assert log is not None
         return ContentsPage(screen, log)
     assert case is not None
+    if name == "missions":
+        return MissionsPage(screen, case)
     if name == "graph":
         return GraphPage(screen, case, subject)
     return MessagesPage(screen, case) if name == "messages" else SignalsPage(screen, case)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from textual.content import Content
@@ -33,13 +34,18 @@ BOUND_WIDTH = 12
 STRIP_WIDTH = 42
 
 
+def worst(results: Sequence[ObjectiveResult]) -> Status:
+    """The verdict of several objectives: what was not evaluated is not OK."""
+    statuses = [result.status for result in results]
+    return "fault" if "fault" in statuses else "not_evaluated" if "not_evaluated" in statuses or not statuses else "ok"
+
+
 def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
     """The verdict on the run in one line; it counts all three states, so it never reads as a false all-clear."""
     statuses = [objective.status for objective in diagnosis.objectives]
     faults, unknown = statuses.count("fault"), statuses.count("not_evaluated")
-    worst: Status = "fault" if faults else "not_evaluated" if unknown or not statuses else "ok"
     counts = f"  {faults} outside, {statuses.count('ok')} within, {unknown} not evaluated"
-    return status(worst, glyphs) + Content(counts)
+    return status(worst(diagnosis.objectives), glyphs) + Content(counts)
 
 
 def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Content:

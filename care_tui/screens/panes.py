@@ -56,7 +56,7 @@ class PanesScreen(CareScreen):
         yield Static(classes="title", markup=False)
         with Container(id="panes"):
             yield Choices(self.glyphs.more, moved=self._show_detail, id="list")
-            yield Lines(id="text")
+            yield Lines(resized=self._fit_text, id="text")
         yield FilterBar()
         yield KeyHints()
 
@@ -114,6 +114,11 @@ class PanesScreen(CareScreen):
         if index is not None:
             self.page.moved(index)
         self.text.show(self.page.view().detail(index))
+
+    def _fit_text(self) -> None:
+        """The text has more or less room than before."""
+        if self.page.FITS:
+            self.draw()
 
     @on(Choices.Chosen)
     def _open_item(self, event: Choices.Chosen) -> None:

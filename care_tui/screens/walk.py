@@ -46,9 +46,10 @@ VIEWS = {
     "history": "Past runs with trends, two side by side",
     "profiles": "The installed profiles and their model cards",
     "contents": "What the log holds: channels, parameters, damage",
+    "missions": "The missions of the log with their verdicts",
 }
 
-NEED_A_DIAGNOSIS = {"graph", "messages", "signals"}
+NEED_A_DIAGNOSIS = {"graph", "messages", "signals", "missions"}
 NEED_A_LOG = {*NEED_A_DIAGNOSIS, "contents"}
 FOLLOW = {"graph", "history"}
 """Made anew each time: one follows what the operator looks at, the other what was remembered since."""
@@ -82,6 +83,7 @@ class WalkScreen(PanesScreen):
         Binding("minus,left_square_bracket", "do('farther')", "Farther", key_display="-", id="signals.farther"),
         Binding("x", "do('mark')", "Compare", id="history.mark"),
         Binding("n", "do('next_marked')", "Next marked", id="messages.next"),
+        Binding("f8,t", "view('missions')", "Missions of the log", show=False, id="view.missions"),
         Binding("right,l", "move(1)", "Next step", show=False, id="step.next"),
         Binding("left,h", "move(-1)", "Previous step", show=False, id="step.previous"),
         Binding("o", "do('pick')", "Other log", id="log.pick"),
@@ -239,6 +241,11 @@ class WalkScreen(PanesScreen):
         """Read the log again, after an error or a change."""
         if self._request is not None:
             self._read(self._request)
+
+    def diagnose_mission(self, index: int) -> None:
+        """Diagnose another mission of the log, from 1."""
+        assert self._request is not None
+        self._read(replace(self._request, mission=index))
 
     def judge_by(self, objective: str, bound: float | None) -> None:
         """Judge the log again with another threshold of an objective; None: that of the profile."""

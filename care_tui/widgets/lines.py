@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import ClassVar
 
 from textual.binding import Binding, BindingType
@@ -23,8 +24,12 @@ class Lines(LineView):
         *SCROLL_KEYS,
     ]
 
-    def __init__(self, rows: Rows | None = None, *, id: str | None = None) -> None:
+    def __init__(
+        self, rows: Rows | None = None, *, resized: Callable[[], None] = lambda: None, id: str | None = None
+    ) -> None:
+        """`resized` is called when there is more or less room."""
         super().__init__(id=id)
+        self._resized = resized
         self._rows = rows or Rows([])
         self._filter = ""
         self._wrapped: list[Content] = []
@@ -58,6 +63,7 @@ class Lines(LineView):
     def on_resize(self, event: Resize) -> None:
         self._wrap()
         super().on_resize(event)
+        self._resized()
 
     @property
     def line_count(self) -> int:

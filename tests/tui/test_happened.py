@@ -7,7 +7,8 @@ from dataclasses import replace
 import pytest
 
 from care_core.application.case import Case, Progress, Request
-from care_core.diagnose.records import Diagnosis
+from care_core.application.viewing import MissionVerdict
+from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.health.records import Health
 from care_tui.app import CareApp
 from care_tui.settings import Settings
@@ -67,7 +68,7 @@ async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         assert walk(app).step == 1
-        assert "No profile fits" in title(app)
+        assert pinned(app)[0].startswith("! arducopter 1.0 does not fit: it is a rover")
         assert "motor 2 lost thrust" in items(app)
         assert "What keeps the nearest from fitting" in text(app)
         assert "- it is a rover, the profile is of a copter" in text(app)
@@ -80,6 +81,18 @@ async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_
             await settle(pilot, "enter")
         await settle(pilot, "6")
         assert text(app) == "report: yaml", "the account is exported all the same"
+
+
+async def test_where_no_profile_fits_what_explains_a_failure_is_ranked_all_the_same(make_app: MakeApp) -> None:
+    weighed = (Hypothesis("hardware", sample.MOTOR.title, 0.8), Hypothesis("parameter", "", 0.2))
+    app = make_app(replace(sample.unfitting(), hypotheses=weighed))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3")
+        assert "no parameter is judged" in title(app)
+        assert items(app).splitlines()[0].split()[:3] == ["80", "%", "motor"]
+        assert "output 1950 us" in text(app)
+        await settle(pilot, "j", "d", "w", "3", "enter")
+        assert text(app).startswith("No profile fits")
 
 
 async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_view(make_app: MakeApp) -> None:
@@ -117,6 +130,37 @@ async def test_parts_parameters_and_chance_compete_in_one_ranking(make_app: Make
         assert "● LAND_SPEED" in text(app)
         await settle(pilot, "enter")
         assert walk(app).step == 4
+
+
+async def test_the_picker_shows_every_mission_with_its_verdict_and_diagnoses_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    first = MissionVerdict(1, 12.4, 199.65, True, (sample.OK_SUCCESS, sample.SLOW))
+    second = MissionVerdict(2, 210.0, 300.0, False, (sample.OK_SUCCESS, sample.NO_PATH))
+    monkeypatch.setattr("care_tui.pages.missions.missions_of", lambda _case: [first, second])
+    asked: list[int | None] = []
+
+    def diagnose(request: Request, progress: Progress) -> Case:
+        asked.append(request.mission)
+        mission = replace(sample.RUN.mission, index=request.mission or 1)
+        return Case(replace(sample.faulty(), run=replace(sample.RUN, mission=mission)), sample.OPTIONS)
+
+    app = CareApp(Request(LOG), engine=fake_engine(diagnose), settings=Settings(places=()))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "t")
+        lines = items(app).splitlines()
+        assert lines[0].split() == ["▸", "1", "12.4", "s", "to", "199.7", "s", "✗", "FAULT", "mission_time"]
+        assert lines[1].split() == ["2", "210.0", "s", "to", "300.0", "s", "?", "NOT", "EVALUATED"]
+        assert "mission_time" in text(app)
+        await settle(pilot, "j")
+        assert "the log stops before the mission does" in text(app)
+        await settle(pilot, "enter")
+        await settle(pilot)
+        assert asked == [None, 2]
+        assert walk(app).step == 2
+        await settle(pilot, "t")
+        assert items(app).splitlines()[1].startswith("▸")
+        assert walk(app).choices.highlighted == 1
 
 
 async def test_an_objective_is_judged_by_another_threshold() -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from care_core.application.case import Case
 from care_core.application.signals import Signal, signals_of, trace_of, whole_of
+from care_core.application.viewing import messages_of
 from care_core.errors import CareError
 from care_tui.render.plot import plot
 from tests.made import MadeLog, T
@@ -55,6 +56,20 @@ def test_of_several_sensors_the_first_is_drawn() -> None:
     log = MadeLog({"BAT": {"Volt": np.where(np.arange(len(T)) % 2, 3.0, 12.0), "Inst": np.arange(len(T)) % 2}})
     trace = trace_of(case_of(log), Signal("BAT", "Volt"), (0.0, 100.0), 5)
     assert (trace.low, trace.high) == (12.0, 12.0)
+
+
+def test_what_the_robot_said_is_in_the_words_of_its_vehicle() -> None:
+    t = np.array(["1", "2", "3"] + [""] * (len(T) - 3), dtype=object)
+    flight = MadeLog({
+        "MSG": {"Message": t},
+        "ERR": {"Subsys": np.full_like(T, 5.0), "ECode": np.where(T < 50, 1.0, 0.0)},
+        "EV": {"Id": np.full_like(T, 11.0)},
+    })  # fmt: skip
+    said = {(one.kind, one.text) for one in messages_of(case_of(flight))}
+    assert {("message", "1"), ("ERR", "radio failsafe"), ("over", "radio failsafe over"), ("event", "disarmed")} <= said
+    words, levels = np.full(len(T), "gyro 0 failed", dtype=object), np.full(len(T), "ERROR", dtype=object)
+    px4 = MadeLog({"logged_messages": {"message": words, "level": levels}})
+    assert ("ERROR", "gyro 0 failed") in {(one.kind, one.text) for one in messages_of(case_of(px4))}
 
 
 def test_what_cannot_be_drawn_is_said() -> None:
