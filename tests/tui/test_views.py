@@ -10,6 +10,7 @@ import pytest
 from textual.widgets import Static
 
 from care_core.application.case import Case, Request
+from care_core.errors import UsageError
 from care_core.files import bundled
 from care_tui.app import CareApp
 from care_tui.pages.history import HistoryPage
@@ -209,13 +210,36 @@ async def test_views_of_a_log_need_one_and_the_others_do_not(make_app: MakeApp) 
         assert "arducopter" in items(app)
 
 
-async def test_a_log_without_a_diagnosis_can_still_be_looked_into(tmp_path: Path) -> None:
+async def test_a_log_that_is_cut_off_before_its_mission_tells_what_is_there(tmp_path: Path) -> None:
     log = tmp_path / "cut.BIN"
     log.write_bytes(SAMPLE.read_bytes()[:60_000])
     app = CareApp(Request(log), settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        assert "Problem" in text(app)
+        assert walk(app).step == 1
+        assert "What keeps the nearest from fitting" in text(app)
+        assert "breaks off inside a record" in text(app)
+        for key, name in (("m", "Messages"), ("p", "Signals"), ("t", "Missions")):
+            await settle(pilot, key)
+            assert walk(app).page.name == name
+        assert "no mission is judged" in text(app)
+        await settle(pilot, "v")
+        assert "Format      dataflash-bin" in text(app)
+        await settle(pilot, "6")
+        assert "schema: care.triage/1" in text(app)
+
+
+async def test_a_log_whose_diagnosis_failed_can_still_be_looked_into(tmp_path: Path) -> None:
+    log = tmp_path / "a.BIN"
+    log.write_bytes(SAMPLE.read_bytes()[:60_000])
+
+    def fails(*_: object) -> Case:
+        raise UsageError("There is no mission 9.", hint="Name another.")
+
+    app = CareApp(Request(log), engine=fake_engine(fails), settings=Settings(places=()))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot)
+        assert "There is no mission 9." in text(app)
         assert "v shows what the log holds" in text(app)
         await settle(pilot, "m")
         assert "no diagnosis" in hints(app)
