@@ -10,7 +10,7 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check bench docs profiles screenshots walk clean
+.PHONY: demo test check bench docs profiles screenshots walk fuzz kills matrix clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
@@ -43,6 +43,15 @@ screenshots: $(BASE)
 
 walk: $(BASE)
 	$(BIN)/python -m benchmarks.walk
+
+fuzz: $(DEV)
+	$(BIN)/python -m tests.fuzzing --seconds 60
+
+kills: $(DEV)
+	CARE_KILLS=200 $(BIN)/pytest -q tests/integration/test_kills.py
+
+matrix:
+	$(PYTHON) -m benchmarks.matrix
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
