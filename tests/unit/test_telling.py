@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -35,6 +37,19 @@ def test_a_lesser_finding_explains_no_worse_one() -> None:
     assert [one.kind for one in told([finding("laser", 1.0, "warning"), finding("planner", 5.0)], LEADS)] == [
         "planner",
         "laser",
+    ]
+
+
+def test_what_is_likely_is_told_before_suspicions_and_is_no_consequence_of_one() -> None:
+    suspected = replace(finding("laser", 1.0), probability=0.2)
+    likely = replace(finding("planner", 5.0), probability=0.9)
+    assert [one.kind for one in told([suspected, likely], LEADS)] == ["planner", "laser"]
+
+
+def test_a_symptom_is_told_after_a_cause_of_its_weight() -> None:
+    assert [one.kind for one in told([finding("attitude", 1.0), finding("battery", 9.0)], {})] == [
+        "battery",
+        "attitude",
     ]
 
 
