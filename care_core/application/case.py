@@ -51,6 +51,8 @@ class Request:
     """Most causes to report per fault."""
     mission: int | None = None
     """Which mission of the log, from 1; the last when None."""
+    repeats: tuple[Path, ...] = ()
+    """Other logs of the same configuration under the same conditions: diagnosed together, the first log reported."""
     since: Path | None = None
     """The log of a good run; what changed since then is told as evidence."""
 
@@ -196,13 +198,19 @@ def _read(
     progress: Progress,
     sha256: Sha256,
 ) -> Reading:
-    from care_core.diagnose.judging import read_and_judge
+    from care_core.diagnose.judging import read_and_judge, with_repeats
 
     progress("reading the log", 0.2)
     judged = read_and_judge(
         log, profile, configs=configs, thresholds=request.thresholds, mission=request.mission, sha256=sha256
     )
-    return Reading(profile, choice, configs, judged)
+    repeats = []
+    for path in request.repeats:
+        with opened(path) as (other, digest):
+            repeats.append(
+                read_and_judge(other, profile, configs=configs, thresholds=request.thresholds, sha256=digest)
+            )
+    return Reading(profile, choice, configs, with_repeats(judged, repeats))
 
 
 def _diagnose(reading: Reading, health: Health, request: Request, progress: Progress) -> Diagnosis:

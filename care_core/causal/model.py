@@ -54,6 +54,11 @@ class EffectRecord(Record):
     direction: Direction
     support: float | None = None
     """Share of bootstrap resamples in which the option has a directed path to the objective; None: not measured."""
+    robustness: float | None = None
+    """Observational tables: share of both that a hidden cause must explain to explain the effect away; None: options
+    were drawn at random."""
+    strongest: float | None = None
+    """Observational tables: share of the objective that the strongest other recorded cause explains."""
 
 
 class PathRecord(Record):

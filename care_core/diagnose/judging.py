@@ -6,7 +6,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from care_core.causal.model import Summary
-from care_core.configs.driven import readable
+from care_core.configs.driven import readable, same_value
 from care_core.configs.loading import ConfigFile, resolve
 from care_core.diagnose.records import MissionVerdict, ObjectiveResult, Status
 from care_core.errors import UsageError, nearest
@@ -41,6 +41,8 @@ class Judged:
     """What they say of the profile's parameters."""
     missions: tuple[MissionVerdict, ...] = ()
     """Every mission of the log, this one among them."""
+    repeats: tuple[Judged, ...] = ()
+    """Other runs of the same configuration under the same conditions: what this one met is read off them too."""
 
     @property
     def broken(self) -> tuple[ObjectiveResult, ...]:
@@ -89,6 +91,24 @@ def verdict(judged: Judged) -> MissionVerdict:
     unknown = [result for result in judged.results if result.status == "not_evaluated"]
     reason = unknown[0].reason if unknown else ""
     return MissionVerdict(judged.run.mission, "not_evaluated" if unknown else "ok", reason)
+
+
+def with_repeats(first: Judged, others: Sequence[Judged]) -> Judged:
+    """A run and others that repeat it. Raises UsageError: another configuration, or a log given twice."""
+    seen = {first.run.log.sha256}
+    for other in others:
+        if other.run.log.sha256 in seen:
+            raise UsageError("The same log is no repeat.", hint="Name it once.", where=other.run.log.path)
+        seen.add(other.run.log.sha256)
+        for name in sorted(first.run.config.keys() & other.run.config.keys()):
+            mine, theirs = first.run.config[name], other.run.config[name]
+            if not same_value(mine, theirs):
+                raise UsageError(
+                    f"The logs are no repeats of one configuration: {name} was {mine:g}, then {theirs:g}.",
+                    hint="Triage them one by one.",
+                    where=other.run.log.path,
+                )
+    return replace(first, repeats=tuple(others))
 
 
 def judge(

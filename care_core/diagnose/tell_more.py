@@ -43,6 +43,12 @@ def tell_more(
             for name in [suspect.option for suspect in unranked[objective]][:HYPOTHESES]
             if name not in keep
         ]
+        advice += [
+            f"change only {name} to {options[name].show(reference[name])} and run again: a change that nobody "
+            f"chose for a reason would settle whether {name} causes it"
+            for name in _chosen(world, fault)
+            if name not in keep
+        ]
         found = experiment(world, fault, options, reference, keep)
         if found is not None:
             advice.append(str(found))
@@ -52,6 +58,13 @@ def tell_more(
             "or the vehicle); if not, it is what this run met"
         )
     return tuple(dict.fromkeys(advice))
+
+
+def _chosen(world: World, fault: Fault) -> list[str]:
+    """The first cause, where operators chose its value in training."""
+    first = [cause.option.name for cause in fault.causes if not cause.is_lead][:1]
+    effects = (world.model.effects.get((name, fault.objective.variable.name)) for name in first)
+    return [effect.option for effect in effects if effect is not None and effect.robustness is not None]
 
 
 def _unrecorded(faults: Sequence[Fault], run: Run) -> Iterator[str]:

@@ -247,6 +247,10 @@ def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float)
         return "low"
     if not in_support or support < LOW_SUPPORT or contribution < UNSURE:
         return "medium" if suspect.option in refused_by(case.run) else "low"
+    effect = suspect.effect
+    if effect is not None and effect.robustness is not None and effect.strongest is not None:
+        # Operators chose the options: no table can rule a hidden reason out.
+        return "medium" if effect.robustness >= effect.strongest else "low"
     is_rivalled = bool(case.unranked[suspect.path.nodes[-1]])
     if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled:
         return "high"
@@ -266,6 +270,13 @@ def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float
         notes.append(Note(f"outside the training support ({summary.low:g} to {summary.high:g})", "outside_training"))
     if suspect.effect is not None and support < LOW_SUPPORT:
         notes.append(Note(f"a path to {suspect.path.nodes[-1]} was found in only {support:.0%} of resamples"))
+    effect = suspect.effect
+    if effect is not None and effect.robustness is not None and effect.strongest is not None:
+        text = (
+            f"operators chose it: a hidden cause that explains {effect.robustness:.0%} of it and of "
+            f"{effect.objective} would do as well (the strongest recorded one explains {effect.strongest:.0%})"
+        )
+        notes.append(Note(text))
     if suspect.option in case.keep:
         notes.append(Note("pinned by --keep: not changed"))
     notes += map(Note, change_notes(case.profile.schema.variables[suspect.option]))
@@ -367,12 +378,26 @@ def _off(case: _Case) -> frozenset[str]:
     return frozenset(deviating(case.run.config, case.reference))
 
 
+def _promise(world: World, broken: Sequence[str]) -> str:
+    """Which next run the probabilities are for, and what is known of how it resembles this one."""
+    known = [world.model.training.persistence[name] for name in broken if name in world.model.training.persistence]
+    pairs = max((persistence.pairs[0] for persistence in known), default=0)
+    measured = f"measured on {pairs} pairs of training runs" if pairs else "not measured, no training run was repeated"
+    seen = f", seen in {1 + len(world.repeats)} runs" if world.repeats else ""
+    return f"probabilities are for the next run under the same conditions{seen}; how alike such runs are was {measured}"
+
+
 def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
     notes = list(case.choice.fit.reasons)
     for name in (result.variable.name for result in broken):
         unknown = ", ".join(suspect.option for suspect in case.unranked[name])
         if unknown:
             notes.append(f"not ranked, as the training runs cannot tell their effect on {name}: {unknown}")
+    notes += [
+        f"no mechanism predicts {name}: it counts with its base rate, {rate:.0%} of the training missions"
+        for name, rate in case.world.base_rates().items()
+    ]
+    notes.append(_promise(case.world, [result.variable.name for result in broken]))
     if not case.run.mission.fits:
         notes.append(case.run.mission.mismatch)
     unread = [name for name in unread_options(case.profile.schema, case.run) if name in _off(case)]

@@ -35,4 +35,5 @@ def world_of(judged: Judged, profile: Profile) -> World:
     reference = reference_of(run, profile)
     unread = unread_options(profile.schema, run)
     config = {**reference, **{name: value for name, value in run.config.items() if name not in unread}}
-    return World(profile.model, config, {**run.metrics, **run.objectives}, judged.bounds)
+    others = [{**other.run.metrics, **other.run.objectives} for other in judged.repeats]
+    return World(profile.model, config, {**run.metrics, **run.objectives}, judged.bounds, others)

@@ -17,6 +17,8 @@ from care_core.learn.table import FloatArray, normal_scores
 from care_core.profile.schema import Schema
 
 BINS = 5
+LEAST_COUNT = 5
+"""Expected count in a cell from which a test of counts holds its level (Cochran 1954)."""
 CUTS = ndtri(np.arange(1, BINS) / BINS)
 """Normal scores are standardised, so the normal quantiles cut them into equally filled bins."""
 
@@ -53,7 +55,9 @@ def dependence(sources: FloatArray, targets: FloatArray) -> FloatArray:
     """p-values of marginal independence of every source with every target.
 
     Two tests on normal scores: correlation (sensitive to monotonic effects) and one-way analysis of variance over
-    up to `BINS` equally filled bins of the source (sensitive to an optimum inside); the smaller p-value, doubled.
+    up to `BINS` equally filled bins of the source (sensitive to an optimum inside); the smaller p-value, doubled. Where
+    the target rarely leaves its usual value (few missions are refused), a bin expects less than `LEAST_COUNT` of them
+    and the variances say nothing: correlation alone; with fewer than that in all there is no test.
 
     Args:
         sources: shape (n, k).
@@ -63,8 +67,11 @@ def dependence(sources: FloatArray, targets: FloatArray) -> FloatArray:
         Shape (k, m).
     """
     x, y = normal_scores(sources), normal_scores(targets)
-    p = np.minimum(_correlation_p(x, y), _binned_p(x, y))
-    return np.asarray(np.minimum(2 * p, 1.0))
+    straight, binned = _correlation_p(x, y), _binned_p(x, y)
+    rare = _rarest_count(x, y)
+    either = np.where(rare < LEAST_COUNT, straight, 2 * np.minimum(straight, binned))
+    uncommon = _off_mode(y) < LEAST_COUNT
+    return np.asarray(np.where(uncommon, 1.0, np.minimum(either, 1.0)))
 
 
 def discoveries(p: FloatArray, rate: float) -> NDArray[np.bool_]:
@@ -104,6 +111,20 @@ def _correlation_p(x: FloatArray, y: FloatArray) -> FloatArray:
     freedom = np.maximum(n - 2, 1)
     t = np.abs(r) * np.sqrt(freedom / np.maximum(1 - r**2, 1e-12))
     return np.asarray(np.where(n > 2, 2 * stdtr(freedom, -t), 1.0))
+
+
+def _off_mode(y: FloatArray) -> FloatArray:
+    """How many rows of each column are off its most frequent value, shape (m,)."""
+    known = [column[np.isfinite(column)] for column in y.T]
+    return np.array([len(v) - max(np.unique(v, return_counts=True)[1], default=0) for v in known], dtype=float)
+
+
+def _rarest_count(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Rows off the usual value of a target that the emptiest bin of a source expects, shape (k, m)."""
+    bins = bin_numbers(x)
+    filled = [np.bincount(column[column >= 0], minlength=BINS) for column in bins.T]
+    smallest = np.array([min(count[count > 0], default=0) / max(count.sum(), 1) for count in filled])
+    return np.asarray(np.outer(smallest, _off_mode(y)))
 
 
 def _binned_p(x: FloatArray, y: FloatArray) -> FloatArray:

@@ -24,6 +24,7 @@ from care_core.learn.identification import identify, is_answered_by
 from care_core.learn.knowledge import with_known
 from care_core.learn.outcomes import badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
 from care_core.learn.repeats import persistence
+from care_core.learn.robustness import robustness
 from care_core.learn.skill import cross_validated_skill
 from care_core.learn.structure import Structure, learn_structure
 from care_core.profile.schema import Schema
@@ -142,14 +143,16 @@ class _Measured:
     effect: Effect
     resampled: FloatArray
 
-    @property
-    def interval(self) -> tuple[float, float]:
-        """5 % and 95 % of the resampled magnitudes."""
-        return _interval(self.resampled)
+    def interval(self, support: float) -> tuple[float, float]:
+        """5 % and 95 % of the magnitudes in resamples."""
+        return _interval(self.resampled, support)
 
 
-def _interval(resampled: FloatArray) -> tuple[float, float]:
-    low, high = np.quantile(resampled, [0.05, 0.95])
+def _interval(resampled: FloatArray, support: float) -> tuple[float, float]:
+    """5 % and 95 % of the magnitudes, the share of resamples in which the graph lacks the effect counted as zero."""
+    low, high = (
+        0.0 if share <= 1 - support else np.quantile(resampled, 1 - (1 - share) / support) for share in (0.05, 0.95)
+    )
     return float(low), float(high)
 
 
@@ -240,12 +243,13 @@ def _edge_record(
     edge: Edge, kind: str, support: Mapping[Finding, float], effects: Mapping[Edge, _Measured]
 ) -> EdgeRecord:
     measured = effects.get(edge) if kind == "directed" else None
-    low, high = measured.interval if measured else (0.0, 0.0)
+    seen = support.get(edge if kind == "directed" else frozenset(edge), 0.0)
+    low, high = measured.interval(seen if support else 1.0) if measured else (0.0, 0.0)
     return EdgeRecord(
         source=edge[0],
         target=edge[1],
         kind="directed" if kind == "directed" else "bidirected",
-        support=support.get(edge if kind == "directed" else frozenset(edge), 0.0),
+        support=seen,
         effect=measured.effect.magnitude if measured else 0.0,
         low=low,
         high=high,
@@ -268,6 +272,7 @@ def _total_effects(
     """
     records: dict[Edge, EffectRecord] = {}
     for objective, outcome in outcomes.items():
+        robust = robustness(frame, schema, objective)
         keys = [stage.mechanism for stage in outcome.stages] or [outcome.mechanism]
         options = [v.name for v in schema.options if v.name in graph.ancestors(objective)]
         by_stage = [
@@ -282,7 +287,8 @@ def _total_effects(
                 continue
             best = max(measured, key=lambda m: m.effect.magnitude)
             inputs = {name for key in keys for name in mechanisms[key].inputs}
-            low, high = best.interval
+            seen = support.get(Reaches(option, objective), 0.0)
+            low, high = best.interval(seen if support else 1.0)
             records[option, objective] = EffectRecord(
                 option=option,
                 objective=objective,
@@ -293,7 +299,9 @@ def _total_effects(
                 low=low,
                 high=high,
                 direction=best.effect.direction,
-                support=support.get(Reaches(option, objective), 0.0),
+                support=seen,
+                robustness=robust[option].value if option in robust else None,
+                strongest=robust[option].strongest if option in robust else None,
             )
     return records
 
@@ -301,13 +309,15 @@ def _total_effects(
 def _paths(
     schema: Schema, graph: CausalGraph, edges: Mapping[Edge, _Measured], support: Mapping[Finding, float]
 ) -> dict[str, tuple[PathRecord, ...]]:
-    """Alg. 2: the top paths of each objective, with the interval of their mean edge effect over resamples."""
+    """Alg. 2: the top paths of each objective, with the interval of their mean edge effect over resamples, which have a
+    path as often as its rarest edge at most."""
     weight = {edge: measured.effect.magnitude for edge, measured in edges.items()}
     options = {option.name for option in schema.options}
 
     def record(path: CausalPath, objective: str) -> PathRecord:
         drawn = np.mean([edges[edge].resampled for edge in path.edges], axis=0)
-        low, high = _interval(drawn)
+        seen = min(support.get(edge, 0.0) for edge in path.edges)
+        low, high = _interval(drawn, seen if support else 1.0)
         return PathRecord(
             objective=objective,
             nodes=path.nodes,

@@ -16,7 +16,6 @@ from care_tui.commands.arguments import (
     ConfigPaths,
     Force,
     Keep,
-    LogPath,
     Mission,
     Out,
     ProfileName,
@@ -37,7 +36,10 @@ SAMPLE = "arducopter_failed.BIN"
 
 @app.command()
 def triage(
-    log: LogPath,
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG...", help="The log to read; more of the same configuration: what they share."),
+    ],
     profile: ProfileName = None,
     config: ConfigPaths = None,
     json: AsJson = False,
@@ -58,8 +60,9 @@ def triage(
     if len(formats) > 1:
         raise UsageError("Only one of --json, --yaml and --markdown can be printed.", hint="Leave the others out.")
     request = Request(
-        log,
+        logs[0],
         profile,
+        repeats=tuple(logs[1:]),
         configs=tuple(config or ()),
         keep=tuple(keep or ()),
         thresholds=bounds(threshold or ()),

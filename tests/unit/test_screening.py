@@ -72,3 +72,15 @@ def test_constant_options_are_dropped() -> None:
     roles = {"option_0": Role.OPTION, "inert_0": Role.OPTION, "metric_0": Role.METRIC, "objective_0": Role.OBJECTIVE}
     screening = screen_options(frame, schema_of(roles))
     assert screening.dropped == ("inert_0",)
+
+
+def test_rare_outcomes_do_not_pass_for_discoveries() -> None:
+    """Six binary outcomes of 3 to 10 in 300 runs, independent of 30 options most of which stay at their reference."""
+    rng, found = np.random.default_rng(0), 0
+    for _ in range(60):
+        options = np.where(rng.random((300, 30)) < 0.6, 0.5, rng.uniform(size=(300, 30)))
+        outcomes = np.zeros((300, 6))
+        for column, count in enumerate((3, 4, 5, 6, 8, 10)):
+            outcomes[rng.choice(300, count, replace=False), column] = 1
+        found += bool(discoveries(dependence(options, outcomes), 0.1).any())
+    assert found <= 14, "6 of 60 expected at a rate of 0.1; 42 before counts were looked at"
