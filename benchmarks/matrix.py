@@ -1,8 +1,8 @@
 """The package on every Python it is for: `python -m benchmarks.matrix [--only 3.12]`.
 
-Builds the wheel and the source archive once. Each is installed, base dependencies alone, into a bare environment of each
-Python that is found (`python3.10` to `python3.13` on the path), where `care --version` must work and `care demo` must
-find its fault. Printed are the outcome and the size of the installation against its bar of 420 MB. Then every base
+Builds the wheel and the source archive once. Each is installed, base dependencies alone, into a bare environment of
+each Python that is found (`python3.10` to `python3.13` on the path), where `care --version` must work and `care demo`
+must find its fault. Printed are the outcome and the size of the installation against its bar of 420 MB. Then every base
 dependency must have a wheel for aarch64, which the computers of robots are: nothing is compiled on one.
 """
 
