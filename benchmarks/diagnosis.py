@@ -13,16 +13,19 @@ import argparse
 import hashlib
 import json
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from care_core.causal.abduction import Kinship, next_passes
 from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import FloatArray
+from care_core.causal.model import UNKNOWN_PERSISTENCE
 from care_core.diagnose.judging import read_and_judge, thresholds_in_force
 from care_core.diagnose.ranking import deviating, reference_config
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
@@ -45,6 +48,7 @@ TRUTH_NAMES = {
 CORE = Path(__file__).parent.parent / "care_core"
 FOLDS = 5
 JOULES_PER_WH = 3600.0
+CLUSTER_RESAMPLES = 300
 LOWERED = 0.98
 """What the operator makes of a threshold that the log just meets although the mission was measured to miss it."""
 
@@ -119,6 +123,11 @@ class Tally:
     """Faults that the log shows just inside the threshold."""
     odds: dict[str, list[float]] = field(default_factory=dict)
     outcomes: list[float] = field(default_factory=list)
+    """Of the flown resets: met everything, in two missions in a row where the platform is not repeatable."""
+    next_outcomes: list[float] = field(default_factory=list)
+    """Of the same: the one mission that was recorded, which is what is promised."""
+    clusters: list[str] = field(default_factory=list)
+    """The fault of each: resets of one fault stand and fall together."""
     held_out: HeldOut | None = None
 
 
@@ -213,6 +222,7 @@ def _count(
     tally.wrong_objectives += [f"{truth['tag']} {line}" for line in objectives_differ(diagnosis, truth, platform)]
     tally.abstained += diagnosis.abstained is not None
     _count_odds(tally, diagnosis, truth, reference, profile, peers)
+    _count_fix(tally, diagnosis, truth)  # of every fault: one without a known fix can be given one that fails
     fixing = [frozenset(options) for options in truth["fixing"]]
     if not fixing:
         return
@@ -225,14 +235,6 @@ def _count(
     tally.with_single += has_single
     for name, ranking in rankings.items():
         tally.hits.setdefault(name, Hits()).count(ranking, fixing)
-    if diagnosis.fix is not None:
-        suggested = frozenset(change.option.name for change in diagnosis.fix.changes)
-        tally.fix_sizes.append(len(suggested))
-        flown = {frozenset(row["reset"]): row["ok"] for row in truth["tried"]}
-        tally.fix_flown += suggested in flown
-        tally.fix_confirmed += flown.get(suggested, False)
-        if suggested not in flown:
-            tally.unflown.append(f"{truth['tag']} {'+'.join(sorted(suggested))}")
     if verbose:
         fix = (
             [f"{c.option.name} {c.current:g}->{c.suggested:g}" for c in diagnosis.fix.changes]
@@ -241,6 +243,18 @@ def _count(
         )
         print(truth["tag"], "care:", rankings["care"][:3], "true:", truth["fixing"], "fix:", fix,
               f"{diagnosis.fix.p_fixed:.2f}" if diagnosis.fix else diagnosis.abstained)  # fmt: skip
+
+
+def _count_fix(tally: Tally, diagnosis: Diagnosis, truth: Mapping[str, Any]) -> None:
+    if diagnosis.fix is None:
+        return
+    suggested = frozenset(change.option.name for change in diagnosis.fix.changes)
+    tally.fix_sizes.append(len(suggested))
+    flown = {frozenset(row["reset"]): row["ok"] for row in truth["tried"]}
+    tally.fix_flown += suggested in flown
+    tally.fix_confirmed += flown.get(suggested, False)
+    if suggested not in flown:
+        tally.unflown.append(f"{truth['tag']} {'+'.join(sorted(suggested))}")
 
 
 def _count_odds(
@@ -256,10 +270,41 @@ def _count_odds(
     bounds = thresholds_in_force(profile.schema, {})
     world = World(profile.model, config, {**diagnosis.run.metrics, **diagnosis.run.objectives}, bounds)
     changed = [{**config, **{name: reference[name] for name in row["reset"]}} for row in truth["tried"]]
-    tally.odds.setdefault("care", []).extend(world.odds(changed))
+    odds = {"care": world.odds(changed)}
+    if truth.get("repeatable"):  # what the second failure measured was not kept: it is taken to be like the first
+        odds["care, told of the second failure"] = replace(world, repeats=(world.observed,)).odds(changed)
     if peers is not None:
-        tally.odds.setdefault("plain classifier", []).extend(peers.classifier.odds(changed))
+        odds["plain classifier"] = peers.classifier.odds(changed)
+        odds["plain classifier, same abduction"] = abducted(peers.classifier, config, changed, 1)
+        if truth.get("repeatable"):
+            odds["plain classifier, told of it too"] = abducted(peers.classifier, config, changed, 2)
+    for name, predicted in odds.items():
+        tally.odds.setdefault(name, []).extend(predicted)
     tally.outcomes.extend(float(row["ok"]) for row in truth["tried"])
+    tally.next_outcomes.extend(_next_outcome(row, truth, profile.schema) for row in truth["tried"])
+    tally.clusters.extend([truth["tag"]] * len(changed))
+
+
+def abducted(
+    classifier: PlainClassifier, config: Mapping[str, float], changed: Sequence[Mapping[str, float]], failures: int
+) -> FloatArray:
+    """The classifier's odds given that this run failed, as the engine's; nothing is known of the classifier's errors."""
+    same, ones = UNKNOWN_PERSISTENCE.same, np.ones(len(changed))
+    kin = Kinship(variance=ones, covariance=same * ones, here=1.0, repeated=same)
+    return next_passes(kin, classifier.odds(changed), float(classifier.odds([config])[0]), [False] * failures)
+
+
+def _next_outcome(row: Mapping[str, Any], truth: Mapping[str, Any], schema: Schema) -> float:
+    """Whether the recorded mission met everything: `ok` asks it of two in a row where missions are not repeatable."""
+    if not truth.get("repeatable"):
+        return float(row["ok"])
+    met = []
+    for objective in schema.objectives:
+        name = TRUTH_NAMES[schema.name][objective.name]
+        scale = 1 / JOULES_PER_WH if name == "energy_j" else 1.0
+        value = row.get(name)
+        met.append(value is not None and objective.threshold is not None and objective.threshold.met(value * scale))
+    return float(all(met))
 
 
 def show(platform: str, tally: Tally) -> None:
@@ -280,20 +325,41 @@ def show(platform: str, tally: Tally) -> None:
 
 
 def _show_odds(tally: Tally) -> None:
-    outcomes = np.array(tally.outcomes)
+    """By part, never pooled: odds of a failed run's resets and odds of new missions are different promises."""
     for name, odds in tally.odds.items():
-        parts = {"flown resets": (np.array(odds), outcomes)}
-        if tally.held_out is not None:
+        p, clusters = np.array(odds), np.array(tally.clusters)
+        parts = {"flown resets": (p, np.array(tally.outcomes), clusters)}
+        if tally.next_outcomes != tally.outcomes:
+            parts["flown resets, next mission alone"] = (p, np.array(tally.next_outcomes), clusters)
+        if tally.held_out is not None and name in ("care", "plain classifier"):
             kept = tally.held_out.care if name == "care" else tally.held_out.plain
-            parts["held-out missions"] = (kept, tally.held_out.met)
-            parts["both"] = (np.r_[parts["flown resets"][0], kept], np.r_[outcomes, tally.held_out.met])
-        for what, (p, met) in parts.items():
-            print(f"  odds, {name}, {len(p)} {what}: calibration error {calibration_error(p, met):.3f}, "
-                  f"Brier {((p - met) ** 2).mean():.3f}")  # fmt: skip
-        p, met = list(parts.values())[-1]
-        print("    predicted  met    n")
-        for predicted, seen, count in reliability(p, met):
-            print(f"    {predicted:9.2f} {seen:4.2f} {count:4d}")
+            parts["held-out missions"] = (kept, tally.held_out.met, np.arange(len(kept)).astype(str))
+        for what, (predicted, met, groups) in parts.items():
+            errors = f"{_with_interval(calibration_error, predicted, met, groups)}"
+            print(f"  odds, {name}, {len(predicted)} {what}: calibration error {errors}, "
+                  f"Brier {_with_interval(brier, predicted, met, groups)}")  # fmt: skip
+            if name == "care":
+                print("    predicted  met    n")
+                for mean, seen, count in reliability(predicted, met):
+                    print(f"    {mean:9.2f} {seen:4.2f} {count:4d}")
+
+
+def brier(p: FloatArray, met: FloatArray) -> float:
+    return float(((p - met) ** 2).mean())
+
+
+def _with_interval(
+    measure: Callable[[FloatArray, FloatArray], float], p: FloatArray, met: FloatArray, groups: NDArray[np.str_]
+) -> str:
+    """The measure with its 90 % interval over resampled groups (faults are drawn whole)."""
+    rng = np.random.default_rng(0)
+    members = [np.flatnonzero(groups == group) for group in np.unique(groups)]
+    drawn = []
+    for _ in range(CLUSTER_RESAMPLES):
+        rows = np.concatenate([members[i] for i in rng.integers(0, len(members), len(members))])
+        drawn.append(measure(p[rows], met[rows]))
+    low, high = np.quantile(drawn, [0.05, 0.95])
+    return f"{measure(p, met):.3f} ({low:.3f} to {high:.3f})"
 
 
 def main() -> None:
