@@ -6,9 +6,10 @@ Each ecosystem is one entry: a module with `examine(log) -> Health` that reads t
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import import_module
 
-from care_core.health.records import Health
+from care_core.health.records import TOO_SHORT, Finding, Health
 from care_core.logs.base import Log, LogFormat
 
 _ARDUPILOT, _PX4 = "care_core.health.ardupilot.examining", "care_core.health.px4"
@@ -29,6 +30,19 @@ def examine(log: Log) -> Health:
     """Account and findings of a log; nothing of either where nobody knows what its messages mean."""
     module = ECOSYSTEMS.get(log.format)
     if module is None:
-        return Health("", (), (), is_readable=False)
+        return Health("", (), (), TOO_SHORT)
     health: Health = import_module(module).examine(log)
-    return health
+    if health.findings or not health.too_little:
+        return health
+    # An answer too: whoever reads the findings must not take none for fine.
+    nothing = Finding(
+        "log",
+        health.too_little,
+        0.0,
+        log.duration_s,
+        "info",
+        f"{log.duration_s:.1f} s of log",
+        "the whole log",
+        "world",
+    )
+    return replace(health, findings=(nothing,))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.health.moments import account_of, counted, damage_of, gaps, parameter_changes, repeats
-from care_core.health.records import Finding, FindingKind, Health, Moment, Severity, Suspect
+from care_core.health.records import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health, Moment, Severity, Suspect
 from care_core.health.telling import Leads, told
 from care_core.logs.base import Log, Table, Wanted
 from care_core.vehicles import mode_name, vehicle_of
@@ -198,8 +198,8 @@ def examine(log: Log) -> Health:
         *_cut(flight, log.duration_s),
     ]
     findings = told((*(finding for _, finding in states if finding), *_refused(flight)), LEADS)
-    is_readable = STATUS in tables and flight.end_s >= _TOO_SHORT_S
-    return Health(vehicle.title, account_of(moments, introduction), findings, is_readable)
+    too_little = TOO_SHORT if STATUS not in tables or flight.end_s < _TOO_SHORT_S else "" if flight.armed else NOT_FLOWN
+    return Health(vehicle.title, account_of(moments, introduction), findings, too_little)
 
 
 def _end(tables: Mapping[str, Table], duration_s: float) -> float:

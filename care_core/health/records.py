@@ -77,6 +77,10 @@ class Finding:
     """Later findings that this one explains."""
 
 
+TOO_SHORT = "too little is recorded to say anything of a run"
+NOT_FLOWN = "the vehicle never armed: no run of it is in this log"
+
+
 @dataclass(frozen=True, slots=True)
 class Health:
     """What happened in a log. `findings` stand in the order told, the first cause first."""
@@ -85,8 +89,8 @@ class Health:
     """What it is, in a few words: "ArduCopter V4.5.4, quad X"; "ROS 1 robot with move_base"."""
     account: tuple[Moment, ...]
     findings: tuple[Finding, ...]
-    is_readable: bool = True
-    """False where the log holds too little to say what happened."""
+    too_little: str = ""
+    """Why the log holds too little to say how a run went: it is too short, or no run is in it."""
 
 
 NOTHING_SEEN = Health("", (), ())

@@ -85,8 +85,8 @@ def _without_profile(health: Health) -> str:
     worst = [finding_text(one) for one in critical(health)[:2]]
     if worst:
         return f"FAULT: {'; '.join(worst)}"
-    if not health.is_readable:
-        return "NOT EVALUATED: the log holds too little to say what happened"
+    if health.too_little:
+        return f"NOT EVALUATED: {health.too_little}"
     return "NOT EVALUATED: no limit of this mission is known; what happened is told below"
 
 

@@ -86,8 +86,8 @@ def verdict_line(health: Health, glyphs: Glyphs) -> Content:
     """What robot this is, and the finding that comes first; that nothing was found is said plainly."""
     robot = Content(clean(f"{health.robot}: " if health.robot else ""))
     first = next(iter(health.findings), None)
-    if not health.is_readable:
-        return robot + Content("too little in the log to say what happened")
+    if health.too_little:
+        return robot + Content(health.too_little)
     if first is None:
         return robot + Content("nothing out of the ordinary was found")
     sign = {"critical": f"{glyphs.fault} ", "warning": "! ", "info": ""}[first.severity]

@@ -143,4 +143,4 @@ def test_a_log_that_ends_armed_says_so() -> None:
 
 
 def test_nothing_is_said_of_a_log_without_status() -> None:
-    assert not examine(MadeLog({})).is_readable
+    assert examine(MadeLog({})).too_little

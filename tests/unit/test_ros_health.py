@@ -49,7 +49,7 @@ def test_a_fault_is_the_first_finding_with_its_onset(fault: str, kind: str, susp
 def test_a_healthy_drive_has_no_finding(outcome: int, tmp_path: Path) -> None:
     health = looked_at(Drive(outcome=outcome), tmp_path)
     assert health.findings == ()
-    assert health.is_readable
+    assert not health.too_little
 
 
 def test_what_was_survived_is_no_more_than_a_warning(tmp_path: Path) -> None:
@@ -101,7 +101,7 @@ def test_an_error_that_a_fatal_one_follows_leads_it(tmp_path: Path) -> None:
 def test_recordings_that_tell_of_no_robot_say_so(tmp_path: Path) -> None:
     write_mcap(tmp_path / "imu.mcap")
     health = examine(open_log(tmp_path / "imu.mcap"))
-    assert not health.is_readable
+    assert health.too_little
     assert health.findings == ()
     assert any("nothing in it tells of a robot" in one.text for one in health.account)
 
@@ -110,7 +110,7 @@ def test_an_empty_recording_is_said_to_be_empty(tmp_path: Path) -> None:
     with McapFile(tmp_path / "empty.mcap"):
         pass
     health = examine(open_log(tmp_path / "empty.mcap"))
-    assert not health.is_readable
+    assert health.too_little
     assert any("nothing was recorded" in one.text for one in health.account)
 
 

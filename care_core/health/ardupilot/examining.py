@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from care_core.health.ardupilot import find, flight_of
 from care_core.health.ardupilot.account import account
-from care_core.health.records import Health
+from care_core.health.records import NOT_FLOWN, TOO_SHORT, Health
 from care_core.logs.base import Log
 
 _TOO_SHORT_S = 2.0
@@ -16,4 +16,5 @@ def examine(log: Log) -> Health:
     flight = flight_of(log)
     is_readable = flight.end_s >= _TOO_SHORT_S and any(name in flight.tables for name in _TELLING)
     findings = find(flight) if is_readable else ()
-    return Health(flight.vehicle.title, account(flight, log.damage), findings, is_readable)
+    too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
+    return Health(flight.vehicle.title, account(flight, log.damage), findings, too_little)

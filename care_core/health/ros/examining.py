@@ -25,7 +25,7 @@ def examine(log: Log) -> Health:
     too_little = "" if findings else _too_little(recording)
     if too_little:
         told = (*told, Moment(recording.duration_s, "recording", too_little, "recording"))
-    return Health(_robot(recording), told, findings, is_readable=not too_little)
+    return Health(_robot(recording), told, findings, too_little)
 
 
 def _robot(recording: Recording) -> str:
