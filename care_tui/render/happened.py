@@ -168,7 +168,7 @@ def hypothesis_item(one: Hypothesis, finding: Finding | None) -> tuple[Content, 
     when = "" if finding is None else f", from {clock(finding.onset_s)}"
     kind = {"hardware": "a part of the robot", "world": "what the robot met", "parameter": "a parameter"}
     head = Content.assemble(f"{percent(one.probability):>5} ", text(hypothesis_text(one), "bold"))
-    return head, Content(f"      {kind.get(one.what, 'no cause')}{when}")
+    return head, Content(f"      {kind[one.what]}{when}" if one.name and one.what in kind else "")
 
 
 def hypothesis_rows(one: Hypothesis, finding: Finding | None) -> list[Row]:

@@ -42,6 +42,14 @@ def test_other_verdicts(snap_compare: SnapCompare, make_app: MakeApp, kind: str)
     assert snap_compare(make_app(diagnosis), terminal_size=(80, 24), run_before=press())
 
 
+@pytest.mark.parametrize("size", SIZES, ids=["80x24", "120x40"])
+@pytest.mark.parametrize(("kind", "step"), [("crashed", "1"), ("crashed", "3"), ("unfitting", "1")])
+def test_what_happened(
+    snap_compare: SnapCompare, make_app: MakeApp, kind: str, step: str, size: tuple[int, int]
+) -> None:
+    assert snap_compare(make_app(getattr(sample, kind)()), terminal_size=size, run_before=press(step))
+
+
 def test_smallest_terminal(snap_compare: SnapCompare, make_app: MakeApp) -> None:
     assert snap_compare(make_app(sample.faulty()), terminal_size=(60, 20), run_before=press("3"))
 
