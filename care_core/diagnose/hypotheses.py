@@ -74,6 +74,14 @@ def explain(
     return weigh(options, min(chance, default=0.0), findings, verdict)
 
 
+def without_parameters(findings: Sequence[Finding], *, failed: bool = False) -> tuple[Hypothesis, ...]:
+    """What explains a failure of which no model can be asked; empty where nothing failed, by a check of the run
+    (`failed`) or by a critical finding."""
+    if not failed and all(finding.severity != "critical" for finding in findings):
+        return ()
+    return weigh({}, 0.0, findings, "no")
+
+
 def _added(before: World, objective: str, reference: Config) -> tuple[float, float]:
     """What this configuration adds to the probability that the objective breaks, and what the reference has of it."""
     if objective not in before.model.outcomes:

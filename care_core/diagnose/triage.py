@@ -26,7 +26,7 @@ from care_core.diagnose.fixes import (
     smallest_good,
     to_fix,
 )
-from care_core.diagnose.hypotheses import explain, weigh
+from care_core.diagnose.hypotheses import explain, without_parameters
 from care_core.diagnose.judging import Judged, check_wishes
 from care_core.diagnose.ranking import (
     Suspect,
@@ -122,7 +122,11 @@ def diagnose(
     objectives = (*judged.results, *judged.checks)
     choice = replace(choice, fit=choice.fit.but(*unusual(run, profile)))
     if not broken:
-        return Diagnosis(choice, run, objectives, (), None, missions=judged.missions, health=health)
+        missed = any(result.status == "fault" for result in judged.checks)
+        explained = without_parameters(health.findings, failed=missed)
+        return Diagnosis(
+            choice, run, objectives, (), None, missions=judged.missions, health=health, hypotheses=explained
+        )
     report("ranking the causes", 0.7)
     reference = reference_of(run, profile)
     world = world_of(judged, profile)
@@ -173,9 +177,8 @@ def unjudged(log: LogInfo, settings: Mapping[str, Setting], choice: ProfileChoic
     """The answer for a log that no profile fits: what happened in it is all that can be said."""
     whole = MissionInfo(0, 0, 0.0, log.duration_s, ended=True, fits=False)
     run = Run({}, {}, {}, {}, settings, log, whole)
-    failed = any(finding.severity == "critical" for finding in health.findings)
-    hypotheses = weigh({}, 0.0, health.findings, "no") if failed else ()
-    return Diagnosis(choice, run, (), (), None, health=health, hypotheses=hypotheses)
+    explained = without_parameters(health.findings)
+    return Diagnosis(choice, run, (), (), None, health=health, hypotheses=explained)
 
 
 def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.diagnose.hypotheses import weigh
+from care_core.diagnose.hypotheses import weigh, without_parameters
 from care_core.diagnose.records import Hypothesis
 from care_core.health.records import Finding, Severity, Suspect
 
@@ -78,6 +78,12 @@ def test_where_no_profile_fits_no_parameter_is_named() -> None:
     found = weigh({"LAND_SPEED": 0.9}, 0.1, [finding(0.6)], "no")
     assert not [one for one in found if one.what == "parameter"]
     assert lead(found)[0] == "hardware"
+
+
+def test_without_a_model_only_a_failure_is_explained() -> None:
+    assert without_parameters([finding(0.9, "warning")]) == ()
+    assert lead(without_parameters([finding(0.9, "warning")], failed=True))[0] == "hardware"
+    assert lead(without_parameters([finding(0.9)])) == ("hardware", "motor 2 lost thrust")
 
 
 def test_what_the_operator_did_counts_as_met() -> None:
