@@ -148,6 +148,29 @@ def test_a_context_is_judged_by_where_training_saw_it(planted: Profile) -> None:
         assert all(str(one.value)[:2] in one.text for one in found)
 
 
+@pytest.mark.parametrize(("side", "share"), [("low", 0.01), ("high", 0.99)], ids=["low", "high"])
+def test_a_circumstance_says_how_many_runs_met_more(planted: Profile, side: Side, share: float) -> None:
+    wind = Variable("wind", Role.CONTEXT, unit="m/s", doc="wind")
+    model = replace(planted.model, summaries={**planted.model.summaries, "wind": _summary(0.0, 10.0)})
+    schema = replace(SCHEMA, variables={**SCHEMA.variables, "wind": wind}, circumstances={"wind": {"wind": side}})
+    run = replace(planted_run(), context={"wind": 10.0 * share})
+    (found,) = circumstances(run, replace(world_of(judge(run, SCHEMA, {}), planted), model=model), schema)
+    assert found.share == pytest.approx(0.01, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("support", "confidence"), [(0.45, "low"), (0.55, "medium"), (0.75, "medium"), (0.85, "high")], ids=str
+)
+def test_confidence_follows_how_many_resamples_have_a_path(planted: Profile, support: float, confidence: str) -> None:
+    effects = {key: effect.model_copy(update={"support": support}) for key, effect in planted.model.effects.items()}
+    profile = Profile(planted.path, SCHEMA)
+    profile.__dict__["model"] = replace(planted.model, effects=effects)
+    judged = judge(planted_run(speed=1.5), SCHEMA, planted.model.summaries)
+    cause = diagnose(judged, profile, CHOICE).faults[0].causes[0]
+    assert (cause.option.name, cause.confidence) == ("speed", confidence)
+    assert any("of resamples" in note.text for note in cause.notes) is (support < 0.5)
+
+
 def _summary(low: float, high: float) -> Summary:
     return Summary(count=100, mean=5.0, spread=3.0, quantiles=tuple(low + (high - low) * i / 20 for i in range(21)))
 
