@@ -288,7 +288,7 @@ def _count_odds(
 def abducted(
     classifier: PlainClassifier, config: Mapping[str, float], changed: Sequence[Mapping[str, float]], failures: int
 ) -> FloatArray:
-    """The classifier's odds given that this run failed, as the engine's; nothing is known of the classifier's errors."""
+    """The classifier's odds given the failures, as the engine's; nothing is known of the classifier's errors."""
     same, ones = UNKNOWN_PERSISTENCE.same, np.ones(len(changed))
     kin = Kinship(variance=ones, covariance=same * ones, here=1.0, repeated=same)
     return next_passes(kin, classifier.odds(changed), float(classifier.odds([config])[0]), [False] * failures)
