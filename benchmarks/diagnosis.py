@@ -26,10 +26,12 @@ from care_core.causal.abduction import Kinship, next_passes
 from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import FloatArray
 from care_core.causal.model import UNKNOWN_PERSISTENCE
-from care_core.diagnose.judging import read_and_judge, thresholds_in_force
-from care_core.diagnose.ranking import deviating, reference_config
+from care_core.diagnose.judging import read_and_judge
+from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
+from care_core.diagnose.reference import profile_config
 from care_core.diagnose.triage import triage
+from care_core.diagnose.worlds import world_of
 from care_core.extract.select import choose_profile
 from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
 from care_core.learn.skill import all_met, calibration_error, held_out_odds, reliability
@@ -45,6 +47,11 @@ TRUTH_NAMES = {
                    "path_error_max": "path_error_max_m"},
     "move_base": {"mission_success": "mission_success", "mission_time": "mission_time", "energy": "energy_j"},
 }  # fmt: skip
+LIMITS: Mapping[str, Mapping[str, float]] = {
+    "arducopter": {"mission_time": 150.0, "energy": 14.0, "path_error_max": 2.0},
+    "move_base": {},
+}
+"""The bounds that the truth was flown against, where the profile sets none of its own."""
 CORE = Path(__file__).parent.parent / "care_core"
 FOLDS = 5
 JOULES_PER_WH = 3600.0
@@ -166,19 +173,21 @@ def evaluate(profile: Profile, shared: Path, peers: Peers | None, *, verbose: bo
     platform = profile.schema.name
     folder = shared / "data" / platform / "faults"
     truths = [json.loads(line) for line in (folder / "truth.jsonl").read_text().splitlines()]
-    reference = reference_config(profile.schema, profile.model)
+    reference = profile_config(profile.schema, profile.model)
     tally = Tally()
     for truth in truths:
         log = open_log(folder / truth["log"])
         choice = choose_profile(log, [profile])[1]
-        diagnosis = triage(read_and_judge(log, profile), profile, choice, top=10)
+        judged = read_and_judge(log, profile, thresholds=LIMITS[platform])
+        diagnosis = triage(judged, profile, choice, top=10)
         if not diagnosis.faults:
             # The outside measurement says failed, the log says just inside: the operator lowers the threshold to match.
             tally.too_close.append(truth["tag"])
             near = [r for r in diagnosis.objectives if _is_near(r, truth, platform)]
             tightened = {r.variable.name: LOWERED * r.value for r in near if r.value is not None}
-            diagnosis = triage(read_and_judge(log, profile, thresholds=tightened), profile, choice, top=10)
-        _count(tally, diagnosis, truth, platform, reference, profile, peers, verbose)
+            judged = read_and_judge(log, profile, thresholds={**LIMITS[platform], **tightened})
+            diagnosis = triage(judged, profile, choice, top=10)
+        _count(tally, diagnosis, truth, platform, reference, world_of(judged, profile), peers, verbose)
     return tally
 
 
@@ -214,14 +223,14 @@ def _count(
     truth: Mapping[str, Any],
     platform: str,
     reference: Mapping[str, float],
-    profile: Profile,
+    world: World,
     peers: Peers | None,
     verbose: bool,
 ) -> None:
     tally.faults += 1
     tally.wrong_objectives += [f"{truth['tag']} {line}" for line in objectives_differ(diagnosis, truth, platform)]
     tally.abstained += diagnosis.abstained is not None
-    _count_odds(tally, diagnosis, truth, reference, profile, peers)
+    _count_odds(tally, truth, reference, world, peers)
     _count_fix(tally, diagnosis, truth)  # of every fault: one without a known fix can be given one that fails
     fixing = [frozenset(options) for options in truth["fixing"]]
     if not fixing:
@@ -259,29 +268,25 @@ def _count_fix(tally: Tally, diagnosis: Diagnosis, truth: Mapping[str, Any]) -> 
 
 def _count_odds(
     tally: Tally,
-    diagnosis: Diagnosis,
     truth: Mapping[str, Any],
     reference: Mapping[str, float],
-    profile: Profile,
+    world: World,
     peers: Peers | None,
 ) -> None:
     """Predicted odds of every reset that was flown, against whether it met all objectives."""
-    config = {**reference, **diagnosis.run.config}
-    bounds = thresholds_in_force(profile.schema, {})
-    world = World(profile.model, config, {**diagnosis.run.metrics, **diagnosis.run.objectives}, bounds)
-    changed = [{**config, **{name: reference[name] for name in row["reset"]}} for row in truth["tried"]]
+    changed = [{**world.config, **{name: reference[name] for name in row["reset"]}} for row in truth["tried"]]
     odds = {"care": world.odds(changed)}
     if truth.get("repeatable"):  # what the second failure measured was not kept: it is taken to be like the first
         odds["care, told of the second failure"] = replace(world, repeats=(world.observed,)).odds(changed)
     if peers is not None:
         odds["plain classifier"] = peers.classifier.odds(changed)
-        odds["plain classifier, same abduction"] = abducted(peers.classifier, config, changed, 1)
+        odds["plain classifier, same abduction"] = abducted(peers.classifier, world.config, changed, 1)
         if truth.get("repeatable"):
-            odds["plain classifier, told of it too"] = abducted(peers.classifier, config, changed, 2)
+            odds["plain classifier, told of it too"] = abducted(peers.classifier, world.config, changed, 2)
     for name, predicted in odds.items():
         tally.odds.setdefault(name, []).extend(predicted)
     tally.outcomes.extend(float(row["ok"]) for row in truth["tried"])
-    tally.next_outcomes.extend(_next_outcome(row, truth, profile.schema) for row in truth["tried"])
+    tally.next_outcomes.extend(_next_outcome(row, truth, world) for row in truth["tried"])
     tally.clusters.extend([truth["tag"]] * len(changed))
 
 
@@ -294,16 +299,16 @@ def abducted(
     return next_passes(kin, classifier.odds(changed), float(classifier.odds([config])[0]), [False] * failures)
 
 
-def _next_outcome(row: Mapping[str, Any], truth: Mapping[str, Any], schema: Schema) -> float:
+def _next_outcome(row: Mapping[str, Any], truth: Mapping[str, Any], world: World) -> float:
     """Whether the recorded mission met everything: `ok` asks it of two in a row where missions are not repeatable."""
     if not truth.get("repeatable"):
         return float(row["ok"])
     met = []
-    for objective in schema.objectives:
-        name = TRUTH_NAMES[schema.name][objective.name]
+    for objective, bound in world.thresholds.items():
+        name = TRUTH_NAMES["move_base"][objective]
         scale = 1 / JOULES_PER_WH if name == "energy_j" else 1.0
         value = row.get(name)
-        met.append(value is not None and objective.threshold is not None and objective.threshold.met(value * scale))
+        met.append(value is not None and bound.met(value * scale))
     return float(all(met))
 
 

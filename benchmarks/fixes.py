@@ -53,9 +53,7 @@ def measure(runs: int, faults: int) -> None:
             if meets_all(config, noise):
                 continue
             seen += 1
-            fix = diagnose(
-                judge(run_of(config, fly(config, noise)), SCHEMA, profile.model.summaries), profile, CHOICE
-            ).fix
+            fix = diagnose(judge(run_of(config, fly(config, noise)), SCHEMA, profile.model), profile, CHOICE).fix
             if fix is None:
                 abstained += 1
                 continue

@@ -25,7 +25,8 @@ from joblib import Parallel, delayed
 
 from care_core.causal.counterfactual import World
 from care_core.causal.model import Model
-from care_core.diagnose.ranking import deviating, reference_config, suspects
+from care_core.diagnose.ranking import deviating, suspects
+from care_core.diagnose.reference import profile_config
 from care_core.diagnose.triage import MIN_ODDS
 from care_core.learn.baselines import PlainClassifier
 from care_core.learn.outcomes import met
@@ -95,14 +96,14 @@ def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
     robot = random_robot(np.random.default_rng(seed), chosen=chosen, inert=4)
     schema = robot.schema
     frame = robot.drive(n, np.random.default_rng(1000 + seed))
-    kept = np.all([np.nan_to_num(met(o, frame)) == 1.0 for o in schema.objectives], axis=0)
+    kept = np.all([np.nan_to_num(met(o, frame, schema)) == 1.0 for o in schema.objectives], axis=0)
     options = [o.name for o in schema.options]
     engines = {"care": _Care(frame, schema, seed), METHODS[1]: _Care(frame, declared_random(schema), seed)}
     plain = PlainClassifier(frame, kept, options, seed)
-    reference = reference_config(schema, engines["care"].model)
+    reference = profile_config(schema, engines["care"].model)
     scores = {name: Score() for name in METHODS}
     fresh = robot.drive(n, np.random.default_rng(2000 + seed))
-    failed = ~np.all([np.nan_to_num(met(o, fresh)) == 1.0 for o in schema.objectives], axis=0)
+    failed = ~np.all([np.nan_to_num(met(o, fresh, schema)) == 1.0 for o in schema.objectives], axis=0)
     for _, row in fresh[failed].head(FAULTS).iterrows():
         run = {str(k): float(v) for k, v in row.items()}
         config = {name: run[name] for name in options}
@@ -131,7 +132,9 @@ def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
 def _true_odds(robot: Robot, config: Mapping[str, float], run: Mapping[str, float]) -> float:
     """Share of missions that meet everything, options set, in this run's wind where the table holds it."""
     frame = robot.drive(TRUTH, np.random.default_rng(7), config, run.get("wind"))
-    return float(np.all([np.nan_to_num(met(o, frame)) == 1.0 for o in robot.schema.objectives], axis=0).mean())
+    return float(
+        np.all([np.nan_to_num(met(o, frame, robot.schema)) == 1.0 for o in robot.schema.objectives], axis=0).mean()
+    )
 
 
 def show(title: str, parts: list[dict[str, Score]]) -> None:

@@ -200,7 +200,7 @@ def _judge(
 ) -> None:
     config = {name: row[name] for name in OPTIONS}
     choice = ProfileChoice("planted", "1", "Planted robot", "")
-    judged = judge(_run_of(world.schema, row), world.schema, profile.model.summaries)
+    judged = judge(_run_of(world.schema, row), world.schema, profile.model)
     diagnosis = diagnose(judged, profile, choice, top=10)
     off = deviating(config, dict.fromkeys(OPTIONS, REFERENCE))
     now = true_probability(world, config, noise)

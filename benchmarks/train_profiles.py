@@ -8,6 +8,7 @@ The two platforms with recorded missions are ingested from the logs themselves; 
 from __future__ import annotations
 
 import argparse
+import csv
 import os
 import tarfile
 import tempfile
@@ -30,34 +31,38 @@ RESAMPLES = 50
 
 @dataclass(frozen=True)
 class Source:
-    """Where a profile's runs come from: an archive of logs, or a table. `origin` goes into the model card."""
+    """Where a profile's runs come from: archives of logs, or a table. `origin` goes into the model card."""
 
-    path: str
+    paths: tuple[str, ...]
     origin: str
+    hardware: str = ""
+    """A table with the columns `tag` and `hardware`: logs in which hardware failed teach nothing about parameters."""
 
 
 SOURCES = {
     "arducopter": Source(
-        "data/arducopter/train.tar.xz",
-        "411 missions of the ArduCopter V4.5.4 firmware in its software-in-the-loop simulator, recorded by this "
-        "project under random configurations and winds; DataFlash logs, read by `care ingest`.",
+        ("data/arducopter/train.tar.xz", "data/varied/table.tar.xz"),
+        "Missions of the ArduCopter V4.5.4 firmware in its software-in-the-loop simulator, recorded by this project "
+        "under random configurations and winds: 411 flights of one mission by one quadcopter, and those of 597 flights "
+        "of 50 settings (mission, vehicle, site) in which no hardware failed; DataFlash logs, read by `care ingest`.",
+        hardware="data/varied/table.csv",
     ),
     "move_base": Source(
-        "data/move_base/train.tar.xz",
+        ("data/move_base/train.tar.xz",),
         "301 missions of the ROS noetic navigation stack (move_base, navfn, dwa_local_planner, costmap_2d) driving a "
         "simulated Husky-sized robot, recorded by this project under random configurations; ROS 1 bags, read by "
         "`care ingest`.",
     ),
     "husky": Source(
-        "data/care/cure_husky_1000.csv",
+        ("data/care/cure_husky_1000.csv",),
         "1000 Husky missions in Gazebo from the CURE artifact (Hossen et al. 2025, MIT license).",
     ),
     "turtlebot3": Source(
-        "data/care/cure_turtlebot3_1000.csv",
+        ("data/care/cure_turtlebot3_1000.csv",),
         "1000 TurtleBot 3 missions in Gazebo from the CURE artifact (Hossen et al. 2025, MIT license).",
     ),
     "husky-care": Source(
-        "data/care/care_husky_sim_399.csv",
+        ("data/care/care_husky_sim_399.csv",),
         "399 Husky missions in Gazebo from the CaRE artifact (Hossen et al. 2023, MIT license).",
     ),
 }
@@ -65,18 +70,27 @@ SOURCES = {
 
 def runs_table(source: Source, schema: Schema, shared: Path, folder: Path) -> Path:
     """The table of runs: the published one, or one made from the logs."""
-    path = shared / source.path
-    if path.suffix == ".csv":
-        return path
-    with tarfile.open(path) as archive:
-        archive.extractall(folder / schema.name, filter="data")
+    paths = [shared / path for path in source.paths]
+    if paths[0].suffix == ".csv":
+        return paths[0]
+    for path in paths:
+        with tarfile.open(path) as archive:
+            archive.extractall(folder / schema.name, filter="data")
     table = folder / f"{schema.name}.parquet"
-    found = ingest(find_logs([folder / schema.name]), schema, table, progress=lambda _step, _share: None)
+    broken = with_failing_hardware(shared / source.hardware) if source.hardware else frozenset()
+    logs = [log for log in find_logs([folder / schema.name]) if log.stem not in broken]
+    found = ingest(logs, schema, table, progress=lambda _step, _share: None)
     for failure in found.failures:
         print(f"  {failure.path.name}: {failure.reason}")
     write_table(table, found.rows, schema)
     journal_of(table).unlink()
     return table
+
+
+def with_failing_hardware(table: Path) -> frozenset[str]:
+    """Tags of the missions in which hardware failed."""
+    with table.open(newline="") as stream:
+        return frozenset(row["tag"] for row in csv.DictReader(stream) if row["hardware"])
 
 
 def main() -> None:

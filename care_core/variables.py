@@ -22,6 +22,8 @@ class Role(str, Enum):
 
 Op = Literal["<=", ">=", "<", ">", "=="]
 Kind = Literal["functional", "non-functional"]
+About = Literal["mission", "vehicle", "world"]
+"""What a context tells of: what was asked, what flew, or what was met. The first two are known before the start."""
 ValueType = Literal["float", "int", "bool", "enum"]
 
 _COMPARE = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt, "==": operator.eq}
@@ -39,6 +41,27 @@ class Threshold:
 
     def __str__(self) -> str:
         return f"{self.op} {self.value:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeThreshold:
+    """A bound that is a multiple of what the reference configuration needs for the same mission and conditions."""
+
+    op: Op
+    ratio: float
+    at_least: float | None = None
+    """The bound is never tighter than this, in the objective's unit."""
+
+    def for_need(self, need: float) -> Threshold:
+        """The bound where the reference configuration needs `need`."""
+        value = self.ratio * need
+        if self.at_least is not None:
+            value = max(value, self.at_least) if self.op in ("<=", "<") else min(value, self.at_least)
+        return Threshold(self.op, float(f"{value:.4g}"))
+
+    def __str__(self) -> str:
+        floor = "" if self.at_least is None else f", or {self.at_least:g}"
+        return f"{self.op} {self.ratio:g} x what the reference configuration needs{floor}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +98,12 @@ class Variable:
     safety: bool = False
     kind: Kind | None = None
     threshold: Threshold | None = None
+    relative: RelativeThreshold | None = None
+    """The bound of an objective that has no fixed one."""
+    about: About = "world"
+    """What a context tells of."""
+    nominal: Extract | None = None
+    """What physics says the value is: the name of a formula, and the variables that are its arguments."""
     extract: Extract | None = None
     order: int | None = None
     """Place in the mission, or in the making of a number out of others: a variable never causes one of a lower

@@ -106,11 +106,10 @@ def missions_of(case: Case) -> list[MissionVerdict]:
     if case.reading is None:
         return []
     profile, own = case.reading.profile, case.reading.judged.own
-    summaries = profile.model.summaries
     return [
         MissionVerdict(run.mission.index, run.mission.start_s, run.mission.end_s, run.mission.ended, judged.results)
         for run in read_runs(log_of(case), profile.schema)
-        for judged in [judge(run, profile.schema, summaries, own)]
+        for judged in [judge(run, profile.schema, profile.model, own)]
     ]
 
 

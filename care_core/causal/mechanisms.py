@@ -18,6 +18,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.causal.nominal import Nominal
+
 FloatArray = NDArray[np.float64]
 Transform = Literal["identity", "log", "log1p"]
 LEAST: Mapping[Transform, float] = {"identity": -np.inf, "log": 0.0, "log1p": -1.0}
@@ -52,6 +54,8 @@ class Kernel:
     additive: float
     joint: float
     noise: float
+    idle: int = 0
+    """Inputs that were found to explain nothing and left out: each adds an e_j of 1."""
 
     def __call__(self, a: FloatArray, b: FloatArray) -> FloatArray:
         """Covariance of the noise-free values. a: (m, p), b: (n, p) -> (m, n)."""
@@ -70,7 +74,8 @@ class Kernel:
 
     def _block(self, a: FloatArray, b: FloatArray) -> FloatArray:
         exponent = -0.5 * ((a[:, None, :] - b[None, :, :]) * self.relevance) ** 2
-        covariance: FloatArray = self.additive**2 * np.exp(exponent).sum(axis=-1) / max(1, len(self.relevance))
+        each = np.exp(exponent).sum(axis=-1) + self.idle
+        covariance: FloatArray = self.additive**2 * each / max(1, len(self.relevance) + self.idle)
         covariance += self.joint**2 * np.exp(exponent.sum(axis=-1))
         return covariance
 
@@ -88,17 +93,20 @@ class Mechanism:
     odds. Everything is scaled: inputs to mean 0 and spread 1 (log first where `log_inputs`), the target likewise.
 
     Attributes:
-        inputs: names, shape (p,), in the order of the columns that `predict` expects.
-        points: shape (n, p), scaled training inputs.
+        inputs: names, shape (p,), in the order of the columns that `latent` expects.
+        reads: places of the inputs that the kernel sees, shape (q,); scaling and relevance have one value for each.
+        points: shape (n, q), scaled training inputs.
         targets: shape (n,), scaled training targets.
         weights: shape (n,), (K + noise)^-1 targets: the posterior mean is a kernel times these.
         calibration: binary: (slope, offset) of the logistic of the regression. Continuous: sorted standardised
             leave-one-out residuals, the distribution of this mechanism's own errors.
         prior: of a mechanism carried over from another platform: that platform's mechanism and the share of its
             prediction that is kept. The regression is then of what that leaves.
+        nominal: what physics says of the target. The regression is then of the logarithm of the ratio to it.
     """
 
     inputs: tuple[str, ...]
+    reads: NDArray[np.int64]
     log_inputs: NDArray[np.bool_]
     centre: FloatArray
     spread: FloatArray
@@ -112,9 +120,11 @@ class Mechanism:
     binary: bool
     calibration: FloatArray
     prior: tuple[Mechanism, float] | None = None
+    nominal: Nominal | None = None
 
     def scaled(self, x: FloatArray) -> FloatArray:
-        """Inputs in their own units, shape (m, p), to the scale the kernel sees."""
+        """Inputs in their own units, shape (m, p), to the scale and the columns that the kernel sees, shape (m, q)."""
+        x = x[:, self.reads]
         logs = np.log(np.where(self.log_inputs, np.maximum(x, 1e-12), 1.0))
         scaled: FloatArray = (np.where(self.log_inputs, logs, x) - self.centre) / self.spread
         return scaled
@@ -127,15 +137,20 @@ class Mechanism:
     def latent(self, x: FloatArray) -> FloatArray:
         """Posterior mean on the transformed scale. x: (m, p) -> (m,)."""
         mean: FloatArray = self.mean + self.scale * (self.kernel(self.scaled(x), self.points) @ self.weights)
-        return mean + self._carried_over(x)
+        return mean + self.known(x)
 
-    def _carried_over(self, x: FloatArray) -> FloatArray:
-        """What the other platform's mechanism says, shape (m,); zero without one."""
-        if self.prior is None:
-            return np.zeros(len(x))
-        source, share = self.prior
-        places = [self.inputs.index(name) for name in source.inputs]
-        return share * source.latent(x[:, places])
+    def known(self, x: FloatArray) -> FloatArray:
+        """What physics and the other platform's mechanism say, shape (m,); zero without either."""
+        latent = np.zeros(len(x))
+        if self.nominal is not None:
+            latent += np.log(self.nominal.of(self._columns(x, self.nominal.inputs)))
+        if self.prior is not None:
+            source, share = self.prior
+            latent += share * source.latent(self._columns(x, source.inputs))
+        return latent
+
+    def _columns(self, x: FloatArray, names: Sequence[str]) -> FloatArray:
+        return x[:, [self.inputs.index(name) for name in names]]
 
     def latent_spread(self, x: FloatArray) -> FloatArray:
         """Posterior standard deviation of the noise-free value, shape (m,)."""
@@ -153,7 +168,7 @@ class Mechanism:
         cross = self.kernel(z, self.points) - self.kernel(origin, self.points)
         prior = 2 * (self.kernel.variance - self.kernel(z, origin)[:, 0])
         mean: FloatArray = self.scale * (cross @ self.weights)
-        return mean + self._carried_over(x) - self._carried_over(here), self._spread(prior, cross)
+        return mean + self.known(x) - self.known(here), self._spread(prior, cross)
 
     def shared(self, x: FloatArray, here: FloatArray) -> FloatArray:
         """Posterior covariance of the noise-free values at x (m, p) and at here (1, p), shape (m,).

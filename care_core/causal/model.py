@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import TAIL, Mechanism
+from care_core.causal.mechanisms import TAIL, Mechanism, columns
 from care_core.variables import Threshold
 
 
@@ -99,6 +99,16 @@ class Summary(Record):
         if bound.op == "==":
             levels = np.round(levels)
         return float(np.clip(np.mean([bound.met(float(level)) for level in levels]), TAIL, 1 - TAIL))
+
+    def times(self, factor: float) -> Summary:
+        """The same in another unit."""
+        return self.model_copy(
+            update={
+                "mean": self.mean * factor,
+                "spread": self.spread * factor,
+                "quantiles": tuple(q * factor for q in self.quantiles),
+            }
+        )
 
     def quantile(self, share: float) -> float:
         """The value that this share of the training runs stays below."""
@@ -188,6 +198,17 @@ class Model:
     mechanisms: Mapping[str, Mechanism] = field(default_factory=dict)
     witnesses: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Per objective the metrics that go with missing it: correlation over the training runs, on scaled values."""
+
+    def summary_at(self, name: str, reference: Mapping[str, float]) -> Summary | None:
+        """What training held of a variable, on the mission of the run that `reference` belongs to.
+
+        Values that have a nominal were compared by their ratio to it; here they are what the training configurations
+        would have taken.
+        """
+        summary, mechanism = self.summaries.get(name), self.mechanisms.get(name)
+        if summary is None or mechanism is None or mechanism.nominal is None:
+            return summary
+        return summary.times(float(mechanism.nominal.of(columns([reference], mechanism.nominal.inputs))[0]))
 
     def supports(self, option: str, value: float) -> bool:
         """Whether the training runs reach this value of the option."""

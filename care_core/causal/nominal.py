@@ -24,9 +24,10 @@ _TINY = 1e-6
 
 # ArduCopter 4.5: seconds between arming and lifting off (ARMING_DELAY_SEC), loiter above home (RTL_LOIT_TIME), height
 # of the last part of a landing (LAND_ALT_LOW), slope of the cone in which a return stays low (RTL_CONE_SLOPE), vertical
-# acceleration and jerk of the way (WPNAV_ACCEL_Z, PSC_JERK_Z), and the landing detector with its disarming.
+# acceleration and jerk of the way (WPNAV_ACCEL_Z, PSC_JERK_Z), the landing detector with its disarming, and a
+# moment before the way down begins.
 _ARMING_S, _LOITER_S, _LAND_LOW_M, _CONE = 2.0, 5.0, 10.0, 3.0
-_RISE_ACCELERATION, _RISE_JERK, _LANDED_S = 1.0, 5.0, 2.0
+_RISE_ACCELERATION, _RISE_JERK, _LANDED_S, _STILL_S = 1.0, 5.0, 2.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,7 @@ def multicopter_return_time(given: Given) -> FloatArray:
 @formula(*_END, "descent_speed")
 def multicopter_descent_time(given: Given) -> FloatArray:
     """From the height of the return, or of the last waypoint, to where a landing slows down."""
-    return _rise_time(_return_height(given) - _LAND_LOW_M, given["descent_speed"])
+    return _STILL_S + _rise_time(_return_height(given) - _LAND_LOW_M, given["descent_speed"])
 
 
 @formula(*_END, "landing_speed")

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from care_core.causal.model import Summary
+from care_core.causal.counterfactual import World
+from care_core.causal.model import Model, Summary
 from care_core.configs.driven import readable, same_value
 from care_core.configs.loading import ConfigFile, resolve
-from care_core.diagnose.records import MissionVerdict, ObjectiveResult, Status
+from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, Status
+from care_core.diagnose.reference import Good, Reference, need_of, reference_of
 from care_core.errors import UsageError, nearest
 from care_core.extract.read import mission_number, read_runs
 from care_core.logs.base import Log
@@ -43,6 +45,8 @@ class Judged:
     """Every mission of the log, this one among them."""
     repeats: tuple[Judged, ...] = ()
     """Other runs of the same configuration under the same conditions: what this one met is read off them too."""
+    reference: Reference = field(default_factory=lambda: Reference({}, ""))
+    """The configuration that the run is judged against."""
 
     @property
     def broken(self) -> tuple[ObjectiveResult, ...]:
@@ -56,6 +60,7 @@ def read_and_judge(
     configs: Sequence[ConfigFile] = (),
     thresholds: Mapping[str, float] | None = None,
     mission: int | None = None,
+    good: Good | None = None,
     sha256: Sha256 | None = None,
 ) -> Judged:
     """Read one mission of a log and judge it.
@@ -64,6 +69,7 @@ def read_and_judge(
         configs: configuration files in the order they are loaded, used where the log holds no value.
         thresholds: the operator's own bounds, per objective.
         mission: which mission of the log, from 1; the last when None.
+        good: the configuration to judge against, where the operator named one.
         sha256: gives the log's digest, where the caller has begun to work it out.
 
     Raises:
@@ -73,7 +79,7 @@ def read_and_judge(
     check_wishes(schema, (), thresholds or {})
     given = resolve(configs, (parameter for option in schema.options for parameter in readable(option)))
     runs = read_runs(log, schema, overrides=given, sha256=sha256)
-    judged = [judge(run, schema, profile.model.summaries, thresholds) for run in runs]
+    judged = [judge(run, schema, profile.model, thresholds, good) for run in runs]
     verdicts = tuple(verdict(one) for one in judged)
     return replace(
         judged[mission_number(mission, len(runs)) - 1], configs=tuple(configs), given=given, missions=verdicts
@@ -112,23 +118,45 @@ def with_repeats(first: Judged, others: Sequence[Judged]) -> Judged:
 
 
 def judge(
-    run: Run, schema: Schema, summaries: Mapping[str, Summary], thresholds: Mapping[str, float] | None = None
+    run: Run,
+    schema: Schema,
+    model: Model | None,
+    thresholds: Mapping[str, float] | None = None,
+    good: Good | None = None,
 ) -> Judged:
     """Every objective of the profile against its threshold. Not evaluated is not OK.
 
     Args:
+        model: says what the reference configuration needs, which some thresholds are a multiple of; None: they are not
+            judged.
         thresholds: the operator's own bounds: they hold for any mission, the profile's for its own alone.
+        good: the configuration to judge against, where the operator named one.
     """
     own = dict(thresholds or {})
     bounds = thresholds_in_force(schema, own)
     run = replace(run, objectives=meaningful(run, schema, bounds, own))
-    results = tuple(
+    if model is None:
+        results = (_judge_one(o, run.objectives.get(o.name), bounds.get(o.name)) for o in schema.objectives)
+        return Judged(run, bounds, own, tuple(results), tuple(map(_judge_check, run.checks)))
+    reference = reference_of(run, schema, model, good)
+    world = World(model, {**reference.config, **run.config}, {**run.metrics, **run.objectives}, bounds)
+    needs: dict[str, Need] = {}
+    for objective in schema.objectives:
+        need = need_of(objective.name, world, reference) if objective.relative and objective.name not in own else None
+        if need is not None and objective.relative is not None:
+            needs[objective.name] = need
+            bounds[objective.name] = objective.relative.for_need(need.value)
+    results = (
         _judge_one(
-            objective, run.objectives.get(objective.name), bounds.get(objective.name), summaries.get(objective.name)
+            objective,
+            run.objectives.get(objective.name),
+            bounds.get(objective.name),
+            model.summary_at(objective.name, reference.config),
+            needs.get(objective.name),
         )
         for objective in schema.objectives
     )
-    return Judged(run, bounds, own, results, tuple(map(_judge_check, run.checks)))
+    return Judged(run, bounds, own, tuple(results), tuple(map(_judge_check, run.checks)), reference=reference)
 
 
 def meaningful(
@@ -202,21 +230,24 @@ def _known(name: str, variables: Iterable[Variable], what: str, where: str, prof
 
 
 def _judge_one(
-    objective: Variable, value: Value | None, bound: Threshold | None, summary: Summary | None = None
+    objective: Variable,
+    value: Value | None,
+    bound: Threshold | None,
+    summary: Summary | None = None,
+    need: Need | None = None,
 ) -> ObjectiveResult:
     if value is None:
-        return ObjectiveResult(
-            objective, None, bound, "not_evaluated", "the profile does not say how to read it from a log"
-        )
+        reason = "the profile does not say how to read it from a log"
+        return ObjectiveResult(objective, None, bound, "not_evaluated", reason, need=need)
     if isinstance(value, Unavailable):
         reason = f"{value.reason} ({value.hint})" if value.hint else value.reason
-        return ObjectiveResult(objective, None, bound, "not_evaluated", reason)
+        return ObjectiveResult(objective, None, bound, "not_evaluated", reason, need=need)
     if bound is None:
         return ObjectiveResult(objective, value, None, "not_evaluated", "no threshold: give one with --threshold")
     status: Status = "ok" if bound.met(value) else "fault"
     # A yes-or-no result has no place among others.
     percentile = summary.percentile(value) if summary and objective.kind == "non-functional" else None
-    return ObjectiveResult(objective, value, bound, status, percentile=percentile)
+    return ObjectiveResult(objective, value, bound, status, percentile=percentile, need=need)
 
 
 def _judge_check(check: Check) -> ObjectiveResult:

@@ -49,21 +49,6 @@ class Suspect:
         return 0.0 if self.effect is None else self.effect.effect
 
 
-def reference_config(schema: Schema, model: Model) -> dict[str, float]:
-    """The configuration that faults are judged against: declared defaults, else the middle of the training runs.
-
-    Contexts are held at the middle of the training runs, until the run's own are known.
-    """
-    config: dict[str, float] = {}
-    for option in (*schema.options, *schema.contexts):
-        if option.default is not None:
-            config[option.name] = option.default
-        elif option.name in model.summaries:
-            quantiles = model.summaries[option.name].quantiles
-            config[option.name] = option.snap(quantiles[len(quantiles) // 2])
-    return config
-
-
 def deviating(config: Config, reference: Config) -> tuple[str, ...]:
     """Options whose value in this run is not the reference's."""
     return tuple(n for n, value in reference.items() if n in config and not same_value(config[n], value))

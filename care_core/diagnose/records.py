@@ -16,6 +16,16 @@ What = Literal["parameter", "hardware", "world", "chance"]
 
 
 @dataclass(frozen=True, slots=True)
+class Need:
+    """What the reference configuration would need for this very mission, vehicle and conditions, with its 80 %
+    interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
 class ObjectiveResult:
     """An objective of this run against its threshold. `reason` says why it was not evaluated."""
 
@@ -26,6 +36,34 @@ class ObjectiveResult:
     reason: str = ""
     percentile: float | None = None
     """Share (0 to 1) of the profile's training runs with a smaller value."""
+    need: Need | None = None
+    """What the threshold is a multiple of, where it is no fixed one."""
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the verdict holds wherever in its interval the need lies."""
+        if self.need is None or self.value is None or self.variable.relative is None:
+            return True
+        bounds = (self.variable.relative.for_need(need) for need in (self.need.low, self.need.high))
+        return len({bound.met(self.value) for bound in bounds}) == 1
+
+    @property
+    def wanted(self) -> str:
+        """The threshold as an operator reads it, and where it comes from."""
+        if self.threshold is None:
+            return "no threshold"
+        bound = f"{self.threshold} {self.variable.unit}".rstrip()
+        return f"{bound} ({self.basis})" if self.basis else bound
+
+    @property
+    def basis(self) -> str:
+        """What the threshold was made of, empty where it is a fixed one."""
+        if self.need is None or self.threshold is None or self.variable.relative is None:
+            return ""
+        need = f"{self.need.value:.3g} {self.variable.unit}".rstrip()
+        if self.threshold.value == self.variable.relative.at_least:
+            return f"the reference configuration needs {need} for this mission"
+        return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"
 
 
 @dataclass(frozen=True, slots=True)

@@ -91,7 +91,7 @@ def _strange(run: Run, other: LogInfo, before: Mapping[str, Setting]) -> Iterato
 def _not_good(good: Judged) -> Iterator[str]:
     """Which objectives the good run misses itself, or else which nobody can judge."""
     for result in good.broken:
-        yield f"it has a fault itself: {result.variable.name} = {result.value:.4g}, wanted {result.threshold}"
+        yield f"it has a fault itself: {result.variable.name} = {result.value:.4g}, wanted {result.wanted}"
     for result in good.results:
         if not good.broken and result.status == "not_evaluated":
             yield f"its {result.variable.name} could not be evaluated: {result.reason}"

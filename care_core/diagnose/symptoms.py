@@ -66,16 +66,25 @@ def _split(
     configs = [reference, world.config, *({**world.config, name: reference[name]} for name in names)]
     expected, here, *back = _latent(mechanism, configs)
     value = 2 * seen - 1 if mechanism.binary else float(transformed(np.array(seen), mechanism.transform))
-    off = (value - expected) / mechanism.scale
+    scale = _scale(world, metric, mechanism)
+    off = (value - expected) / scale
     if correlation * off <= 0:
         return {}
     moved = {}
     for name, there in zip(names, back, strict=True):
-        moved[name] = max(0.0, float(np.sign(off)) * (here - there) / mechanism.scale)
+        moved[name] = max(0.0, float(np.sign(off)) * (here - there) / scale)
         if (name, metric) in schema.known:
             moved[name] += UNLEARNED * schema.variables[name].distance(reference[name], world.config[name])
     whole = sum(moved.values())
     return {name: correlation * off * part / whole for name, part in moved.items() if part > 0}
+
+
+def _scale(world: World, metric: str, mechanism: Mechanism) -> float:
+    """How far training runs differ in a metric; of one that has a nominal, in the logarithm of its ratio to it."""
+    summary = world.model.summaries.get(metric)
+    if mechanism.nominal is None or summary is None or not summary.mean > 0:
+        return mechanism.scale
+    return max(summary.spread / summary.mean, mechanism.scale)
 
 
 def _latent(mechanism: Mechanism, configs: Sequence[Config]) -> list[float]:

@@ -38,7 +38,7 @@ from care_core.diagnose.ranking import (
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Note, ObjectiveResult
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
-from care_core.diagnose.worlds import reference_of, unread_options, world_of
+from care_core.diagnose.worlds import unread_options, world_of
 from care_core.health.records import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
@@ -128,7 +128,7 @@ def diagnose(
             choice, run, objectives, (), None, missions=judged.missions, health=health, hypotheses=explained
         )
     report("ranking the causes", 0.7)
-    reference = reference_of(run, profile)
+    reference = judged.reference.config
     world = world_of(judged, profile)
     weighed = {
         result.variable.name: suspects(world, schema, result.variable.name, reference, run.evidence)
@@ -217,7 +217,7 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         suggested=None if best is None else best[0],
         predicted=None if best is None else prediction(world, result.variable.name, changed),
         p_fixed=None if best is None else best[1],
-        confidence=_confidence(case, suspect, in_support, support),
+        confidence=_confidence(case, result, suspect, in_support, support),
         in_support=in_support,
         notes=_cause_notes(case, suspect, in_support, support),
         is_lead=suspect.weight < MIN_CONTRIBUTION and name not in refused_by(case.run),
@@ -239,9 +239,9 @@ def _as_in_fix(case: _Case, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
     return tuple(map(as_in_fix, fault.causes))
 
 
-def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float) -> Confidence:
-    """High where the option explains most of the fault, nearly every resample gives it a path there, and no option
-    that the training runs cannot judge is off its reference too.
+def _confidence(case: _Case, result: ObjectiveResult, suspect: Suspect, in_support: bool, support: float) -> Confidence:
+    """High where the option explains most of a fault that is one wherever in its interval the threshold lies, nearly
+    every resample gives it a path there, and no option that the training runs cannot judge is off its reference too.
 
     A check that refused this run and reads the option's value is worth more than a doubt about the model.
     """
@@ -255,7 +255,7 @@ def _confidence(case: _Case, suspect: Suspect, in_support: bool, support: float)
         # Operators chose the options: no table can rule a hidden reason out.
         return "medium" if effect.robustness >= effect.strongest else "low"
     is_rivalled = bool(case.unranked[suspect.path.nodes[-1]])
-    if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled:
+    if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled and result.is_sure:
         return "high"
     return "medium"
 
@@ -354,7 +354,7 @@ def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
     if result.variable.kind == "functional":
         return _new_way_to_fail(case)
     name, bound = result.variable.name, result.threshold
-    summary = case.world.model.summaries.get(name)
+    summary = case.world.model.summary_at(name, case.reference)
     if bound is None or summary is None:
         return None
     best = summary.low if bound.op in ("<=", "<") else summary.high

@@ -10,7 +10,7 @@ from care_core.configs.driven import option_value
 from care_core.diagnose.fixes import change_notes, prediction
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.records import ObjectiveResult, Prediction
-from care_core.diagnose.worlds import reference_of, world_of
+from care_core.diagnose.worlds import world_of
 from care_core.errors import UsageError, nearest
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
@@ -112,7 +112,7 @@ def question(judged: Judged, profile: Profile, choice: ProfileChoice) -> Questio
         schema=profile.schema,
         run=judged.run,
         world=world_of(judged, profile),
-        reference=reference_of(judged.run, profile),
+        reference=judged.reference.config,
         objectives=judged.results,
     )
     asked.ask({})  # The mechanisms invert their covariance when first asked, which nobody should wait for at a key.

@@ -1,19 +1,12 @@
-"""Run and profile -> the world to ask: this run's configuration, what it met, and the configuration it is judged by."""
+"""Judged run and profile -> the world to ask: this run's configuration, and what it met."""
 
 from __future__ import annotations
 
 from care_core.causal.counterfactual import World
 from care_core.diagnose.judging import Judged
-from care_core.diagnose.ranking import reference_config
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
-from care_core.run import Run, is_known
-
-
-def reference_of(run: Run, profile: Profile) -> dict[str, float]:
-    """The reference configuration under what this run met: a context is met, not set."""
-    met = {name: value for name, value in run.context.items() if is_known(value)}
-    return {**reference_config(profile.schema, profile.model), **met}
+from care_core.run import Run
 
 
 def unread_options(schema: Schema, run: Run) -> frozenset[str]:
@@ -32,7 +25,7 @@ def world_of(judged: Judged, profile: Profile) -> World:
     """This run, ready to be asked. Options that no source holds are taken to be at their reference, and so are those
     that were never read: their value changed nothing."""
     run = judged.run
-    reference = reference_of(run, profile)
+    reference = judged.reference.config
     unread = unread_options(profile.schema, run)
     config = {**reference, **{name: value for name, value in run.config.items() if name not in unread}}
     others = [{**other.run.metrics, **other.run.objectives} for other in judged.repeats]

@@ -6,7 +6,8 @@ an input that explains nothing ends near zero and costs nothing, which is what m
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from scipy.linalg import cho_solve
 from scipy.optimize import minimize
 
 from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism, Transform, solve, transformed
+from care_core.causal.nominal import Nominal
 from care_core.errors import LearningError
 
 
@@ -32,6 +34,8 @@ METRIC = Effort(points=300, iterations=30)
 """For metrics and edges: they draw the path and size its edges."""
 RELEVANCE_SCALE = 0.1
 """Relevance below which an input counts as unused in the penalty."""
+UNUSED = 0.02
+"""Relevance below which an input is left out: six standard deviations of it move nothing by 1 %."""
 NOISE, BINARY_NOISE = 0.02, 0.3
 """Least noise, as a share of the target's spread. Yes-or-no outcomes near a limit go either way: a regression that
 reproduces every one of them has learned them by heart."""
@@ -39,12 +43,28 @@ RESIDUAL_LEVELS = 101
 MIN_ROWS = 20
 
 
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A mechanism, and how badly it predicts runs of missions that it does not know: mean negative log likelihood."""
+
+    mechanism: Mechanism
+    loss: float
+
+
 @dataclass(frozen=True)
 class Inputs:
-    """What a mechanism may depend on: names, and which of them act as ratios."""
+    """What a mechanism may depend on: names, which of them act as ratios, and which the regression may read; the
+    others are arguments of the nominal only. Arrays have shape (len(names),)."""
 
     names: tuple[str, ...]
     log: NDArray[np.bool_]
+    read: NDArray[np.bool_]
+    nominal: Nominal | None = None
+    """What physics says of a positive target; its arguments are among the names."""
+
+    @classmethod
+    def all_read(cls, names: Sequence[str], log: NDArray[np.bool_]) -> Inputs:
+        return cls(tuple(names), log, np.ones(len(names), dtype=bool))
 
 
 def fit_mechanism(
@@ -57,12 +77,29 @@ def fit_mechanism(
     effort: Effort = OUTCOME,
     transform: Transform | None = None,
 ) -> Mechanism:
+    """The mechanism of `fit`, for runs that are each a mission of their own and a target without a nominal."""
+    return fit(x, y, inputs, binary=binary, rng=rng, effort=effort, transform=transform).mechanism
+
+
+def fit(
+    x: FloatArray,
+    y: FloatArray,
+    inputs: Inputs,
+    *,
+    binary: bool,
+    rng: np.random.Generator,
+    effort: Effort = OUTCOME,
+    transform: Transform | None = None,
+    groups: NDArray[np.int64] | None = None,
+) -> Fitted:
     """Fit one mechanism.
 
     Args:
         x: shape (n, p), inputs in their own units. y: shape (n,), 0 or 1 when `binary`. No NaN.
         rng: only used to thin tables of more than `effort.points` rows.
         transform: the scale of the target, `best_transform` when None.
+        groups: shape (n,), runs of one mission have one number. Errors are those of a model that knows no run of the
+            same number, since it will be asked about other missions; each run is its own when None.
 
     Raises:
         LearningError: too few rows.
@@ -72,22 +109,35 @@ def fit_mechanism(
     if len(y) > effort.points:
         keep = np.sort(rng.choice(len(y), effort.points, replace=False))
         x, y = x[keep], y[keep]
+        groups = None if groups is None else groups[keep]
+    nominal = inputs.nominal
+    if nominal is not None:
+        transform = "log"
     transform = "identity" if binary else transform or best_transform(y)
     coded = 2.0 * y - 1.0 if binary else transformed(y, transform)
-    raw = np.where(inputs.log, np.log(np.where(inputs.log, np.maximum(x, 1e-12), 1.0)), x)
+    if nominal is not None:
+        coded = coded - np.log(nominal.of(x[:, [inputs.names.index(name) for name in nominal.inputs]]))
+    reads = np.flatnonzero(inputs.read)
+    log, seen = inputs.log[reads], x[:, reads]
+    raw = np.where(log, np.log(np.where(log, np.maximum(seen, 1e-12), 1.0)), seen)
     centre, spread = raw.mean(axis=0), raw.std(axis=0)
     spread = np.where(spread > 0, spread, 1.0)
     points = ((raw - centre) / spread).astype(np.float32).astype(float)
     mean, scale = float(coded.mean()), float(coded.std()) or 1.0
     targets = ((coded - mean) / scale).astype(np.float32).astype(float)
     kernel = _fit_kernel(points, targets, effort.iterations, BINARY_NOISE if binary else NOISE)
-    errors, spreads = leave_one_out(kernel, points, targets)
+    used = kernel.relevance > UNUSED
+    kernel = replace(kernel, relevance=kernel.relevance[used], idle=int((~used).sum()))
+    points = points[:, used]
+    errors, spreads = left_out(kernel, points, targets, groups)
     calibration = logistic(mean + scale * (targets - errors), y) if binary else residual_levels(errors / spreads)
-    return Mechanism(
+    mechanism = Mechanism(
         inputs=inputs.names,
-        log_inputs=inputs.log,
-        centre=centre,
-        spread=spread,
+        reads=reads[used],
+        nominal=nominal,
+        log_inputs=log[used],
+        centre=centre[used],
+        spread=spread[used],
         kernel=kernel,
         points=points,
         targets=targets,
@@ -98,13 +148,14 @@ def fit_mechanism(
         binary=binary,
         calibration=calibration,
     )
+    return Fitted(mechanism, _loss(mechanism, errors, spreads))
 
 
-def left_out_loss(mechanism: Mechanism) -> float:
-    """Mean negative log likelihood of each training run given the others: which of two input sets predicts better."""
-    errors, spreads = leave_one_out(mechanism.kernel, mechanism.points, mechanism.targets)
+def _loss(mechanism: Mechanism, errors: FloatArray, spreads: FloatArray) -> float:
+    """Mean negative log likelihood of the runs, each given those of other missions."""
     if not mechanism.binary:
-        return float((np.log(spreads) + 0.5 * (errors / spreads) ** 2).mean())
+        spreads = mechanism.scale * spreads
+        return float((np.log(spreads) + 0.5 * (mechanism.scale * errors / spreads) ** 2).mean())
     slope, offset = mechanism.calibration
     coded = mechanism.mean + mechanism.scale * mechanism.targets
     logit = slope * (coded - mechanism.scale * errors) + offset
@@ -177,12 +228,25 @@ def _negative_log_posterior(
     return float(value + np.log1p(ratio).sum()), gradient
 
 
-def leave_one_out(kernel: Kernel, points: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Leave-one-out errors and their predicted spreads (Rasmussen and Williams 2006, Eq. 5.12)."""
+def left_out(
+    kernel: Kernel, points: FloatArray, targets: FloatArray, groups: NDArray[np.int64] | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Errors of each run, predicted without its group, and their predicted spreads; shape (n,) each.
+
+    Rasmussen and Williams 2006, Eq. 5.12, with blocks of the inverse in place of its diagonal.
+    """
     covariance = kernel.among(points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
     inverse = np.linalg.inv(covariance)
-    diagonal = np.diag(inverse)
-    return (inverse @ targets) / diagonal, 1.0 / np.sqrt(diagonal)
+    weights = inverse @ targets
+    if groups is None:
+        diagonal = np.diag(inverse)
+        return weights / diagonal, 1.0 / np.sqrt(diagonal)
+    errors, spreads = np.empty(len(targets)), np.empty(len(targets))
+    for group in np.unique(groups):
+        own = np.flatnonzero(groups == group)
+        block = np.linalg.inv(inverse[np.ix_(own, own)])
+        errors[own], spreads[own] = block @ weights[own], np.sqrt(np.diag(block))
+    return errors, spreads
 
 
 def residual_levels(standardised: FloatArray) -> FloatArray:

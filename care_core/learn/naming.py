@@ -124,7 +124,7 @@ def usual_values(schema: Schema, fault: FaultFile, config: Config) -> dict[str, 
     drawn at random no single value is usual: it is the nearest to this configuration's in the middle `MIDDLE` of the
     runs that kept the objective."""
     others = fault.runs[FAULTY_RUNS:]
-    kept = others[met(schema.variables[fault.objective], others) == 1.0]
+    kept = others[met(schema.variables[fault.objective], others, schema) == 1.0]
     usual = {}
     for option in schema.options:
         counts = others[option.name].value_counts()
@@ -139,7 +139,9 @@ def usual_values(schema: Schema, fault: FaultFile, config: Config) -> dict[str, 
 
 def by_bug_isolation(schema: Schema, fault: FaultFile) -> list[str]:
     """Options whose predicate, true in a faulty run, has importance above zero in the runs of the file, best first."""
-    failed: NDArray[np.bool_] = np.nan_to_num(met(schema.variables[fault.objective], fault.runs), nan=0.0) == 0.0
+    failed: NDArray[np.bool_] = (
+        np.nan_to_num(met(schema.variables[fault.objective], fault.runs, schema), nan=0.0) == 0.0
+    )
     failed[:FAULTY_RUNS] = True
     options = [option.name for option in schema.options]
     best: dict[str, float] = {}

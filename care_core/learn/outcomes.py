@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Mechanism, transformed
 from care_core.causal.model import OutcomeRecord, StageRecord
-from care_core.learn.fitting import MIN_ROWS, Effort, Inputs, best_transform, fit_mechanism, left_out_loss
+from care_core.causal.nominal import Nominal
+from care_core.learn.fitting import MIN_ROWS, Effort, Fitted, Inputs, best_transform, fit
 from care_core.learn.knowledge import with_known
+from care_core.learn.relative import missions_of, needs
 from care_core.profile.schema import Schema
 from care_core.variables import Role, Variable
 
@@ -38,37 +40,51 @@ class Stage:
     passed: NDArray[np.bool_]
 
 
-def causes_of(name: str, graph: CausalGraph, schema: Schema) -> tuple[str, ...]:
-    """The exogenous variables that a mechanism for `name` reads: its option ancestors, and the contexts among its
-    ancestors where options were chosen by what the run met (they are the adjustment)."""
+def causes_of(name: str, graph: CausalGraph, schema: Schema, *, contexts: bool = False) -> tuple[str, ...]:
+    """The exogenous variables that a mechanism for `name` reads: its option ancestors, and the `contexts` among its
+    ancestors. Where options were chosen by what the run met, contexts are the adjustment and always read."""
     ancestors = graph.ancestors(name)
-    roles = (Role.OPTION, Role.CONTEXT) if schema.observational else (Role.OPTION,)
+    roles = (Role.OPTION, Role.CONTEXT) if contexts or schema.observational else (Role.OPTION,)
     return tuple(v.name for v in schema.variables.values() if v.role in roles and v.name in ancestors)
 
 
 def candidates(name: str, graph: CausalGraph, frame: pd.DataFrame, schema: Schema) -> list[tuple[str, ...]]:
-    """Input sets to choose from: the causes that the search found, and those together with what people know."""
+    """Input sets to choose from: the options that the search found, those together with what people know, and those
+    with the contexts that are known to act on it."""
     sets = [causes_of(name, graph, schema)]
     if schema.known:
-        sets.append(causes_of(name, with_known(graph, frame, schema), schema))
+        known = with_known(graph, frame, schema)
+        sets += [causes_of(name, known, schema), causes_of(name, known, schema, contexts=True)]
     return list(dict.fromkeys(sets))
 
 
-def inputs_of(names: Sequence[str], schema: Schema) -> Inputs:
-    return Inputs(tuple(names), np.array([schema.variables[name].is_log_scaled for name in names], dtype=bool))
+def inputs_of(names: Sequence[str], schema: Schema, nominal: Nominal | None = None) -> Inputs:
+    """Inputs that a regression may read, and those that only a nominal needs."""
+    every = tuple(dict.fromkeys((*names, *(nominal.inputs if nominal is not None else ()))))
+    return Inputs(
+        every,
+        np.array([schema.variables[name].is_log_scaled for name in every], dtype=bool),
+        np.array([name in names for name in every], dtype=bool),
+        nominal,
+    )
 
 
-def met(objective: Variable, frame: pd.DataFrame) -> FloatArray:
+def met(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArray:
     """1 where the objective keeps its threshold, 0 where not, NaN where it has no value; shape (n,)."""
     values = frame[objective.name].to_numpy(dtype=float)
-    bound = objective.threshold
-    return np.array([np.nan if np.isnan(v) else float(bound.met(v)) if bound else 1.0 for v in values])
+    if objective.relative is not None:
+        need = needs(objective, frame, schema)
+        bounds = [None if np.isnan(n) else objective.relative.for_need(n) for n in need]
+    else:
+        bounds = [objective.threshold] * len(values)
+    kept = [np.nan if np.isnan(v) else float(b.met(v)) if b else 1.0 for v, b in zip(values, bounds, strict=True)]
+    return np.array(kept)
 
 
-def badness(objective: Variable, frame: pd.DataFrame) -> FloatArray:
+def badness(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArray:
     """How bad each run was: the value, turned so that more is worse, its logarithm where it has one; shape (n,)."""
     if objective.kind == "functional":
-        return 1.0 - met(objective, frame)
+        return 1.0 - met(objective, frame, schema)
     values = frame[objective.name].to_numpy(dtype=float)
     known = values[np.isfinite(values)]
     scaled = transformed(values, best_transform(known)) if len(known) else values
@@ -82,7 +98,7 @@ def find_stages(objective: Variable, schema: Schema, frame: pd.DataFrame) -> tup
     A binary metric is a stage when every mission on its rarer-success side misses the objective. What the metrics
     leave unexplained is a last stage, the objective itself.
     """
-    success = met(objective, frame)
+    success = met(objective, frame, schema)
     reached = ~np.isnan(success)
     stages: list[Stage] = []
     for metric in schema.metrics:
@@ -132,7 +148,7 @@ def fit_outcomes(
     return outcomes, mechanisms
 
 
-Fitted = tuple[OutcomeRecord, dict[str, Mechanism]]
+Outcome = tuple[OutcomeRecord, dict[str, Mechanism]]
 
 
 def _fit_functional(
@@ -142,7 +158,7 @@ def _fit_functional(
     graph: CausalGraph,
     rng: np.random.Generator,
     effort: Effort,
-) -> Fitted | None:
+) -> Outcome | None:
     records, mechanisms = [], {}
     for stage in find_stages(objective, schema, frame):
         # A stage that no option moves stays in, with its base rate: else its failures would be laid to a later one.
@@ -167,7 +183,7 @@ def _fit_continuous(
     graph: CausalGraph,
     rng: np.random.Generator,
     effort: Effort,
-) -> Fitted | None:
+) -> Outcome | None:
     mechanism = fit_total(objective.name, frame, schema, graph, rng, effort=effort)
     if mechanism is None:
         return None
@@ -191,16 +207,29 @@ def fit_on(
     *,
     effort: Effort,
 ) -> Mechanism | None:
-    """The target as a function of the input set that predicts left-out runs best; None where too few runs hold any."""
-    fitted = []
+    """The target as a function of the input set that predicts left-out runs best; None where too few runs hold any.
+
+    A context that a run does not have is taken to be at its median, as where the mechanism is asked.
+    """
+    nominal = schema.nominal_of(target) if target in schema.variables else None
+    missions = missions_of(frame, schema)
+    met = {v.name: frame[v.name].fillna(frame[v.name].median()) for v in schema.contexts if v.name in frame}
+    frame = frame.assign(**met)
+    best: Fitted | None = None
     for names in sets:
-        known = frame[[*names, target]].dropna()
-        if len(known) < MIN_ROWS or known[target].nunique() < 2:
+        inputs = inputs_of(names, schema, nominal)
+        known = frame[[*inputs.names, target]].notna().all(axis=1).to_numpy()
+        if nominal is not None:
+            known = known & (frame[target].to_numpy(dtype=float) > 0)
+        x = frame.loc[known, list(inputs.names)].to_numpy(dtype=float)
+        y = frame.loc[known, target].to_numpy(dtype=float)
+        if len(y) < MIN_ROWS or np.ptp(y) == 0:
             continue
-        x, y = known[list(names)].to_numpy(dtype=float), known[target].to_numpy(dtype=float)
+        groups = None if missions is None else missions[known]
         binary = set(np.unique(y)) <= {0.0, 1.0}
-        fitted.append(fit_mechanism(x, y, inputs_of(names, schema), binary=binary, rng=rng, effort=effort))
-    return min(fitted, key=left_out_loss, default=None)
+        found = fit(x, y, inputs, binary=binary, rng=rng, effort=effort, groups=groups)
+        best = found if best is None or found.loss < best.loss else best
+    return None if best is None else best.mechanism
 
 
 def groups_that_move_together(schema: Schema, frame: pd.DataFrame) -> tuple[tuple[str, ...], ...]:

@@ -52,7 +52,9 @@ def repeated(frame: pd.DataFrame, schema: Schema) -> tuple[Pairs, Pairs]:
     """Rows of one configuration, each with the next one: under the same conditions, and on another day."""
     met = frame[CONDITIONS].to_numpy() if CONDITIONS in frame else np.full(len(frame), np.nan)
     pairs: tuple[list[tuple[int, int]], list[tuple[int, int]]] = ([], [])
-    for rows in frame.groupby([option.name for option in schema.options], sort=True).indices.values():
+    # A configuration on another mission is no repeat.
+    alike = [variable.name for variable in (*schema.options, *schema.asked)]
+    for rows in frame.groupby(alike, sort=True).indices.values():
         for a, b in pairwise(rows):
             is_same = not pd.isna(met[a]) and met[a] == met[b]
             pairs[0 if is_same else 1].append((int(a), int(b)))
@@ -97,8 +99,9 @@ def _log_likelihood(
     rest = [int(row) for row in np.flatnonzero(known) if row not in paired]
     rows = [*sorted(paired), *rest[:: max(1, -(-len(rest) // MOST_RUNS))]]
     place = {row: i for i, row in enumerate(rows)}
-    points = mechanism.scaled(frame.iloc[rows][list(mechanism.inputs)].to_numpy(dtype=float))
-    y = (transformed(values[rows], mechanism.transform) - mechanism.mean) / mechanism.scale
+    x = frame.iloc[rows][list(mechanism.inputs)].to_numpy(dtype=float)
+    points = mechanism.scaled(x)
+    y = (transformed(values[rows], mechanism.transform) - mechanism.known(x) - mechanism.mean) / mechanism.scale
     noise = mechanism.kernel.noise**2 + JITTER
     inverse = np.linalg.inv(mechanism.kernel.among(points) + np.eye(len(rows)) * noise)
     weighted = inverse @ y

@@ -32,7 +32,7 @@ class Robustness:
 def robustness(frame: pd.DataFrame, schema: Schema, objective: str) -> Mapping[str, Robustness]:
     """Per option that varies; empty where the table is randomised or says too little of the objective."""
     names = [v.name for v in (*schema.options, *schema.contexts) if frame[v.name].nunique() > 1]
-    y = badness(schema.variables[objective], frame)
+    y = badness(schema.variables[objective], frame, schema)
     known = np.isfinite(y) & frame[names].notna().all(axis=1).to_numpy()
     freedom = int(known.sum()) - len(names) - 1
     if not schema.observational or freedom < MIN_ROWS or np.ptp(y[known]) == 0:

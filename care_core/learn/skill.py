@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 from joblib import Parallel, delayed
+from numpy.typing import NDArray
 from sklearn.metrics import roc_auc_score
 from threadpoolctl import threadpool_limits
 
@@ -16,6 +17,7 @@ from care_core.causal.mechanisms import FloatArray
 from care_core.causal.model import Model, SkillRecord, Training
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
+from care_core.learn.relative import missions_of, relative
 from care_core.profile.schema import Schema
 
 BINS = 10
@@ -35,7 +37,7 @@ def cross_validated_skill(
     if not folds:
         return {}
     odds = held_out_odds(frame, schema, lambda _runs, _rng: graph, rng, folds=folds, n_jobs=n_jobs)
-    truth: dict[str, FloatArray] = {objective.name: met(objective, frame) for objective in schema.objectives}
+    truth: dict[str, FloatArray] = {objective.name: met(objective, frame, schema) for objective in schema.objectives}
     truth["all"] = all_met(frame, schema)
     found = {name: score(odds[name], truth[name]) for name in odds}
     return {name: skill for name, skill in found.items() if skill is not None}
@@ -49,7 +51,7 @@ def held_out_odds(
     frame: pd.DataFrame, schema: Schema, learn: Learn, rng: np.random.Generator, *, folds: int, n_jobs: int = 1
 ) -> dict[str, FloatArray]:
     """Odds of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each."""
-    fold = rng.permutation(len(frame)) % folds
+    fold = _folds(frame, schema, rng, folds)
     seeds = rng.integers(2**32, size=folds)
 
     def predict(k: int) -> Mapping[str, FloatArray]:
@@ -66,9 +68,18 @@ def held_out_odds(
     return odds
 
 
+def _folds(frame: pd.DataFrame, schema: Schema, rng: np.random.Generator, folds: int) -> NDArray[np.int64]:
+    """The part that each run is in, shape (n,). Where missions differ, a mission is left out whole."""
+    missions = missions_of(frame, schema)
+    count = 0 if missions is None else int(missions.max()) + 1
+    if missions is None or count < 2 * folds:
+        return np.asarray(rng.permutation(len(frame)) % folds)
+    return np.asarray((rng.permutation(count) % folds)[missions])
+
+
 def all_met(frame: pd.DataFrame, schema: Schema) -> FloatArray:
     """1 where every objective has a value that keeps its threshold, else 0; shape (n,)."""
-    kept = [np.nan_to_num(met(objective, frame), nan=0.0) == 1.0 for objective in schema.objectives]
+    kept = [np.nan_to_num(met(objective, frame, schema), nan=0.0) == 1.0 for objective in schema.objectives]
     answer: FloatArray = np.all(kept, axis=0).astype(float)
     return answer
 
@@ -83,18 +94,33 @@ def _odds(
     outcomes, mechanisms = fit_outcomes(train, schema, graph, rng, effort=FOLD)
     training = Training(
         origin="", runs=len(train), seed=0, alpha=0.0, resamples=0,
-        moves_together=groups_that_move_together(schema, train),
+        moves_together=groups_that_move_together(schema, relative(train, schema)),
     )  # fmt: skip
     model = Model(
         schema_digest="", graph=graph, edges={}, bidirected=(), effects={}, paths={}, outcomes=outcomes, summaries={},
         skill={}, training=training, mechanisms=mechanisms,
     )  # fmt: skip
-    configs = [{str(k): float(v) for k, v in row.items()} for row in test.to_dict("records")]
-    bounds = {v.name: v.threshold for v in schema.objectives if v.threshold is not None and v.name in outcomes}
-    world = World(model, configs[0], {}, bounds)
-    odds = {name: world.predict(name, configs).p_ok for name in bounds}
-    odds["all"] = world.odds(configs)
-    return odds
+    filled = test.fillna({v.name: train[v.name].median() for v in schema.contexts})
+    configs = [{str(k): float(v) for k, v in row.items()} for row in filled.to_dict("records")]
+    fixed = {v.name: v.threshold for v in schema.objectives if v.threshold is not None and v.name in outcomes}
+    relative_ones = [(v.name, v.relative) for v in schema.objectives if v.relative is not None and v.name in outcomes]
+    if not relative_ones:
+        return _asked(World(model, configs[0], {}, fixed), configs)
+    reference = {v.name: v.default for v in schema.options if v.default is not None}
+    rows = []
+    for config in configs:  # each mission has thresholds of its own
+        world = World(model, config, {}, {})
+        at_reference = [{**config, **reference}]
+        needed = {
+            name: bound.for_need(float(world.predict(name, at_reference).value[0])) for name, bound in relative_ones
+        }
+        rows.append(_asked(World(model, config, {}, {**fixed, **needed}), [config]))
+    return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
+
+
+def _asked(world: World, configs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
+    odds = {name: world.predict(name, configs).p_ok for name in world.thresholds}
+    return {**odds, "all": world.odds(configs)}
 
 
 def score(odds: FloatArray, truth: FloatArray) -> SkillRecord | None:

@@ -15,6 +15,7 @@ from care_core.learn.completion import DirectEdge, complete
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import FisherZ, Pag, discover
 from care_core.learn.orientation import resolve
+from care_core.learn.relative import relative
 from care_core.learn.screening import pairwise_correlation, screen_options
 from care_core.learn.table import normal_scores
 from care_core.profile.schema import Schema
@@ -41,13 +42,15 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
     """Learn the causal graph of a platform from its runs.
 
     Args:
-        frame: a checked table (`table.read_table`), one row a run.
+        frame: a checked table (`table.read_table`), one row a run. Values that have a nominal are compared by their
+            ratio to it.
         alpha: significance level of the independence tests.
         rng: starts of the latent search.
 
     Raises:
         LearningError: no option, or no objective, varies.
     """
+    frame = relative(frame, schema)
     varying = [name for name in schema.variables if frame[name].nunique() > 1]
     for role in (Role.OPTION, Role.OBJECTIVE):
         if not any(schema.variables[name].role is role for name in varying):
@@ -57,7 +60,10 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
             )
     constraints = Constraints.of(schema)
     screening = screen_options(frame, schema)
-    searched = [name for name in varying if name not in set(screening.dropped)]
+    # What was asked and what flew was drawn without regard to the options, so it hides nothing; a few dozen missions
+    # cannot show what it does either: that is in the nominals, and in what people know.
+    given = [] if schema.observational else [v.name for v in schema.contexts if v.about != "world"]
+    searched = [name for name in varying if name not in {*screening.dropped, *given}]
     columns = {name: frame[name].to_numpy(dtype=float) for name in searched}
     test = FisherZ(np.column_stack(list(columns.values())))
     pag = discover(searched, test, constraints, alpha=alpha)

@@ -23,6 +23,7 @@ from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME
 from care_core.learn.identification import identify, is_answered_by
 from care_core.learn.knowledge import with_known
 from care_core.learn.outcomes import badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
+from care_core.learn.relative import of_ratios, relative
 from care_core.learn.repeats import persistence
 from care_core.learn.robustness import robustness
 from care_core.learn.skill import cross_validated_skill
@@ -106,7 +107,8 @@ def assemble(
     report("measuring effects", 0.6)
     graph, support = with_known(learned.graph, frame, schema), learned.support
     resamples = _Resamples.draw(len(frame), rng)
-    edges = _edge_effects(frame, schema, graph, settings, resamples)
+    ratios = relative(frame, schema)
+    edges = _edge_effects(ratios, of_ratios(schema), graph, settings, resamples)
     report("cross-validating", 0.8)
     skill = cross_validated_skill(frame, schema, learned.graph, rng, folds=settings.folds, n_jobs=settings.n_jobs)
     return Model(
@@ -114,11 +116,11 @@ def assemble(
         graph=graph,
         edges={edge: _edge_record(edge, "directed", support, edges) for edge in sorted(graph.directed)},
         bidirected=tuple(_edge_record(edge, "bidirected", support, edges) for edge in sorted(graph.bidirected)),
-        effects=_total_effects(frame, schema, graph, learned.outcomes, learned.mechanisms, resamples, support),
+        effects=_total_effects(frame, ratios, schema, graph, learned.outcomes, learned.mechanisms, resamples, support),
         paths=_paths(schema, graph, edges, support),
         outcomes=learned.outcomes,
-        summaries=_summaries(frame, schema),
-        witnesses=_witnesses(frame, schema, learned.mechanisms),
+        summaries=_summaries(ratios, schema),
+        witnesses=_witnesses(ratios, schema, learned.mechanisms),
         skill=skill,
         training=learned.training,
         mechanisms=learned.mechanisms,
@@ -157,9 +159,14 @@ def _interval(resampled: FloatArray, support: float) -> tuple[float, float]:
 
 
 def _measure(
-    names: Sequence[str], mechanism: Mechanism, frame: pd.DataFrame, schema: Schema, resamples: _Resamples
-) -> dict[str, _Measured]:
-    """Eq. 1 of each named input on the mechanism's target, averaged over a background of training runs."""
+    names: Sequence[str], mechanism: Mechanism, frame: pd.DataFrame, schema: Schema, resamples: _Resamples,
+    spread: float | None = None,
+) -> dict[str, _Measured]:  # fmt: skip
+    """Eq. 1 of each named input on the mechanism's target, averaged over a background of training runs.
+
+    Args:
+        spread: what the target is scaled by, the mechanism's own scale when None.
+    """
     if not names:
         return {}
     raw = frame[list(mechanism.inputs)].dropna().to_numpy(dtype=float)
@@ -171,12 +178,13 @@ def _measure(
         grid[:, mechanism.inputs.index(name)] = np.tile(values, len(background))
         grids.append(grid)
     stacked, ends = np.vstack(grids), np.cumsum([len(grid) for grid in grids])[:-1]
-    spread = 0.5 * mechanism.scale if mechanism.binary else mechanism.scale
+    if spread is None:
+        spread = 0.5 * mechanism.scale if mechanism.binary else mechanism.scale
 
     # One kernel serves the fit and all its resamples: only the weights of the training points differ.
     weights = np.column_stack([mechanism.weights, *(_reweighted(mechanism, rows) for rows in resamples.rows)])
     cross = mechanism.kernel(mechanism.scaled(stacked), mechanism.points)
-    latent = mechanism.mean + mechanism.scale * (cross @ weights)
+    latent = mechanism.mean + mechanism.scale * (cross @ weights) + mechanism.known(stacked)[:, None]
 
     def effects(answer: FloatArray) -> list[Effect]:
         responses = [part.reshape(len(background), -1).mean(axis=0) for part in np.split(answer, ends)]
@@ -257,8 +265,17 @@ def _edge_record(
     )
 
 
+def _spread(mechanism: Mechanism, ratios: pd.Series[float]) -> float | None:
+    """How far runs differ in a target that has a nominal: what is left when it is divided out under the reference."""
+    if mechanism.nominal is None:
+        return None
+    known = ratios[ratios > 0].to_numpy(dtype=float)
+    return float(np.log(known).std())
+
+
 def _total_effects(
     frame: pd.DataFrame,
+    ratios: pd.DataFrame,
     schema: Schema,
     graph: CausalGraph,
     outcomes: Mapping[str, OutcomeRecord],
@@ -276,7 +293,14 @@ def _total_effects(
         keys = [stage.mechanism for stage in outcome.stages] or [outcome.mechanism]
         options = [v.name for v in schema.options if v.name in graph.ancestors(objective)]
         by_stage = [
-            _measure([name for name in options if name in m.inputs], m, frame, schema, resamples)
+            _measure(
+                [name for name in options if name in m.inputs],
+                m,
+                frame,
+                schema,
+                resamples,
+                _spread(m, ratios[objective]),
+            )
             for m in (mechanisms[key] for key in keys)
         ]
         for option in options:
@@ -344,7 +368,7 @@ def _witnesses(frame: pd.DataFrame, schema: Schema, mechanisms: Mapping[str, Mec
     """
     found: dict[str, dict[str, float]] = {}
     for objective in schema.objectives:
-        bad = badness(objective, frame)
+        bad = badness(objective, frame, schema)
         for metric in schema.metrics:
             mechanism = mechanisms.get(metric.name)
             if mechanism is None:
@@ -385,6 +409,6 @@ def _training(frame: pd.DataFrame, schema: Schema, structure: Structure, setting
         resamples=settings.resamples,
         screened_out=tuple(structure.dropped_options),
         direct_edges=tuple((a, b, p) for a, b, p in structure.direct),
-        moves_together=groups_that_move_together(schema, frame),
+        moves_together=groups_that_move_together(schema, relative(frame, schema)),
         notes=tuple(structure.notes),
     )

@@ -22,8 +22,9 @@ from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.errors import LearningError
 from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.completion import complete
-from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, Effort, Inputs, fit_mechanism, leave_one_out, logistic
+from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, Effort, Inputs, fit_mechanism, left_out, logistic
 from care_core.learn.outcomes import causes_of, find_stages, groups_that_move_together, inputs_of
+from care_core.learn.relative import relative
 from care_core.learn.screening import screen_options
 from care_core.learn.train import Learned, Settings, assemble
 from care_core.profile.schema import Schema
@@ -72,7 +73,8 @@ def update(
 def _update(source: Model, schema: Schema, frame: pd.DataFrame, settings: Settings, report: Progress) -> Model:
     rng = np.random.default_rng(settings.seed)
     report("completing the graph", 0.0)
-    completion = complete(frame, schema, source.graph, screen_options(frame, schema).kept)
+    ratios = relative(frame, schema)
+    completion = complete(ratios, schema, source.graph, screen_options(ratios, schema).kept)
     graph = completion.graph
     report("carrying the mechanisms over", 0.2)
     outcomes, mechanisms = carry_over(source, schema, frame, graph, rng)
@@ -84,7 +86,7 @@ def _update(source: Model, schema: Schema, frame: pd.DataFrame, settings: Settin
         resamples=source.training.resamples,
         screened_out=source.training.screened_out,
         direct_edges=(*source.training.direct_edges, *completion.direct),
-        moves_together=groups_that_move_together(schema, frame),
+        moves_together=groups_that_move_together(schema, ratios),
         notes=(
             f"Carried over from a model of {source.training.runs} runs: shares of resamples are that model's.",
             *(f"{option}." for option in out_of_support(source, schema, frame)),
@@ -131,9 +133,10 @@ def carry_over(
         names = tuple(dict.fromkeys((*mechanism.inputs, *causes_of(name, graph, schema))))
         known = rows & frame[list(names)].notna().all(axis=1).to_numpy() & (values > LEAST[mechanism.transform])
         enough = int(known.sum()) >= MIN_ROWS and np.ptp(values[known]) > 0
-        x = frame.loc[known, list(names)].to_numpy(dtype=float)
         effort = METRIC if schema.variables[name].role is Role.METRIC and key == name else OUTCOME
-        inputs = inputs_of(names, schema)
+        read = {mechanism.inputs[place] for place in mechanism.reads} | set(causes_of(name, graph, schema))
+        inputs = dataclasses.replace(inputs_of(names, schema), read=np.array([name in read for name in names]))
+        x = frame.loc[known, list(inputs.names)].to_numpy(dtype=float)
         mechanisms[key] = started_from(mechanism, x, values[known], inputs, rng, effort) if enough else mechanism
     return dict(source.outcomes), mechanisms
 
@@ -172,7 +175,7 @@ def started_from(
     carried = dataclasses.replace(rest, transform=source.transform, binary=source.binary, prior=(source, share))
     if not source.binary:
         return carried
-    errors, _ = leave_one_out(rest.kernel, rest.points, rest.targets)
+    errors, _ = left_out(rest.kernel, rest.points, rest.targets)
     held_out = coded - rest.scale * errors
     return dataclasses.replace(carried, calibration=logistic(held_out, y))
 

@@ -30,6 +30,7 @@ from care_core.causal.model import (
     Summary,
     Training,
 )
+from care_core.causal.nominal import FORMULAS, Nominal
 from care_core.errors import ProfileError
 from care_core.files import replace_file, sync_folder
 
@@ -41,9 +42,18 @@ PRIOR = "prior:"
 """Begins the key of a mechanism that belongs to the platform a profile was carried over from."""
 
 
+class _NominalRecord(Record):
+    kind: str
+    inputs: tuple[str, ...]
+    scales: tuple[float, ...]
+
+
 class _MechanismRecord(Record):
     target: str
     inputs: tuple[str, ...]
+    reads: tuple[str, ...] | None = None
+    """The inputs that the kernel sees; all when None."""
+    nominal: _NominalRecord | None = None
     transform: Transform
     binary: bool
     prior: str = ""
@@ -115,7 +125,18 @@ def _prior_key(key: str) -> str:
 def _mechanism_record(key: str, m: Mechanism) -> _MechanismRecord:
     target = key.removeprefix("stage:")
     prior = "" if m.prior is None else _prior_key(key)
-    return _MechanismRecord(target=target, inputs=m.inputs, transform=m.transform, binary=m.binary, prior=prior)
+    reads = tuple(m.inputs[place] for place in m.reads)
+    n = m.nominal
+    physics = None if n is None else _NominalRecord(kind=n.kind, inputs=n.inputs, scales=n.scales)
+    return _MechanismRecord(
+        target=target,
+        inputs=m.inputs,
+        reads=None if reads == m.inputs else reads,
+        nominal=physics,
+        transform=m.transform,
+        binary=m.binary,
+        prior=prior,
+    )
 
 
 def _rounded(value: Any) -> Any:
@@ -132,7 +153,7 @@ def _arrays(mechanisms: Mapping[str, Mechanism]) -> dict[str, np.ndarray[Any, An
     for key, m in mechanisms.items():
         k = m.kernel
         arrays[f"{key}/scaling"] = np.vstack([m.log_inputs, m.centre, m.spread, k.relevance]).astype(np.float64)
-        arrays[f"{key}/numbers"] = np.array([k.additive, k.joint, k.noise, m.mean, m.scale])
+        arrays[f"{key}/numbers"] = np.array([k.additive, k.joint, k.noise, m.mean, m.scale, k.idle])
         arrays[f"{key}/points"] = m.points.astype(np.float32)
         arrays[f"{key}/targets"] = m.targets.astype(np.float32)
         arrays[f"{key}/weights"] = m.weights
@@ -260,6 +281,18 @@ def _mechanisms(records: Mapping[str, _MechanismRecord], arrays: Mapping[str, Fl
     return {key: read(key) for key in records if not key.startswith(PRIOR)}
 
 
+def _nominal(key: str, record: _MechanismRecord) -> Nominal | None:
+    physics = record.nominal
+    if physics is None:
+        return None
+    known = FORMULAS.get(physics.kind)
+    if known is None or not set(physics.inputs) <= set(record.inputs):
+        raise ValueError(f"{key} rests on the formula '{physics.kind}', which is not there or lacks its inputs")
+    if not len(known.arguments) == len(physics.inputs) == len(physics.scales):
+        raise ValueError(f"{key} does not match the arguments of '{physics.kind}'")
+    return Nominal(physics.kind, physics.inputs, physics.scales)
+
+
 def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArray]) -> Mechanism:
     def floats(name: str) -> FloatArray:
         array = arrays[f"{key}/{name}"]
@@ -268,23 +301,27 @@ def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArr
         return array
 
     logs, centre, spread, relevance = floats("scaling")
-    additive, joint, noise, mean, scale = floats("numbers")
+    additive, joint, noise, mean, scale, *idle = floats("numbers")
+    reads = record.inputs if record.reads is None else record.reads
     points, targets, calibration = floats("points"), floats("targets"), floats("calibration")
     weights = floats("weights")
     if (
-        points.shape != (len(targets), len(record.inputs))
+        points.shape != (len(targets), len(reads))
         or weights.shape != targets.shape
-        or len(logs) != len(record.inputs)
+        or len(logs) != len(reads)
+        or not set(reads) <= set(record.inputs)
     ):
         raise ValueError(f"{key} does not match its inputs")
     if calibration.ndim != 1 or (len(calibration) != 2 if record.binary else not len(calibration)):
         raise ValueError(f"{key} has no calibration of its kind")
     return Mechanism(
         inputs=record.inputs,
+        reads=np.array([record.inputs.index(name) for name in reads], dtype=np.int64),
+        nominal=_nominal(key, record),
         log_inputs=logs.astype(bool),
         centre=centre,
         spread=spread,
-        kernel=Kernel(relevance, float(additive), float(joint), float(noise)),
+        kernel=Kernel(relevance, float(additive), float(joint), float(noise), *map(int, idle)),
         points=points,
         targets=targets,
         weights=weights,

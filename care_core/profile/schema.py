@@ -15,10 +15,11 @@ from typing import Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from care_core import plain_yaml
+from care_core.causal.nominal import Nominal, nominal
 from care_core.configs.driven import same_value
 from care_core.errors import ProfileError, nearest
 from care_core.logs.base import LogFormat
-from care_core.variables import Extract, Kind, Op, Role, Threshold, ValueType, Variable
+from care_core.variables import About, Extract, Kind, Op, RelativeThreshold, Role, Threshold, ValueType, Variable
 from care_core.vehicles import Kind as VehicleKind
 
 Side = Literal["low", "high"]
@@ -34,6 +35,23 @@ class _Threshold(_Strict):
     value: float
 
 
+class _Bound(_Strict):
+    """An objective's threshold: a value, or a ratio to what the reference configuration needs."""
+
+    op: Op
+    value: float | None = None
+    ratio: float | None = Field(default=None, gt=0)
+    at_least: float | None = None
+
+    @model_validator(mode="after")
+    def _is_one_of_both(self) -> _Bound:
+        if (self.value is None) == (self.ratio is None):
+            raise ValueError("a threshold has a 'value' or a 'ratio'")
+        if self.at_least is not None and self.ratio is None:
+            raise ValueError("'at_least' belongs to a 'ratio'")
+        return self
+
+
 class _Variable(_Strict):
     role: Role
     type: ValueType = "float"
@@ -47,7 +65,9 @@ class _Variable(_Strict):
     modes: list[str] = Field(default_factory=list)
     safety: bool = False
     kind: Kind | None = None
-    threshold: _Threshold | None = None
+    threshold: _Bound | None = None
+    about: About = "world"
+    nominal: dict[str, str] | None = None
     extract: dict[str, Any] | None = None
     order: int | None = None
 
@@ -57,6 +77,12 @@ class _Variable(_Strict):
             raise ValueError("an objective needs 'kind': functional or non-functional")
         if self.role is not Role.OBJECTIVE and self.threshold is not None:
             raise ValueError("only objectives have a 'threshold'")
+        if self.role is not Role.CONTEXT and self.about != "world":
+            raise ValueError("only contexts are 'about' something")
+        if self.role not in (Role.METRIC, Role.OBJECTIVE) and self.nominal is not None:
+            raise ValueError("only metrics and objectives have a 'nominal'")
+        if self.nominal is not None and "kind" not in self.nominal:
+            raise ValueError("'nominal' needs 'kind', the name of a formula")
         if self.role is not Role.OPTION and self.parameter:
             raise ValueError("only options have a 'parameter'")
         if self.role is not Role.OPTION and self.modes:
@@ -153,6 +179,10 @@ class _Profile(_Strict):
             _declared(sides, met, f"circumstance '{name}' names the context or metric")
         for known in self.known:
             _declared((*known.causes, *known.effects), self.variables, "Under 'known' stands")
+        units = {name: variable.unit for name, variable in self.variables.items()}
+        for variable in self.variables.values():
+            if variable.nominal is not None:
+                nominal(variable.nominal["kind"], _arguments(variable.nominal), units)
         return self
 
 
@@ -161,6 +191,10 @@ def _declared(names: Iterable[str], known: Iterable[str], what: str) -> None:
     for name in names:
         if name not in known:
             raise ValueError(f"{what} '{name}', which the profile does not declare. {nearest(name, known)}".strip())
+
+
+def _arguments(nominal: Mapping[str, Any]) -> dict[str, str]:
+    return {key: str(value) for key, value in nominal.items() if key != "kind"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,6 +269,18 @@ class Schema:
     @property
     def objectives(self) -> tuple[Variable, ...]:
         return self.of(Role.OBJECTIVE)
+
+    @property
+    def asked(self) -> tuple[Variable, ...]:
+        """The contexts that tell of the mission."""
+        return tuple(v for v in self.contexts if v.about == "mission")
+
+    def nominal_of(self, name: str) -> Nominal | None:
+        """What physics says a variable is, None where the profile names no formula for it."""
+        declared = self.variables[name].nominal
+        if declared is None:
+            return None
+        return nominal(declared.kind, declared.args, {v.name: v.unit for v in self.variables.values()})
 
 
 def read_schema(path: Path) -> Schema:
@@ -332,16 +378,28 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         modes=tuple(v.modes),
         safety=v.safety,
         kind=v.kind,
-        threshold=None if v.threshold is None else Threshold(v.threshold.op, v.threshold.value),
+        threshold=_absolute(v.threshold),
+        relative=_relative(v.threshold),
+        about=v.about,
+        nominal=None if v.nominal is None else Extract(v.nominal["kind"], _arguments(v.nominal)),
         extract=extract,
         order=v.order,
     )
+
+
+def _absolute(bound: _Bound | None) -> Threshold | None:
+    return None if bound is None or bound.value is None else Threshold(bound.op, bound.value)
+
+
+def _relative(bound: _Bound | None) -> RelativeThreshold | None:
+    return None if bound is None or bound.ratio is None else RelativeThreshold(bound.op, bound.ratio, bound.at_least)
 
 
 def _digest(variables: Mapping[str, Variable]) -> str:
     parts = [
         f"{v.name}|{v.role.value}|{v.type}|{v.range}|{v.labels}|{v.extract.kind if v.extract else ''}"
         f"|{sorted(v.extract.args.items()) if v.extract else ''}"
+        f"{f'|{v.nominal.kind}|{sorted(v.nominal.args.items())}' if v.nominal else ''}"
         for v in variables.values()
     ]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()

@@ -75,12 +75,23 @@ class ThresholdEntry(Strict):
     value: float
 
 
+class NeedEntry(Strict):
+    """What the reference configuration would need for this mission, with its 80 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
 class ObjectiveEntry(Strict):
     name: str
     value: float | None
     unit: str
     kind: Kind
     threshold: ThresholdEntry | None
+    needs: NeedEntry | None = None
+    basis: str = ""
+    """What the threshold was made of, empty where it is a fixed one."""
     status: Status
     reason: str | None
 
@@ -327,16 +338,26 @@ def profile_entry(choice: ProfileChoice) -> ProfileEntry:
     return ProfileEntry(name=choice.name, version=choice.version, platform=choice.platform)
 
 
+def wanted_text(entry: ObjectiveEntry) -> str:
+    """The threshold of an objective with its unit and what it was made of, empty where it has none."""
+    if entry.threshold is None:
+        return ""
+    bound = f"{entry.threshold.op} {entry.threshold.value:g} {entry.unit}".rstrip()
+    return f"{bound} ({entry.basis})" if entry.basis else bound
+
+
 def objective_entry(result: ObjectiveResult) -> ObjectiveEntry:
     """An objective of a run against its threshold."""
     variable = result.variable
-    threshold = result.threshold
+    threshold, need = result.threshold, result.need
     return ObjectiveEntry(
         name=variable.name,
         value=_finite(result.value),
         unit=variable.unit,
         kind=variable.kind or "non-functional",
         threshold=None if threshold is None else ThresholdEntry(op=threshold.op, value=threshold.value),
+        needs=None if need is None else NeedEntry(value=need.value, low=need.low, high=need.high),
+        basis=result.basis,
         status=result.status,
         reason=clean(result.reason) or None,
     )

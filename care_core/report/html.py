@@ -17,7 +17,7 @@ from care_core.report.document import (
     PredictedObjective,
     Report,
     SinceEntry,
-    ThresholdEntry,
+    wanted_text,
 )
 from care_core.report.happened import SEVERITY_WORDS, clock, finding_sentence, fit_text, hypothesis_text
 from care_core.report.together import listed, together
@@ -130,14 +130,10 @@ def _objective_row(objective: ObjectiveEntry) -> tuple[str, ...]:
     return (
         f"<code>{escape(objective.name)}</code>",
         escape(value),
-        escape(_wanted(objective.threshold, objective.unit)),
+        escape(wanted_text(objective)),
         _status(objective.status),
         escape(objective.reason or ""),
     )
-
-
-def _wanted(threshold: ThresholdEntry | None, unit: str) -> str:
-    return "" if threshold is None else f"{threshold.op} {threshold.value:g} {unit}".strip()
 
 
 def _status(status: str) -> str:

@@ -91,10 +91,9 @@ def _without_profile(health: Health) -> str:
 
 
 def _measured(objective: ObjectiveResult) -> str:
-    unit = objective.variable.unit
-    value = "unknown" if objective.value is None else f"{objective.value:.4g}"
-    wanted = "" if objective.threshold is None else f", wanted {objective.threshold}"
-    return f"{objective.variable.name} = {value}{wanted} {unit}".rstrip()
+    value = "unknown" if objective.value is None else f"{objective.value:.4g} {objective.variable.unit}".rstrip()
+    wanted = "" if objective.threshold is None else f", wanted {objective.wanted}"
+    return f"{objective.variable.name} {value}{wanted}"
 
 
 def _origin(diagnosis: Diagnosis) -> Iterator[str]:
@@ -137,6 +136,8 @@ def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
         word = STATUS_WORDS[objective.status]
         line = f"  {word:<13}  {objective.variable.name:<{name_width}}  {value:>8}  {wanted} {objective.variable.unit}"
         yield line.rstrip()
+        if objective.basis:
+            yield from wrapped(objective.basis, " " * 17)
         if objective.reason:
             yield from wrapped(objective.reason, " " * 17)
 

@@ -132,5 +132,5 @@ def _outlook(outlook: Outlook) -> str:
         return f"{STATUS_WORDS[result.status]} in this run -> {odds}{unchanged}"
     here = "not evaluated" if result.value is None else f"{result.value:.4g}"
     span = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {unit}".rstrip()
-    bound = "" if result.threshold is None else f", wanted {result.threshold} {unit}, ".replace(" ,", ",")
+    bound = "" if result.threshold is None else f", wanted {result.wanted}, "
     return f"{here} in this run -> {span}{bound}{odds}{unchanged}"

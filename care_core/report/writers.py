@@ -20,6 +20,7 @@ from care_core.report.document import (
     Report,
     SinceEntry,
     TriageDocument,
+    wanted_text,
 )
 from care_core.report.happened import SEVERITY_WORDS, clock, finding_sentence, fit_text, hypothesis_text
 from care_core.report.together import listed, together
@@ -131,10 +132,8 @@ def _changes(fix: FixSet) -> str:
 
 def _objective_row(objective: ObjectiveEntry) -> tuple[str, ...]:
     value = "" if objective.value is None else f"{objective.value:.4g} {objective.unit}".strip()
-    bound = objective.threshold
-    wanted = "" if bound is None else f"{bound.op} {bound.value:g} {objective.unit}".strip()
     reason = _escape(objective.reason or "")
-    return f"`{objective.name}`", value, _escape(wanted), STATUS_WORDS[objective.status], reason
+    return f"`{objective.name}`", value, _escape(wanted_text(objective)), STATUS_WORDS[objective.status], reason
 
 
 def _cause_row(cause: CauseEntry) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ Row = dict[str, str | int | float | None]
 
 def rows_of(path: Path, schema: Schema) -> list[Row]:
     """The rows of one log; objectives that mean nothing for their mission are empty."""
-    return [_row(path, judge(run, schema, {}).run, schema) for run in read_runs(open_log(path), schema)]
+    return [_row(path, judge(run, schema, None).run, schema) for run in read_runs(open_log(path), schema)]
 
 
 def _row(path: Path, run: Run, schema: Schema) -> Row:

@@ -100,8 +100,9 @@ def _described(variable: Variable) -> str:
     facts = [variable.name]
     if variable.range is not None:
         facts.append(f"{variable.range[0]:g} to {variable.range[1]:g}")
-    if variable.threshold is not None:
-        facts.append(str(variable.threshold))
+    bound = variable.threshold or variable.relative
+    if bound is not None:
+        facts.append(str(bound))
     facts += [text for text in (variable.unit, variable.doc) if text]
     return "  ".join(facts)
 

@@ -52,7 +52,9 @@ class ObjectivesPage(DiagnosisPage):
         if index is None:
             return run_rows(diagnosis)
         result = diagnosis.objectives[index]
-        summary = model.summaries.get(result.variable.name) if model else None
+        reading = self.session.case and self.session.case.reading
+        reference = reading.judged.reference.config if reading else {}
+        summary = model.summary_at(result.variable.name, reference) if model else None
         rows = objective_detail(result, summary, self.glyphs)
         return Rows([Row(text(result.variable.name, "bold")), *rows, Row(text("")), *run_rows(diagnosis).rows])
 

@@ -64,6 +64,8 @@ def objective_detail(result: ObjectiveResult, summary: Summary | None, glyphs: G
     """Why it was not evaluated, or where its value lies among the training runs."""
     variable = result.variable
     rows = [labelled("About", variable.doc)] if variable.doc else []
+    if result.basis:
+        rows.append(labelled("Threshold", result.basis))
     if result.reason:
         rows.append(warning("Reason", result.reason))
     if result.value is None or variable.kind == "functional":

@@ -32,7 +32,7 @@ CASES: tuple[tuple[str, float, str], ...] = (
 
 
 def diagnosed(run: Run, profile: Profile, keep: tuple[str, ...] = (), **thresholds: float) -> Diagnosis:
-    return diagnose(judge(run, profile.schema, profile.model.summaries, thresholds), profile, CHOICE, keep=keep)
+    return diagnose(judge(run, profile.schema, profile.model, thresholds), profile, CHOICE, keep=keep)
 
 
 def repaired(diagnosis: Diagnosis, noise: Mapping[str, float] = CALM) -> bool:

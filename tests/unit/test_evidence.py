@@ -17,7 +17,7 @@ from care_core.diagnose.evidence import refused_by
 from care_core.diagnose.judging import judge, read_and_judge
 from care_core.diagnose.tell_more import experiment
 from care_core.diagnose.triage import diagnose, triage
-from care_core.diagnose.worlds import reference_of, world_of
+from care_core.diagnose.worlds import world_of
 from care_core.errors import ProfileError
 from care_core.extract.select import choose_profile
 from care_core.logs.opening import open_log
@@ -96,7 +96,7 @@ def refused_run(**options: float) -> Run:
 
 def test_a_refusing_check_puts_its_option_first_and_is_quoted(planted: Profile) -> None:
     run = refused_run(min_sats=14, speed=8.0)
-    diagnosis = diagnose(judge(run, SCHEMA, planted.model.summaries), planted, CHOICE)
+    diagnosis = diagnose(judge(run, SCHEMA, planted.model), planted, CHOICE)
     (fault,) = diagnosis.faults
     assert refused_by(run) == {"min_sats"}
     assert fault.causes[0].option.name == "min_sats"
@@ -106,7 +106,7 @@ def test_a_refusing_check_puts_its_option_first_and_is_quoted(planted: Profile) 
 def test_a_refusing_check_names_an_option_that_the_model_knows_nothing_of(planted: Profile) -> None:
     run = planted_run(min_sats=14, inert=0.9)
     run = replace(run, evidence=(Evidence(3.0, "Arm: inert", "refusal", ("inert",)),))
-    cause = diagnose(judge(run, SCHEMA, planted.model.summaries), planted, CHOICE).faults[0].causes[0]
+    cause = diagnose(judge(run, SCHEMA, planted.model), planted, CHOICE).faults[0].causes[0]
     assert cause.option.name == "inert"
     assert not cause.is_lead
 
@@ -114,15 +114,12 @@ def test_a_refusing_check_names_an_option_that_the_model_knows_nothing_of(plante
 def test_a_message_in_flight_is_a_note_and_no_proof(planted: Profile) -> None:
     run = replace(refused_run(min_sats=14), evidence=(Evidence(3.0, "tracking", "failsafe", ("speed",)),))
     assert refused_by(run) == frozenset()
-    assert (
-        diagnose(judge(run, SCHEMA, planted.model.summaries), planted, CHOICE).faults[0].causes[0].option.name
-        == "min_sats"
-    )
+    assert diagnose(judge(run, SCHEMA, planted.model), planted, CHOICE).faults[0].causes[0].option.name == "min_sats"
 
 
 def circumstances_of(profile: Profile, run: Run, sides: Mapping[str, Side]) -> list[str]:
     schema = replace(profile.schema, circumstances={"battery": sides})
-    world = world_of(judge(run, schema, profile.model.summaries), profile)
+    world = world_of(judge(run, schema, profile.model), profile)
     return [one.variable for one in circumstances(run, world, schema)]
 
 
@@ -142,7 +139,7 @@ def test_a_context_is_judged_by_where_training_saw_it(planted: Profile) -> None:
     schema = replace(SCHEMA, variables={**SCHEMA.variables, "wind": wind}, circumstances={"wind": {"wind": "high"}})
     for value, expected in ((5.0, []), (9.9, ["wind"]), (12.0, ["wind"]), (0.1, [])):
         run = replace(planted_run(), context={"wind": value})
-        world = replace(world_of(judge(run, SCHEMA, {}), planted), model=model)
+        world = replace(world_of(judge(run, SCHEMA, planted.model), planted), model=model)
         found = circumstances(run, world, schema)
         assert [one.name for one in found][: len(expected)] == expected
         assert all(str(one.value)[:2] in one.text for one in found)
@@ -177,10 +174,10 @@ def _summary(low: float, high: float) -> Summary:
 
 def test_the_experiment_separates_the_two_leading_causes(planted: Profile) -> None:
     run = planted_run(speed=3.0, planner=2.0)
-    judged = judge(run, SCHEMA, planted.model.summaries, {"time": 183.0})
+    judged = judge(run, SCHEMA, planted.model, {"time": 183.0})
     diagnosis = diagnose(judged, planted, CHOICE)
     (fault,) = diagnosis.faults
-    reference = reference_of(run, planted)
+    reference = judged.reference.config
     world = world_of(judged, planted)
     found = experiment(world, fault, SCHEMA.variables, reference)
     assert found is not None
@@ -194,7 +191,7 @@ def test_the_experiment_separates_the_two_leading_causes(planted: Profile) -> No
 def test_where_nothing_is_off_its_reference_a_repeat_is_advised(planted: Profile) -> None:
     run = planted_run()
     slow = replace(run, objectives={**run.objectives, "time": 300.0})
-    diagnosis = diagnose(judge(slow, SCHEMA, planted.model.summaries), planted, CHOICE)
+    diagnosis = diagnose(judge(slow, SCHEMA, planted.model), planted, CHOICE)
     assert diagnosis.abstained is not None
     assert any("same configuration again" in advice for advice in diagnosis.tell_more)
     report = build_document(diagnosis)
@@ -204,7 +201,7 @@ def test_where_nothing_is_off_its_reference_a_repeat_is_advised(planted: Profile
 
 
 def test_a_sure_cause_has_no_rivals(planted: Profile) -> None:
-    diagnosis = diagnose(judge(planted_run(speed=1.5), SCHEMA, planted.model.summaries), planted, CHOICE)
+    diagnosis = diagnose(judge(planted_run(speed=1.5), SCHEMA, planted.model), planted, CHOICE)
     if all(fault.causes[0].confidence == "high" for fault in diagnosis.faults):
         assert diagnosis.rivals == ()
         assert diagnosis.tell_more == ()

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.causal.model import Summary
+from care_core.causal.graph import CausalGraph
+from care_core.causal.model import Model, Summary, Training
 from care_core.diagnose.judging import judge, thresholds_in_force
 from care_core.run import Unavailable, Value
 from care_core.variables import Threshold
@@ -14,6 +15,10 @@ from tests.planted import SCHEMA, TIME, planted_run, with_variable
 
 BOUNDS = thresholds_in_force(SCHEMA, {})
 SUMMARIES = {"time": Summary(count=100, mean=150, spread=20, quantiles=tuple(100.0 + 5 * i for i in range(21)))}
+MODEL = Model(
+    schema_digest="", graph=CausalGraph(()), edges={}, bidirected=(), effects={}, paths={}, outcomes={},
+    summaries=SUMMARIES, skill={}, training=Training(origin="", runs=100, seed=0, alpha=0.01, resamples=0),
+)  # fmt: skip
 
 
 def test_the_profiles_thresholds_hold_unless_the_operator_says_otherwise() -> None:
@@ -31,7 +36,7 @@ def test_an_operators_threshold_where_the_profile_has_none() -> None:
 @given(st.floats(0, 1e4), st.floats(0, 1e4))
 def test_a_fault_is_a_value_beyond_its_threshold(value: float, bound: float) -> None:
     run = replace(planted_run(), objectives={"success": 1.0, "time": value})
-    result = judge(run, SCHEMA, SUMMARIES, {"time": bound}).results[1]
+    result = judge(run, SCHEMA, MODEL, {"time": bound}).results[1]
     assert result.status == ("ok" if value <= bound else "fault")
     assert result.value == value
     assert result.percentile is not None
@@ -39,7 +44,7 @@ def test_a_fault_is_a_value_beyond_its_threshold(value: float, bound: float) -> 
 
 
 def test_every_objective_is_judged_in_the_profiles_order() -> None:
-    results = judge(planted_run(accel=3.9), SCHEMA, SUMMARIES).results
+    results = judge(planted_run(accel=3.9), SCHEMA, MODEL).results
     assert [(r.variable.name, r.status) for r in results] == [("success", "ok"), ("time", "ok"), ("energy", "fault")]
     assert [r.percentile is None for r in results] == [True, False, True]
 
@@ -47,7 +52,7 @@ def test_every_objective_is_judged_in_the_profiles_order() -> None:
 def test_what_could_not_be_had_is_neither_zero_nor_ok() -> None:
     gone = Unavailable("no BAT in the log", "set LOG_BITMASK")
     run = replace(planted_run(), objectives={"success": 1.0, "energy": gone})
-    _, time, energy = judge(run, SCHEMA, SUMMARIES).results
+    _, time, energy = judge(run, SCHEMA, MODEL).results
     assert (energy.status, energy.value, energy.reason) == (
         "not_evaluated",
         None,
@@ -59,7 +64,7 @@ def test_what_could_not_be_had_is_neither_zero_nor_ok() -> None:
 
 def test_without_a_threshold_the_value_is_shown_but_not_judged() -> None:
     bare = with_variable(SCHEMA, replace(TIME, threshold=None))
-    time = judge(planted_run(), bare, SUMMARIES).results[1]
+    time = judge(planted_run(), bare, MODEL).results[1]
     assert time.status == "not_evaluated"
     assert time.value is not None
     assert "--threshold" in time.reason
@@ -68,7 +73,7 @@ def test_without_a_threshold_the_value_is_shown_but_not_judged() -> None:
 @pytest.mark.parametrize("success", [0.0, Unavailable("told so")])
 def test_a_mission_that_was_not_accomplished_has_no_time(success: Value) -> None:
     run = replace(planted_run(), objectives={**planted_run().objectives, "success": success})
-    judged = judge(run, SCHEMA, SUMMARIES, {"time": 90.0})
+    judged = judge(run, SCHEMA, MODEL, {"time": 90.0})
     for name in ("time", "energy"):
         value = judged.run.objectives[name]
         assert isinstance(value, Unavailable)
@@ -77,7 +82,7 @@ def test_a_mission_that_was_not_accomplished_has_no_time(success: Value) -> None
 
 def test_a_log_that_ends_early_evaluates_nothing() -> None:
     run = planted_run()
-    judged = judge(replace(run, mission=replace(run.mission, ended=False)), SCHEMA, SUMMARIES)
+    judged = judge(replace(run, mission=replace(run.mission, ended=False)), SCHEMA, MODEL)
     assert {result.status for result in judged.results} == {"not_evaluated"}
     assert all("ends before the mission" in result.reason for result in judged.results)
 
@@ -85,7 +90,7 @@ def test_a_log_that_ends_early_evaluates_nothing() -> None:
 def test_another_mission_is_judged_only_where_the_operator_gave_a_bound() -> None:
     run = planted_run()
     other = replace(run, mission=replace(run.mission, fits=False, mismatch="it has 3 waypoints, not 5"))
-    judged = judge(other, SCHEMA, SUMMARIES, {"energy": 1e6})
+    judged = judge(other, SCHEMA, MODEL, {"energy": 1e6})
     assert [result.status for result in judged.results] == ["ok", "not_evaluated", "ok"]
     hint = "give this mission's bound with --threshold time=VALUE"
     assert judged.run.objectives["time"] == Unavailable("it has 3 waypoints, not 5", hint)
@@ -93,5 +98,5 @@ def test_another_mission_is_judged_only_where_the_operator_gave_a_bound() -> Non
 
 def test_judging_twice_is_judging_once() -> None:
     run = planted_run()
-    once = judge(replace(run, objectives={**run.objectives, "success": 0.0}), SCHEMA, SUMMARIES)
-    assert judge(once.run, SCHEMA, SUMMARIES).results == once.results
+    once = judge(replace(run, objectives={**run.objectives, "success": 0.0}), SCHEMA, MODEL)
+    assert judge(once.run, SCHEMA, MODEL).results == once.results

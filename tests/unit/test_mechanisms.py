@@ -29,6 +29,7 @@ def mechanism(*, binary: bool = False, transform: Transform = "identity", n: int
     targets, kernel = np.sin(points[:, 0]), Kernel(np.array([0.5, 1.0]), 0.7, 0.4, 0.2)
     return Mechanism(
         inputs=("a", "b"),
+        reads=np.arange(2),
         log_inputs=np.array([False, True]),
         centre=np.array([1.0, 0.5]),
         spread=np.array([2.0, 1.5]),

@@ -117,9 +117,14 @@ def test_a_byte_turned_over_never_escapes_as_a_traceback(folder: Path, place: in
     data = bytearray(path.read_bytes())
     for i in range(8):
         data[len(data) * place // 100 + i] ^= 0xFF
+    whole = read_model(folder).mechanisms
     path.write_bytes(bytes(data))
-    with pytest.raises(ProfileError):
-        read_model(folder)
+    try:
+        read = read_model(folder).mechanisms
+    except ProfileError:
+        return
+    # Not every byte of an archive says something: what is read all the same is what was written.
+    assert all((read[key].weights == whole[key].weights).all() for key in whole)
 
 
 def test_a_plain_array_in_place_of_an_archive(folder: Path) -> None:

@@ -73,7 +73,7 @@ def stages(frame: pd.DataFrame, schema: Schema = SMALL) -> list[tuple[str, int, 
 
 def test_met_is_one_zero_or_unknown() -> None:
     frame = pd.DataFrame({"time": [100.0, 500.0, np.nan]})
-    np.testing.assert_array_equal(met(TIME, frame), [1.0, 0.0, np.nan])
+    np.testing.assert_array_equal(met(TIME, frame, SMALL), [1.0, 0.0, np.nan])
 
 
 def test_stages_come_in_order_each_on_the_missions_that_reached_it() -> None:

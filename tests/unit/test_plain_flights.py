@@ -171,7 +171,7 @@ def test_checks_are_judged_and_withhold_what_a_mission_would_mean() -> None:
     objectives: dict[str, Value] = {
         "mission_success": Unavailable("no mission was flown"), "mission_time": 61.0, "energy": 3.0,
     }  # fmt: skip
-    judged = judge(replace(made_run(), objectives=objectives, checks=plain), schema, {})
+    judged = judge(replace(made_run(), objectives=objectives, checks=plain), schema, None)
     assert [(one.variable.name, one.status) for one in judged.checks] == [
         ("no_crash", "fault"), ("landed", "not_evaluated"),
     ]  # fmt: skip
@@ -187,7 +187,7 @@ def test_several_missions_are_listed_with_their_verdicts() -> None:
     for index, crashed in enumerate((1.0, 0.0), start=1):
         one = replace(run, mission=MissionInfo(index, 2, 100.0 * index, 100.0 * index + 50, ended=True, fits=True),
                       checks=(Check("no_crash", crashed, ""),), objectives={})  # fmt: skip
-        missions.append(verdict(judge(one, schema, {})))
+        missions.append(verdict(judge(one, schema, None)))
     shown = to_text(replace(made_diagnosis(), missions=tuple(missions)))
     assert "   1  OK, 100 to 150 s: no mission was flown  <- this report" in shown
     assert "   2  FAULT, 200 to 250 s: no_crash" in shown

@@ -19,9 +19,9 @@ from care_core.diagnose.ranking import (
     best_paths,
     describe_path,
     deviating,
-    reference_config,
     suspects,
 )
+from care_core.diagnose.reference import profile_config
 from care_core.profile.store import Profile
 from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run, with_variable
 
@@ -86,10 +86,10 @@ def test_an_effect_that_is_not_identified_is_not_ranked(planted: Profile) -> Non
 
 
 def test_the_reference_is_the_default_or_the_middle_of_the_training_runs(planted: Profile) -> None:
-    assert reference_config(SCHEMA, planted.model) == DEFAULTS
+    assert profile_config(SCHEMA, planted.model) == DEFAULTS
     bare = with_variable(SCHEMA, replace(OPTIONS[0], default=None))
     quantiles = planted.model.summaries["speed"].quantiles
-    assert reference_config(bare, planted.model)["speed"] == OPTIONS[0].snap(quantiles[10])
+    assert profile_config(bare, planted.model)["speed"] == OPTIONS[0].snap(quantiles[10])
 
 
 @pytest.mark.parametrize(("value", "off"), [(5.0, False), (5.0 + 1e-9, False), (5.001, True), (-5.0, True)])

@@ -19,7 +19,7 @@ CHOICE = ProfileChoice("planted", "1", "Simulated robot", "")
 
 def judged(profile: Profile, digest: str, outcome: Mapping[str, float], **options: float) -> Judged:
     run = run_of({**DEFAULTS, **options}, outcome)
-    return judge(replace(run, log=replace(run.log, sha256=digest)), SCHEMA, profile.model.summaries)
+    return judge(replace(run, log=replace(run.log, sha256=digest)), SCHEMA, profile.model)
 
 
 def outcome(time: float) -> dict[str, float]:

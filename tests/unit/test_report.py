@@ -38,7 +38,9 @@ def test_the_document_has_exactly_the_published_keys() -> None:
     assert document["schema"] == "care.triage/1"
     assert list(document["profile"]) == ["name", "version", "platform"]
     assert list(document["log"]) == ["path", "format", "start", "duration_s", "damage", "sha256"]
-    assert list(document["objectives"][0]) == ["name", "value", "unit", "kind", "threshold", "status", "reason"]
+    assert list(document["objectives"][0]) == [
+        "name", "value", "unit", "kind", "threshold", "needs", "basis", "status", "reason"
+    ]  # fmt: skip
     assert document["objectives"][2]["reason"] == "no BAT in the log"
     (fault,) = document["faults"]
     (cause,) = fault["causes"]
@@ -107,7 +109,7 @@ def test_the_terminal_text_answers_first_and_fits_80_columns() -> None:
     text = to_text(made_diagnosis())
     lines = text.splitlines()
     assert lines[0].startswith("Profile arducopter fits in part: firmware Arm:")
-    assert lines[2] == "FAULT: mission_time = 190, wanted <= 150 s"
+    assert lines[2] == "FAULT: mission_time 190 s, wanted <= 150 s"
     assert "land_speed 16 -> 50" in lines[3]
     assert max(map(len, lines)) <= 80
     for part in (

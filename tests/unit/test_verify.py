@@ -44,7 +44,7 @@ def promise(*others: PromisedSet) -> Promise:
 
 
 def checked(doubt: str = "", *others: PromisedSet, **options: float) -> Verification:
-    return verify(promise(*others), judge(planted_run(**options), SCHEMA, {}), SCHEMA, doubt)
+    return verify(promise(*others), judge(planted_run(**options), SCHEMA, None), SCHEMA, doubt)
 
 
 def test_a_change_that_was_made_and_did_what_it_promised() -> None:
@@ -99,7 +99,7 @@ def test_a_move_within_what_runs_differ_by_is_none(time_s: float, outcome: str) 
     run = planted_run(speed=5.0)
     driven = replace(run, objectives={**run.objectives, "time": time_s})
     within = replace(PROMISED, intervals={"time": (130.0, 170.0)})
-    found = verify(replace(promise(), sets=(within,)), judge(driven, SCHEMA, {}), SCHEMA)
+    found = verify(replace(promise(), sets=(within,)), judge(driven, SCHEMA, None), SCHEMA)
     assert {check.variable.name: check.outcome for check in found.objectives}["time"] == outcome
 
 
@@ -118,7 +118,7 @@ def test_a_mission_that_failed_otherwise_is_not_fixed() -> None:
 def test_what_was_not_evaluated_or_is_another_mission_cannot_be_told() -> None:
     run = planted_run(speed=5.0)
     run = replace(run, objectives={**run.objectives, "time": Unavailable("the log ends early")})
-    found = verify(promise(), judge(run, SCHEMA, {}), SCHEMA)
+    found = verify(promise(), judge(run, SCHEMA, None), SCHEMA)
     assert found.verdict == "cannot_tell"
     assert "the log ends early" in found.sentence
     assert checked("the mission has 3 waypoints", speed=5.0).verdict == "cannot_tell"
@@ -138,9 +138,9 @@ def test_an_option_of_two_keys_is_made_when_both_are() -> None:
     for values, made in (((0.3, 0.3), "made"), ((0.3, 0.5), "not_made"), ((0.4, 0.4), "other_value")):
         keys = dict(zip(("/a/radius", "/b/radius"), values, strict=True))
         driven = replace(run, settings={key: Setting(key, value, "log") for key, value in keys.items()})
-        found = verify(replace(promise(), sets=(both,)), judge(driven, SCHEMA, {}), SCHEMA)
+        found = verify(replace(promise(), sets=(both,)), judge(driven, SCHEMA, None), SCHEMA)
         assert found.changes[0].made == made
-    unread = judge(replace(run, config={}), SCHEMA, {})
+    unread = judge(replace(run, config={}), SCHEMA, None)
     assert verify(replace(promise(), sets=(both,)), unread, SCHEMA).changes[0].made == "unknown"
 
 

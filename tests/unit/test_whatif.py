@@ -22,7 +22,7 @@ CHOICE = ProfileChoice("planted", "1", "Simulated robot", "")
 
 @pytest.fixture(scope="module")
 def slow(planted: Profile) -> Question:
-    return question(judge(planted_run(speed=2.0), SCHEMA, planted.model.summaries), planted, CHOICE)
+    return question(judge(planted_run(speed=2.0), SCHEMA, planted.model), planted, CHOICE)
 
 
 def test_a_faster_robot_is_predicted_to_meet_its_time(slow: Question) -> None:
@@ -62,7 +62,7 @@ def test_what_speaks_against_a_value_is_said_beside_it(slow: Question) -> None:
 
 
 def test_a_run_without_a_fault_can_be_asked(planted: Profile) -> None:
-    asked = question(judge(planted_run(), SCHEMA, planted.model.summaries), planted, CHOICE)
+    asked = question(judge(planted_run(), SCHEMA, planted.model), planted, CHOICE)
     assert all(result.status == "ok" for result in asked.objectives)
     assert asked.ask({"speed": 1.2}).p_ok < asked.ask({}).p_ok
 

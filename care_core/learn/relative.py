@@ -1,0 +1,77 @@
+"""Runs of different missions made comparable: each value over what physics says the reference configuration needs.
+
+A mission of 800 m takes longer than one of 300 m, which hides what an option costs. The graph search, and all that asks
+how bad a run was, look at the ratio. Mechanisms do not: they take the nominal of the run's own configuration.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from care_core.causal.mechanisms import FloatArray
+from care_core.profile.schema import Schema
+from care_core.variables import Role, Variable
+
+
+def relative(frame: pd.DataFrame, schema: Schema) -> pd.DataFrame:
+    """The table with every variable that has a nominal divided by it, all options at their reference."""
+    ratios = {}
+    for name in schema.variables:
+        nominal = schema.nominal_of(name)
+        if nominal is not None:
+            columns = np.column_stack([_at_reference(frame, schema, argument) for argument in nominal.inputs])
+            ratios[name] = frame[name].to_numpy(dtype=float) / nominal.of(columns)
+    compared: pd.DataFrame = frame.assign(**ratios)
+    return compared
+
+
+def needs(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArray:
+    """What the reference configuration needs for the mission of each run, shape (n,).
+
+    It is what runs of the same mission with every option at its reference took; where there is none, the nominal
+    corrected by what all such runs took, or their median.
+    """
+    ratio = relative(frame, schema)[objective.name].to_numpy(dtype=float)
+    values = frame[objective.name].to_numpy(dtype=float)
+    at_reference = _is_reference(frame, schema) & np.isfinite(values)
+    typical = float(np.median(ratio[at_reference])) if at_reference.any() else np.nan
+    need = np.asarray(typical * values / ratio) if objective.nominal else np.full(len(frame), typical)
+    missions = missions_of(frame, schema)
+    for mission in () if missions is None else np.unique(missions[at_reference]):
+        same = missions == mission
+        need[same] = np.median(values[same & at_reference])
+    return need
+
+
+def missions_of(frame: pd.DataFrame, schema: Schema) -> NDArray[np.int64] | None:
+    """A number for each run, the same for runs of which the same was asked, shape (n,); None where nothing tells."""
+    names = [context.name for context in schema.asked]
+    if not names:
+        return None
+    rounded = frame[names].to_numpy(dtype=float).round(1)
+    return np.asarray(np.unique(rounded, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
+
+
+def _is_reference(frame: pd.DataFrame, schema: Schema) -> NDArray[np.bool_]:
+    at = np.ones(len(frame), dtype=bool)
+    for option in schema.options:
+        if option.default is not None:
+            at &= np.isclose(frame[option.name].to_numpy(dtype=float), option.default, rtol=1e-4)
+    return at
+
+
+def of_ratios(schema: Schema) -> Schema:
+    """The schema of a table that `relative` has made: nothing is left to divide by."""
+    return replace(schema, variables={name: replace(v, nominal=None) for name, v in schema.variables.items()})
+
+
+def _at_reference(frame: pd.DataFrame, schema: Schema, name: str) -> FloatArray:
+    """An option's reference in every run, or the context that the run met; shape (n,)."""
+    variable, values = schema.variables[name], frame[name].to_numpy(dtype=float)
+    if variable.role is Role.OPTION:
+        return np.full(len(frame), float(np.median(values)) if variable.default is None else variable.default)
+    return values
