@@ -33,6 +33,8 @@ def test_an_offset_changes_nothing_and_a_factor_scales(response: list[float], of
         ([3, 2.9, 1, 0], "decreasing"),
         ([0, 1.1, 1, 2], "increasing"),
         ([0, 2, 3, 1], "optimum inside"),
+        ([0, 10, 7], "optimum inside"),
+        ([0, 10, 8], "increasing"),
         ([3, 0, 0, 3], "optimum inside"),
         ([1, 1, 1, 1], "none"),
         ([1], "none"),
