@@ -16,6 +16,7 @@ from textual.binding import Binding, BindingType
 from care_core.application.case import Case, Request
 from care_core.diagnose.records import Fix
 from care_core.errors import CareError
+from care_core.report.happened import critical
 from care_tui.clipboard import fits, osc52
 from care_tui.jobs import CAUSES, Engine, Job
 from care_tui.messages import Progressed, StepChosen
@@ -310,8 +311,8 @@ class WalkScreen(PanesScreen):
         self._pin()
         if self._view is not None:
             self.draw()
-        elif answer.diagnosis.profile.fit.verdict == "no":
-            self._show(Place(self.step))
+        elif answer.diagnosis.profile.fit.verdict == "no" or critical(answer.diagnosis.health):
+            self._show(Place(self.step))  # what happened is the answer, or a part of it that comes first
         elif self.step == LOG:
             self.action_go(OBJECTIVES)
         else:

@@ -25,7 +25,8 @@ def pinned(app: CareApp) -> list[str]:
 async def test_the_first_step_tells_what_happened_the_first_cause_first(make_app: MakeApp) -> None:
     app = make_app(sample.crashed())
     async with app.run_test(size=(80, 24)) as pilot:
-        await settle(pilot, "1")
+        await settle(pilot)
+        assert walk(app).step == 1, "with a critical finding the app opens on it"
         assert title(app).startswith("ArduCopter V4.3.6, quad X: ✗ motor 2 lost thrust \\x1b[31m at 91.3 s")
         lines = [line.split() for line in items(app).splitlines()]
         assert [line[:4] for line in lines[:4]] == [
