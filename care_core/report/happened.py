@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict
 
 from care_core.diagnose.records import Hypothesis, What
 from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
+from care_core.report.wording import SEVERITY_WORDS, clock, hypothesis_text
 from care_core.run import Fit, FitVerdict
 from care_core.text import clean, wrapped
 
@@ -19,7 +20,6 @@ MOMENTS_SHOWN = 24
 """Lines of the account in text; the document holds all."""
 LED_TO_SHOWN = 4
 HYPOTHESES_SHOWN = 4
-SEVERITY_WORDS: dict[Severity, str] = {"critical": "CRITICAL", "warning": "WARNING", "info": "note"}
 
 
 class _Entry(BaseModel):
@@ -137,20 +137,8 @@ def finding_sentence(finding: FindingEntry) -> str:
     return f"{finding.title}, at {clock(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
 
 
-def critical(health: Health) -> list[Finding]:
-    """Findings that would stop a mission, those after the impact left out."""
-    return [one for one in health.findings if one.severity == "critical" and not one.after_impact]
-
-
 def finding_text(finding: Finding) -> str:
     return f"{finding.title} at {clock(finding.onset_s)}"
-
-
-def clock(time_s: float | None) -> str:
-    """Seconds of a log as an operator reads them: 61.3 s, from ten minutes on 12:05."""
-    if time_s is None or not math.isfinite(time_s):
-        return "?"
-    return f"{time_s:.1f} s" if abs(time_s) < 600 else f"{int(time_s // 60)}:{int(time_s % 60):02d}"
 
 
 def account_lines(health: Health, most: int = MOMENTS_SHOWN) -> Iterator[str]:
@@ -199,16 +187,6 @@ def _led_to(finding: Finding, indent: str) -> Iterator[str]:
     if titles:
         more = f" and {len(titles) - LED_TO_SHOWN} more" if len(titles) > LED_TO_SHOWN else ""
         yield from wrapped(f"led to: {'; '.join(titles[:LED_TO_SHOWN])}{more}", indent)
-
-
-def hypothesis_text(one: Hypothesis | HypothesisEntry) -> str:
-    """An explanation in a clause."""
-    if one.what == "parameter":
-        return f"the parameter {one.name}"
-    if one.name:
-        return one.name
-    unnamed = {"hardware": "a part whose failure left no trace in this log", "world": "something the robot met"}
-    return unnamed.get(one.what, "chance: the reference configuration fails like this as well")
 
 
 def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> Iterator[str]:

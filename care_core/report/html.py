@@ -19,8 +19,9 @@ from care_core.report.document import (
     SinceEntry,
     wanted_text,
 )
-from care_core.report.happened import SEVERITY_WORDS, clock, finding_sentence, fit_text, hypothesis_text
+from care_core.report.happened import finding_sentence, fit_text
 from care_core.report.together import listed, together
+from care_core.report.wording import SEVERITY_WORDS, clock, hypothesis_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import shown
 

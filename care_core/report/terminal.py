@@ -9,15 +9,9 @@ from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
 from care_core.health.records import Health
-from care_core.report.happened import (
-    account_lines,
-    critical,
-    finding_lines,
-    finding_text,
-    fit_text,
-    hypothesis_lines,
-)
+from care_core.report.happened import account_lines, finding_lines, finding_text, fit_text, hypothesis_lines
 from care_core.report.together import listed, together
+from care_core.report.wording import critical
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
 from care_core.variables import Variable

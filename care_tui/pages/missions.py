@@ -6,7 +6,7 @@ from textual.content import Content
 
 from care_core.application.case import Case
 from care_core.application.viewing import MissionVerdict, missions_of
-from care_core.report.happened import clock
+from care_core.report.wording import clock
 from care_tui.pages.page import Fetch, Page, View, sentence
 from care_tui.render.objectives import objective_item, worst
 from care_tui.render.rows import Row, Rows, status, text, warning

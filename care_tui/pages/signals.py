@@ -11,7 +11,7 @@ from textual.content import Content
 from care_core.application.case import Case
 from care_core.application.signals import Signal, Trace, signals_of, trace_of, whole_of
 from care_core.errors import CareError
-from care_core.report.happened import clock
+from care_core.report.wording import clock
 from care_core.text import clean
 from care_tui.pages.page import Fetch, Page, View, sentence
 from care_tui.render.happened import Mark, marks_of

@@ -9,7 +9,7 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.health.records import Finding, Health, Moment, Severity
-from care_core.report.happened import SEVERITY_WORDS, clock, hypothesis_text
+from care_core.report.wording import SEVERITY_WORDS, clock, hypothesis_text
 from care_core.text import clean
 from care_tui.render.objectives import damage
 from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, text, warning

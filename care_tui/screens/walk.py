@@ -16,7 +16,7 @@ from textual.binding import Binding, BindingType
 from care_core.application.case import Case, Request
 from care_core.diagnose.records import Fix
 from care_core.errors import CareError
-from care_core.report.happened import critical
+from care_core.report.wording import critical
 from care_tui.clipboard import fits, osc52
 from care_tui.jobs import CAUSES, Engine, Job
 from care_tui.messages import Progressed, StepChosen

@@ -42,3 +42,7 @@ def test_diagnosis_imports_neither_learning_nor_a_terminal() -> None:
 
 def test_the_core_is_light_until_it_is_used() -> None:
     assert not imported_by("import care_core") & (HEAVY | LEARNING)
+
+
+def test_the_app_draws_its_first_frame_without_what_reading_a_log_needs() -> None:
+    assert not imported_by("import care_tui.app") & (HEAVY - {"rich", "textual"} | LEARNING)
