@@ -151,7 +151,7 @@ def test_a_circumstance_says_how_many_runs_met_more(planted: Profile, side: Side
     model = replace(planted.model, summaries={**planted.model.summaries, "wind": _summary(0.0, 10.0)})
     schema = replace(SCHEMA, variables={**SCHEMA.variables, "wind": wind}, circumstances={"wind": {"wind": side}})
     run = replace(planted_run(), context={"wind": 10.0 * share})
-    (found,) = circumstances(run, replace(world_of(judge(run, SCHEMA, {}), planted), model=model), schema)
+    (found,) = circumstances(run, replace(world_of(judge(run, SCHEMA, None), planted), model=model), schema)
     assert found.share == pytest.approx(0.01, abs=1e-6)
 
 
@@ -162,7 +162,7 @@ def test_confidence_follows_how_many_resamples_have_a_path(planted: Profile, sup
     effects = {key: effect.model_copy(update={"support": support}) for key, effect in planted.model.effects.items()}
     profile = Profile(planted.path, SCHEMA)
     profile.__dict__["model"] = replace(planted.model, effects=effects)
-    judged = judge(planted_run(speed=1.5), SCHEMA, planted.model.summaries)
+    judged = judge(planted_run(speed=1.5), SCHEMA, planted.model)
     cause = diagnose(judged, profile, CHOICE).faults[0].causes[0]
     assert (cause.option.name, cause.confidence) == ("speed", confidence)
     assert any("of resamples" in note.text for note in cause.notes) is (support < 0.5)
