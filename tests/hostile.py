@@ -318,6 +318,7 @@ def _forget_digest(folder: Path) -> None:
 
 
 INDENTED = "".join(f"    {line}\n" for line in aliases().splitlines())
+CUSTOM = f"rosbag2_bagfile_information:\n  custom_data:\n{INDENTED}"
 DIGITS = "9" * 400
 
 LOGS: dict[str, Maker] = {
@@ -334,7 +335,7 @@ LOGS: dict[str, Maker] = {
     "a view without end": endless_view,
     "a computed column": computed_column,
     "aliases in metadata.yaml": metadata_beside(aliases()),
-    "aliases in custom data": metadata_beside(f"rosbag2_bagfile_information:\n  custom_data:\n{INDENTED}"),
+    "aliases in custom data": metadata_beside(CUSTOM),
     "brackets in metadata.yaml": metadata_beside(NESTED),
     "a date that no calendar has in metadata.yaml": metadata_beside("a: 2024-13-45\n"),
     "an integer of 400 digits in metadata.yaml": metadata_beside(
@@ -343,9 +344,9 @@ LOGS: dict[str, Maker] = {
     "an integer of 400 digits in custom data": metadata_beside(
         f"rosbag2_bagfile_information:\n  custom_data: {{/a.b: '{DIGITS}'}}\n"
     ),
-    "aliases in db3 metadata": metadata_inside_db3(aliases()),
+    "aliases in db3 metadata": metadata_inside_db3(CUSTOM),
     "brackets in db3 metadata": metadata_inside_db3(NESTED),
-    "aliases in mcap metadata": metadata_inside_mcap(aliases()),
+    "aliases in mcap metadata": metadata_inside_mcap(CUSTOM),
     "brackets in mcap metadata": metadata_inside_mcap(NESTED),
     "a text log of line ends": text_of(b"\n" * (9 * MEGABYTE)),
     "a text log of short lines": text_of(b"a\n" * (9 * MEGABYTE // 2)),
