@@ -18,14 +18,14 @@ from care_core.variables import Role, Variable
 
 
 def relative(frame: pd.DataFrame, schema: Schema) -> pd.DataFrame:
-    """The table with every variable that has a nominal divided by it, all options at their reference."""
+    """The schema's variables, each that has a nominal divided by it, all options at their reference."""
     ratios = {}
     for name in schema.variables:
         nominal = schema.nominal_of(name)
         if nominal is not None:
             columns = np.column_stack([_at_reference(frame, schema, argument) for argument in nominal.inputs])
             ratios[name] = frame[name].to_numpy(dtype=float) / nominal.of(columns)
-    compared: pd.DataFrame = frame.assign(**ratios)
+    compared: pd.DataFrame = frame[[name for name in schema.variables if name in frame]].assign(**ratios)
     return compared
 
 

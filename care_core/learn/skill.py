@@ -101,7 +101,8 @@ def _odds(
         skill={}, training=training, mechanisms=mechanisms,
     )  # fmt: skip
     filled = test.fillna({v.name: train[v.name].median() for v in schema.contexts})
-    configs = [{str(k): float(v) for k, v in row.items()} for row in filled.to_dict("records")]
+    names = [name for name in schema.variables if name in filled]
+    configs = [{str(k): float(v) for k, v in row.items()} for row in filled[names].to_dict("records")]
     fixed = {v.name: v.threshold for v in schema.objectives if v.threshold is not None and v.name in outcomes}
     relative_ones = [(v.name, v.relative) for v in schema.objectives if v.relative is not None and v.name in outcomes]
     if not relative_ones:
