@@ -8,6 +8,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,6 +30,8 @@ Offsets = NDArray[np.int64]
 
 _TEXT_CODES = frozenset("nNZ")
 _MAYBE_TEXT_CODES = frozenset("aM")
+_FRACTION_CODES = frozenset("fdgcCeEL")
+"""What may be no number (nan): a whole one cannot."""
 _NAME_BYTES = 5  # four of a message's name and the comma
 _PIECE = 2048  # lines parsed in one go
 _HEADS = 1 << 18
@@ -204,7 +207,11 @@ class DataFlashTextLog:
                 values = np.fromstring(b",".join(lines), sep=",")
         except (ValueError, DeprecationWarning):
             return None
-        return values.reshape(len(lines), count) if values.size == len(lines) * count else None
+        if values.size != len(lines) * count:
+            return None
+        table = values.reshape(len(lines), count)
+        whole = [at for at, code in enumerate(codes[:count]) if code not in _FRACTION_CODES]
+        return table if np.isfinite(table[:, whole]).all() else None
 
     def _values(self, name: str, place: int) -> list[str] | None:
         """The values of a line, None when they are not as many as declared or a number is none."""
@@ -280,10 +287,10 @@ def _is_value(value: str, code: str) -> bool:
     if code in _TEXT_CODES or code == "M":
         return True
     try:
-        float(value)
+        number = float(value)
     except ValueError:
         return code == "a"
-    return True
+    return code in _FRACTION_CODES or isfinite(number)
 
 
 def _column(values: list[str], code: str) -> NDArray[Any]:
