@@ -156,7 +156,7 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
     truth = all_met(frame, schema)
     print(f"missions left out whole: {len(frame)} runs")
     print(
-        "  runs at a distance of      time: rms  in 80 %   energy: rms  in 80 %    all met: ECE   Brier  plain ECE  Brier"
+        "  runs at a distance of    time: rms  in 80 %   energy: rms  in 80 %   all met: ECE   Brier  plain ECE  Brier"
     )
     bounds = (0.0, *FAR, np.inf)
     for low, high in ((0.0, np.inf), *pairwise(bounds)):
@@ -259,9 +259,8 @@ def show_faults(found: Faults) -> None:
     for name in found.first:
         print(f"  {name:24s} first {found.first[name]}/{n}, in three {found.three[name]}/{n}")
     print(f"  fixes advised {found.advised}, flown as resets {found.flown}, confirmed {found.confirmed}")
-    print(
-        f"  limits of accomplished missions, time and energy, against the true ones: rms {np.sqrt(np.mean(np.square(found.limits))):.1%}"
-    )
+    rms = float(np.sqrt(np.mean(np.square(found.limits))))
+    print(f"  limits of accomplished missions, time and energy, against the true ones: rms {rms:.1%}")
     for name, odds in found.odds.items():
         p = np.array(odds)
         print(f"  odds of {len(p)} resets, {name}: calibration error {calibration_error(p, kept):.3f}, "

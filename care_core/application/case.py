@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from care_core.configs.loading import ConfigFile
     from care_core.diagnose.judging import Judged
     from care_core.diagnose.records import Diagnosis, Fix
+    from care_core.diagnose.reference import Good
     from care_core.diagnose.whatif import Question
     from care_core.health.records import Health
     from care_core.logs.base import Log
@@ -54,7 +55,9 @@ class Request:
     repeats: tuple[Path, ...] = ()
     """Other logs of the same configuration under the same conditions: diagnosed together, the first log reported."""
     since: Path | None = None
-    """The log of a good run; what changed since then is told as evidence."""
+    """The log of a good run; what changed since then is told as evidence, and it is the reference."""
+    reference: Path | None = None
+    """A configuration file, or a log, that the operator vouches for: the reference, even before that of `since`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,16 +204,35 @@ def _read(
     from care_core.diagnose.judging import read_and_judge, with_repeats
 
     progress("reading the log", 0.2)
+    good = _good(request, profile)
     judged = read_and_judge(
-        log, profile, configs=configs, thresholds=request.thresholds, mission=request.mission, sha256=sha256
+        log, profile, configs=configs, thresholds=request.thresholds, mission=request.mission, good=good, sha256=sha256
     )
     repeats = []
     for path in request.repeats:
         with opened(path) as (other, digest):
             repeats.append(
-                read_and_judge(other, profile, configs=configs, thresholds=request.thresholds, sha256=digest)
+                read_and_judge(other, profile, configs=configs, thresholds=request.thresholds, good=good, sha256=digest)
             )
     return Reading(profile, choice, configs, with_repeats(judged, repeats))
+
+
+def _good(request: Request, profile: Profile) -> Good | None:
+    """The configuration that the operator vouches for, None where none was named. Raises CareError."""
+    from care_core.configs.driven import readable
+    from care_core.configs.loading import read_configs, resolve
+    from care_core.diagnose.reference import Good
+    from care_core.logs.finding import is_log
+    from care_core.logs.opening import open_log
+
+    path = request.reference or request.since
+    if path is None:
+        return None
+    source = f"the configuration of {path.name}"
+    if request.reference is not None and not is_log(path):
+        parameters = (parameter for option in profile.schema.options for parameter in readable(option))
+        return Good(resolve(read_configs((path,)), parameters), source)
+    return Good({name: history[-1] for name, history in open_log(path).settings().items()}, source)
 
 
 def _diagnose(reading: Reading, health: Health, request: Request, progress: Progress) -> Diagnosis:

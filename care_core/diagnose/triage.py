@@ -66,6 +66,8 @@ class _Case:
     run: Run
     world: World
     reference: Config
+    source: str
+    """Whose the reference is."""
     keep: Collection[str]
     unranked: Mapping[str, tuple[Suspect, ...]]
     """Per objective the options off their reference whose effect the training runs cannot tell, the likeliest first."""
@@ -137,7 +139,7 @@ def diagnose(
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
     assumed = frozenset(v.name for v in schema.options) - frozenset(run.config)
-    case = _Case(profile, choice, run, world, reference, keep, unranked, assumed)
+    case = _Case(profile, choice, run, world, reference, judged.reference.source, keep, unranked, assumed)
     unheard = {result.variable.name: _out_of_reach(case, result) for result in broken}
     faults = tuple(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
@@ -392,6 +394,8 @@ def _promise(world: World, broken: Sequence[str]) -> str:
 
 def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
     notes = list(case.choice.fit.reasons)
+    off = len(deviating(case.world.config, case.reference))
+    notes.append(f"judged against {case.source}: {off} options of this run are off it")
     for name in (result.variable.name for result in broken):
         unknown = ", ".join(suspect.option for suspect in case.unranked[name])
         if unknown:

@@ -49,7 +49,12 @@ Keep = Annotated[
     list[str] | None, typer.Option("--keep", metavar="OPTION", help="Never change this option; may be repeated.")
 ]
 Since = Annotated[
-    Path | None, typer.Option("--since", metavar="GOOD_LOG", help="List what changed since this good run.")
+    Path | None,
+    typer.Option("--since", metavar="GOOD_LOG", help="List what changed since this good run, and judge against it."),
+]
+Reference = Annotated[
+    Path | None,
+    typer.Option("--reference", metavar="FILE", help="Judge against this configuration, a file or a log."),
 ]
 Mission = Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last.")]
 

@@ -19,6 +19,7 @@ from care_tui.commands.arguments import (
     Mission,
     Out,
     ProfileName,
+    Reference,
     Since,
     Thresholds,
     bounds,
@@ -52,6 +53,7 @@ def triage(
     threshold: Thresholds = None,
     mission: Mission = None,
     since: Since = None,
+    reference: Reference = None,
     no_history: NoHistory = False,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
@@ -69,6 +71,7 @@ def triage(
         top=top,
         mission=mission,
         since=since,
+        reference=reference,
     )
     with Progress() as progress:
         case = care_core.triage(request, progress)

@@ -1,0 +1,74 @@
+"""Thresholds that are a multiple of what the reference needs, and whose the reference is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from care_core.diagnose.judging import judge
+from care_core.diagnose.reference import Good
+from care_core.profile.store import Profile
+from care_core.run import Run, Setting
+from care_core.variables import RelativeThreshold, Threshold
+from tests.planted import DEFAULTS, SCHEMA, TIME, planted_run, with_variable
+
+RATIO = RelativeThreshold("<=", 1.3)
+TRAVELLING = with_variable(SCHEMA, replace(TIME, threshold=None, relative=RATIO))
+
+
+def driven(run: Run, default: float) -> Run:
+    """The run, with the default of its speed that its log records."""
+    return replace(run, settings={"SPEED": Setting("SPEED", run.config["speed"], "PARM", default=default)})
+
+
+def test_the_bound_is_a_multiple_of_what_the_reference_needs(planted: Profile) -> None:
+    slow = judge(planted_run(speed=0.4), TRAVELLING, planted.model).results[1]
+    assert slow.need is not None
+    assert slow.threshold == RATIO.for_need(slow.need.value)
+    assert slow.need.low < slow.need.value < slow.need.high
+    fine = judge(planted_run(), TRAVELLING, planted.model).results[1]
+    assert (slow.status, fine.status) == ("fault", "ok")
+    assert fine.need is not None
+    assert fine.need.value == pytest.approx(fine.value, rel=0.1)
+    assert "1.3 x the" in slow.wanted
+    assert slow.is_sure
+
+
+def test_a_value_within_the_interval_of_the_bound_is_not_sure(planted: Profile) -> None:
+    result = judge(planted_run(speed=0.4), TRAVELLING, planted.model).results[1]
+    assert result.need is not None
+    assert result.threshold is not None
+    near = replace(result, value=result.threshold.value * 1.001)
+    assert not near.is_sure
+
+
+def test_an_operators_bound_wins(planted: Profile) -> None:
+    result = judge(planted_run(), TRAVELLING, planted.model, {"time": 50.0}).results[1]
+    assert result.threshold == Threshold("<=", 50.0)
+    assert result.need is None
+    assert result.wanted == "<= 50 s"
+
+
+def test_without_a_model_nothing_is_judged_by_a_need() -> None:
+    assert judge(planted_run(), TRAVELLING, None).results[1].status == "not_evaluated"
+
+
+def test_a_floor_holds_where_the_reference_needs_little() -> None:
+    floored = RelativeThreshold("<=", 1.3, at_least=2.0)
+    assert floored.for_need(1.0) == Threshold("<=", 2.0)
+    assert floored.for_need(3.0) == Threshold("<=", 3.9)
+
+
+def test_the_reference_is_the_operators_then_the_logs_then_the_profiles(planted: Profile) -> None:
+    schema = with_variable(SCHEMA, replace(SCHEMA.variables["speed"], parameters=("SPEED",)))
+    run = planted_run(speed=1.5)
+    ours = judge(run, schema, planted.model).reference
+    assert (ours.config["speed"], ours.source) == (DEFAULTS["speed"], "the profile's reference")
+    logged = judge(driven(run, 1.2), schema, planted.model).reference
+    assert (logged.config["speed"], logged.source) == (1.2, "the defaults that the log records")
+    good = Good({"SPEED": Setting("SPEED", 1.4, "good.param")}, "the configuration of good.param")
+    named = judge(driven(run, 1.2), schema, planted.model, good=good).reference
+    assert (named.config["speed"], named.source) == (1.4, "the configuration of good.param")
+    unacceptable = judge(driven(run, 99.0), schema, planted.model).reference
+    assert unacceptable.config["speed"] == DEFAULTS["speed"]
