@@ -18,6 +18,9 @@ from care_core.diagnose.records import Need
 from care_core.profile.schema import Schema
 from care_core.run import Run, Setting, is_known
 
+FIRMWARE = "PARM"
+"""The record in which a vehicle's log tells its parameters with the firmware's defaults."""
+
 
 @dataclass(frozen=True, slots=True)
 class Good:
@@ -65,13 +68,20 @@ def _given(run: Run, schema: Schema, good: Good | None) -> tuple[dict[str, float
     for option in schema.options:
         setting = option_setting(option, run.settings if good is None else good.settings)
         if setting is not None and good is None:
-            setting = None if setting.default is None else replace(setting, value=setting.default)
+            setting = _by_default(setting)
         value = None if setting is None else option_value(option, setting)
         if value is not None:
             values[option.name] = value
     if good is not None:
         return values, good.source
     return values, "the defaults that the log records" if values else "the profile's reference"
+
+
+def _by_default(setting: Setting) -> Setting | None:
+    """The setting at the default of the vehicle's firmware. A ROS node's own default is no configuration of a robot."""
+    if setting.source != FIRMWARE or setting.default is None:
+        return None
+    return replace(setting, value=setting.default)
 
 
 def need_of(name: str, world: World, reference: Reference) -> Need | None:

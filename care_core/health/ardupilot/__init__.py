@@ -27,10 +27,16 @@ def _plan() -> Wanted:
 READS: Wanted = _plan()
 
 
+_LAST_S = 1.0
+"""Damage so near to the end is the end."""
+
+
 def flight_of(log: Log) -> flight.Flight:
     """The flight that a DataFlash or telemetry log holds."""
     tables = plausible(as_dataflash(log).read(READS))
-    return flight.Flight(tables, log.settings(), log.facts, log.duration_s, log.format is LogFormat.MAVLINK_TLOG)
+    end_s, is_telemetry = log.duration_s, log.format is LogFormat.MAVLINK_TLOG
+    breaks_off = any(damage.time_s is None or damage.time_s >= end_s - _LAST_S for damage in log.damage)
+    return flight.Flight(tables, log.settings(), log.facts, end_s, is_telemetry, breaks_off)
 
 
 def find(of: flight.Flight) -> tuple[Finding, ...]:

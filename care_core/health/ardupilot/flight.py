@@ -72,6 +72,8 @@ class Flight:
     end_s: float
     is_telemetry: bool = False
     """Whether a ground station heard it: then holes are the link's."""
+    breaks_off: bool = False
+    """Whether the log is damaged at its end: what was not yet may still have come."""
     _known: dict[str, tuple[Table, ...]] = field(default_factory=dict, repr=False)
 
     def all(self, name: str, *fields: str) -> tuple[Table, ...]:

@@ -30,7 +30,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     why = max(counts, key=lambda one: counts[one])
     begin = next(t for t, one, _ in refusals if _plain(one) == why)
     asked = any(is_order for _, _, is_order in refusals)
-    severity: Severity = "critical" if asked else "warning"
+    severity: Severity = "critical" if asked and not flight.breaks_off else "warning"
     yield Finding(
         "prearm", f"arming was refused: {why}", begin, last, severity,
         "; ".join(dict.fromkeys(_plain(one) for _, one, _ in lasting)), "MSG", suspect="parameter", probability=0.3,
