@@ -152,7 +152,7 @@ def _judge(path: Path, profile: Profile | None) -> Verdict:
         choose_profile(log, [profile])
     schema = nav2_drive.schema() if profile is None else profile.schema
     run = read_run(log, schema)
-    statuses = {result.status for result in judge(run, schema, None).results}
+    statuses = {result.status for result in judge(run, schema, None if profile is None else profile.model).results}
     if "fault" in statuses:
         return _verdict(ExitCode.FAULT, run.mission)
     return _verdict(ExitCode.NOT_EVALUATED if "not_evaluated" in statuses else ExitCode.OK, run.mission)

@@ -72,3 +72,10 @@ def test_the_reference_is_the_operators_then_the_logs_then_the_profiles(planted:
     assert (named.config["speed"], named.source) == (1.4, "the configuration of good.param")
     unacceptable = judge(driven(run, 99.0), schema, planted.model).reference
     assert unacceptable.config["speed"] == DEFAULTS["speed"]
+
+
+def test_the_default_of_a_ros_node_is_no_reference(planted: Profile) -> None:
+    run = planted_run(radius=0.9)
+    described = Setting("/a/radius", 0.9, "/a/parameter_updates", default=0.6)
+    reference = judge(replace(run, settings={"/a/radius": described}), SCHEMA, planted.model).reference
+    assert (reference.config["radius"], reference.source) == (DEFAULTS["radius"], "the profile's reference")
