@@ -61,7 +61,7 @@ class ObjectiveResult:
         if self.need is None or self.threshold is None or self.variable.relative is None:
             return ""
         need = f"{self.need.value:.3g} {self.variable.unit}".rstrip()
-        if self.threshold.value == self.variable.relative.at_least:
+        if self.threshold.value == self.variable.relative.at_least or self.variable.relative.ratio == 1:
             return f"the reference configuration needs {need} for this mission"
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"
 

@@ -42,10 +42,20 @@ class Stage:
 
 def causes_of(name: str, graph: CausalGraph, schema: Schema, *, contexts: bool = False) -> tuple[str, ...]:
     """The exogenous variables that a mechanism for `name` reads: its option ancestors, and the `contexts` among its
-    ancestors. Where options were chosen by what the run met, contexts are the adjustment and always read."""
+    ancestors. Where options were chosen by what the run met, contexts are the adjustment and always read.
+
+    What ends a mission also bends what is measured in it: the power of a vehicle that lies on its side says that it
+    crashed, not why. So whether a stage is passed is told by what was asked, never by what was met on the way.
+    """
     ancestors = graph.ancestors(name)
-    roles = (Role.OPTION, Role.CONTEXT) if contexts or schema.observational else (Role.OPTION,)
-    return tuple(v.name for v in schema.variables.values() if v.role in roles and v.name in ancestors)
+    ends = schema.variables[name].type == "bool" or schema.variables[name].kind == "functional"
+
+    def is_read(variable: Variable) -> bool:
+        if variable.role is Role.CONTEXT:
+            return schema.observational or (contexts and (variable.about == "mission" or not ends))
+        return variable.role is Role.OPTION
+
+    return tuple(v.name for v in schema.variables.values() if v.name in ancestors and is_read(v))
 
 
 def candidates(name: str, graph: CausalGraph, frame: pd.DataFrame, schema: Schema) -> list[tuple[str, ...]]:
