@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, fitting, open_case, opened, read_case
-from care_core.errors import CareError
+from care_core.application.case import Case, Progress, Request, choose, fitting, open_case, opened, read_case
+from care_core.errors import CareError, LogError
 
 if TYPE_CHECKING:
     from care_core.configs.edit import EditedFile
@@ -29,13 +29,24 @@ def open_log(path: str | Path) -> Log:
 
 
 def inspect(log: str | Path) -> InspectDocument:
-    """What a log holds, and what each installed profile finds in it; nothing is judged. Raises LogError."""
+    """What happened in a log, what it holds, and what each installed profile finds in it; nothing is judged.
+
+    Raises:
+        LogError: the log cannot be read.
+    """
     from care_core.extract.coverage import try_on
     from care_core.extract.select import sound_profiles
+    from care_core.health.examine import examine
     from care_core.report.inspection import build_inspection
+    from care_core.run import Fit, ProfileChoice
 
     found = open_log(log)
-    return build_inspection(found, [try_on(found, profile.schema) for profile in sound_profiles()[0]])
+    trials = [try_on(found, profile.schema) for profile in sound_profiles()[0]]
+    try:
+        choice = choose(found)[1]
+    except LogError as err:  # not a message is left of it, which is worth a look too
+        choice = ProfileChoice("", "", "", "", Fit("no", (err.message.rstrip("."),)))
+    return build_inspection(found, trials, choice, examine(found))
 
 
 def triage(asked: Request | str | Path, progress: Progress = _silent) -> Case:

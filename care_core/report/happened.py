@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
@@ -20,6 +21,9 @@ MOMENTS_SHOWN = 24
 """Lines of the account in text; the document holds all."""
 LED_TO_SHOWN = 4
 HYPOTHESES_SHOWN = 4
+
+
+M = TypeVar("M", bound="Moment | MomentEntry")
 
 
 class _Entry(BaseModel):
@@ -141,22 +145,22 @@ def finding_text(finding: Finding) -> str:
     return f"{finding.title} at {clock(finding.onset_s)}"
 
 
-def account_lines(health: Health, most: int = MOMENTS_SHOWN) -> Iterator[str]:
+def account_lines(account: Sequence[Moment | MomentEntry], robot: str = "", most: int = MOMENTS_SHOWN) -> Iterator[str]:
     """The account as text; of a long one the lines that say most about a failure."""
-    if not health.account:
+    if not account:
         return
-    yield from wrapped(f"What happened{f' ({health.robot})' if health.robot else ''}")
-    told = telling(health.account, most)
+    yield from wrapped(f"What happened{f' ({robot})' if robot else ''}")
+    told = telling(account, most)
     for moment in told:
         yield from wrapped(moment.text, f"  {clock(moment.time_s):>9}  ")
-    if len(told) < len(health.account):
-        yield f"  and {len(health.account) - len(told)} more: 'care inspect' tells all"
+    if len(told) < len(account):
+        yield f"  and {len(account) - len(told)} more: 'care inspect' tells all"
 
 
 _TELLING = ("crash", "failsafe", "error", "arming", "goal", "damage", "mode", "recovery", "message")
 
 
-def telling(account: Sequence[Moment], most: int) -> list[Moment]:
+def telling(account: Sequence[M], most: int) -> list[M]:
     """At most so many moments, in order of time: those of the kinds that say most about a failure stay."""
     if len(account) <= most:
         return list(account)
@@ -165,15 +169,13 @@ def telling(account: Sequence[Moment], most: int) -> list[Moment]:
     return [account[i] for i in sorted(ranked[:most])]
 
 
-def finding_lines(health: Health) -> Iterator[str]:
-    """The findings as text, consequences under what explains them."""
-    if not health.account and not health.findings:
-        return
-    if not health.findings:
+def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
+    """The findings as text, consequences under what explains them; that nothing was found is said plainly."""
+    if not findings:
         yield "Findings: nothing out of the ordinary, as far as this log lets itself be checked"
         return
     yield "Findings, the first cause first"
-    for finding in health.findings:
+    for finding in findings:
         late = ", after the impact" if finding.after_impact else ""
         head = f"  {SEVERITY_WORDS[finding.severity]:<8}  "
         yield from wrapped(f"{finding.title}, at {clock(finding.onset_s)}{late}", head)
@@ -182,7 +184,7 @@ def finding_lines(health: Health) -> Iterator[str]:
         yield from _led_to(finding, " " * len(head))
 
 
-def _led_to(finding: Finding, indent: str) -> Iterator[str]:
+def _led_to(finding: Finding | FindingEntry, indent: str) -> Iterator[str]:
     titles = list(dict.fromkeys(f"{one.title} ({clock(one.onset_s)})" for one in finding.consequences))
     if titles:
         more = f" and {len(titles) - LED_TO_SHOWN} more" if len(titles) > LED_TO_SHOWN else ""

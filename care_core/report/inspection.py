@@ -12,9 +12,21 @@ from typing import Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from care_core.extract.coverage import Missed, Trial
+from care_core.health.records import Health
 from care_core.logs.base import Log
-from care_core.run import Damage, MissionInfo
-from care_core.text import clean
+from care_core.report.happened import (
+    FindingEntry,
+    FitEntry,
+    MomentEntry,
+    account_entries,
+    account_lines,
+    finding_entries,
+    finding_lines,
+    fit_entry,
+    fit_text,
+)
+from care_core.run import Damage, MissionInfo, ProfileChoice
+from care_core.text import clean, wrapped
 
 INSPECT_ID: Final = "care.inspect/1"
 
@@ -110,6 +122,12 @@ class ProfileEntry(_Model):
 
 class InspectDocument(_Model):
     id: Literal["care.inspect/1"] = Field(default=INSPECT_ID, alias="schema")
+    fit: FitEntry
+    """How well the profile fits that fits best."""
+    account: list[MomentEntry]
+    """What happened, in order of time."""
+    findings: list[FindingEntry]
+    """In the order told, the first cause first."""
     log: LogEntry
     channels: list[ChannelEntry]
     parameters: ParameterEntry
@@ -117,7 +135,7 @@ class InspectDocument(_Model):
     """Those that can use the log first, the best of them before the others."""
 
 
-def build_inspection(log: Log, trials: Sequence[Trial]) -> InspectDocument:
+def build_inspection(log: Log, trials: Sequence[Trial], choice: ProfileChoice, health: Health) -> InspectDocument:
     """The document of a log and the installed profiles. Text of the log is made safe to show."""
     ranked = sorted(trials, key=lambda t: (not t.is_usable, -t.coverage.found, t.coverage.schema.name))
     profiles = [_profile(trial) for trial in ranked]
@@ -127,7 +145,15 @@ def build_inspection(log: Log, trials: Sequence[Trial]) -> InspectDocument:
     ]
     parameters = _parameters(log)
     # Last, since a reader tells what it could not decode only after it was asked to.
-    return InspectDocument(log=_log(log), channels=channels, parameters=parameters, profiles=profiles)
+    return InspectDocument(
+        fit=fit_entry(choice.fit),
+        account=account_entries(health),
+        findings=finding_entries(health),
+        log=_log(log),
+        channels=channels,
+        parameters=parameters,
+        profiles=profiles,
+    )
 
 
 def inspection_json(document: InspectDocument) -> str:
@@ -234,7 +260,14 @@ def _missed(missed: Missed) -> MissedEntry:
 def inspection_text(document: InspectDocument) -> str:
     """Lines for a terminal."""
     log = document.log
+    fitting = next((profile.name for profile in document.profiles if profile.usable), "")
     lines = [
+        *wrapped(fit_text("" if document.fit.verdict == "no" else fitting, document.fit)),
+        "",
+        *finding_lines(document.findings),
+        "",
+        *account_lines(document.account, most=len(document.account)),
+        "",
         f"Log         {log.path}",
         f"Format      {log.format}",
         f"Start       {log.start or 'not known (no wall clock)'}",

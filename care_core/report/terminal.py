@@ -24,11 +24,12 @@ CHANGES_SHOWN = 20
 
 def to_text(diagnosis: Diagnosis) -> str:
     """The diagnosis in lines of at most 80 columns (a diff or command may be longer: it is to be copied)."""
+    health = diagnosis.health
     sections = [
         _headline(diagnosis),
         hypothesis_lines(diagnosis.hypotheses),
-        finding_lines(diagnosis.health),
-        account_lines(diagnosis.health),
+        finding_lines(health.findings) if health.account or health.findings else (),
+        account_lines(health.account, health.robot),
         _origin(diagnosis),
         _missions(diagnosis),
         _objectives(diagnosis),
