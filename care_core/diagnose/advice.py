@@ -17,12 +17,17 @@ def believed(fixes: Sequence[Fix], hypotheses: Sequence[Hypothesis]) -> tuple[Fi
     return tuple(replace(fix, p_fixed=fix.p_fixed * (1.0 - broken)) for fix in fixes)
 
 
-def speaks_against(fix: Fix, hypotheses: Sequence[Hypothesis], broken: Sequence[ObjectiveResult]) -> str | None:
-    """Why a fix is not advised, None where it is."""
+def outweighed(hypotheses: Sequence[Hypothesis]) -> str | None:
+    """Why no parameter is to be changed, where something else explains the failure better than all of them together."""
     rival = next((one for one in hypotheses if one.what in ("hardware", "world") and one.name), None)
     parameters = sum(one.probability for one in hypotheses if one.what == "parameter")
-    if rival is not None and rival.probability > parameters:
-        return f"{rival.name} explains this failure better than any parameter: look at that first"
+    if rival is None or rival.probability <= parameters:
+        return None
+    return f"{rival.name}: that explains this failure better than any parameter, look at it first"
+
+
+def falls_short(fix: Fix, broken: Sequence[ObjectiveResult]) -> str | None:
+    """Why a fix is not advised that is less likely than not to repair the run, with what it reaches; None where it is."""
     if fix.p_fixed >= ENOUGH:
         return None
     changes = ", ".join(map(str, fix.changes))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import Config, World
 from care_core.diagnose import provenance
-from care_core.diagnose.advice import believed, speaks_against
+from care_core.diagnose.advice import believed, falls_short, outweighed
 from care_core.diagnose.circumstances import circumstances, unusual
 from care_core.diagnose.evidence import refused_by, said
 from care_core.diagnose.fixes import (
@@ -149,9 +149,9 @@ def diagnose(
     report("searching for a fix", 0.85)
     fixes = believed(_fixes(case, {s.option for group in found.values() for s in group}), hypotheses)
     out_of_reach = next(filter(None, unheard.values()), None)
-    abstained = out_of_reach or _abstains(case, faults, fixes)
+    abstained = out_of_reach or outweighed(hypotheses) or _abstains(case, faults, fixes)
     if abstained is None:
-        abstained = speaks_against(fixes[0], hypotheses, broken)
+        abstained = falls_short(fixes[0], broken)
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     if abstained is None:
         faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from care_core.diagnose.advice import believed, speaks_against
+from care_core.diagnose.advice import believed, falls_short, outweighed
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
 from care_core.variables import Threshold
 from tests.made import LAND_SPEED, TIME, made_diagnosis
@@ -27,21 +27,22 @@ def motor(probability: float) -> tuple[Hypothesis, ...]:
 
 
 def test_a_likely_change_is_advised() -> None:
-    assert speaks_against(fix_with(0.8), ALONE, [LATE]) is None
+    assert outweighed(ALONE) is None
+    assert falls_short(fix_with(0.8), [LATE]) is None
 
 
 def test_a_change_less_likely_than_not_is_named_and_not_advised() -> None:
     fix = replace(fix_with(0.4), predicted={"mission_time": Prediction(118.0, 112.0, 124.0, 0.01)})
-    said = speaks_against(fix, ALONE, [LATE])
+    said = falls_short(fix, [LATE])
     assert said is not None
     assert "land_speed 16 -> 50, has 40%" in said
     assert "mission_time is 90 % sure to reach 124 s, the limit of 100 s is out of reach" in said
 
 
 def test_no_parameter_is_advised_where_a_part_explains_more() -> None:
-    said = speaks_against(fix_with(0.9), motor(0.7), [LATE])
-    assert said == "motor 2 lost thrust explains this failure better than any parameter: look at that first"
-    assert speaks_against(fix_with(0.9), motor(0.3), [LATE]) is None
+    said = "motor 2 lost thrust: that explains this failure better than any parameter, look at it first"
+    assert outweighed(motor(0.7)) == said
+    assert outweighed(motor(0.3)) is None
 
 
 def test_a_part_that_left_no_trace_stops_no_advice() -> None:
@@ -50,7 +51,7 @@ def test_a_part_that_left_no_trace_stops_no_advice() -> None:
         Hypothesis("parameter", "land_speed", 0.3),
         Hypothesis("chance", "", 0.3),
     )
-    assert speaks_against(fix_with(0.9), unseen, [LATE]) is None
+    assert outweighed(unseen) is None
 
 
 def test_what_no_parameter_repairs_comes_off_the_promise() -> None:
