@@ -27,7 +27,7 @@ def outweighed(hypotheses: Sequence[Hypothesis]) -> str | None:
 
 
 def falls_short(fix: Fix, broken: Sequence[ObjectiveResult]) -> str | None:
-    """Why a fix is not advised that is less likely than not to repair the run, with what it reaches; None where it is."""
+    """Why a fix is not advised that is less likely than not to repair the run, with what it reaches, else None."""
     if fix.p_fixed >= ENOUGH:
         return None
     changes = ", ".join(map(str, fix.changes))
