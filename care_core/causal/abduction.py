@@ -51,10 +51,10 @@ def kinship(mechanism: Mechanism, x: FloatArray, here: FloatArray, persistence: 
         x: shape (m, p). here: shape (1, p). persistence: share of the noise variance, 0 to 1.
     """
     noise = mechanism.noise_spread**2
-    unsure = float(mechanism.latent_spread(here)[0] ** 2)
+    variance, covariance, unsure = mechanism.around(x, here)
     return Kinship(
-        variance=mechanism.latent_spread(x) ** 2 + noise,
-        covariance=mechanism.shared(x, here) + persistence * noise,
+        variance=variance + noise,
+        covariance=covariance + persistence * noise,
         here=unsure + noise,
         repeated=unsure + persistence * noise,
     )

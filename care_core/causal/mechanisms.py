@@ -170,15 +170,18 @@ class Mechanism:
         mean: FloatArray = self.scale * (cross @ self.weights)
         return mean + self.known(x) - self.known(here), self._spread(prior, cross)
 
-    def shared(self, x: FloatArray, here: FloatArray) -> FloatArray:
-        """Posterior covariance of the noise-free values at x (m, p) and at here (1, p), shape (m,).
+    def around(self, x: FloatArray, here: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        """What is not known of the noise-free values at x (m, p) and at here (1, p): their posterior variances, shape
+        (m,) and a number, and between them the covariance, shape (m,).
 
         What is not known of the mechanism at one place is partly what is not known at the other.
         """
-        z, origin = self.scaled(x), self.scaled(here)
-        explained = self.kernel(z, self.points) @ (self._inverse @ self.kernel(origin, self.points)[0])
-        covariance: FloatArray = self.scale**2 * (self.kernel(z, origin)[:, 0] - explained)
-        return covariance
+        z = self.scaled(np.vstack([x, here]))
+        cross = self.kernel(z, self.points)
+        half = cross @ self._inverse
+        variance = self.scale**2 * np.maximum(self.kernel.variance - (half * cross).sum(axis=1), 1e-12)
+        covariance: FloatArray = self.scale**2 * (self.kernel(z[:-1], z[-1:])[:, 0] - half[:-1] @ cross[-1])
+        return variance[:-1], covariance, float(variance[-1])
 
     def _spread(self, prior: FloatArray, cross: FloatArray) -> FloatArray:
         explained = ((cross @ self._inverse) * cross).sum(axis=1)
