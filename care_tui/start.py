@@ -1,10 +1,11 @@
-"""Where the command begins: before anything is imported, an interruption ends it without a word."""
+"""Where the command begins: an interruption ends it without a word, whatever it is importing or building then."""
 
 from __future__ import annotations
 
 import signal
 from types import FrameType
 
+_INTERRUPTED = 128 + signal.SIGINT
 _TERMINATED = 128 + signal.SIGTERM
 
 
@@ -15,11 +16,13 @@ def main() -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from care_tui.cli import main as run
 
-    if is_listening:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, _leave)
     try:
+        signal.signal(signal.SIGTERM, _leave)
+        if is_listening:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
         run()
+    except KeyboardInterrupt:  # typer builds its commands before it handles any
+        raise SystemExit(_INTERRUPTED) from None
     finally:
         if is_listening:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
