@@ -8,8 +8,8 @@ from __future__ import annotations
 
 MEBIBYTE = 1 << 20
 
-HELD_BYTES = 32 * MEBIBYTE
-"""Of a log that is held in memory as a whole: a flight of half an hour."""
+HELD_BYTES = 256 * MEBIBYTE
+"""Of a log held in memory as a whole: hours of flight. Of a mapped one, a cut while it is read ends the process."""
 UNPACKED_BYTES, UNPACKED_RATIO = 256 * MEBIBYTE, 32
 """Laser scans pack 5:1, costmaps 30:1 and more, but no log is mostly empty costmaps."""
 CHUNK_BYTES = 128 * MEBIBYTE

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import signal
+import sys
 from types import FrameType
+from typing import Any
 
 _INTERRUPTED = 128 + signal.SIGINT
 _TERMINATED = 128 + signal.SIGTERM
@@ -18,6 +20,7 @@ def main() -> None:
 
     try:
         signal.signal(signal.SIGTERM, _leave)
+        sys.unraisablehook = _once_more
         if is_listening:
             signal.signal(signal.SIGINT, signal.default_int_handler)
         run()
@@ -31,3 +34,13 @@ def main() -> None:
 def _leave(_number: int, _frame: FrameType | None) -> None:
     """End as on an error, so that temporary files go: the system's own way leaves them."""
     raise SystemExit(_TERMINATED)
+
+
+def _once_more(unraisable: Any) -> None:
+    """An interruption that met a callback of the interpreter's own is lost there, so it is sent again."""
+    if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
+        return
+    from threading import Timer, main_thread
+
+    Timer(0.01, signal.pthread_kill, (main_thread().ident, signal.SIGINT)).start()

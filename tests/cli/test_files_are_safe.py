@@ -129,3 +129,30 @@ def test_an_interruption_while_the_commands_are_built_is_no_traceback(monkeypatc
         for number, handler in before.items():
             signal.signal(number, handler)
     assert ended.value.code == ExitCode.INTERRUPTED
+
+
+LOST_IN_A_CALLBACK = """
+import time, weakref
+import care_tui.cli
+
+class Lock: pass
+
+def interrupted(_): raise KeyboardInterrupt
+
+def run():
+    lock = Lock()
+    kept = weakref.ref(lock, interrupted)
+    del lock
+    time.sleep(20)
+
+care_tui.cli.main = run
+from care_tui.start import main
+main()
+"""
+
+
+def test_an_interruption_that_meets_a_callback_is_not_lost() -> None:
+    ended = subprocess.run(
+        [sys.executable, "-c", LOST_IN_A_CALLBACK], capture_output=True, cwd=Path(__file__).parents[2], check=False
+    )
+    assert (ended.returncode, ended.stderr) == (ExitCode.INTERRUPTED, b"")
