@@ -34,6 +34,7 @@ bench: $(DEV)
 
 docs: $(BASE)
 	$(BIN)/python -m care_core.report.extractors docs/extractors.md
+	$(BIN)/python -m benchmarks.documents
 
 profiles: $(DEV)
 	$(BIN)/python -m benchmarks.train_profiles

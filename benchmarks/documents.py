@@ -1,0 +1,112 @@
+"""The commands in README.md and docs/, run as they stand: `make docs` puts in what they print.
+
+python -m benchmarks.documents [FILE...]
+
+A fenced block whose first line begins with `$ ` is a session: its commands run in order, all of one document in one
+empty folder that holds `samples/`, and what each prints follows it, data before talk. A block after the line `<!-- not run: REASON -->`
+is left as it is: it needs a robot, the network or hours.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from care_core.files import bundled, write_atomically
+
+ROOT = Path(__file__).parents[1]
+WRITTEN_ELSEWHERE = {"extractors.md", "walk.md"}
+DOCUMENTS = (
+    ROOT / "README.md",
+    *(path for path in sorted((ROOT / "docs").glob("*.md")) if path.name not in WRITTEN_ELSEWHERE),
+)
+
+_BLOCK = re.compile(r"(?P<before>[^\n]*)\n```[a-z]*\n(?P<session>\$ .*?)^```$", re.DOTALL | re.MULTILINE)
+_NOT_RUN = "<!-- not run"
+_LIMIT_S = 120
+
+
+@dataclass(frozen=True)
+class Session:
+    """A block of commands of a document, at [start, end) of its text."""
+
+    start: int
+    end: int
+    written: str
+
+    @property
+    def commands(self) -> list[str]:
+        """What stands behind the `$ ` of each command; a backslash goes on in the next line."""
+        joined = self.written.replace("\\\n", "\\\0")
+        return [line[2:].replace("\0", "\n") for line in joined.splitlines() if line.startswith("$ ")]
+
+
+def sessions(text: str) -> Iterator[Session]:
+    """The sessions of a document that are run."""
+    for block in _BLOCK.finditer(text):
+        if not block["before"].startswith(_NOT_RUN):
+            yield Session(block.start("session"), block.end("session"), block["session"])
+
+
+def played(session: Session, folder: Path) -> str:
+    """The session with what its commands print in a folder, both streams as a terminal shows them."""
+    lines = []
+    for command in session.commands:
+        lines += [f"$ {command}", printed(command, folder).rstrip("\n")]
+    return "".join(f"{line}\n" for line in lines if line)
+
+
+def printed(command: str, folder: Path) -> str:
+    """What a command prints in a terminal of 80 columns, without what it said of its progress. Raises TimeoutExpired."""
+    environment = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "COLUMNS": "80",
+        "NO_COLOR": "1",
+        "CARE_HISTORY": str(folder / ".history.sqlite"),
+        "XDG_DATA_HOME": str(folder / ".data"),
+        "PYTHONPATH": str(ROOT),
+    }
+    ended = subprocess.run(
+        ("bash", "-c", command), cwd=folder, env=environment, capture_output=True, text=True, encoding="utf-8",
+        stdin=subprocess.DEVNULL, timeout=_LIMIT_S, check=False,
+    )  # fmt: skip
+    talk = [line for line in ended.stderr.splitlines(keepends=True) if not line.rstrip().endswith(" ...")]
+    return ended.stdout + "".join(talk)
+
+
+def prepare(folder: Path) -> None:
+    """What a new user has: the bundled samples."""
+    (folder / "samples").symlink_to(bundled("samples"), target_is_directory=True)
+
+
+def renewed(text: str) -> str:
+    """A document with what its commands print now."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        prepare(folder)
+        parts, done = [], 0
+        for session in sessions(text):
+            parts += [text[done : session.start], played(session, folder)]
+            done = session.end
+        return "".join((*parts, text[done:]))
+
+
+def main(names: list[str]) -> None:
+    """Renew the named documents, or all."""
+    for path in map(Path, names) if names else DOCUMENTS:
+        before = path.read_text(encoding="utf-8")
+        after = renewed(before)
+        if after != before:
+            write_atomically(path, after)
+            print(f"renewed {path}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

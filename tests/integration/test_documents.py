@@ -1,0 +1,32 @@
+"""Every command of README.md and docs/ runs as it stands and prints what stands below it, but for the digits."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from benchmarks.documents import DOCUMENTS, ROOT, played, prepare, sessions
+
+_LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
+
+
+def without_digits(text: str) -> str:
+    """A text whose numbers may differ in their last digits, and with them where its lines wrap."""
+    return " ".join(re.sub(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?", "0", text).split())
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_the_commands_print_what_the_document_says(document: Path, tmp_path: Path) -> None:
+    prepare(tmp_path)
+    for session in sessions(document.read_text(encoding="utf-8")):
+        found = played(session, tmp_path)
+        assert "Traceback" not in found
+        assert without_digits(found) == without_digits(session.written), "make docs renews it"
+
+
+@pytest.mark.parametrize("document", [*DOCUMENTS, ROOT / "ARCHITECTURE.md"], ids=lambda path: path.name)
+def test_links_lead_somewhere(document: Path) -> None:
+    for target in _LINK.findall(document.read_text(encoding="utf-8")):
+        assert (document.parent / target).exists(), target
