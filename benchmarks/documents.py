@@ -3,8 +3,8 @@
 python -m benchmarks.documents [FILE...]
 
 A fenced block whose first line begins with `$ ` is a session: its commands run in order, all of one document in one
-empty folder that holds `samples/`, and what each prints follows it, data before talk. A block after the line `<!-- not run: REASON -->`
-is left as it is: it needs a robot, the network or hours.
+empty folder that holds `samples/`, and what each prints follows it, data before talk. A block after the line
+`<!-- not run: REASON -->` is left as it is: it needs a robot, the network or hours.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def played(session: Session, folder: Path) -> str:
 
 
 def printed(command: str, folder: Path) -> str:
-    """What a command prints in a terminal of 80 columns, without what it said of its progress. Raises TimeoutExpired."""
+    """What a command prints in a terminal of 80 columns, without its progress. Raises TimeoutExpired."""
     environment = {
         **os.environ,
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
