@@ -5,7 +5,7 @@
 1. The ten Husky faults: every column scaled, the slope of the objective on each option alone by the same solver, the
    options of the three largest distinct magnitudes. What it rests on: the predictions that name constant columns.
 2. The TurtleBot 3: its fault files were not published, so only the measures can be recomputed.
-3. The trials of ranks: is the spread of the objective really larger for a higher rank (Levene 1960, about the median)?
+3. The trials of ranks: does the objective really vary more for a higher rank (Levene 1960, about the median)?
 """
 
 from __future__ import annotations
@@ -92,8 +92,8 @@ def ranks(data: Path) -> None:
         frame = pd.read_csv(data / f"care_rank_trials_{stem}.csv")
         for where, trials in frame.groupby("Husky"):
             groups = {str(rank): group[target].to_numpy(dtype=float) for rank, group in trials.groupby("Rank")}
-            spread = ", ".join(f"{rank} {values.std(ddof=1):.3f}" for rank, values in groups.items())
-            print(f"  {stem}, {target}, {where} ({min(len(v) for v in groups.values())} a rank): {spread}")
+            deviation = ", ".join(f"{rank} {values.std(ddof=1):.3f}" for rank, values in groups.items())
+            print(f"  {stem}, {target}, {where} ({min(len(v) for v in groups.values())} a rank): {deviation}")
             for a, b in combinations(groups, 2):
                 p = float(levene(groups[a], groups[b], center="median").pvalue)
                 print(f"    {a} against {b}: p = {p:.3f}{'' if p < LEVEL else ', not supported'}")

@@ -2,9 +2,9 @@
 
     python -m benchmarks.diagnosis --shared DIR [--platform arducopter] [--tables DIR] [--profiles DIR] [--verbose]
 
-`--tables` holds the training runs (made by `care ingest` on the training logs): for the peers, and for the odds of
-training missions held out of graph and mechanisms, which join those of the resets in the calibration error. Every truth
-row says which resets were really flown and which fixed the mission.
+`--tables` holds the training runs (made by `care ingest` on the training logs): for the peers, and for the
+probabilities of training missions held out of graph and mechanisms, which join those of the resets in the calibration
+error. Every truth row says which resets were really flown and which fixed the mission.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from care_core.diagnose.triage import triage
 from care_core.diagnose.worlds import world_of
 from care_core.extract.select import choose_profile
 from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
-from care_core.learn.skill import all_met, calibration_error, held_out_odds, reliability
+from care_core.learn.skill import all_met, calibration_error, held_out_probabilities, reliability
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
 from care_core.logs.opening import open_log
@@ -62,7 +62,7 @@ LOWERED = 0.98
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Odds of training missions by models that had not seen them, and whether they met everything; shape (n,) each."""
+    """Training missions: probability by models that had not seen them, and whether all was met; shape (n,) each."""
 
     care: FloatArray
     plain: FloatArray
@@ -70,14 +70,14 @@ class HeldOut:
 
 
 def held_out(table: Path, schema: Schema, cache: Path) -> HeldOut:
-    """Cross-validated odds, graph and mechanisms learned anew in each fold; kept in `cache` for this table and code."""
+    """Cross-validated probabilities, all learned anew in each fold; kept in `cache` by table and code."""
     code = [path.read_bytes() for room in ("learn", "causal") for path in sorted((CORE / room).glob("*.py"))]
     key = hashlib.sha256(b"".join([table.read_bytes(), repr(schema).encode(), *code])).hexdigest()[:16]
     kept = cache / f"{schema.name}-{key}.npz"
     if not kept.exists():
         frame = read_table(table, schema)
         truth = all_met(frame, schema)
-        odds = held_out_odds(
+        probabilities = held_out_probabilities(
             frame,
             schema,
             lambda runs, rng: learn_structure(runs, schema, rng=rng).graph,
@@ -89,9 +89,9 @@ def held_out(table: Path, schema: Schema, cache: Path) -> HeldOut:
         fold = np.random.default_rng(0).permutation(len(frame)) % FOLDS
         for k in range(FOLDS):
             peer = PlainClassifier(frame[fold != k], truth[fold != k] == 1.0, [o.name for o in schema.options])
-            plain[fold == k] = peer.odds(frame[fold == k].to_dict("records"))
+            plain[fold == k] = peer.probability(frame[fold == k].to_dict("records"))
         cache.mkdir(parents=True, exist_ok=True)
-        np.savez(kept, care=odds["all"], plain=plain, met=truth)
+        np.savez(kept, care=probabilities["all"], plain=plain, met=truth)
     with np.load(kept) as arrays:
         return HeldOut(arrays["care"], arrays["plain"], arrays["met"])
 
@@ -128,7 +128,7 @@ class Tally:
     abstained: int = 0
     too_close: list[str] = field(default_factory=list)
     """Faults that the log shows just inside the threshold."""
-    odds: dict[str, list[float]] = field(default_factory=dict)
+    probabilities: dict[str, list[float]] = field(default_factory=dict)
     outcomes: list[float] = field(default_factory=list)
     """Of the flown resets: met everything, in two missions in a row where the platform is not repeatable."""
     next_outcomes: list[float] = field(default_factory=list)
@@ -230,7 +230,7 @@ def _count(
     tally.faults += 1
     tally.wrong_objectives += [f"{truth['tag']} {line}" for line in objectives_differ(diagnosis, truth, platform)]
     tally.abstained += diagnosis.abstained is not None
-    _count_odds(tally, truth, reference, world, peers)
+    _count_probabilities(tally, truth, reference, world, peers)
     _count_fix(tally, diagnosis, truth)  # of every fault: one without a known fix can be given one that fails
     fixing = [frozenset(options) for options in truth["fixing"]]
     if not fixing:
@@ -266,25 +266,27 @@ def _count_fix(tally: Tally, diagnosis: Diagnosis, truth: Mapping[str, Any]) -> 
         tally.unflown.append(f"{truth['tag']} {'+'.join(sorted(suggested))}")
 
 
-def _count_odds(
+def _count_probabilities(
     tally: Tally,
     truth: Mapping[str, Any],
     reference: Mapping[str, float],
     world: World,
     peers: Peers | None,
 ) -> None:
-    """Predicted odds of every reset that was flown, against whether it met all objectives."""
+    """Predicted probabilities of every reset that was flown, against whether it met all objectives."""
     changed = [{**world.config, **{name: reference[name] for name in row["reset"]}} for row in truth["tried"]]
-    odds = {"care": world.odds(changed)}
+    probabilities = {"care": world.probability(changed)}
     if truth.get("repeatable"):  # what the second failure measured was not kept: it is taken to be like the first
-        odds["care, told of the second failure"] = replace(world, repeats=(world.observed,)).odds(changed)
+        probabilities["care, told of the second failure"] = replace(world, repeats=(world.observed,)).probability(
+            changed
+        )
     if peers is not None:
-        odds["plain classifier"] = peers.classifier.odds(changed)
-        odds["plain classifier, same abduction"] = abducted(peers.classifier, world.config, changed, 1)
+        probabilities["plain classifier"] = peers.classifier.probability(changed)
+        probabilities["plain classifier, same abduction"] = abducted(peers.classifier, world.config, changed, 1)
         if truth.get("repeatable"):
-            odds["plain classifier, told of it too"] = abducted(peers.classifier, world.config, changed, 2)
-    for name, predicted in odds.items():
-        tally.odds.setdefault(name, []).extend(predicted)
+            probabilities["plain classifier, told of it too"] = abducted(peers.classifier, world.config, changed, 2)
+    for name, predicted in probabilities.items():
+        tally.probabilities.setdefault(name, []).extend(predicted)
     tally.outcomes.extend(float(row["ok"]) for row in truth["tried"])
     tally.next_outcomes.extend(_next_outcome(row, truth, world) for row in truth["tried"])
     tally.clusters.extend([truth["tag"]] * len(changed))
@@ -293,10 +295,12 @@ def _count_odds(
 def abducted(
     classifier: PlainClassifier, config: Mapping[str, float], changed: Sequence[Mapping[str, float]], failures: int
 ) -> FloatArray:
-    """The classifier's odds given the failures, as the engine's; nothing is known of the classifier's errors."""
+    """The classifier's probabilities given the failures, as the engine's; nothing is known of its errors."""
     same, ones = UNKNOWN_PERSISTENCE.same, np.ones(len(changed))
     kin = Kinship(variance=ones, covariance=same * ones, here=1.0, repeated=same)
-    return next_passes(kin, classifier.odds(changed), float(classifier.odds([config])[0]), [False] * failures)
+    return next_passes(
+        kin, classifier.probability(changed), float(classifier.probability([config])[0]), [False] * failures
+    )
 
 
 def _next_outcome(row: Mapping[str, Any], truth: Mapping[str, Any], world: World) -> float:
@@ -326,13 +330,13 @@ def show(platform: str, tally: Tally) -> None:
           f"median changes {median:g}; abstained {tally.abstained}")  # fmt: skip
     if tally.unflown:
         print(f"  suggested sets that nobody flew: {', '.join(tally.unflown)}")
-    _show_odds(tally)
+    _show_probabilities(tally)
 
 
-def _show_odds(tally: Tally) -> None:
-    """By part, never pooled: odds of a failed run's resets and odds of new missions are different promises."""
-    for name, odds in tally.odds.items():
-        p, clusters = np.array(odds), np.array(tally.clusters)
+def _show_probabilities(tally: Tally) -> None:
+    """By part, never pooled: a failed run's resets and new missions are different promises."""
+    for name, predicted_all in tally.probabilities.items():
+        p, clusters = np.array(predicted_all), np.array(tally.clusters)
         parts = {"flown resets": (p, np.array(tally.outcomes), clusters)}
         if tally.next_outcomes != tally.outcomes:
             parts["flown resets, next mission alone"] = (p, np.array(tally.next_outcomes), clusters)
@@ -341,7 +345,7 @@ def _show_odds(tally: Tally) -> None:
             parts["held-out missions"] = (kept, tally.held_out.met, np.arange(len(kept)).astype(str))
         for what, (predicted, met, groups) in parts.items():
             errors = f"{_with_interval(calibration_error, predicted, met, groups)}"
-            print(f"  odds, {name}, {len(predicted)} {what}: calibration error {errors}, "
+            print(f"  probabilities, {name}, {len(predicted)} {what}: calibration error {errors}, "
                   f"Brier {_with_interval(brier, predicted, met, groups)}")  # fmt: skip
             if name == "care":
                 print("    predicted  met    n")
@@ -377,7 +381,7 @@ def main() -> None:
     parser.add_argument("--verbose", action="store_true", help="one line a fault")
     parser.add_argument("--profiles", type=Path, help="folder of profiles to judge; default: the bundled ones")
     parser.add_argument("--cache", type=Path, default=Path(tempfile.gettempdir()) / "care-benchmarks",
-                        help="where cross-validated odds are kept")  # fmt: skip
+                        help="where cross-validated probabilities are kept")  # fmt: skip
     args = parser.parse_args()
     for platform in args.platform or PLATFORMS:
         profile = load_profile(platform if args.profiles is None else args.profiles / platform)

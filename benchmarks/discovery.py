@@ -39,8 +39,8 @@ class Pearson(FisherZ):
 
     def __init__(self, data: FloatArray) -> None:
         super().__init__(data)
-        spread = np.nanstd(data, axis=0)
-        self._scores = (data - np.nanmean(data, axis=0)) / np.where(spread > 0, spread, 1.0)
+        sd = np.nanstd(data, axis=0)
+        self._scores = (data - np.nanmean(data, axis=0)) / np.where(sd > 0, sd, 1.0)
 
 
 class WithMagnitudes:

@@ -24,7 +24,7 @@ from care_core.profile.schema import Schema, read_schema
 from care_core.run import Value, is_known
 
 PROFILES = Path(__file__).resolve().parent.parent / "profiles"
-Row = Mapping[str, str]
+TruthRow = Mapping[str, str]
 
 
 class Check(NamedTuple):
@@ -109,7 +109,7 @@ def check_move_base(data: Path, limit: int | None = None) -> None:
     print_agreement(rows, values, MOVE_BASE)
 
 
-def count_wrong_options(path: Path, row: Row, schema: Schema) -> int:
+def count_wrong_options(path: Path, row: TruthRow, schema: Schema) -> int:
     """Options whose last value in the log is not the one that was driven."""
     settings = open_log(path).settings()
     driven = {option.name: settings[option.parameters[0]][-1].value for option in schema.options}
@@ -143,7 +143,7 @@ def read_rows(table: Path) -> list[dict[str, str]]:
 
 
 def print_agreement(
-    rows: Sequence[Row],
+    rows: Sequence[TruthRow],
     values: Sequence[Mapping[str, Value]],
     checks: Sequence[Check],
     say: Callable[[str], None] = print,

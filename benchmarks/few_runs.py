@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks.diagnosis import PLATFORMS, Peers, Tally, evaluate, table_of
 from care_core.learn.table import read_table
-from care_core.learn.train import Settings, train
+from care_core.learn.train import TrainSettings, train
 from care_core.profile.model import write_model
 from care_core.profile.store import PROFILE_FILE, Profile, load_profile
 
@@ -34,7 +34,7 @@ def tally_of(profile: Profile, table: Path, size: int, seed: int, shared: Path) 
     rows = np.random.default_rng([seed, size]).choice(len(frame), min(size, len(frame)), replace=False)
     subset = frame.iloc[np.sort(rows)].reset_index(drop=True)
     started = time.monotonic()
-    model = train(subset, profile.schema, Settings(seed=seed, resamples=RESAMPLES, folds=0))
+    model = train(subset, profile.schema, TrainSettings(seed=seed, resamples=RESAMPLES, folds=0))
     seconds = time.monotonic() - started
     with tempfile.TemporaryDirectory() as scratch:
         shutil.copy(profile.path / PROFILE_FILE, scratch)

@@ -43,7 +43,7 @@ def next_noise(noise: Mapping[str, float], rng: np.random.Generator) -> dict[str
 def measure(runs: int, faults: int) -> None:
     """Train on `runs` missions, diagnose `faults` failed ones, fly their fixes and print what came of them."""
     rng = np.random.default_rng(runs)
-    odds, fixed, reset, sizes, nearer = [], [], [], [], 0
+    promised, fixed, reset, sizes, nearer = [], [], [], [], 0
     abstained = seen = 0
     with tempfile.TemporaryDirectory() as scratch:
         write_model(train(fly_many(runs), SCHEMA, SETTINGS), Path(scratch))
@@ -59,12 +59,12 @@ def measure(runs: int, faults: int) -> None:
                 continue
             after = next_noise(noise, rng)
             changes = {change.option.name: change.suggested for change in fix.changes}
-            odds.append(fix.p_fixed)
+            promised.append(fix.p_fixed)
             fixed.append(meets_all({**config, **changes}, after))
             reset.append(meets_all({**config, **{name: DEFAULTS[name] for name in changes}}, after))
             sizes.append(len(changes))
             nearer += any(value != DEFAULTS[name] for name, value in changes.items())
-    p, met = np.array(odds), np.array(fixed, dtype=float)
+    p, met = np.array(promised), np.array(fixed, dtype=float)
     print(f"\ntrained on {runs} missions: {seen} faults, {abstained} abstained, median changes {np.median(sizes):g}")
     print(f"  suggested values that fixed the fault: {met.mean():.2f} (promised {p.mean():.2f}); "
           f"the same options at their reference: {np.mean(reset):.2f}; {nearer} nearer to the run's")  # fmt: skip

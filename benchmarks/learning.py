@@ -35,7 +35,7 @@ from care_core.learn.bootstrap import support
 from care_core.learn.constraints import ALWAYS
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
-from care_core.learn.train import Settings, train
+from care_core.learn.train import TrainSettings, train
 from care_core.profile.schema import Schema, read_schema
 from tests.simulated import simulate
 
@@ -92,12 +92,12 @@ def runs(shared: Path, limit: float) -> None:
 
 
 def _training(part: str, frame: pd.DataFrame, schema: Schema) -> None:
-    resamples = Settings().resamples
+    resamples = TrainSettings().resamples
     print(f"{part}: {len(schema.options)} options, {len(schema.contexts)} contexts, {len(schema.metrics)} metrics, "
           f"{len(schema.objectives)} objectives x {len(frame)} runs")  # fmt: skip
     steps: list[tuple[str, float]] = []
     with _measured(f"whole training, {resamples} resamples, {JOBS} processes") as took:
-        train(frame, schema, Settings(n_jobs=JOBS), lambda step, _share: steps.append((step, time.monotonic())))
+        train(frame, schema, TrainSettings(n_jobs=JOBS), lambda step, _share: steps.append((step, time.monotonic())))
         steps.append(("", time.monotonic()))
     for (step, began), (_, ended) in pairwise(steps):
         print(f"    {step}: {ended - began:.1f} s")

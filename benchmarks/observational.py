@@ -4,12 +4,12 @@
 
 Simulated robots (`tests/robots.py`) whose table was not randomised: three options follow the wind, which also moves a
 metric that the objectives hang on. Once the wind is a context in the table, once no column holds it. Asked of 12 failed
-runs a robot: does the reset of the first-ranked option really help (odds of meeting everything rise by half of what the
-best single reset gives, at least 0.1), and how far are the predicted odds of every single reset from the true ones
-(1000 simulated missions each, the option set by intervention)? A reset is named only where its predicted odds reach
-those below which `care` abstains; "wrong" ones would have cost a field day, "fooled" are those of them that the wind
-chose. Where an option whose effect is not identified is as likely a cause, `care` names none and asks for a run with it
-changed: "asks well" counts those that really help.
+runs a robot: does the reset of the first-ranked option really help (the probability of meeting everything rises by half
+of what the best single reset gives, at least 0.1), and how far is the predicted probability of every single reset from
+the true one (1000 simulated missions each, the option set by intervention)? A reset is named only where its predicted
+probability reaches those below which `care` abstains; "wrong" ones would have cost a field day, "fooled" are those of
+them that the wind chose. Where an option whose effect is not identified is as likely a cause, `care` names none and
+asks for a run with it changed: "asks well" counts those that really help.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from care_core.causal.counterfactual import World
 from care_core.causal.model import Model
 from care_core.diagnose.ranking import deviating, suspects
 from care_core.diagnose.reference import profile_config
-from care_core.diagnose.triage import MIN_ODDS
+from care_core.diagnose.triage import MIN_PROBABILITY
 from care_core.learn.baselines import PlainClassifier
 from care_core.learn.outcomes import met
-from care_core.learn.train import Settings, train
+from care_core.learn.train import TrainSettings, train
 from care_core.profile.schema import Schema
 from tests.robots import Chosen, Robot, declared_random, random_robot
 
@@ -51,21 +51,21 @@ class Score:
     asked_well: int = 0
     misses: list[float] = field(default_factory=list)
     swayed_misses: list[float] = field(default_factory=list)
-    """Errors of the odds, over the options that followed the wind."""
+    """Errors of the probabilities, over the options that followed the wind."""
 
 
 class Answer(NamedTuple):
-    """Options, the likeliest cause first, the odds of resetting each, and the option that a run would have to tell."""
+    """Options, the likeliest cause first, the probability after resetting each, and what a run would have to tell."""
 
     ranking: list[str]
-    odds: dict[str, float]
+    probabilities: dict[str, float]
     asks: str | None = None
 
 
 class _Care:
     def __init__(self, frame: pd.DataFrame, schema: Schema, seed: int) -> None:
         self.schema = schema
-        self.model: Model = train(frame, schema, Settings(seed=seed, resamples=0, folds=0, n_jobs=1))
+        self.model: Model = train(frame, schema, TrainSettings(seed=seed, resamples=0, folds=0, n_jobs=1))
         self.bounds = {o.name: o.threshold for o in schema.objectives if o.threshold is not None}
         self.refused = {option for (option, objective), effect in self.model.effects.items() if not effect.identified}
 
@@ -85,11 +85,11 @@ class _Care:
                     kind[suspect.option] = max(kind.get(suspect.option, 0.0), suspect.contribution)
         fresh = World(self.model, config, {}, self.bounds)
         asked = [name for name in deviating(config, here) if name not in self.refused]
-        odds = fresh.odds([{**config, name: here[name]} for name in asked]) if asked else np.zeros(0)
+        probabilities = fresh.probability([{**config, name: here[name]} for name in asked]) if asked else np.zeros(0)
         asks = max(unknown, key=unknown.__getitem__, default=None)
         asks = asks if asks is not None and unknown[asks] > max(best.values(), default=0.0) else None
         ranking = [] if asks else sorted(best, key=lambda name: -best[name])
-        return Answer(ranking, dict(zip(asked, odds.tolist(), strict=True)), asks)
+        return Answer(ranking, dict(zip(asked, probabilities.tolist(), strict=True)), asks)
 
 
 def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
@@ -108,19 +108,19 @@ def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
         run = {str(k): float(v) for k, v in row.items()}
         config = {name: run[name] for name in options}
         off = deviating(config, {name: reference[name] for name in options})
-        truth = {name: _true_odds(robot, {**config, name: reference[name]}, run) for name in off}
-        worth = max(truth.values()) - _true_odds(robot, config, run)
-        helps = {name for name in off if truth[name] - _true_odds(robot, config, run) >= max(WORTH, worth / 2)}
+        truth = {name: _true_probability(robot, {**config, name: reference[name]}, run) for name in off}
+        worth = max(truth.values()) - _true_probability(robot, config, run)
+        helps = {name for name in off if truth[name] - _true_probability(robot, config, run) >= max(WORTH, worth / 2)}
         answers = {name: engine.answer(run, reference) for name, engine in engines.items()}
-        predicted = plain.odds([{**config, name: reference[name]} for name in off])
-        odds_of = dict(zip(off, predicted.tolist(), strict=True))
-        answers[METHODS[2]] = Answer(plain.rank(config, reference, off), odds_of)
-        for name, (ranking, odds, asks) in answers.items():
+        predicted = plain.probability([{**config, name: reference[name]} for name in off])
+        promised = dict(zip(off, predicted.tolist(), strict=True))
+        answers[METHODS[2]] = Answer(plain.rank(config, reference, off), promised)
+        for name, (ranking, promised, asks) in answers.items():
             score = scores[name]
-            score.misses += [abs(odds[option] - truth[option]) for option in odds]
-            score.swayed_misses += [abs(odds[o] - truth[o]) for o in odds if o in robot.swayed]
+            score.misses += [abs(promised[option] - truth[option]) for option in promised]
+            score.swayed_misses += [abs(promised[o] - truth[o]) for o in promised if o in robot.swayed]
             if helps:
-                named = ranking[0] if ranking and odds[ranking[0]] >= MIN_ODDS else None
+                named = ranking[0] if ranking and promised[ranking[0]] >= MIN_PROBABILITY else None
                 score.asked += 1
                 score.right += named in helps
                 score.wrong += named is not None and named not in helps
@@ -129,7 +129,7 @@ def compare(chosen: Chosen, seed: int, n: int) -> dict[str, Score]:
     return scores
 
 
-def _true_odds(robot: Robot, config: Mapping[str, float], run: Mapping[str, float]) -> float:
+def _true_probability(robot: Robot, config: Mapping[str, float], run: Mapping[str, float]) -> float:
     """Share of missions that meet everything, options set, in this run's wind where the table holds it."""
     frame = robot.drive(TRUTH, np.random.default_rng(7), config, run.get("wind"))
     return float(
@@ -140,7 +140,7 @@ def _true_odds(robot: Robot, config: Mapping[str, float], run: Mapping[str, floa
 def show(title: str, parts: list[dict[str, Score]]) -> None:
     print(f"\n{title}")
     print(f"  {'method':30s} {'faults':>6s} {'right':>6s} {'wrong':>6s} {'fooled':>7s} {'no answer':>10s} "
-          f"{'asks well':>10s} {'odds error':>11s} {'swayed':>7s}")  # fmt: skip
+          f"{'asks well':>10s} {'p error':>11s} {'swayed':>7s}")  # fmt: skip
     for name in METHODS:
         mine = [part[name] for part in parts]
         asked, right, wrong, fooled, well = (

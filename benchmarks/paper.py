@@ -3,7 +3,7 @@
     python -m benchmarks.paper --shared DIR [--splits 5]
 
 1. `care evaluate husky-care`: the ten Husky faults, beside cooperative bug isolation and the published predictions.
-2. The energy experiment: how much the objective spreads when only the options of one rank are varied, in a model that
+2. The energy experiment: how much the objective varies when only the options of one rank are varied, in a model that
    is trained on the 399 runs with every option in it, and how often resampled runs give the same order.
 3. Transfer: `care update` with 0 to 300 runs of the TurtleBot 3, judged on 100 others.
 """
@@ -62,19 +62,25 @@ def rank_order(profile: Profile, frame: pd.DataFrame) -> None:
         x, y = frame[options].to_numpy(dtype=float), frame[target].to_numpy(dtype=float)
         rng = np.random.default_rng(0)
         mechanism = fit_mechanism(x, y, inputs_of(options, profile.schema), binary=binary, rng=rng, effort=OUTCOME)
-        spread = {rank: _spread(mechanism, of_rank(names, profile), profile, rng) for rank, names in ranks.items()}
+        deviation = {
+            rank: _deviation(mechanism, of_rank(names, profile), profile, rng) for rank, names in ranks.items()
+        }
         share = {rank: _explained(frame, of_rank(names, profile), target) for rank, names in ranks.items()}
         rows = [frame.iloc[rng.integers(0, len(frame), len(frame))] for _ in range(RESAMPLES)]
         drawn = [[_explained(row, of_rank(names, profile), target) for names in ranks.values()] for row in rows]
         same = float(np.mean([a > b > c for a, b, c in drawn]))
-        print(f"\n{title} ({target}): spread when only the options of one rank vary, all options in the model")
+        print(
+            f"\n{title} ({target}): standard deviation when only the options of one rank vary, all options in the model"
+        )
         for rank, names in ranks.items():
-            print(f"  rank {rank}  {spread[rank]:8.3f}  rank variance explained {share[rank]:6.3f}  {', '.join(names)}")
+            print(
+                f"  rank {rank}  {deviation[rank]:8.3f}  rank variance explained {share[rank]:6.3f}  {', '.join(names)}"
+            )
         print(f"  variance explained falls from rank 1 to 4 in {same:.0%} of {RESAMPLES} resamples")
     print("  the published trials support only energy's rank 1 against 4 and 3 against 4 (benchmarks.artifact, Levene)")
 
 
-def _spread(mechanism: Mechanism, names: Sequence[str], profile: Profile, rng: np.random.Generator) -> float:
+def _deviation(mechanism: Mechanism, names: Sequence[str], profile: Profile, rng: np.random.Generator) -> float:
     """Standard deviation of the predicted objective with the named options drawn over their ranges."""
     variables = profile.schema.variables
     row = np.array([float(variables[name].default or 0.0) for name in mechanism.inputs])
@@ -144,7 +150,7 @@ def _all_options(profile: Profile, frame: pd.DataFrame) -> dict[str, Mechanism]:
 def _effects(
     mechanisms: Mapping[str, Mechanism], frame: pd.DataFrame, profile: Profile
 ) -> dict[tuple[str, str], float]:
-    """Eq. 1 of every (option, objective) over the target's values, in spreads of the objective."""
+    """Eq. 1 of every (option, objective) over the target's values, in standard deviations of the objective."""
     effects = {}
     for name, key in MECHANISM.items():
         mechanism = mechanisms[key]
@@ -158,8 +164,8 @@ def _effects(
                 [mechanism.expected(_held(background, mechanism, option.name, v)).mean() for v in levels]
             )
             pairs = np.abs(response[:, None] - response[None, :])
-            spread = float(frame[name].std()) or 1.0
-            effects[option.name, name] = float(pairs.sum() / (len(levels) * (len(levels) - 1)) / spread)
+            deviation = float(frame[name].std()) or 1.0
+            effects[option.name, name] = float(pairs.sum() / (len(levels) * (len(levels) - 1)) / deviation)
     return effects
 
 

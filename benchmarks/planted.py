@@ -33,7 +33,7 @@ from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Cause, Diagnosis
 from care_core.diagnose.triage import diagnose
 from care_core.learn.baselines import PlainClassifier
-from care_core.learn.train import Settings, train
+from care_core.learn.train import TrainSettings, train
 from care_core.profile.model import write_model
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
@@ -175,7 +175,9 @@ def measure(world: Planted, seed: int, runs: int, faults: int) -> Score:
         rng = np.random.default_rng([seed, WORLDS.index(world)])
         frame = training_table(world, runs, rng)
         schema = world.schema
-        write_model(train(frame, schema, Settings(seed=seed, resamples=RESAMPLES, folds=0, n_jobs=1)), Path(folder))
+        write_model(
+            train(frame, schema, TrainSettings(seed=seed, resamples=RESAMPLES, folds=0, n_jobs=1)), Path(folder)
+        )
         profile = Profile(Path(folder), schema)
         met = (frame["success"] == 1) & (frame["time"] <= 135)
         plain = PlainClassifier(frame, met.to_numpy(), OPTIONS, seed)

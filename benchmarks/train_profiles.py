@@ -19,7 +19,7 @@ from pathlib import Path
 from care_core.files import bundled
 from care_core.learn.card import model_card
 from care_core.learn.table import read_table
-from care_core.learn.train import Settings, train
+from care_core.learn.train import TrainSettings, train
 from care_core.logs.finding import find_logs
 from care_core.profile.model import write_model
 from care_core.profile.schema import Schema, read_schema
@@ -111,7 +111,7 @@ def main() -> None:
             place = args.tables or Path(scratch)
             place.mkdir(parents=True, exist_ok=True)
             frame = read_table(runs_table(SOURCES[name], schema, args.shared, place), schema)
-        settings = Settings(resamples=args.resamples, origin=SOURCES[name].origin)
+        settings = TrainSettings(resamples=args.resamples, origin=SOURCES[name].origin)
         model = train(frame, schema, settings, lambda step, _share: print(f"  {step}", flush=True))
         write_model(model, folder)
         (folder / "MODEL_CARD.md").write_text(model_card(schema, model), encoding="utf-8")

@@ -67,7 +67,7 @@ class LeftOut:
     need_error: dict[str, FloatArray]
     """Logarithm of what the reference flight took over what was said that it needs."""
     need_inside: dict[str, FloatArray]
-    odds: FloatArray
+    predicted: FloatArray
     plain: FloatArray
 
 
@@ -88,7 +88,7 @@ def left_out(frame: pd.DataFrame, schema: Schema, folds: int) -> LeftOut:
     return LeftOut(
         joined([p.distance for p in parts]), by_name([p.error for p in parts]), by_name([p.inside for p in parts]),
         by_name([p.need_error for p in parts]), by_name([p.need_inside for p in parts]),
-        joined([p.odds for p in parts]), joined([p.plain for p in parts]),
+        joined([p.predicted for p in parts]), joined([p.plain for p in parts]),
     )  # fmt: skip
 
 
@@ -120,7 +120,7 @@ def _asked(
     found = LeftOut(distance, error, inside, need_error, need_inside, np.full(n, np.nan), np.full(n, np.nan))
     reference = {v.name: v.default for v in schema.options if v.default is not None}
     configs = [{str(k): float(v) for k, v in row.items()} for row in filled.to_dict("records")]
-    found.plain = peer.odds(configs)
+    found.plain = peer.probability(configs)
     for i, config in enumerate(configs):
         there = {**config, **reference}
         before = World(model, config, {}, {})
@@ -130,7 +130,7 @@ def _asked(
             if objective.relative is not None and objective.name in model.outcomes:
                 need = float(before.predict(objective.name, [there]).value[0])
                 bounds[objective.name] = objective.relative.for_need(need)
-        found.odds[i] = World(model, config, {}, bounds).odds([config])[0]
+        found.predicted[i] = World(model, config, {}, bounds).probability([config])[0]
         for name in MEASURED:
             value = rows[name].iloc[i]
             if not value > 0:
@@ -169,9 +169,9 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
             cells.append(
                 f"{np.sqrt(np.mean(found.error[name][known] ** 2)):9.1%} {found.inside[name][known].mean():8.0%}"
             )
-        for odds in (found.odds, found.plain):
-            brier = float(((odds[part] - truth[part]) ** 2).mean())
-            cells.append(f"{calibration_error(odds[part], truth[part]):9.3f} {brier:7.3f}")
+        for predicted in (found.predicted, found.plain):
+            brier = float(((predicted[part] - truth[part]) ** 2).mean())
+            cells.append(f"{calibration_error(predicted[part], truth[part]):9.3f} {brier:7.3f}")
         print(f"  {low:4.1f} to {high:4.1f} ({part.sum():4d})    {'    '.join(cells)}")
     for name in MEASURED:
         known = np.isfinite(found.need_error[name])
@@ -179,8 +179,8 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
         print(f"  what the reference needs, {name}: rms {np.sqrt(np.mean(error**2)):.1%}, "
               f"in its 80 % interval {found.need_inside[name][known].mean():.0%}, n {known.sum()}")  # fmt: skip
     print("    predicted  met    n")
-    for predicted, seen, count in reliability(found.odds, truth):
-        print(f"    {predicted:9.2f} {seen:4.2f} {count:4d}")
+    for p, seen, count in reliability(found.predicted, truth):
+        print(f"    {p:9.2f} {seen:4.2f} {count:4d}")
 
 
 # --- faults whose resets were flown -----------------------------------------------------------------------------
@@ -197,7 +197,7 @@ class Faults:
     advised: int = 0
     flown: int = 0
     confirmed: int = 0
-    odds: dict[str, list[float]] = field(default_factory=dict)
+    predicted: dict[str, list[float]] = field(default_factory=dict)
     kept: list[float] = field(default_factory=list)
     limits: list[float] = field(default_factory=list)
     """Logarithm of the true limit of time or energy over the one in force."""
@@ -243,9 +243,9 @@ def _count(
         found.flown += suggested in outcome
         found.confirmed += outcome.get(suggested, False)
     changed = [{**world.config, **{name: reference[name] for name in row["reset"]}} for row in tried]
-    found.odds.setdefault("care", []).extend(world.odds(changed))
-    found.odds.setdefault("plain classifier", []).extend(peer.odds(changed))
-    found.odds.setdefault("plain, same abduction", []).extend(abducted(peer, world.config, changed, 1))
+    found.predicted.setdefault("care", []).extend(world.probability(changed))
+    found.predicted.setdefault("plain classifier", []).extend(peer.probability(changed))
+    found.predicted.setdefault("plain, same abduction", []).extend(abducted(peer, world.config, changed, 1))
     found.kept.extend(float(row["ok"]) for row in tried)
     limits: Mapping[str, float] = truth["limits"]  # type: ignore[assignment]
     for name, key in (("mission_time", "armed_time_s"), ("energy", "energy_wh")):
@@ -261,9 +261,9 @@ def show_faults(found: Faults) -> None:
     print(f"  fixes advised {found.advised}, flown as resets {found.flown}, confirmed {found.confirmed}")
     rms = float(np.sqrt(np.mean(np.square(found.limits))))
     print(f"  limits of accomplished missions, time and energy, against the true ones: rms {rms:.1%}")
-    for name, odds in found.odds.items():
-        p = np.array(odds)
-        print(f"  odds of {len(p)} resets, {name}: calibration error {calibration_error(p, kept):.3f}, "
+    for name, predicted in found.predicted.items():
+        p = np.array(predicted)
+        print(f"  probabilities of {len(p)} resets, {name}: calibration error {calibration_error(p, kept):.3f}, "
               f"Brier {((p - kept) ** 2).mean():.3f}")  # fmt: skip
 
 

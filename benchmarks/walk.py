@@ -49,8 +49,10 @@ WALK = (
     Step(
         ("Enter",), "Confidence", "What caused it? The path from the option to the objective, with this run's values."
     ),
-    Step(("Enter",), "as driven", "What to change, and what that is predicted to bring. As driven, the odds are poor."),
-    Step(("=", "20", "Enter"), "16 → 20", "What if it were 20? The odds follow: that is not enough."),
+    Step(
+        ("Enter",), "as driven", "What to change, and what that is predicted to bring. As driven, little speaks for it."
+    ),
+    Step(("=", "20", "Enter"), "16 → 20", "What if it were 20? The probability follows: that is not enough."),
     Step(("u",), "as driven", "u takes it back."),
     Step(("Enter",), "Commands that do it", "What would change in the configuration, and how to change it."),
     Step(("Enter",), "schema: care.triage", "The report as it will be written; f turns it into Markdown."),

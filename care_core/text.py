@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 import unicodedata
 
@@ -28,3 +29,19 @@ def wrapped(text: str, first: str = "", rest: str | None = None) -> list[str]:
     not given."""
     indent = " " * len(first) if rest is None else rest
     return textwrap.wrap(clean(text), WIDTH, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+
+
+def clock(time_s: float | None) -> str:
+    """A time of a log to the second, 02:13, from an hour on 1:02:13."""
+    if time_s is None or not math.isfinite(time_s):
+        return "an unknown time"
+    minutes, seconds = divmod(round(time_s), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes:02}:{seconds:02}"
+
+
+def seconds(time_s: float | None) -> str:
+    """A time of a log as exact as an operator needs it: 61.3 s, from ten minutes on 12:05."""
+    if time_s is None or not math.isfinite(time_s):
+        return "?"
+    return f"{time_s:.1f} s" if abs(time_s) < 600 else f"{int(time_s // 60)}:{int(time_s % 60):02d}"

@@ -86,7 +86,7 @@ class Session:
         return values
 
     def alone(self) -> dict[tuple[str, float], float]:
-        """Odds of keeping all thresholds with one option alone at a value: the one suggested for it as a cause."""
+        """Probability of keeping all thresholds with one option alone at the value suggested for it as a cause."""
         causes = [cause for fault in self.diagnosis.faults for cause in fault.causes]
         return {
             (c.option.name, c.suggested): c.p_fixed for c in causes if not (c.suggested is None or c.p_fixed is None)

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from care_core.learn.train import Settings
+from care_core.learn.train import TrainSettings
 from care_core.profile.schema import Schema
 from care_core.run import LogInfo, MissionInfo, Run, Unavailable, Value
 from care_core.variables import Role, Threshold, Variable
@@ -61,7 +61,7 @@ DEFAULTS = {v.name: float(v.default or 0.0) for v in OPTIONS}
 NOISE = ("sats", "speed", "error", "replans", "hold", "sag", "time", "energy")
 CALM = dict.fromkeys(NOISE, 0.0)
 MISSED = float("nan")
-SETTINGS = Settings(resamples=3, n_jobs=1, origin="simulated")
+SETTINGS = TrainSettings(resamples=3, n_jobs=1, origin="simulated")
 
 
 def fly(config: Mapping[str, float], noise: Mapping[str, float]) -> dict[str, float]:

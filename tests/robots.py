@@ -162,9 +162,9 @@ def random_robot(
         laws |= {(before, m): law(("line", "bend")) for before in flight[:j] if rng.random() < 1 / metrics}
     if refusals:
         laws["option_0", "armed"] = Law("line", -3.0)
-    carriers = rng.permutation(flight).tolist()
-    laws |= {(m, "time"): Law("line", float(rng.uniform(0.5, 0.9))) for m in carriers[:2]}
-    laws |= {(m, "success"): Law("line", float(-rng.uniform(0.5, 0.9))) for m in carriers[1:3]}
+    mediators = rng.permutation(flight).tolist()
+    laws |= {(m, "time"): Law("line", float(rng.uniform(0.5, 0.9))) for m in mediators[:2]}
+    laws |= {(m, "success"): Law("line", float(-rng.uniform(0.5, 0.9))) for m in mediators[1:3]}
     together = ((names[-1], names[-2], flight[-1]),)
     directed = set(laws) | {(option, metric) for a, b, metric in together for option in (a, b)}
     if refusals:
@@ -173,7 +173,7 @@ def random_robot(
     coded = {names[3]} if options > 3 else set()
     swayed: tuple[str, ...] = ()
     if chosen != "at random":
-        target = carriers[1]
+        target = mediators[1]
         swayed = (*names[:3], target)
         for name in swayed[:-1]:
             laws.setdefault((name, target), Law("line", 0.15))

@@ -50,9 +50,9 @@ def train_profile(runs: Path, schema_path: Path, out: Path, *, seed: int, resamp
     schema = read_schema(schema_path)
     with _learning():
         from care_core.learn.table import read_table
-        from care_core.learn.train import Settings, train
+        from care_core.learn.train import TrainSettings, train
     frame = read_table(runs, schema)
-    model = train(frame, schema, Settings(seed=seed, resamples=resamples, origin=runs.name), progress)
+    model = train(frame, schema, TrainSettings(seed=seed, resamples=resamples, origin=runs.name), progress)
     _write(out, schema, model, schema_path.read_text(encoding="utf-8"))
 
 
@@ -70,13 +70,13 @@ def update_profile(source: str, runs: Path, out: Path, *, seed: int, progress: P
         raise UsageError("The new profile would replace its source.", hint="Choose another --out.", where=str(out))
     with _learning():
         from care_core.learn.table import read_table
-        from care_core.learn.train import Settings
+        from care_core.learn.train import TrainSettings
         from care_core.learn.transfer import out_of_support, update
     frame = read_table(runs, profile.schema)
     outside = out_of_support(profile.model, profile.schema, frame)
     text = _retargeted((profile.path / PROFILE_FILE).read_text(encoding="utf-8"), out.name, runs.name, outside)
     schema = parse_schema(text, runs)
-    model = update(profile.model, schema, frame, Settings(seed=seed, origin=runs.name), progress)
+    model = update(profile.model, schema, frame, TrainSettings(seed=seed, origin=runs.name), progress)
     _write(out, schema, model, text)
     return tuple(map(str, outside))
 

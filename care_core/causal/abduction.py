@@ -1,4 +1,4 @@
-"""What a run's own outcome says about the next one: one correlation for centre and spread.
+"""What a run's own outcome says about the next one: one correlation for centre and standard deviation.
 
 Around its mechanism f every run has noise. Two runs of configurations x and x' have values whose errors go together for
 two reasons: what is not known of f at x is partly what is not known at x' (the posterior covariance of f), and what the
@@ -50,7 +50,7 @@ def kinship(mechanism: Mechanism, x: FloatArray, here: FloatArray, persistence: 
     Args:
         x: shape (m, p). here: shape (1, p). persistence: share of the noise variance, 0 to 1.
     """
-    noise = mechanism.noise_spread**2
+    noise = mechanism.noise_sd**2
     variance, covariance, unsure = mechanism.around(x, here)
     return Kinship(
         variance=variance + noise,

@@ -28,7 +28,7 @@ Conditions = Literal["same", "another day"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Predicted:
-    """An objective under m configurations: expected value, 80 % interval, odds of keeping its threshold; shape (m,)."""
+    """An objective under m configurations: expected value, 80 % interval, probability of being met; shape (m,)."""
 
     value: FloatArray
     low: FloatArray
@@ -56,8 +56,8 @@ class World:
         outcome = self.model.outcomes[objective]
         return self._functional(outcome, configs) if outcome.stages else self._continuous(outcome, configs)
 
-    def odds(self, configs: Sequence[Config]) -> FloatArray:
-        """Odds that every objective keeps its threshold, shape (m,).
+    def probability(self, configs: Sequence[Config]) -> FloatArray:
+        """Probability that every objective keeps its threshold, shape (m,).
 
         Objectives that move together (DESIGN: time and energy) share one cause: the least likely of a group counts
         once; the rest multiply. What no mechanism predicts counts with its base rate.
@@ -113,11 +113,11 @@ class World:
                     ok = None  # what came after the failure says nothing about this stage
                 passed += [] if ok is None else [ok]
                 runs[i] = seen, reached and ok is not False
-            p_ok *= self._stage_odds(outcome.objective, stage, passed, configs)
+            p_ok *= self._stage_probability(outcome.objective, stage, passed, configs)
         zero, one = np.zeros_like(p_ok), np.ones_like(p_ok)
         return Predicted(p_ok, np.where(p_ok > INTERVAL[1], one, zero), np.where(p_ok < INTERVAL[0], zero, one), p_ok)
 
-    def _stage_odds(
+    def _stage_probability(
         self, objective: str, stage: StageRecord, passed: Sequence[bool], configs: Sequence[Config]
     ) -> FloatArray:
         """Probability of passing one stage, given which runs of this configuration passed it."""
@@ -140,7 +140,7 @@ class World:
 
     @staticmethod
     def _chance(mechanism: Mechanism, passes: float, configs: Sequence[Config]) -> FloatArray:
-        one = mechanism.odds(columns(configs, mechanism.inputs))
+        one = mechanism.probability(columns(configs, mechanism.inputs))
         return one if passes == 1.0 else 1.0 - one
 
     def _continuous(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
@@ -153,12 +153,12 @@ class World:
         if len(seen):
             here = columns([self.config], mechanism.inputs)
             kin = kinship(mechanism, x, here, self._persistence(outcome.objective))
-            centre, spread = next_value(kin, latent, float(mechanism.latent(here)[0]), seen)
+            centre, sd = next_value(kin, latent, float(mechanism.latent(here)[0]), seen)
         else:
-            centre, spread = latent, np.sqrt(mechanism.latent_spread(x) ** 2 + mechanism.noise_spread**2)
+            centre, sd = latent, np.sqrt(mechanism.latent_sd(x) ** 2 + mechanism.noise_sd**2)
         bound = self.thresholds.get(outcome.objective)
-        low, high = (restored(centre + mechanism.error_quantile(q) * spread, mechanism.transform) for q in INTERVAL)
-        p_ok = np.full(len(configs), np.nan) if bound is None else _odds_of(mechanism, bound, centre, spread)
+        low, high = (restored(centre + mechanism.error_quantile(q) * sd, mechanism.transform) for q in INTERVAL)
+        p_ok = np.full(len(configs), np.nan) if bound is None else _probability_of(mechanism, bound, centre, sd)
         return Predicted(restored(centre, mechanism.transform), low, high, p_ok)
 
 
@@ -168,9 +168,9 @@ def known_value(observed: Mapping[str, object], name: str) -> float | None:
     return float(value) if is_known(value) else None  # type: ignore[arg-type]
 
 
-def _odds_of(mechanism: Mechanism, bound: Threshold, centre: FloatArray, spread: FloatArray) -> FloatArray:
+def _probability_of(mechanism: Mechanism, bound: Threshold, centre: FloatArray, sd: FloatArray) -> FloatArray:
     # A bound that no value of the target can go below (a time of 0 s) lies infinitely far on a log scale.
     reachable = bound.value > LEAST[mechanism.transform]
     limit = float(transformed(np.array(bound.value), mechanism.transform)) if reachable else -np.inf
-    below = mechanism.share_below((limit - centre) / spread)
+    below = mechanism.share_below((limit - centre) / sd)
     return below if bound.op in ("<=", "<") else 1.0 - below

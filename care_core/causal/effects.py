@@ -15,14 +15,14 @@ FloatArray = NDArray[np.float64]
 Direction = Literal["increasing", "decreasing", "optimum inside", "none"]
 
 NO_EFFECT = 1e-9
-"""A response whose range is below this share of the variable's spread is flat."""
+"""A response whose range is below this share of the variable's standard deviation is flat."""
 BUMP = 0.25
 """Share of the response's range by which an inner value must beat both ends to be an optimum."""
 
 
 @dataclass(frozen=True)
 class Effect:
-    """How far one variable moves another, in spreads of the latter, and which way.
+    """How far one variable moves another, in standard deviations of the latter, and which way.
 
     `low` and `high` bound the magnitude over bootstrap resamples, None where none were drawn.
     """
@@ -36,13 +36,13 @@ class Effect:
 def average_causal_effect(response: ArrayLike, scale: float) -> Effect:
     """Eq. 1: how far V2 moves, on average, between two acceptable values of V1.
 
-    As printed, Eq. 1 adds signed differences over all ordered pairs, which is zero. The magnitude here is the mean
-    of their absolute values over ordered pairs of different values, divided by the spread of V2, so that effects
-    of options in different units compare; the sign is reported apart.
+    As printed, Eq. 1 adds signed differences over all ordered pairs, which is zero. The magnitude here is the mean of
+    their absolute values over ordered pairs of different values, divided by the standard deviation of V2, so that
+    effects of options in different units compare; the sign is reported apart.
 
     Args:
         response: shape (m,), E[V2 | do(V1 = value_k)] for the acceptable values of V1 in increasing order.
-        scale: spread of V2 in its own unit; 0 for a variable that never varies.
+        scale: standard deviation of V2 in its own unit; 0 for a variable that never varies.
 
     Raises:
         ValueError: the response is empty or not finite, or the scale is negative or not finite.

@@ -29,7 +29,7 @@ BLOCK = 4_000_000
 SLICE = 64
 JITTER = 1e-6
 TAIL = 0.01
-"""Odds are kept this far from 0 and 1: no table of a few hundred runs supports more."""
+"""Probabilities are kept this far from 0 and 1: no table of a few hundred runs supports more."""
 
 
 def transformed(values: FloatArray, transform: Transform) -> FloatArray:
@@ -90,7 +90,8 @@ class Mechanism:
     """One mechanism: a regression of the (transformed) target on its inputs.
 
     Binary targets are coded -1 and 1 and regressed the same way; `calibration` then turns the regression into
-    odds. Everything is scaled: inputs to mean 0 and spread 1 (log first where `log_inputs`), the target likewise.
+    probability. Everything is scaled: inputs to mean 0 and standard deviation 1 (log first where `log_inputs`), the
+    target likewise.
 
     Attributes:
         inputs: names, shape (p,), in the order of the columns that `latent` expects.
@@ -109,7 +110,7 @@ class Mechanism:
     reads: NDArray[np.int64]
     log_inputs: NDArray[np.bool_]
     centre: FloatArray
-    spread: FloatArray
+    sd: FloatArray
     kernel: Kernel
     points: FloatArray
     targets: FloatArray
@@ -126,7 +127,7 @@ class Mechanism:
         """Inputs in their own units, shape (m, p), to the scale and the columns that the kernel sees, shape (m, q)."""
         x = x[:, self.reads]
         logs = np.log(np.where(self.log_inputs, np.maximum(x, 1e-12), 1.0))
-        scaled: FloatArray = (np.where(self.log_inputs, logs, x) - self.centre) / self.spread
+        scaled: FloatArray = (np.where(self.log_inputs, logs, x) - self.centre) / self.sd
         return scaled
 
     @cached_property
@@ -152,9 +153,9 @@ class Mechanism:
     def _columns(self, x: FloatArray, names: Sequence[str]) -> FloatArray:
         return x[:, [self.inputs.index(name) for name in names]]
 
-    def latent_spread(self, x: FloatArray) -> FloatArray:
+    def latent_sd(self, x: FloatArray) -> FloatArray:
         """Posterior standard deviation of the noise-free value, shape (m,)."""
-        return self._spread(np.full(len(x), self.kernel.variance), self.kernel(self.scaled(x), self.points))
+        return self._known_sd(np.full(len(x), self.kernel.variance), self.kernel(self.scaled(x), self.points))
 
     def change(self, x: FloatArray, here: FloatArray) -> tuple[FloatArray, FloatArray]:
         """f(x) - f(here) on the transformed scale: posterior mean and standard deviation, both of shape (m,).
@@ -168,7 +169,7 @@ class Mechanism:
         cross = self.kernel(z, self.points) - self.kernel(origin, self.points)
         prior = 2 * (self.kernel.variance - self.kernel(z, origin)[:, 0])
         mean: FloatArray = self.scale * (cross @ self.weights)
-        return mean + self.known(x) - self.known(here), self._spread(prior, cross)
+        return mean + self.known(x) - self.known(here), self._known_sd(prior, cross)
 
     def around(self, x: FloatArray, here: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """What is not known of the noise-free values at x (m, p) and at here (1, p): their posterior variances, shape
@@ -183,26 +184,26 @@ class Mechanism:
         covariance: FloatArray = self.scale**2 * (self.kernel(z[:-1], z[-1:])[:, 0] - half[:-1] @ cross[-1])
         return variance[:-1], covariance, float(variance[-1])
 
-    def _spread(self, prior: FloatArray, cross: FloatArray) -> FloatArray:
+    def _known_sd(self, prior: FloatArray, cross: FloatArray) -> FloatArray:
         explained = ((cross @ self._inverse) * cross).sum(axis=1)
-        spread: FloatArray = self.scale * np.sqrt(np.maximum(prior - explained, 1e-12))
-        return spread
+        sd: FloatArray = self.scale * np.sqrt(np.maximum(prior - explained, 1e-12))
+        return sd
 
     def ignorance(self, x: FloatArray) -> FloatArray:
         """How little the training data say there: posterior over prior variance, 0 (known) to 1 (nothing known)."""
-        share: FloatArray = (self.latent_spread(x) / self.scale) ** 2 / max(self.kernel.variance, 1e-12)
+        share: FloatArray = (self.latent_sd(x) / self.scale) ** 2 / max(self.kernel.variance, 1e-12)
         return np.clip(share, 0.0, 1.0)
 
     @property
-    def noise_spread(self) -> float:
+    def noise_sd(self) -> float:
         """Standard deviation of a run around the mechanism, on the transformed scale."""
         return self.scale * self.kernel.noise
 
-    def odds(self, x: FloatArray) -> FloatArray:
+    def probability(self, x: FloatArray) -> FloatArray:
         """Binary targets: probability of 1, shape (m,)."""
-        return self.odds_of(self.latent(x))
+        return self.probability_of(self.latent(x))
 
-    def odds_of(self, latent: FloatArray) -> FloatArray:
+    def probability_of(self, latent: FloatArray) -> FloatArray:
         """Binary targets: probability of 1 for values of the regression, of any shape."""
         slope, offset = self.calibration
         probability: FloatArray = 1.0 / (1.0 + np.exp(-(slope * latent + offset)))
@@ -222,14 +223,14 @@ class Mechanism:
         was expected there. x: (1, p). An error that no training run had is 0 or 1."""
         if value <= LEAST[self.transform]:
             return 0.0, float(self.expected(x)[0])
-        spread = np.sqrt(self.latent_spread(x) ** 2 + self.noise_spread**2)
-        z = (transformed(np.array([value]), self.transform) - self.latent(x)) / spread
+        sd = np.sqrt(self.latent_sd(x) ** 2 + self.noise_sd**2)
+        z = (transformed(np.array([value]), self.transform) - self.latent(x)) / sd
         share = np.searchsorted(self.calibration, z)[0] / len(self.calibration)
         return float(share), float(self.expected(x)[0])
 
     def expected(self, x: FloatArray) -> FloatArray:
-        """Expected value in the target's own unit; the odds of 1 for binary targets."""
-        return self.odds(x) if self.binary else restored(self.latent(x), self.transform)
+        """Expected value in the target's own unit; the probability of 1 for binary targets."""
+        return self.probability(x) if self.binary else restored(self.latent(x), self.transform)
 
 
 def solve(kernel: Kernel, points: FloatArray, targets: FloatArray) -> FloatArray:

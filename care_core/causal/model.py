@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field
 
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
@@ -74,11 +74,11 @@ class PathRecord(Record):
 
 
 class Summary(Record):
-    """What the training runs held of one variable: `quantiles` at 0, 5, ... 100 %."""
+    """What the training runs held of one variable: `quantiles` at 0, 5, ... 100 %; `sd` is "spread" in the file."""
 
     count: int
     mean: float
-    spread: float
+    sd: float = Field(validation_alias=AliasChoices("spread", "sd"), serialization_alias="spread")
     quantiles: tuple[float, ...] = Field(min_length=2)
 
     @property
@@ -105,7 +105,7 @@ class Summary(Record):
         return self.model_copy(
             update={
                 "mean": self.mean * factor,
-                "spread": self.spread * factor,
+                "sd": self.sd * factor,
                 "quantiles": tuple(q * factor for q in self.quantiles),
             }
         )
@@ -132,7 +132,7 @@ class OutcomeRecord(Record):
 
 
 class SkillRecord(Record):
-    """How well an objective's odds predict runs that were held out."""
+    """How well the predicted probabilities of an objective fit runs that were held out."""
 
     runs: int
     base_rate: float
@@ -142,7 +142,7 @@ class SkillRecord(Record):
     auc: float | None = None
     """None where all runs met the threshold, or none did."""
     curve: tuple[tuple[float, float, int], ...] = ()
-    """Calibration: mean predicted odds, share that met the threshold, runs; a row a tenth of the odds that has any."""
+    """Calibration: mean predicted probability, share that met the threshold, runs; a row a tenth that has runs."""
 
 
 class Persistence(Record):

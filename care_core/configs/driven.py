@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from care_core.configs import yaml_tree
 from care_core.run import Setting, shown
-from care_core.text import clean
+from care_core.text import clean, clock
 from care_core.variables import Variable
 from care_core.vehicles.self_written import is_self_written
 
@@ -82,11 +82,6 @@ def remark(history: Sequence[Setting], *, source: bool = False) -> str:
     if source:
         parts.append(f"from {history[-1].source}")
     return clean(", ".join(parts))
-
-
-def clock(time_s: float | None) -> str:
-    """A time of the log as minutes and seconds, `02:13`."""
-    return "an unknown time" if time_s is None else f"{int(time_s // 60):02d}:{int(time_s % 60):02d}"
 
 
 def option_value(option: Variable, setting: Setting) -> float | None:

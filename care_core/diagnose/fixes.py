@@ -18,11 +18,11 @@ STEPS = 5
 BEAM = 8
 """Sets kept at each size."""
 GAIN_FOR_ONE_MORE = 0.1
-"""Odds that one more change must add: each change is something an operator has to do and to believe."""
+"""Probability that one more change must add: each change is something an operator has to do and to believe."""
 DISTANCE_COST = 0.02
-"""Odds given up for leaving a value where it is rather than moving it across its whole range."""
+"""Probability given up for leaving a value where it is rather than moving it across its whole range."""
 NEARLY = 0.02
-"""Odds this close are the same: the surer set is taken, or the value nearer to the run's."""
+"""Probabilities this close are the same: the surer set is taken, or the value nearer to the run's."""
 MAX_ALTERNATIVES = 3
 
 Assignment = Mapping[str, float]
@@ -50,7 +50,7 @@ def candidate_values(variable: Variable, current: float, reference: float, model
 def search(
     world: World, options: Mapping[str, Variable], candidates: Collection[str], reference: Config
 ) -> list[tuple[Assignment, float]]:
-    """Best sets of changes by size (index 0: one change), each with the odds that all thresholds are met.
+    """Best sets of changes by size (index 0: one change), each with the probability that all thresholds are met.
 
     Beam search: every option alone back to its reference (yes-or-no options and codes to any other value), then the
     best sets widened by one option at a time. `settled` then looks for values nearer to the run's.
@@ -79,31 +79,31 @@ def _is_unordered(option: Variable) -> bool:
 def settled(
     world: World, options: Mapping[str, Variable], assignment: Assignment, reference: Config
 ) -> tuple[Assignment, float]:
-    """The same options with values as near to the run's as is safe, and the odds of that.
+    """The same options with values as near to the run's as is safe, and the probability of that.
 
     A nearer value than the reference is taken only where the value one step nearer still would do nearly as well: the
     edge of what works, and of what was flown in training, is not known to a step.
     """
     chosen = dict(assignment)
-    floor = float(world.odds([{**world.config, **chosen}])[0]) - NEARLY
+    floor = float(world.probability([{**world.config, **chosen}])[0]) - NEARLY
     for name in assignment:
         if not _is_unordered(options[name]):
             values = candidate_values(options[name], world.config[name], reference[name], world.model)
-            odds = world.odds([{**world.config, **chosen, name: value} for value in values])
-            works = int(np.argmin(odds >= floor)) if (odds < floor).any() else len(values)
+            reached = world.probability([{**world.config, **chosen, name: value} for value in values])
+            works = int(np.argmin(reached >= floor)) if (reached < floor).any() else len(values)
             chosen[name] = values[max(0, works - 2)]
-    return chosen, float(world.odds([{**world.config, **chosen}])[0])
+    return chosen, float(world.probability([{**world.config, **chosen}])[0])
 
 
 def best_alone(
     world: World, options: Mapping[str, Variable], name: str, reference: Config
 ) -> tuple[float, float] | None:
-    """The value of one option to suggest when nothing else changes, and its odds."""
+    """The value of one option to suggest when nothing else changes, and its probability."""
     ranked = _ranked(world, options, [{name: value} for value in _starts(world, options[name], reference[name])])
     if not ranked:
         return None
-    assignment, odds = settled(world, options, ranked[0][0], reference)
-    return assignment[name], odds
+    assignment, probability = settled(world, options, ranked[0][0], reference)
+    return assignment[name], probability
 
 
 def needs_unsafe(
@@ -117,7 +117,7 @@ def needs_unsafe(
         values = {option.snap(float(value)) for value in np.linspace(*option.range, STEPS + 1)}
         default = reference[name]
         past = [v for v in values if v != default and (v - default) * (world.config[name] - default) <= 0]
-        if past and world.odds([{**world.config, name: value} for value in past]).max() >= enough:
+        if past and world.probability([{**world.config, name: value} for value in past]).max() >= enough:
             return name
     return None
 
@@ -132,7 +132,7 @@ def _widened(sets: Iterable[Assignment], values: Mapping[str, tuple[float, ...]]
 
 
 def _surest(world: World, beam: Sequence[tuple[Assignment, float]]) -> tuple[Assignment, float]:
-    """The first of the sets, or the one among its equals in odds and fewer in doubt about the mechanisms."""
+    """The first of the sets, or the one among its equals in probability and fewer in doubt about the mechanisms."""
     equals = [pair for pair in beam if pair[1] >= beam[0][1] - NEARLY]
     if len(equals) == 1:
         return equals[0]
@@ -145,17 +145,17 @@ def _ranked(
 ) -> list[tuple[Assignment, float]]:
     if not sets:
         return []
-    odds = world.odds([{**world.config, **assignment} for assignment in sets])
+    reached = world.probability([{**world.config, **assignment} for assignment in sets])
     moved = [
         sum(options[name].distance(world.config[name], value) for name, value in assignment.items())
         for assignment in sets
     ]
-    order = np.argsort(-(odds - DISTANCE_COST * np.array(moved)), kind="stable")
-    return [(sets[i], float(odds[i])) for i in order]
+    order = np.argsort(-(reached - DISTANCE_COST * np.array(moved)), kind="stable")
+    return [(sets[i], float(reached[i])) for i in order]
 
 
 def smallest_good(found: list[tuple[Assignment, float]]) -> int:
-    """Index of the set to suggest: one more change only where it adds enough odds."""
+    """Index of the set to suggest: one more change only where it adds enough probability."""
     chosen = 0
     for i in range(1, len(found)):
         if found[i][1] >= found[chosen][1] + GAIN_FOR_ONE_MORE * (i - chosen):
@@ -163,16 +163,16 @@ def smallest_good(found: list[tuple[Assignment, float]]) -> int:
     return chosen
 
 
-def to_fix(world: World, options: Mapping[str, Variable], assignment: Assignment, odds: float) -> Fix:
+def to_fix(world: World, options: Mapping[str, Variable], assignment: Assignment, probability: float) -> Fix:
     """The set as a record, with every objective's predicted outcome; changes in the order of what each does alone."""
-    alone = {name: world.odds([{**world.config, name: value}])[0] for name, value in assignment.items()}
+    alone = {name: world.probability([{**world.config, name: value}])[0] for name, value in assignment.items()}
     order = sorted(assignment, key=lambda name: (-alone[name], name))
     config = {**world.config, **assignment}
     return Fix(
         changes=tuple(
             Change(options[name], world.config[name], assignment[name], change_notes(options[name])) for name in order
         ),
-        p_fixed=odds,
+        p_fixed=probability,
         predicted={name: prediction(world, name, config) for name in world.model.outcomes},
     )
 

@@ -91,7 +91,7 @@ def _added(before: World, objective: str, reference: Config) -> tuple[float, flo
     added = float(here - there)
     if before.model.outcomes[objective].stages:
         # What makes a mission late or costly makes it fail as well, and then its time and energy are not known.
-        here, all_there = 1.0 - before.odds(asked)
+        here, all_there = 1.0 - before.probability(asked)
         added = max(added, float(here - all_there))
     return max(0.0, added), float(there)
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from care_core.configs.driven import clock, disagreements, readable
+from care_core.configs.driven import disagreements, readable
 from care_core.configs.loading import ConfigFile, guesses, resolve
 from care_core.profile.schema import Schema
 from care_core.run import Run, Setting, shown
+from care_core.text import clock
 
 _SHOWN = 5
 

@@ -19,7 +19,7 @@ from care_core.profile.schema import Schema
 from care_core.run import Evidence, Run, is_known
 
 FELT = 0.05
-"""Effect times support, in spreads, from which an edge is taken to carry something of this run."""
+"""Effect times support, in standard deviations, from which an edge is taken to carry something of this run."""
 PERMUTATIONS = 12
 """Orders of reset per Shapley estimate, each also taken backwards."""
 
@@ -34,8 +34,8 @@ class Suspect:
     effect: EffectRecord | None
     """None when no effect was found in training."""
     weight: float = 0.0
-    """What suspects are ranked by: the contribution, and of the odds that no contribution explains the share that this
-    run's own symptoms lay to the option."""
+    """What suspects are ranked by: the contribution, and of the probability that no contribution explains the share
+    that this run's own symptoms lay to the option."""
     symptom: str | None = None
     """The metric of this run that points at the option most."""
 
@@ -59,16 +59,16 @@ def suspects(
 ) -> tuple[Suspect, ...]:
     """Options off their reference that have a causal path to the objective, the likeliest cause first.
 
-    The contribution is a Shapley value (Shapley 1953) over these options: how much the odds of keeping the threshold
-    rise when the option goes back to its reference, averaged over the orders in which the others may go back, so an
-    interaction is shared by those who take part in it and the contributions add up to the whole change. What they
+    The contribution is a Shapley value (Shapley 1953) over these options: how much the probability of keeping the
+    threshold rise when the option goes back to its reference, averaged over the orders in which the others may go back,
+    so an interaction is shared by those who take part in it and the contributions add up to the whole change. What they
     leave unexplained, much where training runs were few, is laid to the options that this run's symptoms point at.
 
     Options whose effect is not identified are among them, to be told and not to be ranked (`is_identified`): theirs is
     an association.
     """
     off = deviating(world.config, reference)
-    paths = best_paths(world.model, objective, off, _carriers(world, schema))
+    paths = best_paths(world.model, objective, off, _mediators(world, schema))
     effects = {name: world.model.effects.get((name, objective)) for name in paths}
     names = list(paths)
     learned = [name for name in names if effects[name] is not None and objective in world.model.outcomes]
@@ -110,7 +110,7 @@ def not_ruled_out(
 
 
 def best_paths(
-    model: Model, objective: str, options: Sequence[str], carriers: Collection[str] | None = None
+    model: Model, objective: str, options: Sequence[str], mediators: Collection[str] | None = None
 ) -> dict[str, CausalPath]:
     """Per option the directed path to the objective with the largest mean of effect times support.
 
@@ -119,11 +119,11 @@ def best_paths(
     carry this fault, nor over an edge that hardly carries anything: in a mean, a strong last edge hides it.
 
     Args:
-        carriers: metrics that may have carried this run's fault; all when None.
+        mediators: metrics that may have carried this run's fault; all when None.
     """
     weight = {edge: record.effect * record.support for edge, record in model.edges.items()}
     whole = model.graph.directed
-    met = frozenset(edge for edge in whole if carriers is None or edge[1] in carriers or edge[1] == objective)
+    met = frozenset(edge for edge in whole if mediators is None or edge[1] in mediators or edge[1] == objective)
     felt = frozenset(edge for edge in whole if weight[edge] >= FELT)
     graphs = [CausalGraph(model.graph.nodes, edges) for edges in (met & felt, met, felt, whole)]
     found: dict[str, CausalPath] = {}
@@ -135,7 +135,7 @@ def best_paths(
     return found
 
 
-def _carriers(world: World, schema: Schema) -> frozenset[str]:
+def _mediators(world: World, schema: Schema) -> frozenset[str]:
     """Metrics and objectives that may have carried this run's fault: known, and no event that stayed away as usual."""
     found = set()
     for variable in (*schema.metrics, *schema.objectives):
@@ -150,7 +150,7 @@ def _reset(config: Config, reference: Config, names: frozenset[str]) -> dict[str
     return {**config, **{name: reference[name] for name in names}}
 
 
-def _shapley(names: Sequence[str], odds: Callable[[Sequence[frozenset[str]]], FloatArray]) -> FloatArray:
+def _shapley(names: Sequence[str], worth: Callable[[Sequence[frozenset[str]]], FloatArray]) -> FloatArray:
     """Shapley values by sampled orders, each with its reverse; the seed is fixed, so the answer repeats."""
     if not names:
         return np.zeros(0)
@@ -159,7 +159,7 @@ def _shapley(names: Sequence[str], odds: Callable[[Sequence[frozenset[str]]], Fl
     orders += [order[::-1] for order in orders]
     chains = [[frozenset(names[i] for i in order[:k]) for k in range(len(names) + 1)] for order in orders]
     distinct = list(dict.fromkeys(subset for chain in chains for subset in chain))
-    value = dict(zip(distinct, odds(distinct), strict=True))
+    value = dict(zip(distinct, worth(distinct), strict=True))
     shares = np.zeros(len(names))
     for order, chain in zip(orders, chains, strict=True):
         shares[order] += np.diff([value[subset] for subset in chain])

@@ -78,7 +78,7 @@ class MissionVerdict:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """A predicted value of an objective with its 80 % interval, and the odds that it keeps its threshold."""
+    """A predicted value of an objective with its 80 % interval, and the probability that it keeps its threshold."""
 
     value: float
     low: float
@@ -121,7 +121,7 @@ class Cause:
     """An option with the path by which it moved a faulty objective in this run.
 
     `path_ace` is the paper's Eq. 2 on scaled variables (it ranks the platform, not this run); `total_effect` the
-    option's Eq. 1 effect on the objective. `contribution` is how much of this run's odds of being fault-free the
+    option's Eq. 1 effect on the objective. `contribution` is how much of this run's probability of being fault-free the
     option costs (0 to 1): counterfactual change against the profile's reference configuration.
     """
 
@@ -152,7 +152,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """A set of changes with its predicted outcome. `p_fixed`: odds that all objectives keep their thresholds."""
+    """A set of changes with its predicted outcome. `p_fixed`: probability that all objectives keep their thresholds."""
 
     changes: tuple[Change, ...]
     p_fixed: float
@@ -179,18 +179,18 @@ class Circumstance:
 
 @dataclass(frozen=True, slots=True)
 class Experiment:
-    """What would tell two causes apart: one option changed alone, and the odds of success under each hypothesis."""
+    """What would tell two causes apart: one option changed alone, and the probability of success under each."""
 
     objective: str
     option: Variable
     value: float
     if_cause: tuple[tuple[str, float], ...]
-    """(the cause, odds that the objective then keeps its threshold), the leading cause first."""
+    """(the cause, probability that the objective then keeps its threshold), the leading cause first."""
 
     def __str__(self) -> str:
         change = f"change only {self.option.name} to {self.option.show(self.value)} and run again"
-        odds = ", ".join(f"{p:.0%} if the cause is {name}" for name, p in self.if_cause)
-        return f"{change}: odds of a good {self.objective} are {odds}"
+        expected = ", ".join(f"{p:.0%} if the cause is {name}" for name, p in self.if_cause)
+        return f"{change}: probability of a good {self.objective} is {expected}"
 
 
 @dataclass(frozen=True, slots=True)

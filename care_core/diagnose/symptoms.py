@@ -1,9 +1,9 @@
-"""What this run's metrics say about its options, where the odds say little.
+"""What this run's metrics say about its options, where the predicted probability says little.
 
 A run that takes too long shows where: its last ten metres took a minute more than the reference would. That is a
-symptom, a metric that is off in the direction that goes with missing the objective. It points at the options that
-moved it: those that its mechanism, or what people know of the platform, says act on it. Odds of the whole mission need
-many runs to be learned, a phase or an error that few options act on needs few.
+symptom, a metric that is off in the direction that goes with missing the objective. It points at the options that moved
+it: those that its mechanism, or what people know of the platform, says act on it. The probability of a whole mission
+takes many runs to be learned, a phase or an error that few options act on needs few.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from care_core.profile.schema import Schema
 from care_core.run import Evidence
 
 UNLEARNED = 0.02
-"""Effect of a known cause moved across its whole range, in spreads of the metric, where no run has shown more."""
+"""Effect of a known cause over its whole range, in standard deviations of the metric, where no run shows more."""
 SAID, REFUSED = 1.0, 10.0
-"""Spreads that a message naming an option counts for; a check that refused the mission leaves no room for others."""
+"""Standard deviations that a message naming an option counts for; a refusing check leaves no room for others."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +37,9 @@ def pointers(
 ) -> dict[str, Pointer]:
     """What the metrics and the messages of this run say about the options `names`. The shares add up to 1, or are 0.
 
-    A symptom weighs as much as it shows of the miss: its distance from what the reference would give, in spreads of
-    the training runs, times its correlation with missing the objective. It is split by how much of it goes away when
-    each option alone goes back.
+    A symptom weighs as much as it shows of the miss: its distance from what the reference would give, in standard
+    deviations of the training runs, times its correlation with missing the objective. It is split by how much of it
+    goes away when each option alone goes back.
     """
     shown: dict[str, dict[str, float]] = {name: {} for name in names}
     for metric, correlation in world.model.witnesses.get(objective, {}).items():
@@ -84,7 +84,7 @@ def _scale(world: World, metric: str, mechanism: Mechanism) -> float:
     summary = world.model.summaries.get(metric)
     if mechanism.nominal is None or summary is None or not summary.mean > 0:
         return mechanism.scale
-    return max(summary.spread / summary.mean, mechanism.scale)
+    return max(summary.sd / summary.mean, mechanism.scale)
 
 
 def _latent(mechanism: Mechanism, configs: Sequence[Config]) -> list[float]:

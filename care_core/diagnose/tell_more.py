@@ -17,7 +17,7 @@ from care_core.run import Run, Unavailable
 from care_core.variables import Variable
 
 TELLING = 0.15
-"""Odds by which an experiment's outcome must differ between two causes to be worth a run."""
+"""Probability by which an experiment's outcome must differ between two causes to be worth a run."""
 HYPOTHESES = 3
 """Leading causes that are compared in pairs."""
 MOST_METRICS = 3
@@ -107,19 +107,19 @@ def _separating(
     ]
     if not changes or objective not in world.model.outcomes:
         return None
-    odds = [_odds_if(world, objective, cause, pair, changes, reference) for cause in pair]
-    best = int(np.argmax(np.abs(odds[0] - odds[1])))
-    if abs(odds[0][best] - odds[1][best]) < TELLING:
+    promised = [_probability_if(world, objective, cause, pair, changes, reference) for cause in pair]
+    best = int(np.argmax(np.abs(promised[0] - promised[1])))
+    if abs(promised[0][best] - promised[1][best]) < TELLING:
         return None
     name, value = changes[best]
-    return Experiment(objective, options[name], value, ((pair[0], odds[0][best]), (pair[1], odds[1][best])))
+    return Experiment(objective, options[name], value, ((pair[0], promised[0][best]), (pair[1], promised[1][best])))
 
 
-def _odds_if(
+def _probability_if(
     world: World, objective: str, cause: str, pair: tuple[str, str], changes: Sequence[tuple[str, float]],
     reference: Config,
 ) -> FloatArray:  # fmt: skip
-    """Odds of a good outcome after each change, shape (m,), if one of the pair is the cause and the other is not.
+    """Probability of a good outcome after each change, shape (m,), if one of the pair is the cause, the other not.
 
     The other did nothing, so it is taken to have been at its reference all along, and changing it changes nothing. The
     run's noise is abducted anew: what the other cost in the model is put down to the cause and to what the run met.

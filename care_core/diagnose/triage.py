@@ -45,9 +45,9 @@ from care_core.profile.store import Profile
 from care_core.run import LogInfo, MissionInfo, ProfileChoice, Run, Setting, is_known
 
 MIN_CONTRIBUTION = 0.02
-"""Odds an option must cost before it is called a cause of this run."""
-MIN_ODDS = 0.2
-"""Best odds below which the engine abstains: a confident wrong answer costs a field day."""
+"""Probability an option must cost before it is called a cause of this run."""
+MIN_PROBABILITY = 0.2
+"""Best probability below which the engine abstains: a confident wrong answer costs a field day."""
 CONVINCING, LEADS = 0.5, 3
 """A cause that costs less than this leaves room for others: up to so many options are then named in all."""
 SURE, UNSURE = 0.4, 0.1
@@ -236,7 +236,7 @@ def _as_in_fix(case: _Case, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
             return cause
         changed = {**case.world.config, cause.option.name: value}
         promised = prediction(case.world, fault.objective.variable.name, changed)
-        return replace(cause, suggested=value, predicted=promised, p_fixed=float(case.world.odds([changed])[0]))
+        return replace(cause, suggested=value, predicted=promised, p_fixed=float(case.world.probability([changed])[0]))
 
     return tuple(map(as_in_fix, fault.causes))
 
@@ -292,7 +292,7 @@ def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float
 
 
 def _fixes(case: _Case, options: set[str]) -> list[Fix]:
-    """The suggested fix first, then up to three that trade changes for odds or take another way."""
+    """The suggested fix first, then up to three that trade changes for probability or take another way."""
     variables = case.profile.schema.variables
     # Options off their reference that break another objective matter too once this fault is gone.
     every = options | {name for name in deviating(case.world.config, case.reference) if _has_effect(case, name)}
@@ -309,14 +309,14 @@ def _fixes(case: _Case, options: set[str]) -> list[Fix]:
     ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
     return [
         to_fix(case.world, variables, *settled(case.world, variables, assignment, case.reference))
-        for assignment, _odds in ranked
+        for assignment, _probability in ranked
     ]
 
 
 def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]) -> bool:
     """Whether an operator might prefer it: likely enough, and not the same changes with one more for nothing."""
     adds_for_nothing = chosen[0].keys() <= other[0].keys() and other[1] < chosen[1] + MIN_CONTRIBUTION
-    return other[1] >= MIN_ODDS and not adds_for_nothing
+    return other[1] >= MIN_PROBABILITY and not adds_for_nothing
 
 
 def _has_effect(case: _Case, option: str) -> bool:
@@ -333,8 +333,8 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
         rival = next(iter(case.unranked[fault.objective.variable.name]), None)
         if rival is not None and rival.weight > max((cause.contribution for cause in fault.causes), default=0.0):
             return f"'{rival.option}' is as likely a cause, and the training runs cannot tell what it does"
-    now = float(case.world.odds([case.world.config])[0])
-    enough = max(MIN_ODDS, now + MIN_CONTRIBUTION)
+    now = float(case.world.probability([case.world.config])[0])
+    enough = max(MIN_PROBABILITY, now + MIN_CONTRIBUTION)
     has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
     if has_cause and fixes and fixes[0].p_fixed >= enough:
         return None

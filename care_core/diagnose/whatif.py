@@ -30,7 +30,7 @@ class Outlook:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What the changes are predicted to do. The odds are those of meeting every threshold."""
+    """What the changes are predicted to do. The probability is that of meeting every threshold."""
 
     changes: tuple[Change, ...]
     """With the warnings of each value: out of range, outside the training runs, looser than a safety default."""
@@ -61,7 +61,7 @@ class Question:
         """The prediction for this run with these options changed; option names must be the profile's."""
         world = self.world
         config = {**world.config, **changes}
-        odds = world.odds([config, world.config])
+        then, now = world.probability([config, world.config])
         return Answer(
             changes=tuple(
                 Change(
@@ -78,8 +78,8 @@ class Question:
                 for result in self.objectives
                 if (name := result.variable.name) in world.model.outcomes
             ),
-            p_ok=float(odds[0]),
-            p_ok_now=float(odds[1]),
+            p_ok=float(then),
+            p_ok_now=float(now),
         )
 
     def warnings(self, name: str, value: float) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from care_core.files import write_atomically
 from care_core.history.store import Triaged, Verified
 
 EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-"""Promises are compared with outcomes in these bins of odds."""
+"""Promises are compared with outcomes in these bins of probability."""
 
 RECORD_FILE = "VERIFIED_FIXES.md"
 """The model card is the training's, and the same model gives the same card: what came after has its own file."""
@@ -23,7 +23,7 @@ _ASCII = "_.-~=*#@"
 
 @dataclass(frozen=True, slots=True)
 class Bin:
-    """Fixes promised at about the same odds: how many, the mean promise, how many worked."""
+    """Fixes promised at about the same probability: how many, the mean promise, how many worked."""
 
     low: float
     high: float
@@ -95,8 +95,8 @@ def _as_markdown(record: TrackRecord) -> str:
     lines = [
         "# Verified fixes",
         "",
-        f"Of {record.count} fixes that were made and verified after the next run, {record.worked} worked; the odds"
-        f" promised {record.expected:.1f}.",
+        f"Of {record.count} fixes that were made and verified after the next run, {record.worked} worked; the"
+        f" probabilities promised {record.expected:.1f}.",
         "",
         "| promised | fixes | mean promise | worked |",
         "|---|---|---|---|",

@@ -80,7 +80,8 @@ def _importance(predicate: Predicate, values: FloatArray, failed: NDArray[np.boo
 
 
 class PlainClassifier:
-    """Extremely randomised trees averaged with gradient boosting on the options alone: odds of meeting everything."""
+    """Extremely randomised trees averaged with gradient boosting, on options alone: probability of meeting
+    everything."""
 
     def __init__(self, frame: pd.DataFrame, met_all: NDArray[np.bool_], options: Sequence[str], seed: int = 0) -> None:
         self.options = list(options)
@@ -88,13 +89,13 @@ class PlainClassifier:
         self._trees = ExtraTreesClassifier(TREES, min_samples_leaf=2, random_state=seed).fit(x, met_all)
         self._boosting = GradientBoostingClassifier(random_state=seed).fit(x, met_all)
 
-    def odds(self, configs: Sequence[Config]) -> FloatArray:
-        """Predicted odds that every objective keeps its threshold, shape (m,)."""
+    def probability(self, configs: Sequence[Config]) -> FloatArray:
+        """Predicted probability that every objective keeps its threshold, shape (m,)."""
         x = columns([dict(c) for c in configs], self.options)
         mean: FloatArray = (self._trees.predict_proba(x)[:, 1] + self._boosting.predict_proba(x)[:, 1]) / 2
         return mean
 
     def rank(self, config: Config, reference: Config, suspects: Sequence[str]) -> list[str]:
-        """Options by the odds of meeting everything when each alone goes back to its reference."""
-        odds = self.odds([{**config, name: reference[name]} for name in suspects])
-        return [suspects[i] for i in np.argsort(-odds, kind="stable")]
+        """Options by the probability of meeting everything when each alone goes back to its reference."""
+        reached = self.probability([{**config, name: reference[name]} for name in suspects])
+        return [suspects[i] for i in np.argsort(-reached, kind="stable")]

@@ -108,7 +108,7 @@ def _skill(model: Model) -> str:
         )
         for name, s in model.skill.items()
     ]
-    header = ("odds of keeping the threshold of", "runs", "met", "log loss", "AUC", "calibration error")
+    header = ("probability of keeping the threshold of", "runs", "met", "log loss", "AUC", "calibration error")
     text = "## Skill on runs it has not seen (cross-validation)\n\n" + _table(header, rows)
     return text + (_curve(model.skill["all"]) if "all" in model.skill else "")
 
@@ -117,7 +117,7 @@ def _curve(skill: SkillRecord) -> str:
     """The calibration curve as a table with bars."""
     rows = ((f"{p:.2f}", f"{met:.2f}", f"{n}", f"`{_bar(p)}`<br>`{_bar(met)}`") for p, met, n in skill.curve)
     header = ("predicted", "met", "runs", "predicted above, met below")
-    return "\n\nCalibration of the odds of all objectives together:\n\n" + _table(header, rows)
+    return "\n\nCalibration of the probability that all objectives are met:\n\n" + _table(header, rows)
 
 
 def _bar(share: float) -> str:

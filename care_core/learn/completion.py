@@ -109,9 +109,9 @@ class _Completer:
     def _link(self, option: str, objective: str, p: float) -> None:
         """Give the option a path to the objective: through the metric that best carries it, else directly."""
         parents = sorted(self.graph.parents(objective))
-        carriers = [m for m in self.metrics if option in self.graph.ancestors(m) and self._may_add(m, objective)]
-        left = {m: self.regressions.p_of(option, [*parents, m], objective) for m in carriers}
-        helps = [m for m in carriers if self.regressions.p_of(m, parents, objective) <= LEVEL]
+        mediators = [m for m in self.metrics if option in self.graph.ancestors(m) and self._may_add(m, objective)]
+        left = {m: self.regressions.p_of(option, [*parents, m], objective) for m in mediators}
+        helps = [m for m in mediators if self.regressions.p_of(m, parents, objective) <= LEVEL]
         best = max(helps, key=lambda m: (left[m], m), default=None)
         if best is not None:
             self._add(best, objective, f"carries the effect of '{option}' (p = {p:.2g})")

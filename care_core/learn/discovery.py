@@ -129,9 +129,9 @@ class FisherZ:
         known = ~np.any(lacking, axis=0) if lacking else np.ones(len(self._scores), dtype=bool)
         scores = np.nan_to_num(self._scores[known])
         scores = scores - scores.mean(axis=0) if len(scores) else scores
-        spread = np.sqrt((scores**2).sum(axis=0))
-        varies = spread > 1e-6
-        scores = scores / np.where(varies, spread, np.inf)
+        length = np.sqrt((scores**2).sum(axis=0))
+        varies = length > 1e-6
+        scores = scores / np.where(varies, length, np.inf)
         correlation = (1 - SHRINK) * (scores.T @ scores)
         np.fill_diagonal(correlation, 1.0)
         return correlation, varies, len(scores)

@@ -32,7 +32,7 @@ Answers = Mapping[str, frozenset[str]]
 
 @dataclass(frozen=True)
 class Scores:
-    """The paper's measures over all cells, as fractions. `rmse` is in spreads of the objective, see `score`."""
+    """The paper's measures over all cells, as fractions. `rmse`: standard deviations of the objective, see `score`."""
 
     accuracy: float
     precision: float

@@ -29,7 +29,7 @@ class Effort:
 
 
 OUTCOME = Effort(points=600, iterations=60)
-"""For objectives: odds and fixes rest on them."""
+"""For objectives: probabilities and fixes rest on them."""
 METRIC = Effort(points=300, iterations=30)
 """For metrics and edges: they draw the path and size its edges."""
 RELEVANCE_SCALE = 0.1
@@ -37,8 +37,8 @@ RELEVANCE_SCALE = 0.1
 UNUSED = 0.02
 """Relevance below which an input is left out: six standard deviations of it move nothing by 1 %."""
 NOISE, BINARY_NOISE = 0.02, 0.3
-"""Least noise, as a share of the target's spread. Yes-or-no outcomes near a limit go either way: a regression that
-reproduces every one of them has learned them by heart."""
+"""Least noise, as a share of the target's standard deviation. Yes-or-no outcomes near a limit go either way: a
+regression that reproduces every one of them has learned them by heart."""
 RESIDUAL_LEVELS = 101
 MIN_ROWS = 20
 
@@ -120,24 +120,24 @@ def fit(
     reads = np.flatnonzero(inputs.read)
     log, seen = inputs.log[reads], x[:, reads]
     raw = np.where(log, np.log(np.where(log, np.maximum(seen, 1e-12), 1.0)), seen)
-    centre, spread = raw.mean(axis=0), raw.std(axis=0)
-    spread = np.where(spread > 0, spread, 1.0)
-    points = ((raw - centre) / spread).astype(np.float32).astype(float)
+    centre, sd = raw.mean(axis=0), raw.std(axis=0)
+    sd = np.where(sd > 0, sd, 1.0)
+    points = ((raw - centre) / sd).astype(np.float32).astype(float)
     mean, scale = float(coded.mean()), float(coded.std()) or 1.0
     targets = ((coded - mean) / scale).astype(np.float32).astype(float)
     kernel = _fit_kernel(points, targets, effort.iterations, BINARY_NOISE if binary else NOISE)
     used = kernel.relevance > UNUSED
     kernel = replace(kernel, relevance=kernel.relevance[used], idle=int((~used).sum()))
     points = points[:, used]
-    errors, spreads = left_out(kernel, points, targets, groups)
-    calibration = logistic(mean + scale * (targets - errors), y) if binary else residual_levels(errors / spreads)
+    errors, error_sd = left_out(kernel, points, targets, groups)
+    calibration = logistic(mean + scale * (targets - errors), y) if binary else residual_levels(errors / error_sd)
     mechanism = Mechanism(
         inputs=inputs.names,
         reads=reads[used],
         nominal=nominal,
         log_inputs=log[used],
         centre=centre[used],
-        spread=spread[used],
+        sd=sd[used],
         kernel=kernel,
         points=points,
         targets=targets,
@@ -148,14 +148,14 @@ def fit(
         binary=binary,
         calibration=calibration,
     )
-    return Fitted(mechanism, _loss(mechanism, errors, spreads))
+    return Fitted(mechanism, _loss(mechanism, errors, error_sd))
 
 
-def _loss(mechanism: Mechanism, errors: FloatArray, spreads: FloatArray) -> float:
+def _loss(mechanism: Mechanism, errors: FloatArray, error_sd: FloatArray) -> float:
     """Mean negative log likelihood of the runs, each given those of other missions."""
     if not mechanism.binary:
-        spreads = mechanism.scale * spreads
-        return float((np.log(spreads) + 0.5 * (mechanism.scale * errors / spreads) ** 2).mean())
+        error_sd = mechanism.scale * error_sd
+        return float((np.log(error_sd) + 0.5 * (mechanism.scale * errors / error_sd) ** 2).mean())
     slope, offset = mechanism.calibration
     coded = mechanism.mean + mechanism.scale * mechanism.targets
     logit = slope * (coded - mechanism.scale * errors) + offset
@@ -173,8 +173,8 @@ def best_transform(y: FloatArray) -> Transform:
 
 
 def _skewness(values: FloatArray) -> float:
-    spread = values.std()
-    return 0.0 if spread == 0 else float((((values - values.mean()) / spread) ** 3).mean())
+    sd = values.std()
+    return 0.0 if sd == 0 else float((((values - values.mean()) / sd) ** 3).mean())
 
 
 def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_noise: float) -> Kernel:
@@ -231,7 +231,7 @@ def _negative_log_posterior(
 def left_out(
     kernel: Kernel, points: FloatArray, targets: FloatArray, groups: NDArray[np.int64] | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Errors of each run, predicted without its group, and their predicted spreads; shape (n,) each.
+    """Errors of each run, predicted without its group, and their predicted standard deviations; shape (n,) each.
 
     Rasmussen and Williams 2006, Eq. 5.12, with blocks of the inverse in place of its diagonal.
     """
@@ -241,12 +241,12 @@ def left_out(
     if groups is None:
         diagonal = np.diag(inverse)
         return weights / diagonal, 1.0 / np.sqrt(diagonal)
-    errors, spreads = np.empty(len(targets)), np.empty(len(targets))
+    errors, error_sd = np.empty(len(targets)), np.empty(len(targets))
     for group in np.unique(groups):
         own = np.flatnonzero(groups == group)
         block = np.linalg.inv(inverse[np.ix_(own, own)])
-        errors[own], spreads[own] = block @ weights[own], np.sqrt(np.diag(block))
-    return errors, spreads
+        errors[own], error_sd[own] = block @ weights[own], np.sqrt(np.diag(block))
+    return errors, error_sd
 
 
 def residual_levels(standardised: FloatArray) -> FloatArray:

@@ -30,7 +30,8 @@ MIDDLE = 0.9
 
 def by_paper_rule(schema: Schema, fault: FaultFile) -> frozenset[str]:
     """The rule of the artifact behind the paper (Hossen et al. 2023), declared: every option among the three largest
-    distinct magnitudes of the objective's slope on that option alone, all columns scaled to spread 1, ties kept.
+    distinct magnitudes of the objective's slope on that option alone, all columns scaled to a standard deviation of 1,
+    ties kept.
 
     The graph plays no part in it: the functional that the artifact evaluates has no adjustment, since nothing causes
     an option. Options that never vary have no slope and are left out; the artifact lets rounding choose among them.
@@ -108,7 +109,7 @@ def by_deviation(schema: Schema, model: Model, fault: FaultFile) -> list[str]:
         record = model.effects.get((option.name, fault.objective))
         effect = record.effect if record is not None and record.identified else 0.0
         if distance.any() or effect > 0:
-            far = float(distance.max()) / (model.summaries[option.name].spread or 1.0)
+            far = float(distance.max()) / (model.summaries[option.name].sd or 1.0)
             keys[option.name] = (-float((distance > 0).mean()), -effect, -far, option.name)
     return sorted(keys, key=lambda name: keys[name])
 

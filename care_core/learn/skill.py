@@ -1,4 +1,4 @@
-"""Does the model predict missions it has not seen? Cross-validated odds, and whether they can be believed."""
+"""Does the model predict missions it has not seen? Cross-validated probabilities, and whether they can be believed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FOLD = Effort(points=400, iterations=30)
 def cross_validated_skill(
     frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, folds: int, n_jobs: int = 1
 ) -> dict[str, SkillRecord]:
-    """Per objective, and for `all` of them, skill of the odds on held-out runs. The graph is kept.
+    """Per objective, and for `all` of them, skill of the probabilities on held-out runs. The graph is kept.
 
     Args:
         rng: draws the folds and the runs that mechanisms keep; the answer does not depend on `n_jobs`.
@@ -36,10 +36,10 @@ def cross_validated_skill(
     """
     if not folds:
         return {}
-    odds = held_out_odds(frame, schema, lambda _runs, _rng: graph, rng, folds=folds, n_jobs=n_jobs)
+    promised = held_out_probabilities(frame, schema, lambda _runs, _rng: graph, rng, folds=folds, n_jobs=n_jobs)
     truth: dict[str, FloatArray] = {objective.name: met(objective, frame, schema) for objective in schema.objectives}
     truth["all"] = all_met(frame, schema)
-    found = {name: score(odds[name], truth[name]) for name in odds}
+    found = {name: score(promised[name], truth[name]) for name in promised}
     return {name: skill for name, skill in found.items() if skill is not None}
 
 
@@ -47,10 +47,10 @@ Learn = Callable[[pd.DataFrame, np.random.Generator], CausalGraph]
 """The runs of the other folds -> the graph to fit mechanisms on."""
 
 
-def held_out_odds(
+def held_out_probabilities(
     frame: pd.DataFrame, schema: Schema, learn: Learn, rng: np.random.Generator, *, folds: int, n_jobs: int = 1
 ) -> dict[str, FloatArray]:
-    """Odds of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each."""
+    """Probability of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each."""
     fold = _folds(frame, schema, rng, folds)
     seeds = rng.integers(2**32, size=folds)
 
@@ -58,14 +58,14 @@ def held_out_odds(
         own = np.random.default_rng(seeds[k])
         runs = frame[fold != k]
         with threadpool_limits(1):  # the last digits depend on the number of threads
-            return _odds(runs, frame[fold == k], schema, learn(runs, own), own)
+            return _probabilities(runs, frame[fold == k], schema, learn(runs, own), own)
 
     predicted = Parallel(n_jobs=min(n_jobs, folds))(delayed(predict)(k) for k in range(folds))
-    odds: dict[str, FloatArray] = {}
+    promised: dict[str, FloatArray] = {}
     for k, values in enumerate(predicted):
         for name, held_out in values.items():
-            odds.setdefault(name, np.full(len(frame), np.nan))[fold == k] = held_out
-    return odds
+            promised.setdefault(name, np.full(len(frame), np.nan))[fold == k] = held_out
+    return promised
 
 
 def _folds(frame: pd.DataFrame, schema: Schema, rng: np.random.Generator, folds: int) -> NDArray[np.int64]:
@@ -84,7 +84,7 @@ def all_met(frame: pd.DataFrame, schema: Schema) -> FloatArray:
     return answer
 
 
-def _odds(
+def _probabilities(
     train: pd.DataFrame,
     test: pd.DataFrame,
     schema: Schema,
@@ -120,14 +120,14 @@ def _odds(
 
 
 def _asked(world: World, configs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
-    odds = {name: world.predict(name, configs).p_ok for name in world.thresholds}
-    return {**odds, "all": world.odds(configs)}
+    promised = {name: world.predict(name, configs).p_ok for name in world.thresholds}
+    return {**promised, "all": world.probability(configs)}
 
 
-def score(odds: FloatArray, truth: FloatArray) -> SkillRecord | None:
+def score(promised: FloatArray, truth: FloatArray) -> SkillRecord | None:
     """Log loss, Brier score, AUC, calibration and the base rate over the runs that have a truth; None without any."""
-    known = np.isfinite(odds) & np.isfinite(truth)
-    p, y = odds[known], truth[known]
+    known = np.isfinite(promised) & np.isfinite(truth)
+    p, y = promised[known], truth[known]
     if not len(y):
         return None
     clipped = np.clip(p, 1e-3, 1 - 1e-3)
@@ -143,7 +143,7 @@ def score(odds: FloatArray, truth: FloatArray) -> SkillRecord | None:
 
 
 def reliability(p: FloatArray, y: FloatArray) -> list[tuple[float, float, int]]:
-    """Rows of (mean predicted odds, share that was met, runs), one a tenth of the odds that holds any."""
+    """Rows of (mean predicted probability, share that was met, runs), one for each tenth that holds any."""
     tenth = np.minimum((p * BINS).astype(int), BINS - 1)
     return [
         (float(p[tenth == k].mean()), float(y[tenth == k].mean()), int((tenth == k).sum()))
@@ -153,6 +153,6 @@ def reliability(p: FloatArray, y: FloatArray) -> list[tuple[float, float, int]]:
 
 
 def calibration_error(p: FloatArray, y: FloatArray) -> float:
-    """Expected calibration error over tenths of the predicted odds."""
+    """Expected calibration error over tenths of the predicted probability."""
     rows = reliability(p, y)
     return sum(abs(predicted - seen) * count for predicted, seen, count in rows) / len(p)

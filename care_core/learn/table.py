@@ -76,8 +76,8 @@ def normal_scores(values: ArrayLike) -> FloatArray:
     scores = ndtri(ranks / (known.sum(axis=0) + 1))
     count = np.maximum(known.sum(axis=0), 1)
     scores = scores - np.where(known, scores, 0.0).sum(axis=0) / count
-    spread = np.sqrt(np.where(known, scores**2, 0.0).sum(axis=0) / count)
-    return np.asarray(np.where(known, scores / np.where(spread > 1e-12, spread, np.inf), np.nan))
+    sd = np.sqrt(np.where(known, scores**2, 0.0).sum(axis=0) / count)
+    return np.asarray(np.where(known, scores / np.where(sd > 1e-12, sd, np.inf), np.nan))
 
 
 def _read(path: Path) -> pd.DataFrame:

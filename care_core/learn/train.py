@@ -44,7 +44,7 @@ QUANTILES = np.linspace(0, 1, 21)
 
 
 @dataclass(frozen=True)
-class Settings:
+class TrainSettings:
     """What steers training. `n_jobs` processes share the bootstrap; the answer does not depend on them."""
 
     seed: int = 0
@@ -56,7 +56,7 @@ class Settings:
     origin: str = "not stated"
 
 
-def train(frame: pd.DataFrame, schema: Schema, settings: Settings, progress: Progress | None = None) -> Model:
+def train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, progress: Progress | None = None) -> Model:
     """Learn a profile's model from a table of runs (one row a mission, columns named as in the schema).
 
     Raises:
@@ -66,7 +66,7 @@ def train(frame: pd.DataFrame, schema: Schema, settings: Settings, progress: Pro
         return _train(frame, schema, settings, progress or (lambda _step, _share: None))
 
 
-def _train(frame: pd.DataFrame, schema: Schema, settings: Settings, report: Progress) -> Model:
+def _train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, report: Progress) -> Model:
     rng = np.random.default_rng(settings.seed)
     report("learning the graph", 0.0)
     structure = learn_structure(frame, schema, alpha=settings.alpha, rng=rng)
@@ -99,7 +99,7 @@ def assemble(
     frame: pd.DataFrame,
     schema: Schema,
     learned: Learned,
-    settings: Settings,
+    settings: TrainSettings,
     rng: np.random.Generator,
     report: Progress,
 ) -> Model:
@@ -160,12 +160,12 @@ def _interval(resampled: FloatArray, support: float) -> tuple[float, float]:
 
 def _measure(
     names: Sequence[str], mechanism: Mechanism, frame: pd.DataFrame, schema: Schema, resamples: _Resamples,
-    spread: float | None = None,
+    sd: float | None = None,
 ) -> dict[str, _Measured]:  # fmt: skip
     """Eq. 1 of each named input on the mechanism's target, averaged over a background of training runs.
 
     Args:
-        spread: what the target is scaled by, the mechanism's own scale when None.
+        sd: what the target is scaled by, the mechanism's own scale when None.
     """
     if not names:
         return {}
@@ -178,8 +178,8 @@ def _measure(
         grid[:, mechanism.inputs.index(name)] = np.tile(values, len(background))
         grids.append(grid)
     stacked, ends = np.vstack(grids), np.cumsum([len(grid) for grid in grids])[:-1]
-    if spread is None:
-        spread = 0.5 * mechanism.scale if mechanism.binary else mechanism.scale
+    if sd is None:
+        sd = 0.5 * mechanism.scale if mechanism.binary else mechanism.scale
 
     # One kernel serves the fit and all its resamples: only the weights of the training points differ.
     weights = np.column_stack([mechanism.weights, *(_reweighted(mechanism, rows) for rows in resamples.rows)])
@@ -188,9 +188,9 @@ def _measure(
 
     def effects(answer: FloatArray) -> list[Effect]:
         responses = [part.reshape(len(background), -1).mean(axis=0) for part in np.split(answer, ends)]
-        return [average_causal_effect(response, spread) for response in responses]
+        return [average_causal_effect(response, sd) for response in responses]
 
-    whole, *drawn = [effects(answer) for answer in (mechanism.odds_of(latent) if mechanism.binary else latent).T]
+    whole, *drawn = [effects(answer) for answer in (mechanism.probability_of(latent) if mechanism.binary else latent).T]
     magnitudes = np.array([[effect.magnitude for effect in resample] for resample in drawn])
     return {name: _Measured(whole[i], magnitudes[:, i]) for i, name in enumerate(names)}
 
@@ -204,7 +204,7 @@ def _reweighted(mechanism: Mechanism, rows: NDArray[np.int64]) -> FloatArray:
 
 
 def _metric_mechanisms(
-    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: Settings
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: TrainSettings
 ) -> dict[str, Mechanism]:
     """Every metric as a function of the options that cause it."""
 
@@ -217,7 +217,7 @@ def _metric_mechanisms(
 
 
 def _edge_effects(
-    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: Settings, resamples: _Resamples
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: TrainSettings, resamples: _Resamples
 ) -> dict[Edge, _Measured]:
     """Direct effect of every directed edge: the child's mechanism over all its parents, the others held.
 
@@ -240,7 +240,7 @@ def _edge_effects(
     return {edge: effect for part in measured for edge, effect in part.items()}
 
 
-def _in_parallel(settings: Settings, calls: Iterable[Any]) -> list[Any]:
+def _in_parallel(settings: TrainSettings, calls: Iterable[Any]) -> list[Any]:
     """Run on `n_jobs` processes, one thread each: the matrices are too small to share between threads."""
     with parallel_config("loky", n_jobs=settings.n_jobs, inner_max_num_threads=1):
         answers: list[Any] = Parallel()(calls)
@@ -265,7 +265,7 @@ def _edge_record(
     )
 
 
-def _spread(mechanism: Mechanism, ratios: pd.Series[float]) -> float | None:
+def _target_sd(mechanism: Mechanism, ratios: pd.Series[float]) -> float | None:
     """How far runs differ in a target that has a nominal: what is left when it is divided out under the reference."""
     if mechanism.nominal is None:
         return None
@@ -299,7 +299,7 @@ def _total_effects(
                 frame,
                 schema,
                 resamples,
-                _spread(m, ratios[objective]),
+                _target_sd(m, ratios[objective]),
             )
             for m in (mechanisms[key] for key in keys)
         ]
@@ -394,13 +394,13 @@ def _summaries(frame: pd.DataFrame, schema: Schema) -> dict[str, Summary]:
             summaries[name] = Summary(
                 count=len(values),
                 mean=float(values.mean()),
-                spread=float(values.std()),
+                sd=float(values.std()),
                 quantiles=tuple(float(q) for q in np.quantile(values, QUANTILES)),
             )
     return summaries
 
 
-def _training(frame: pd.DataFrame, schema: Schema, structure: Structure, settings: Settings) -> Training:
+def _training(frame: pd.DataFrame, schema: Schema, structure: Structure, settings: TrainSettings) -> Training:
     return Training(
         origin=settings.origin,
         runs=len(frame),

@@ -26,7 +26,7 @@ from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, Effort, Inputs, f
 from care_core.learn.outcomes import causes_of, find_stages, groups_that_move_together, inputs_of
 from care_core.learn.relative import relative
 from care_core.learn.screening import screen_options
-from care_core.learn.train import Learned, Settings, assemble
+from care_core.learn.train import Learned, TrainSettings, assemble
 from care_core.profile.schema import Schema
 from care_core.variables import Role
 
@@ -50,7 +50,7 @@ class OutOfSupport:
 
 
 def update(
-    source: Model, schema: Schema, frame: pd.DataFrame, settings: Settings, progress: Progress | None = None
+    source: Model, schema: Schema, frame: pd.DataFrame, settings: TrainSettings, progress: Progress | None = None
 ) -> Model:
     """Carry a model over to the robot whose runs are in `frame`.
 
@@ -70,7 +70,7 @@ def update(
         return _update(source, schema, frame, settings, progress or (lambda _step, _share: None))
 
 
-def _update(source: Model, schema: Schema, frame: pd.DataFrame, settings: Settings, report: Progress) -> Model:
+def _update(source: Model, schema: Schema, frame: pd.DataFrame, settings: TrainSettings, report: Progress) -> Model:
     rng = np.random.default_rng(settings.seed)
     report("completing the graph", 0.0)
     ratios = relative(frame, schema)
@@ -183,8 +183,8 @@ def started_from(
 def _share(before: FloatArray, coded: FloatArray) -> float:
     """Slope of the target on the source's prediction, drawn towards 1 as by `TRUST` runs that obey the source."""
     centred = before - before.mean()
-    spread = float(centred @ centred) / len(before)
-    if spread == 0:
+    variance = float(centred @ centred) / len(before)
+    if variance == 0:
         return 1.0
-    slope = float(centred @ (coded - coded.mean())) / (len(before) * spread)
+    slope = float(centred @ (coded - coded.mean())) / (len(before) * variance)
     return (len(before) * slope + TRUST) / (len(before) + TRUST)

@@ -42,7 +42,7 @@ _FIELD_TYPES: dict[str, tuple[str, float]] = {
 }  # fmt: skip
 
 
-class Field(NamedTuple):
+class RecordField(NamedTuple):
     """Where a field lies in a record (bytes from its first byte) and how it is stored."""
 
     offset: int
@@ -58,7 +58,7 @@ class Format:
     name: str
     length: int
     code: str
-    fields: Mapping[str, Field]
+    fields: Mapping[str, RecordField]
     byte: int
 
     @property
@@ -71,7 +71,7 @@ class _RecordColumns(Mapping[str, NDArray[Any]]):
     """Columns of records of one layout. Numbers are decoded each time they are asked for: a log holds more than is
     looked at. Text is slow to decode and rare, so it is kept."""
 
-    def __init__(self, read_bytes: Callable[[], Bytes], fields: Mapping[str, Field], offsets: Offsets) -> None:
+    def __init__(self, read_bytes: Callable[[], Bytes], fields: Mapping[str, RecordField], offsets: Offsets) -> None:
         self._read_bytes, self._fields, self._offsets = read_bytes, fields, offsets
         self._texts: dict[str, NDArray[Any]] = {}
 
@@ -306,7 +306,7 @@ def _to_format(number: int, name: str, length: int, code: str, columns: str, byt
         kind, divisor = _FIELD_TYPES[letter]
         dtype = np.dtype(kind)
         if offset + dtype.itemsize <= length:
-            fields[column] = Field(offset, dtype, divisor)
+            fields[column] = RecordField(offset, dtype, divisor)
         offset += dtype.itemsize
     return Format(number, name, length, code, fields, byte)
 
@@ -369,7 +369,7 @@ def _gap_text(low: int, high: int, size: int) -> str:
     return f"{high - low} bytes {where}are not readable records"
 
 
-def _decode(data: Bytes, offsets: Offsets, field: Field) -> NDArray[Any]:
+def _decode(data: Bytes, offsets: Offsets, field: RecordField) -> NDArray[Any]:
     """One field of the records at `offsets`: float64, or object for text and arrays."""
     count = len(data) - field.offset - field.dtype.itemsize + 1
     # A view of the field at every byte of the file, from which indexing copies only the records' own.

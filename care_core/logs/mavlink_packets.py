@@ -31,7 +31,7 @@ _KINDS = {
 }  # fmt: skip
 
 
-class Field(NamedTuple):
+class PacketField(NamedTuple):
     """Where a field lies in a payload and how it is stored: a number, text (`S`), or an array of numbers."""
 
     offset: int
@@ -45,7 +45,7 @@ class Message:
     id: int
     name: str
     extra: int
-    fields: Mapping[str, Field]
+    fields: Mapping[str, PacketField]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,7 +82,7 @@ def _to_message(number: int, peer: Any) -> Message:
     for name, count in zip(peer.ordered_fieldnames, peer.array_lengths, strict=True):
         one = np.dtype(_KINDS[kinds[name]])
         whole = np.dtype(f"S{max(count, 1)}") if one.kind == "S" else np.dtype((one, (count,))) if count else one
-        fields[name] = Field(offset, whole)
+        fields[name] = PacketField(offset, whole)
         offset += whole.itemsize
     return Message(number, peer.msgname, peer.crc_extra, fields)
 
@@ -192,7 +192,7 @@ def stamps(data: Bytes, start: Offsets) -> NDArray[np.float64]:
     return seconds
 
 
-def decode(data: Bytes, start: Offsets, field: Field) -> NDArray[Any]:
+def decode(data: Bytes, start: Offsets, field: PacketField) -> NDArray[Any]:
     """One field of packets of one message: float64, or object for text (str) and arrays (tuple).
 
     A sender leaves out the zeros at the end of a payload, so what lies past it is zero.

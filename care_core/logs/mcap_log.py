@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from care_core.logs.base import LogFormat
 from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
 from care_core.logs.mapped import FileBytes, opened
-from care_core.logs.mcap_records import MAGIC, Chunk, Contents, locate, read_contents
+from care_core.logs.mcap_records import MAGIC, McapChunk, McapContents, locate, read_contents
 from care_core.logs.recording import recording_at
 from care_core.logs.ros_log import (
     BrokenRecordError,
@@ -69,7 +69,7 @@ class McapPart:
                 if wanted and (plain := self._open(chunk, log, unpack)):
                     yield from self._of_chunk(chunk, wanted, unpack, *plain)
 
-    def _open(self, chunk: Chunk, log: FileBytes, unpack: Unpacker) -> tuple[Source, int, int] | None:
+    def _open(self, chunk: McapChunk, log: FileBytes, unpack: Unpacker) -> tuple[Source, int, int] | None:
         key = f"chunk {chunk.pos}"
         try:
             found = chunk.open(log, unpack)
@@ -84,7 +84,7 @@ class McapPart:
         return found
 
     def _of_chunk(
-        self, chunk: Chunk, wanted: Sequence[int], unpack: Unpacker, buffer: Source, begin: int, end: int
+        self, chunk: McapChunk, wanted: Sequence[int], unpack: Unpacker, buffer: Source, begin: int, end: int
     ) -> Iterator[Message]:
         left = end - begin
         for number in wanted:
@@ -104,7 +104,7 @@ class McapPart:
                     self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
 
 
-def _metadata(contents: Contents) -> Metadata:
+def _metadata(contents: McapContents) -> Metadata:
     """What the recorder wrote into the file: its own record, the statistics, and whatever else was noted."""
     found = []
     for record in contents.metadata:
@@ -119,7 +119,7 @@ def _metadata(contents: Contents) -> Metadata:
     return Metadata.merged(found)
 
 
-def _times_by_channel(contents: Contents) -> dict[int, NDArray[np.int64]]:
+def _times_by_channel(contents: McapContents) -> dict[int, NDArray[np.int64]]:
     parts: dict[int, list[NDArray[np.int64]]] = {}
     for chunk in contents.chunks:
         for number, entries in chunk.index.items():
@@ -128,11 +128,11 @@ def _times_by_channel(contents: Contents) -> dict[int, NDArray[np.int64]]:
     return {number: np.concatenate(times) for number, times in parts.items()}
 
 
-def _first_ns(chunk: Chunk) -> int | None:
+def _first_ns(chunk: McapChunk) -> int | None:
     return min((int(_times_ns(entries).min()) for entries in chunk.index.values() if len(entries)), default=None)
 
 
-def _last_ns(chunk: Chunk) -> int:
+def _last_ns(chunk: McapChunk) -> int:
     return max(int(_times_ns(entries).max()) for entries in chunk.index.values())
 
 

@@ -15,10 +15,10 @@ from io import BytesIO
 from typing import Any, NamedTuple
 
 import numpy as np
+from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Header, Metadata, Schema, Statistics
 from numpy.typing import NDArray
 
 from care_core import limits
@@ -43,7 +43,7 @@ _PIECE = 1 << 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chunk:
+class McapChunk:
     """A chunk: where its packed records lie in the file, and per channel the entries of its messages."""
 
     pos: int
@@ -79,22 +79,22 @@ class Chunk:
 
 
 @dataclass(slots=True)
-class Contents:
+class McapContents:
     """What a walk over a file finds."""
 
     profile: str = ""
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    chunks: list[Chunk] = field(default_factory=list)
-    metadata: list[Metadata] = field(default_factory=list)
-    statistics: Statistics | None = None
+    schemas: dict[int, records.Schema] = field(default_factory=dict)
+    channels: dict[int, records.Channel] = field(default_factory=dict)
+    chunks: list[McapChunk] = field(default_factory=list)
+    metadata: list[records.Metadata] = field(default_factory=list)
+    statistics: records.Statistics | None = None
     flaws: dict[str, Flaw] = field(default_factory=dict)
     is_closed: bool = False
 
     def connections(self) -> dict[int, Connection]:
         return {number: self._connection(channel) for number, channel in self.channels.items()}
 
-    def _connection(self, channel: Channel) -> Connection:
+    def _connection(self, channel: records.Channel) -> Connection:
         schema = self.schemas.get(channel.schema_id)
         if schema is None:
             return Connection(channel.topic, "", "", channel.message_encoding)
@@ -116,9 +116,9 @@ class _Record(NamedTuple):
     end: int
 
 
-def read_contents(log: FileBytes) -> Contents:
+def read_contents(log: FileBytes) -> McapContents:
     """Walk over a file's records; behind a broken one, go on where the summary says that the next chunk is."""
-    contents = Contents()
+    contents = McapContents()
     loose = _Loose()
     pos, size = len(MAGIC), len(log)
     while pos < size and not contents.is_closed:
@@ -172,13 +172,13 @@ class _Loose:
         self.times.setdefault(number, array("Q")).append(time_ns)
         self.offsets.setdefault(number, array("Q")).append(record.pos)
 
-    def chunks(self, size: int) -> Iterator[Chunk]:
+    def chunks(self, size: int) -> Iterator[McapChunk]:
         if self.times:
             index = {number: _entries(times, self.offsets[number]) for number, times in self.times.items()}
-            yield Chunk(0, 0, size, is_whole=True, index=index)
+            yield McapChunk(0, 0, size, is_whole=True, index=index)
 
 
-def _take(log: FileBytes, record: _Record, contents: Contents) -> None:
+def _take(log: FileBytes, record: _Record, contents: McapContents) -> None:
     """Add what a top-level record says to the contents."""
     if record.op == Opcode.CHUNK:
         contents.chunks.append(_chunk(log, record))
@@ -194,7 +194,7 @@ def _take(log: FileBytes, record: _Record, contents: Contents) -> None:
         _take_described(log, record, contents)
 
 
-def _take_index(log: FileBytes, record: _Record, chunk: Chunk) -> None:
+def _take_index(log: FileBytes, record: _Record, chunk: McapChunk) -> None:
     if record.end - record.start < _INDEX.size:
         raise BrokenRecordError("a message index of the wrong size")
     number, size = _INDEX.unpack(log[record.start : record.start + _INDEX.size])
@@ -204,11 +204,11 @@ def _take_index(log: FileBytes, record: _Record, chunk: Chunk) -> None:
         chunk.index[number] = np.frombuffer(log[record.start + _INDEX.size : record.end], ENTRY)
 
 
-def _take_described(log: Source, record: _Record, contents: Contents) -> None:
+def _take_described(log: Source, record: _Record, contents: McapContents) -> None:
     """Take records that the mcap library reads: schemas, channels, metadata, statistics."""
     kinds: Mapping[int, Any] = {
-        Opcode.HEADER: Header, Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel, Opcode.METADATA: Metadata,
-        Opcode.STATISTICS: Statistics,
+        Opcode.HEADER: records.Header, Opcode.SCHEMA: records.Schema, Opcode.CHANNEL: records.Channel,
+        Opcode.METADATA: records.Metadata, Opcode.STATISTICS: records.Statistics,
     }  # fmt: skip
     kind = kinds.get(record.op)
     if kind is None:
@@ -217,19 +217,19 @@ def _take_described(log: Source, record: _Record, contents: Contents) -> None:
         read = kind.read(ReadDataStream(BytesIO(log[record.start : record.end])))
     except (McapError, struct.error, UnicodeDecodeError) as err:
         raise BrokenRecordError(f"a {kind.__name__.lower()} record is broken") from err
-    if isinstance(read, Header):
+    if isinstance(read, records.Header):
         contents.profile = read.profile
-    elif isinstance(read, Schema):
+    elif isinstance(read, records.Schema):
         contents.schemas.setdefault(read.id, read)
-    elif isinstance(read, Channel):
+    elif isinstance(read, records.Channel):
         contents.channels.setdefault(read.id, read)
-    elif isinstance(read, Metadata):
+    elif isinstance(read, records.Metadata):
         contents.metadata.append(read)
     else:
         contents.statistics = read
 
 
-def _chunk(log: FileBytes, record: _Record) -> Chunk:
+def _chunk(log: FileBytes, record: _Record) -> McapChunk:
     """A chunk record; of one that is cut short, what is there."""
     end = min(record.end, len(log))
     name_at = record.start + _CHUNK.size
@@ -243,10 +243,10 @@ def _chunk(log: FileBytes, record: _Record) -> Chunk:
     if start + packed != record.end:
         raise BrokenRecordError("a chunk of the wrong size")
     compression = log[name_at : name_at + name_size].decode("ascii", "replace")
-    return Chunk(record.pos, start, end, end == record.end, compression, size, checksum)
+    return McapChunk(record.pos, start, end, end == record.end, compression, size, checksum)
 
 
-def _complete(log: FileBytes, contents: Contents) -> None:
+def _complete(log: FileBytes, contents: McapContents) -> None:
     """Look into chunks for what their message index and the summary do not say."""
     unpack = Unpacker(len(log))
     left = limits.messages(len(log))
@@ -264,7 +264,9 @@ def _complete(log: FileBytes, contents: Contents) -> None:
         left -= sum(map(len, found.values()))
 
 
-def _scan(chunk: Chunk, log: FileBytes, contents: Contents, unpack: Unpacker, most: int) -> dict[int, NDArray[Any]]:
+def _scan(
+    chunk: McapChunk, log: FileBytes, contents: McapContents, unpack: Unpacker, most: int
+) -> dict[int, NDArray[Any]]:
     """Index entries of a chunk's complete messages per channel; takes its schemas and channels on the way."""
     buffer, begin, end = chunk.open(log, unpack)
     times: dict[int, array[int]] = {}

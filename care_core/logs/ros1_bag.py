@@ -15,7 +15,7 @@ from care_core.logs.base import LogFormat
 from care_core.logs.compression import Unpacker
 from care_core.logs.mapped import opened
 from care_core.logs.recording import recording_at
-from care_core.logs.ros1_records import MAGIC, Chunk, Contents, locate, read_contents
+from care_core.logs.ros1_records import MAGIC, BagChunk, BagContents, locate, read_contents
 from care_core.logs.ros_log import (
     BrokenRecordError,
     Connection,
@@ -53,7 +53,7 @@ class Ros1Part:
         self.path = path
         self.metadata = Metadata()
         with opened(path, MAGIC, "a ROS 1 bag of format 2.0") as bag:
-            self._contents: Contents = read_contents(bag)
+            self._contents: BagContents = read_contents(bag)
         if self._contents.is_encrypted:
             raise LogError("The bag is encrypted.", hint="Decrypt it with 'rosbag decrypt' first.", where=str(path))
         self.connections: Mapping[int, Connection] = self._contents.connections
@@ -76,7 +76,9 @@ class Ros1Part:
                 else:
                     yield from self._of_chunk(chunk, wanted, *plain)
 
-    def _of_chunk(self, chunk: Chunk, wanted: Sequence[int], buffer: Source, begin: int, end: int) -> Iterator[Message]:
+    def _of_chunk(
+        self, chunk: BagChunk, wanted: Sequence[int], buffer: Source, begin: int, end: int
+    ) -> Iterator[Message]:
         left = end - begin
         for number in wanted:
             entries = chunk.index[number]
@@ -105,7 +107,7 @@ def _check_one_run(path: Path, parts: Sequence[Ros1Part]) -> None:
         )
 
 
-def _times_by_connection(contents: Contents) -> Mapping[int, NDArray[np.int64]]:
+def _times_by_connection(contents: BagContents) -> Mapping[int, NDArray[np.int64]]:
     parts: dict[int, list[NDArray[np.int64]]] = {}
     for chunk in contents.chunks:
         for number, entries in chunk.index.items():
@@ -114,12 +116,12 @@ def _times_by_connection(contents: Contents) -> Mapping[int, NDArray[np.int64]]:
     return {number: np.concatenate(times) for number, times in parts.items()}
 
 
-def _first_ns(chunk: Chunk) -> int | None:
+def _first_ns(chunk: BagChunk) -> int | None:
     times = [int(_entry_times_ns(entries).min()) for entries in chunk.index.values() if len(entries)]
     return min(times, default=None)
 
 
-def _last_ns(chunk: Chunk) -> int | None:
+def _last_ns(chunk: BagChunk) -> int | None:
     return max((int(_entry_times_ns(entries).max()) for entries in chunk.index.values() if len(entries)), default=None)
 
 

@@ -35,7 +35,7 @@ _IS_MESSAGE = b"\x04\x00\x00\x00op=\x02"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Chunk:
+class BagChunk:
     """A chunk: where its data lies in the file, and per connection id the entries of its messages."""
 
     pos: int
@@ -58,11 +58,11 @@ class Chunk:
 
 
 @dataclass(slots=True)
-class Contents:
+class BagContents:
     """What a walk over a bag finds."""
 
     connections: dict[int, Connection] = field(default_factory=dict)
-    chunks: list[Chunk] = field(default_factory=list)
+    chunks: list[BagChunk] = field(default_factory=list)
     flaws: dict[str, Flaw] = field(default_factory=dict)
     is_encrypted: bool = False
 
@@ -88,9 +88,9 @@ class _Record:
         return int.from_bytes(value, "little")
 
 
-def read_contents(bag: FileBytes) -> Contents:
+def read_contents(bag: FileBytes) -> BagContents:
     """Walk over a bag's records; behind a broken one, go on where the index says that the next chunk is."""
-    contents = Contents()
+    contents = BagContents()
     pos, size = len(MAGIC), len(bag)
     index_pos = connection_count = chunk_count = chunk_infos = 0
     while pos < size:
@@ -152,12 +152,12 @@ def locate(buffer: Source, begin: int, end: int, offset: int) -> tuple[int, int]
     raise BrokenRecordError("a message lies beyond the end of its chunk")
 
 
-def _take(bag: FileBytes, record: _Record, contents: Contents) -> None:
+def _take(bag: FileBytes, record: _Record, contents: BagContents) -> None:
     """Add what a top-level record says to the contents."""
     if record.op == _CHUNK:
         compression = record.fields.get(b"compression", b"").decode("ascii", "replace")
         size = int.from_bytes(record.fields.get(b"size", b"")[:4], "little")
-        contents.chunks.append(Chunk(record.pos, record.start, min(record.end, len(bag)), compression, size))
+        contents.chunks.append(BagChunk(record.pos, record.start, min(record.end, len(bag)), compression, size))
     if record.end > len(bag):
         raise BrokenRecordError("its last record is cut short")
     if record.op == _INDEX and contents.chunks:
@@ -169,7 +169,7 @@ def _take(bag: FileBytes, record: _Record, contents: Contents) -> None:
         _take_connection(bag, record, contents)
 
 
-def _take_connection(buffer: Source, record: _Record, contents: Contents) -> None:
+def _take_connection(buffer: Source, record: _Record, contents: BagContents) -> None:
     described = _fields(buffer[record.start : record.end])
     contents.connections[record.number(b"conn")] = Connection(
         topic=_normal(record.fields.get(b"topic", b"").decode("utf-8", "replace")),
@@ -178,7 +178,7 @@ def _take_connection(buffer: Source, record: _Record, contents: Contents) -> Non
     )
 
 
-def _complete(bag: FileBytes, contents: Contents) -> None:
+def _complete(bag: FileBytes, contents: BagContents) -> None:
     """Look into chunks for what index and connection records at the top level do not say."""
     unpack = Unpacker(len(bag))
     left = limits.messages(len(bag))
@@ -196,7 +196,7 @@ def _complete(bag: FileBytes, contents: Contents) -> None:
 
 
 def _scan(
-    chunk: Chunk, bag: FileBytes, contents: Contents, unpack: Unpacker, most: int
+    chunk: BagChunk, bag: FileBytes, contents: BagContents, unpack: Unpacker, most: int
 ) -> dict[int, list[tuple[int, int, int]]]:
     """Index entries of a chunk's complete messages per connection; takes its connection records on the way."""
     buffer, begin, end = chunk.open(bag, unpack)

@@ -21,7 +21,7 @@ from care_core.logs.mapped import opened
 from care_core.logs.recording import recording_at
 from care_core.logs.ros_log import Connection, Flaw, Message, RosLog
 from care_core.logs.ros_metadata import Metadata, parse_metadata
-from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, Row, is_blob, is_text, promised_size
+from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, StoredRow, is_blob, is_text, promised_size
 
 _WHAT = "a SQLite file"
 _NOT_SOUND = (sqlite3.Error, UnicodeDecodeError)
@@ -134,7 +134,7 @@ class _Contents:
 
 
 _DataRow = tuple[int, int, int, Any]
-"""Row id, topic id, record time in ns, data."""
+"""StoredRow id, topic id, record time in ns, data."""
 
 
 class _Store(Protocol):
@@ -289,7 +289,7 @@ class _SalvagedPages:
                     yield row.id, *message, None
 
 
-def _message_head(pages: Pages, row: Row) -> tuple[int, int] | None:
+def _message_head(pages: Pages, row: StoredRow) -> tuple[int, int] | None:
     """Topic id and record time of a row of `messages`, None for a row of another table."""
     if len(row.types) != _MESSAGE_COLUMNS or not is_blob(row.types[-1]) or row.types[0] != 0:
         return None
@@ -299,7 +299,7 @@ def _message_head(pages: Pages, row: Row) -> tuple[int, int] | None:
     return numbers[0], numbers[1]
 
 
-def _take_described(contents: _Contents, row: Row, values: list[int | bytes | None]) -> None:
+def _take_described(contents: _Contents, row: StoredRow, values: list[int | bytes | None]) -> None:
     """Take a row of `topics`, `message_definitions`, `metadata` or `schema`."""
     texts = [value.decode("utf-8", "replace") if isinstance(value, bytes) else "" for value in values]
     if not row.types or not is_text(row.types[-1]) or row.types[0] != 0:

@@ -26,6 +26,7 @@ from care_core.logs.ros_metadata import Metadata
 from care_core.logs.ros_settings import setting_fields, settings_in
 from care_core.logs.ros_types import cdr_types
 from care_core.run import Damage, Setting
+from care_core.text import clock
 
 _EPOCH_OF_ROS = datetime(2005, 1, 1, tzinfo=timezone.utc)
 """No recording is older: an earlier time comes from a simulated clock."""
@@ -359,8 +360,8 @@ class RosLog:
         own = [self._kept(times) for times in part.times_ns.values()]
         end_s = (max((int(times.max()) for times in own if len(times)), default=self._low_ns) - self._low_ns) / 1e9
         whole_s = self._metadata.duration_s
-        of = f" of about {_clock_text(whole_s)}" if whole_s and whole_s > end_s else ""
-        what = f"{where}read 00:00 to {_clock_text(end_s)}{of}, cut at byte {flaw.byte}: {flaw.what}"
+        of = f" of about {clock(whole_s)}" if whole_s and whole_s > end_s else ""
+        what = f"{where}read 00:00 to {clock(end_s)}{of}, cut at byte {flaw.byte}: {flaw.what}"
         return Damage(what, flaw.byte, end_s)
 
     @cached_property
@@ -476,10 +477,6 @@ def _channel(topic: str, types: Mapping[str, None], recorded: Sequence[NDArray[n
     count = sum(len(times) for times in recorded)
     times = np.concatenate(recorded) if count else np.zeros(1, dtype=np.int64)
     return Channel.over(topic, ", ".join(types), count, (int(times.max()) - int(times.min())) / 1e9)
-
-
-def _clock_text(seconds: float) -> str:
-    return f"{int(seconds) // 60:02d}:{int(seconds) % 60:02d}"
 
 
 def _columns(decoder: Decoder, rows: Sequence[Sequence[Any]]) -> dict[str, NDArray[Any]]:

@@ -113,7 +113,7 @@ class Wire(Protocol):
     def elements(self, each: MessageDecoder, count: int | None) -> Step: ...
 
 
-class Field(NamedTuple):
+class MessageField(NamedTuple):
     """A field of a message: `size` is None for one value, -1 for a sequence, else the length of an array."""
 
     name: str
@@ -121,7 +121,7 @@ class Field(NamedTuple):
     size: int | None
 
 
-Types = Mapping[str, Sequence[Field]]
+Types = Mapping[str, Sequence[MessageField]]
 """Fields by message type (`package/Type`), of a message and all that it is made of."""
 
 
@@ -145,7 +145,7 @@ def parse_definition(type_name: str, definition: str) -> Types:
     return {name: _fields(name, text, texts) for name, text in texts.items()}
 
 
-def _fields(owner: str, text: str, known: Mapping[str, str]) -> list[Field]:
+def _fields(owner: str, text: str, known: Mapping[str, str]) -> list[MessageField]:
     fields = []
     for line in text.splitlines():
         bare = line.partition("#")[0].strip()
@@ -160,7 +160,7 @@ def _fields(owner: str, text: str, known: Mapping[str, str]) -> list[Field]:
             if length and len(length) > _LONGEST_LENGTH:
                 raise MalformedMessageError("an array of its definition is too long")
             size = None if is_array is None else int(length or -1)
-            fields.append(Field(name, _full_name(base, owner, known), size))
+            fields.append(MessageField(name, _full_name(base, owner, known), size))
     return fields
 
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from care_core import limits
 from care_core.logs.cdr_message import wide_size
-from care_core.logs.ros_message import Field, MalformedMessageError, Types, parse_definition, short_name
+from care_core.logs.ros_message import MalformedMessageError, MessageField, Types, parse_definition, short_name
 
 _DISTROS = ("humble", "foxy", "galactic")
 """Tried in this order where a log names neither its definitions nor its distribution: later ones always do."""
@@ -16,7 +16,7 @@ _DISTROS = ("humble", "foxy", "galactic")
 _LANGUAGES = ("", "ros2msg", "ros2idl", "omgidl")
 _IDL_SEPARATOR = re.compile(r"^=+\s*\nIDL: (\S+)\s*$", re.MULTILINE)
 _DIRECTIVE = re.compile(r"^\s*#.*$", re.MULTILINE)
-_PADDING_FIELD = Field("structure_needs_at_least_one_member", "uint8", None)
+_PADDING_FIELD = MessageField("structure_needs_at_least_one_member", "uint8", None)
 """What ROS 2 puts into a message that has no field."""
 
 

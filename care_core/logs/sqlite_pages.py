@@ -47,7 +47,7 @@ class BrokenCellError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class StoredRow:
     """A row of some table: its id, the columns' serial types, and where its payload begins."""
 
     id: int
@@ -68,7 +68,7 @@ class Pages:
         self.usable = self.size - (log.byte(20) if len(log) > _FIRST_PAGE_HEADER else 0)
         self._left = _SHARED * len(log)
 
-    def rows(self) -> Iterator[Row]:
+    def rows(self) -> Iterator[StoredRow]:
         """Every row of every table, in the order of the pages; what is no row is passed over."""
         for page in range(len(self.log) // self.size):
             base = page * self.size
@@ -86,7 +86,7 @@ class Pages:
                 except (BrokenCellError, IndexError):
                     continue
 
-    def values(self, row: Row) -> list[int | bytes | None]:
+    def values(self, row: StoredRow) -> list[int | bytes | None]:
         """The columns of a row; text as its bytes. Raises BrokenCellError."""
         payload = self._payload(row)
         values: list[int | bytes | None] = []
@@ -100,7 +100,7 @@ class Pages:
             pos += size
         return values
 
-    def numbers(self, row: Row) -> list[int | None]:
+    def numbers(self, row: StoredRow) -> list[int | None]:
         """The columns before the first text or blob, which lie in the row's own page."""
         values: list[int | None] = []
         pos = row.start + row.head
@@ -113,7 +113,7 @@ class Pages:
             pos += size
         return values
 
-    def _row(self, page: int, pos: int) -> Row:
+    def _row(self, page: int, pos: int) -> StoredRow:
         size, pos = self._varint(pos)
         rowid, start = self._varint(pos)
         head, pos = self._varint(start)
@@ -125,9 +125,9 @@ class Pages:
             types.append(kind)
         if size > len(self.log) or len(types) > _MOST_COLUMNS or head + sum(_size(kind) for kind in types) != size:
             raise BrokenCellError("a row's header is broken")
-        return Row(rowid, tuple(types), page, start, size, head)
+        return StoredRow(rowid, tuple(types), page, start, size, head)
 
-    def _payload(self, row: Row) -> bytes:
+    def _payload(self, row: StoredRow) -> bytes:
         """A row's payload, gathered over its overflow pages, whose chain may run in circles."""
         self._left -= row.size
         if self._left < 0:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted
 
 Floats = NDArray[np.float64]
-Row = tuple[float, tuple[Any, ...]]
+Sample = tuple[float, tuple[Any, ...]]
 
 _ARMED_FLAG = 128
 _ARM_DISARM, _FORCE = 400, 21196
@@ -222,7 +222,7 @@ def _messages(log: _Telemetry) -> Table | None:
     return _to_table(rows, ("Message",))
 
 
-def _texts(log: _Telemetry) -> Iterator[Row]:
+def _texts(log: _Telemetry) -> Iterator[Sample]:
     """The texts of STATUSTEXT; a long one comes in pieces of the same number."""
     table = log.heard("STATUSTEXT", "text", "id", "chunk_seq")
     if table is None:
@@ -244,7 +244,7 @@ def _texts(log: _Telemetry) -> Iterator[Row]:
 
 def _items(log: _Telemetry) -> Table | None:
     """CMD: the mission as the vehicle or, to the vehicle, a ground station sent it. Item 0 is home, no item."""
-    rows: list[Row] = []
+    rows: list[Sample] = []
     for message, scale in (("MISSION_ITEM_INT", 1e-7), ("MISSION_ITEM", 1.0)):
         for table in log.exchanged(
             message, "seq", "command", "param1", "param2", "x", "y", "z", "frame", "mission_type"
@@ -264,7 +264,7 @@ def _items(log: _Telemetry) -> Table | None:
     return _to_table(rows, ("CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame"))
 
 
-def _to_table(rows: Iterable[Row], fields: tuple[str, ...]) -> Table | None:
+def _to_table(rows: Iterable[Sample], fields: tuple[str, ...]) -> Table | None:
     ordered = sorted(rows, key=lambda row: row[0])
     if not ordered:
         return None

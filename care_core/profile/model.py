@@ -101,7 +101,7 @@ def write_model(model: Model, folder: Path) -> None:
         mechanisms={key: _mechanism_record(key, m) for key, m in stored.items()},
         arrays_sha256=hashlib.sha256(arrays).hexdigest(),
     )
-    text = json.dumps(_rounded(record.model_dump(mode="json")), indent=1, ensure_ascii=False) + "\n"
+    text = json.dumps(_rounded(record.model_dump(mode="json", by_alias=True)), indent=1, ensure_ascii=False) + "\n"
     replace_file(folder / _NEXT_ARRAYS, arrays)
     replace_file(folder / "model.json", text.encode())
     (folder / _NEXT_ARRAYS).replace(folder / _ARRAYS)
@@ -152,7 +152,7 @@ def _arrays(mechanisms: Mapping[str, Mechanism]) -> dict[str, np.ndarray[Any, An
     arrays: dict[str, np.ndarray[Any, Any]] = {}
     for key, m in mechanisms.items():
         k = m.kernel
-        arrays[f"{key}/scaling"] = np.vstack([m.log_inputs, m.centre, m.spread, k.relevance]).astype(np.float64)
+        arrays[f"{key}/scaling"] = np.vstack([m.log_inputs, m.centre, m.sd, k.relevance]).astype(np.float64)
         arrays[f"{key}/numbers"] = np.array([k.additive, k.joint, k.noise, m.mean, m.scale, k.idle])
         arrays[f"{key}/points"] = m.points.astype(np.float32)
         arrays[f"{key}/targets"] = m.targets.astype(np.float32)
@@ -300,7 +300,7 @@ def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArr
             raise ValueError(f"{key}/{name} holds values that are not finite")
         return array
 
-    logs, centre, spread, relevance = floats("scaling")
+    logs, centre, sd, relevance = floats("scaling")
     additive, joint, noise, mean, scale, *idle = floats("numbers")
     reads = record.inputs if record.reads is None else record.reads
     points, targets, calibration = floats("points"), floats("targets"), floats("calibration")
@@ -320,7 +320,7 @@ def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArr
         nominal=_nominal(key, record),
         log_inputs=logs.astype(bool),
         centre=centre,
-        spread=spread,
+        sd=sd,
         kernel=Kernel(relevance, float(additive), float(joint), float(noise), *map(int, idle)),
         points=points,
         targets=targets,

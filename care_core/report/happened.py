@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict
 
 from care_core.diagnose.records import Hypothesis, What
 from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
-from care_core.report.wording import SEVERITY_WORDS, clock, hypothesis_text
+from care_core.report.wording import SEVERITY_WORDS, hypothesis_text
 from care_core.run import Fit, FitVerdict
-from care_core.text import clean, wrapped
+from care_core.text import clean, seconds, wrapped
 
 MOMENTS_SHOWN = 24
 """Lines of the account in text; the document holds all."""
@@ -138,11 +138,11 @@ def finding_sentence(finding: FindingEntry) -> str:
     """A finding of a document with its numbers and what it led to."""
     late = ", after the impact" if finding.after_impact else ""
     led = f" Led to: {'; '.join(one.title for one in finding.consequences)}." if finding.consequences else ""
-    return f"{finding.title}, at {clock(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
+    return f"{finding.title}, at {seconds(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
 
 
 def finding_text(finding: Finding) -> str:
-    return f"{finding.title} at {clock(finding.onset_s)}"
+    return f"{finding.title} at {seconds(finding.onset_s)}"
 
 
 def account_lines(account: Sequence[Moment | MomentEntry], robot: str = "", most: int = MOMENTS_SHOWN) -> Iterator[str]:
@@ -152,7 +152,7 @@ def account_lines(account: Sequence[Moment | MomentEntry], robot: str = "", most
     yield from wrapped(f"What happened{f' ({robot})' if robot else ''}")
     told = telling(account, most)
     for moment in told:
-        yield from wrapped(moment.text, f"  {clock(moment.time_s):>9}  ")
+        yield from wrapped(moment.text, f"  {seconds(moment.time_s):>9}  ")
     if len(told) < len(account):
         yield f"  and {len(account) - len(told)} more: 'care inspect' tells all"
 
@@ -178,14 +178,14 @@ def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
     for finding in findings:
         late = ", after the impact" if finding.after_impact else ""
         head = f"  {SEVERITY_WORDS[finding.severity]:<8}  "
-        yield from wrapped(f"{finding.title}, at {clock(finding.onset_s)}{late}", head)
+        yield from wrapped(f"{finding.title}, at {seconds(finding.onset_s)}{late}", head)
         if finding.evidence:
             yield from wrapped(finding.evidence, " " * len(head))
         yield from _led_to(finding, " " * len(head))
 
 
 def _led_to(finding: Finding | FindingEntry, indent: str) -> Iterator[str]:
-    titles = list(dict.fromkeys(f"{one.title} ({clock(one.onset_s)})" for one in finding.consequences))
+    titles = list(dict.fromkeys(f"{one.title} ({seconds(one.onset_s)})" for one in finding.consequences))
     if titles:
         more = f" and {len(titles) - LED_TO_SHOWN} more" if len(titles) > LED_TO_SHOWN else ""
         yield from wrapped(f"led to: {'; '.join(titles[:LED_TO_SHOWN])}{more}", indent)

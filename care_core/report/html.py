@@ -21,9 +21,10 @@ from care_core.report.document import (
 )
 from care_core.report.happened import finding_sentence, fit_text
 from care_core.report.together import listed, together
-from care_core.report.wording import SEVERITY_WORDS, clock, hypothesis_text
+from care_core.report.wording import SEVERITY_WORDS, hypothesis_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import shown
+from care_core.text import seconds
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8886; --ok: #16803c; --fault: #c0261c; --unknown: #9a6a00; }
@@ -65,7 +66,7 @@ def _page(report: Report) -> Iterator[str]:
         fault = faults[-1]
         yield f"<h2>Causes of {listed([f'<code>{escape(one.objective)}</code>' for one in faults])}</h2>"
         if fault.causes:
-            heads = ("", "Option", "Path", "Driven", "Suggested", "Odds", "Confidence", "Notes")
+            heads = ("", "Option", "Path", "Driven", "Suggested", "Probability", "Confidence", "Notes")
             yield from _table(heads, map(_cause_row, fault.causes))
         else:
             yield "<p>None was found among the options of the profile.</p>"
@@ -102,7 +103,7 @@ def _happened(report: Report) -> Iterator[str]:
         )
     if report.account:
         yield "<h2>What happened</h2>"
-        rows = ((clock(one.time_s), escape(one.text), escape(one.source)) for one in report.account)
+        rows = ((seconds(one.time_s), escape(one.text), escape(one.source)) for one in report.account)
         yield from _table(("Time", "What", "Source"), rows)
 
 
@@ -123,7 +124,7 @@ def _verdict(report: Report) -> str:
     changes = ", ".join(
         f"<code>{escape(change.option)}</code> from {change.from_:g} to {change.to:g}" for change in report.fix.changes
     )
-    return f"{found} Change {changes}: {report.fix.p_fixed:.0%} odds that all objectives are met."
+    return f"{found} Change {changes}: {report.fix.p_fixed:.0%} probability that all objectives are met."
 
 
 def _objective_row(objective: ObjectiveEntry) -> tuple[str, ...]:
@@ -184,9 +185,9 @@ def _since(since: SinceEntry) -> Iterator[str]:
 
 
 def _prediction(objective: ObjectiveEntry, predicted: PredictedObjective) -> str:
-    """A yes-or-no objective has odds, not a value."""
+    """A yes-or-no objective has a probability, not a value."""
     if objective.kind == "functional":
-        return f"{predicted.value:.0%} odds"
+        return f"{predicted.value:.0%} probability"
     return f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
 
 
@@ -194,7 +195,7 @@ def _alternative(fix: FixSet) -> str:
     changes = ", ".join(
         f"<code>{escape(change.option)}</code> {change.from_:g} to {change.to:g}" for change in fix.changes
     )
-    return f"{changes}: {fix.p_fixed:.0%} odds"
+    return f"{changes}: {fix.p_fixed:.0%} probability"
 
 
 def _diff_line(line: str) -> str:

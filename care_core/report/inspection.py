@@ -26,7 +26,7 @@ from care_core.report.happened import (
     fit_text,
 )
 from care_core.run import Damage, MissionInfo, ProfileChoice
-from care_core.text import clean, wrapped
+from care_core.text import clean, clock, wrapped
 
 INSPECT_ID: Final = "care.inspect/1"
 
@@ -283,17 +283,9 @@ def inspection_text(document: InspectDocument) -> str:
 
 def _span(log: LogEntry) -> str:
     if not log.damage:
-        return f"{_clock(log.duration_s)} ({log.duration_s:.1f} s)"
-    about = "" if log.read.about_s is None else f" of about {_clock(log.read.about_s)}"
-    return f"read 00:00 to {_clock(log.read.to_s)}{about} ({log.duration_s:.1f} s), see Damage"
-
-
-def _clock(seconds: float | None) -> str:
-    if seconds is None:
-        return "an unknown time"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes:02}:{rest:02}"
+        return f"{clock(log.duration_s)} ({log.duration_s:.1f} s)"
+    about = "" if log.read.about_s is None else f" of about {clock(log.read.about_s)}"
+    return f"read 00:00 to {clock(log.read.to_s)}{about} ({log.duration_s:.1f} s), see Damage"
 
 
 def _damage_lines(damage: Sequence[DamageEntry]) -> Iterator[str]:
@@ -311,7 +303,7 @@ def _damage_lines(damage: Sequence[DamageEntry]) -> Iterator[str]:
 
 def _place(entry: DamageEntry) -> str:
     byte = "" if entry.byte is None else f" at byte {entry.byte}"
-    return byte + ("" if entry.time_s is None else f" (at {_clock(entry.time_s)})")
+    return byte + ("" if entry.time_s is None else f" (at {clock(entry.time_s)})")
 
 
 def _parameter_lines(found: ParameterEntry) -> Iterator[str]:
@@ -319,7 +311,7 @@ def _parameter_lines(found: ParameterEntry) -> Iterator[str]:
     yield f"Parameters  {found.count}{f': {sources}' if sources else ''}"
     for change in found.changed[:MOST_CHANGED]:
         values = f"from {_value(change.before)} to {_value(change.after)}"
-        yield f"  changed   {change.name} {values} at {_clock(change.time_s)}"
+        yield f"  changed   {change.name} {values} at {clock(change.time_s)}"
     if len(found.changed) > MOST_CHANGED:
         yield f"  changed   and {len(found.changed) - MOST_CHANGED} more (see --json)"
 
@@ -346,7 +338,7 @@ def _profile_lines(profiles: Iterable[ProfileEntry]) -> Iterator[str]:
 def _mission_text(mission: MissionEntry) -> str:
     end = "" if mission.ended else ", the log ends before it does"
     mismatch = f", {mission.mismatch}" if mission.mismatch else ""
-    return f"{_clock(mission.start_s)} to {_clock(mission.end_s)}{end}{mismatch}"
+    return f"{clock(mission.start_s)} to {clock(mission.end_s)}{end}{mismatch}"
 
 
 def _missed_lines(missed: Sequence[MissedEntry]) -> Iterator[str]:

@@ -72,7 +72,7 @@ def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
     confidence = next((cause.confidence for cause in causes if cause.option.name in changed), None)
     changes = ", ".join(map(str, fix.changes))
     sure = f", {confidence} confidence in the cause" if confidence else ""
-    return f"Change {changes}: {fix.p_fixed:.0%} odds that all objectives are met{sure}"
+    return f"Change {changes}: {fix.p_fixed:.0%} probability that all objectives are met{sure}"
 
 
 def _without_profile(health: Health) -> str:
@@ -183,7 +183,7 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     fix = diagnosis.fix
     if fix is None:
         return
-    yield f"Fix ({fix.p_fixed:.0%} odds that all objectives are met)"
+    yield f"Fix ({fix.p_fixed:.0%} probability that all objectives are met)"
     for change in fix.changes:
         option = change.option
         restart = ", needs a restart" if option.reboot_required else ""
@@ -195,7 +195,7 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
         if objective.name in fix.predicted:
             yield from wrapped(_prediction(objective, fix.predicted[objective.name]), "  ", "    ")
     for other in diagnosis.alternatives:
-        yield from wrapped(f"or {', '.join(map(str, other.changes))}: {other.p_fixed:.0%} odds", "  ", "     ")
+        yield from wrapped(f"or {', '.join(map(str, other.changes))}: {other.p_fixed:.0%} probability", "  ", "     ")
     yield ""
     yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix.changes).splitlines())
     yield ""
@@ -206,12 +206,12 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _prediction(objective: Variable, predicted: Prediction) -> str:
-    """A yes-or-no objective has odds, not a value."""
-    odds = STATUS_WORDS[predicted.status()] if predicted.p_ok is None else f"{predicted.p_ok:.0%} odds"
+    """A yes-or-no objective has a probability, not a value."""
+    probability = STATUS_WORDS[predicted.status()] if predicted.p_ok is None else f"{predicted.p_ok:.0%} probability"
     if objective.kind == "functional":
-        return f"predicted {objective.name}: {odds}"
+        return f"predicted {objective.name}: {probability}"
     interval = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
-    return f"predicted {objective.name}: {interval}, {odds}"
+    return f"predicted {objective.name}: {interval}, {probability}"
 
 
 def _evidence(diagnosis: Diagnosis) -> Iterator[str]:

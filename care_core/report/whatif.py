@@ -118,7 +118,7 @@ def _lines(question: Question, answer: Answer) -> Iterator[str]:
         yield from wrapped("The mission is likely to fail; the other values are those of a mission that does not.")
     yield ""
     yield from wrapped(
-        f"Odds that all objectives are met: {answer.p_ok:.0%} with the change, "
+        f"Probability that all objectives are met: {answer.p_ok:.0%} with the change, "
         f"{answer.p_ok_now:.0%} if the same configuration runs again{guess}"
     )
 
@@ -126,11 +126,11 @@ def _lines(question: Question, answer: Answer) -> Iterator[str]:
 def _outlook(outlook: Outlook) -> str:
     result, predicted = outlook.objective, outlook.predicted
     unit = result.variable.unit
-    odds = "" if predicted.p_ok is None else f"{predicted.p_ok:.0%} odds"
+    probability = "" if predicted.p_ok is None else f"{predicted.p_ok:.0%} probability"
     unchanged = "" if outlook.now.p_ok is None else f" ({outlook.now.p_ok:.0%} unchanged)"
     if result.variable.kind == "functional":
-        return f"{STATUS_WORDS[result.status]} in this run -> {odds}{unchanged}"
+        return f"{STATUS_WORDS[result.status]} in this run -> {probability}{unchanged}"
     here = "not evaluated" if result.value is None else f"{result.value:.4g}"
     span = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {unit}".rstrip()
     bound = "" if result.threshold is None else f", wanted {result.wanted}, "
-    return f"{here} in this run -> {span}{bound}{odds}{unchanged}"
+    return f"{here} in this run -> {span}{bound}{probability}{unchanged}"

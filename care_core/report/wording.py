@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from care_core.diagnose.records import Hypothesis
@@ -12,13 +11,6 @@ if TYPE_CHECKING:
     from care_core.report.happened import HypothesisEntry
 
 SEVERITY_WORDS: dict[Severity, str] = {"critical": "CRITICAL", "warning": "WARNING", "info": "note"}
-
-
-def clock(time_s: float | None) -> str:
-    """Seconds of a log as an operator reads them: 61.3 s, from ten minutes on 12:05."""
-    if time_s is None or not math.isfinite(time_s):
-        return "?"
-    return f"{time_s:.1f} s" if abs(time_s) < 600 else f"{int(time_s // 60)}:{int(time_s % 60):02d}"
 
 
 def critical(health: Health) -> list[Finding]:

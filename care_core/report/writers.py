@@ -24,8 +24,9 @@ from care_core.report.document import (
 )
 from care_core.report.happened import finding_sentence, fit_text
 from care_core.report.together import listed, together
-from care_core.report.wording import SEVERITY_WORDS, clock, hypothesis_text
+from care_core.report.wording import SEVERITY_WORDS, hypothesis_text
 from care_core.run import shown
+from care_core.text import seconds
 
 STATUS_WORDS = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
 
@@ -73,7 +74,7 @@ def _markdown(report: Report) -> Iterator[str]:
     yield from _listed("Findings, the first cause first", told)
     if report.account:
         yield from ("", "## What happened", "")
-        rows = ((clock(one.time_s), _escape(one.text), f"`{one.source}`") for one in report.account)
+        rows = ((seconds(one.time_s), _escape(one.text), f"`{one.source}`") for one in report.account)
         yield from _table(("Time", "What", "Source"), rows)
     if report.objectives:
         yield from ("", "## Objectives", "")
@@ -84,7 +85,9 @@ def _markdown(report: Report) -> Iterator[str]:
         yield f"## Causes of {listed([f'`{one.objective}`' for one in faults])}"
         yield ""
         if fault.causes:
-            yield from _table(("", "Option", "Path", "Driven", "Suggested", "Odds"), map(_cause_row, fault.causes))
+            yield from _table(
+                ("", "Option", "Path", "Driven", "Suggested", "Probability"), map(_cause_row, fault.causes)
+            )
         else:
             yield "None was found among the options of the profile."
     if report.fix is not None:
@@ -124,7 +127,7 @@ def _verdict(report: Report) -> str:
     if report.fix is None:
         return f"**Fault**: {names}."
     fix = report.fix
-    return f"**Fault**: {names}. Change {_changes(fix)}: {fix.p_fixed:.0%} odds that all objectives are met."
+    return f"**Fault**: {names}. Change {_changes(fix)}: {fix.p_fixed:.0%} probability that all objectives are met."
 
 
 def _changes(fix: FixSet) -> str:
@@ -139,10 +142,10 @@ def _objective_row(objective: ObjectiveEntry) -> tuple[str, ...]:
 
 def _cause_row(cause: CauseEntry) -> tuple[str, ...]:
     suggested = "" if cause.suggested is None else f"{cause.suggested:g}"
-    odds = cause.confidence if cause.p_fixed is None else f"{cause.p_fixed:.0%}, {cause.confidence}"
+    probability = cause.confidence if cause.p_fixed is None else f"{cause.p_fixed:.0%}, {cause.confidence}"
     if not cause.in_support:
-        odds += ", outside the training runs"
-    return str(cause.rank), f"`{cause.option}`", " → ".join(cause.path), f"{cause.current:g}", suggested, odds
+        probability += ", outside the training runs"
+    return str(cause.rank), f"`{cause.option}`", " → ".join(cause.path), f"{cause.current:g}", suggested, probability
 
 
 def _fix_section(report: Report, fix: FixEntry) -> Iterator[str]:
@@ -166,7 +169,7 @@ def _fix_section(report: Report, fix: FixEntry) -> Iterator[str]:
         yield ""
         yield "Or:"
         yield ""
-        yield from (f"- {_changes(other)}: {other.p_fixed:.0%} odds" for other in fix.alternatives)
+        yield from (f"- {_changes(other)}: {other.p_fixed:.0%} probability" for other in fix.alternatives)
 
 
 def _since_section(since: SinceEntry) -> Iterator[str]:
@@ -186,9 +189,9 @@ def _since_section(since: SinceEntry) -> Iterator[str]:
 
 
 def _prediction(objective: ObjectiveEntry, predicted: PredictedValue) -> str:
-    """A yes-or-no objective has odds, not a value."""
+    """A yes-or-no objective has a probability, not a value."""
     if objective.kind == "functional":
-        return f"{predicted.value:.0%} odds"
+        return f"{predicted.value:.0%} probability"
     return f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
 
 

@@ -25,7 +25,7 @@ from care_core.logs.opening import open_log
 from care_core.parallel import Failed, each
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
-from care_core.tables.rows import Row, rows_of
+from care_core.tables.rows import TableRow, rows_of
 
 Report = Callable[[str, float], None]
 
@@ -42,7 +42,7 @@ class Failure:
 class Ingested:
     """The rows and failures of logs, in the order in which the logs were named; `resumed` of them were done before."""
 
-    rows: list[Row] = field(default_factory=list)
+    rows: list[TableRow] = field(default_factory=list)
     failures: list[Failure] = field(default_factory=list)
     resumed: int = 0
 
@@ -64,7 +64,7 @@ def ingest(
     workers: int | None = None,
     limit_s: float = 600.0,
     progress: Report,
-    read: Callable[[Path, Schema], list[Row]] = rows_of,
+    read: Callable[[Path, Schema], list[TableRow]] = rows_of,
 ) -> Ingested:
     """Read every log, going on with what `journal_of(out)` holds. The caller removes the journal when all is written.
 
@@ -74,7 +74,7 @@ def ingest(
     """
     known = _read_journal(journal_of(out), _purpose(schema))
     keys = {path: _key(path) for path in paths}
-    done: dict[Path, list[Row] | Failed] = {path: known[key] for path, key in keys.items() if key in known}
+    done: dict[Path, list[TableRow] | Failed] = {path: known[key] for path, key in keys.items() if key in known}
     resumed, left = len(done), [path for path in paths if path not in done]
     since = 0.0  # when the first answer came: until then the processes were started
     answers = each(partial(_read_one, schema=schema, read=read), left, workers=workers, limit_s=limit_s)
@@ -106,11 +106,11 @@ def by_reason(failures: Sequence[Failure]) -> list[tuple[str, int, Path]]:
     return [(reason, count, first[reason]) for reason, count in counts.most_common()]
 
 
-def _read_one(path: Path, *, schema: Schema, read: Callable[[Path, Schema], list[Row]]) -> list[Row]:
+def _read_one(path: Path, *, schema: Schema, read: Callable[[Path, Schema], list[TableRow]]) -> list[TableRow]:
     return read(path, schema)
 
 
-def _collected(paths: Sequence[Path], done: Mapping[Path, list[Row] | Failed], resumed: int) -> Ingested:
+def _collected(paths: Sequence[Path], done: Mapping[Path, list[TableRow] | Failed], resumed: int) -> Ingested:
     found = Ingested(resumed=resumed)
     for path in paths:
         answer = done[path]
@@ -121,7 +121,7 @@ def _collected(paths: Sequence[Path], done: Mapping[Path, list[Row] | Failed], r
     return found
 
 
-def _said(done: Mapping[Path, list[Row] | Failed], count: int, now: int, pace_s: float) -> str:
+def _said(done: Mapping[Path, list[TableRow] | Failed], count: int, now: int, pace_s: float) -> str:
     failed = sum(isinstance(answer, Failed) for answer in done.values())
     read = f"read {len(done)} of {count} logs, {failed} failed"
     if now < _PACE_LOGS:
@@ -147,12 +147,12 @@ def _key(path: Path) -> str:
     return json.dumps([str(path), sum(s.st_size for s in stats), max((s.st_mtime_ns for s in stats), default=0)])
 
 
-def _line(key: str, answer: list[Row] | Failed) -> str:
+def _line(key: str, answer: list[TableRow] | Failed) -> str:
     found = {"failure": answer.reason} if isinstance(answer, Failed) else {"rows": answer}
     return json.dumps({"log": key, **found}) + "\n"
 
 
-def _read_journal(path: Path, purpose: Mapping[str, str]) -> dict[str, list[Row] | Failed]:
+def _read_journal(path: Path, purpose: Mapping[str, str]) -> dict[str, list[TableRow] | Failed]:
     """What an interrupted run had done; nothing where there is no journal, or one of another profile."""
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
@@ -170,7 +170,7 @@ def _read_journal(path: Path, purpose: Mapping[str, str]) -> dict[str, list[Row]
 
 
 @contextmanager
-def _writing(path: Path, purpose: Mapping[str, str], known: Mapping[str, list[Row] | Failed]) -> Iterator[TextIO]:
+def _writing(path: Path, purpose: Mapping[str, str], known: Mapping[str, list[TableRow] | Failed]) -> Iterator[TextIO]:
     """The journal, opened to append to what is known. Raises UsageError where it cannot be written."""
     fresh = path.with_name(f".{path.name}.new")
     try:

@@ -18,17 +18,17 @@ ABOUT = ("log", "mission", "log_format", "log_start", "log_sha256")
 """The columns before the variables."""
 INSTALL_LEARN = "Install what it needs with: pip install 'care-tui[learn]'"
 
-Row = dict[str, str | int | float | None]
+TableRow = dict[str, str | int | float | None]
 
 
-def rows_of(path: Path, schema: Schema) -> list[Row]:
+def rows_of(path: Path, schema: Schema) -> list[TableRow]:
     """The rows of one log; objectives that mean nothing for their mission are empty."""
     return [_row(path, judge(run, schema, None).run, schema) for run in read_runs(open_log(path), schema)]
 
 
-def _row(path: Path, run: Run, schema: Schema) -> Row:
+def _row(path: Path, run: Run, schema: Schema) -> TableRow:
     about = (_as_text(path), run.mission.index, run.log.format, run.log.start, run.log.sha256)
-    row: Row = dict(zip(ABOUT, about, strict=True))
+    row: TableRow = dict(zip(ABOUT, about, strict=True))
     for name in schema.variables:
         value = run.value(name)
         row[name] = value if is_known(value) else None
@@ -40,7 +40,7 @@ def _as_text(path: Path) -> str:
     return str(path).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
-def write_table(path: Path, rows: Sequence[Row], schema: Schema) -> None:
+def write_table(path: Path, rows: Sequence[TableRow], schema: Schema) -> None:
     """Write the table as CSV or Parquet, by suffix; whole or not at all."""
     columns = [*ABOUT, *schema.variables]
     if path.suffix.lower() == ".parquet":
@@ -71,7 +71,7 @@ def check_table_path(path: Path) -> None:
             raise UsageError("Parquet cannot be written here.", hint=f"{INSTALL_LEARN}, or write .csv.")
 
 
-def _write_parquet(path: Path, rows: Sequence[Row], columns: list[str]) -> None:
+def _write_parquet(path: Path, rows: Sequence[TableRow], columns: list[str]) -> None:
     import pandas as pd
 
     from care_core.files import replace_file

@@ -43,7 +43,7 @@ def whatif(
     out: Out = None,
     force: Force = False,
 ) -> None:
-    """Predict what a run would have done with other options. Ends with 0, whatever the odds."""
+    """Predict what a run would have done with other options. Ends with 0, whatever the probability."""
     from care_core.diagnose.whatif import parse_change
     from care_core.report.whatif import whatif_json, whatif_text
 

@@ -1,4 +1,4 @@
-"""Step 4: the changes as a basket of boxes, with the odds and objectives they are predicted to bring."""
+"""Step 4: the changes as a basket of boxes, with the probability and the objectives they are predicted to bring."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class FixPage(DiagnosisPage):
     name = "Fix"
     NOTHING = "no change is suggested"
     HELP = (
-        "Space ticks a change, + and - nudge its value, = types one. The odds follow at once. a loads the next "
+        "Space ticks a change, + and - nudge its value, = types one. The probability follows at once. a loads the next "
         "alternative, s the suggestion, u takes the last change back. Every option of the profile is here: / finds "
         "it. Enter shows the diff. Nothing is written to the robot."
     )
@@ -45,8 +45,8 @@ class FixPage(DiagnosisPage):
         def item(index: int, _width: int) -> tuple[Content]:
             option = options[index]
             value = basket.values.get(option.name)
-            odds = None if value is None else alone.get((option.name, value))
-            shown = "" if odds is None else f"alone {percent(odds)}"
+            probability = None if value is None else alone.get((option.name, value))
+            shown = "" if probability is None else f"alone {percent(probability)}"
             ticked = option.name in basket.ticked
             return (option_item(option, session.current(option), value, ticked, shown, width, glyphs),)
 
@@ -64,14 +64,18 @@ class FixPage(DiagnosisPage):
             return Content("No prediction")
         count = len(session.basket.ticked)
         shown = session.fix if count else session.unchanged
-        odds = "..." if shown is None else percent(shown.p_fixed)
+        probability = "..." if shown is None else percent(shown.p_fixed)
         if not count:
-            return Content.assemble("Odds of no fault ", (odds, "bold"), " as driven", ("  nothing ticked", "dim"))
+            return Content.assemble(
+                "Probability of no fault ", (probability, "bold"), " as driven", ("  nothing ticked", "dim")
+            )
         changes = f"{count} change{'' if count == 1 else 's'}"
         now = "" if session.unchanged is None else f"  (as driven {percent(session.unchanged.p_fixed)})"
         guess = shown is not None and not all(change.in_support for change in shown.changes)
         outside = " a guess, outside the training runs" if guess else ""
-        return Content.assemble("Odds of no fault ", (odds, "bold"), outside, now, (f"  {changes}", "dim"))
+        return Content.assemble(
+            "Probability of no fault ", (probability, "bold"), outside, now, (f"  {changes}", "dim")
+        )
 
     def _detail(self, option: Variable | None) -> Rows:
         session = self.session

@@ -6,7 +6,7 @@ from textual.content import Content
 
 from care_core.application.case import Case
 from care_core.application.viewing import MissionVerdict, missions_of
-from care_core.report.wording import clock
+from care_core.text import seconds
 from care_tui.pages.page import Fetch, Page, View, sentence
 from care_tui.render.objectives import objective_item, worst
 from care_tui.render.rows import Row, Rows, status, text, warning
@@ -53,7 +53,7 @@ class MissionsPage(Page):
 
     def _item(self, mission: MissionVerdict) -> Content:
         mark = self.glyphs.here if mission.index == self._here else " "
-        span = f"{clock(mission.start_s)} to {clock(mission.end_s)}"
+        span = f"{seconds(mission.start_s)} to {seconds(mission.end_s)}"
         verdict = status(worst(mission.results), self.glyphs)
         return Content.assemble(
             f"{mark} {mission.index:>3}  {span:<22}  ", verdict, text(f"  {', '.join(_broken(mission))}")

@@ -11,8 +11,7 @@ from textual.content import Content
 from care_core.application.case import Case
 from care_core.application.signals import Signal, Trace, signals_of, trace_of, whole_of
 from care_core.errors import CareError
-from care_core.report.wording import clock
-from care_core.text import clean
+from care_core.text import clean, seconds
 from care_tui.pages.page import Fetch, Page, View, sentence
 from care_tui.render.happened import Mark, marks_of
 from care_tui.render.plot import WANTED, dots_across, plot
@@ -59,9 +58,9 @@ class SignalsPage(Page):
         return self._found.view("Signals", self._show)
 
     def _show(self, signals: list[Signal]) -> View:
-        title = Content(f"Signals from {clock(self._span[0])} to {clock(self._span[1])}")
+        title = Content(f"Signals from {seconds(self._span[0])} to {seconds(self._span[1])}")
         if self._moment is not None:
-            title += Content.styled(f"  at {clock(self._moment)}", "bold")
+            title += Content.styled(f"  at {seconds(self._moment)}", "bold")
         if not signals:
             return View(title, lambda _: sentence("The log holds no signal that is known here."))
         listing = Listing(
@@ -108,10 +107,10 @@ class SignalsPage(Page):
         for mark in reversed(told):
             signs[self._place(mark.time_s, trace, width)] = mark.sign
         rows.append(Row(Content(f"{'':>{AXIS}} {''.join(signs)}")))
-        start, end = clock(trace.start_s), clock(trace.end_s)
+        start, end = seconds(trace.start_s), seconds(trace.end_s)
         rows.append(Row(Content(f"{'':>{AXIS}} {start:<{max(width - len(end), 0)}}{end}")))
         near = sorted(sorted(told, key=self._weight)[:below], key=lambda mark: mark.time_s)
-        return rows + [Row(text(f"{mark.sign} {clock(mark.time_s):>8}  {mark.words}"), 12) for mark in near]
+        return rows + [Row(text(f"{mark.sign} {seconds(mark.time_s):>8}  {mark.words}"), 12) for mark in near]
 
     def _head(self, signal: Signal, trace: Trace) -> Content:
         head = Content.assemble((clean(signal.name), "bold"), f"  {trace.count} values")
@@ -174,7 +173,7 @@ class SignalsPage(Page):
         mark = next((mark for mark in self._marks if mark.time_s > here), self._marks[0])
         self.look_at(mark.time_s)
         self.screen.draw()
-        self.screen.say(f"{clock(mark.time_s)}  {mark.words}")
+        self.screen.say(f"{seconds(mark.time_s)}  {mark.words}")
 
 
 def shown(value: float, trace: Trace) -> str:

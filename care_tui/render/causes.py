@@ -52,7 +52,7 @@ def cause_item(cause: Cause, share: float | None, dismissed: str | None, glyphs:
         return head, Content(f"{below}set aside: " + clean(dismissed))
     worth = ["not ruled out" if cause.is_lead else f"{cause.confidence} confidence"]
     if cause.p_fixed is not None:
-        worth.append(f"{percent(cause.p_fixed)} odds if changed alone")
+        worth.append(f"{percent(cause.p_fixed)} probability alone")
     if cause.is_lead:  # its one caveat is that it is no more than a lead
         return head, Content(below + ", ".join(worth))
     worth.append(f"costs {percent(cause.contribution)}")
@@ -120,13 +120,15 @@ def cause_detail(
     rows += [*path_rows(cause, objective, glyphs), Row(Content())]
     if option.name in dismissed:
         rows.append(warning("Set aside", dismissed[option.name]))
-    gain = "" if cause.p_fixed is None else f", {percent(cause.p_fixed)} odds of no fault if it alone is changed"
+    gain = "" if cause.p_fixed is None else f", {percent(cause.p_fixed)} probability of no fault if it alone is changed"
     rows.append(labelled("Confidence", f"{cause.confidence}{gain}"))
     said = [part.text + meaning(part) for part in evidence if option.name in part.options]
     rows += [labelled("" if place else "The log says", line) for place, line in enumerate(said)]
     rows += [warning("Caveat", note) for note in caveats_of(cause)]
     if not cause.is_lead:
-        rows.append(labelled("Contribution", f"costs {percent(cause.contribution)} of this run's odds of no fault"))
+        rows.append(
+            labelled("Contribution", f"costs {percent(cause.contribution)} of this run's probability of no fault")
+        )
         rows += _runner_up(cause, rivals)
     if cause.predicted is not None and cause.suggested is not None:
         change = change_text(option, cause.current, cause.suggested, glyphs)
@@ -157,7 +159,7 @@ def _runner_up(cause: Cause, rivals: Sequence[Cause]) -> list[Row]:
 
 def _effect(cause: Cause, effect: EffectRecord | None) -> str:
     interval = "" if effect is None else f" ({effect.low:.2f} to {effect.high:.2f})"
-    return f"{cause.total_effect:.2f}{interval} spreads over all runs, {cause.path_ace:.2f} along this path"
+    return f"{cause.total_effect:.2f}{interval} standard deviations over all runs, {cause.path_ace:.2f} along this path"
 
 
 def no_cause_rows(diagnosis: Diagnosis, objective: ObjectiveResult | None) -> Rows:

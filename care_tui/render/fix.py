@@ -28,7 +28,7 @@ from care_tui.render.rows import (
 def option_item(
     option: Variable, current: float | None, value: float | None, ticked: bool, alone: str, width: int, glyphs: Glyphs
 ) -> Content:
-    """One option of the basket on one line: its box, its name padded to `width`, its change, its odds alone."""
+    """One option of the basket on one line: its box, its name padded to `width`, its change, its probability alone."""
     box = ("[x]" if ticked else "[ ]") if value is not None else "   "
     change = text(setting(option, current)) if value is None else change_text(option, current or 0.0, value, glyphs)
     line = Content.assemble(f"{box} ", padded(option.name, width + 2, "bold" if ticked else ""), change)
@@ -65,12 +65,12 @@ def option_rows(option: Variable, notes: Sequence[str], glyphs: Glyphs) -> list[
 
 
 def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs) -> Content:
-    """`✓ OK  139, 131 to 150 s, odds 91 %`."""
-    odds = "" if predicted.p_ok is None else f", odds {percent(predicted.p_ok)}"
-    if variable.kind == "functional":  # a yes-or-no objective has odds, not a value
-        return status(predicted.status(), glyphs) + text(odds.replace(",", " ", 1))
+    """`✓ OK  139, 131 to 150 s, probability 91 %`."""
+    probability = "" if predicted.p_ok is None else f", probability {percent(predicted.p_ok)}"
+    if variable.kind == "functional":  # a yes-or-no objective has a probability, not a value
+        return status(predicted.status(), glyphs) + text(probability.replace(",", " ", 1))
     span = f"  {predicted.value:.4g}, {predicted.low:.4g} to {measure(predicted.high, variable.unit)}"
-    return status(predicted.status(), glyphs) + text(f"{span}{odds}")
+    return status(predicted.status(), glyphs) + text(f"{span}{probability}")
 
 
 def no_fix_rows(diagnosis: Diagnosis) -> Rows:

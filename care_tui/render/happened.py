@@ -9,8 +9,8 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.health.records import Finding, Health, Moment, Severity
-from care_core.report.wording import SEVERITY_WORDS, clock, hypothesis_text
-from care_core.text import clean
+from care_core.report.wording import SEVERITY_WORDS, hypothesis_text
+from care_core.text import clean, seconds
 from care_tui.render.objectives import damage
 from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, text, warning
 
@@ -47,7 +47,7 @@ def told(health: Health) -> list[Told]:
 
 def told_item(one: Told, glyphs: Glyphs) -> Content:
     """One line of the pane. A finding has a sign and a word, what it led to is set in, a moment is plain."""
-    time = f"{clock(one.time_s):>{TIME_WIDTH}}  "
+    time = f"{seconds(one.time_s):>{TIME_WIDTH}}  "
     if isinstance(one.what, Moment):
         return Content.assemble("  ", padded(one.what.kind, KIND_WIDTH), time, text(one.what.text))
     late = "  (after the impact)" if one.what.after_impact else ""
@@ -61,22 +61,22 @@ def told_item(one: Told, glyphs: Glyphs) -> Content:
 def told_rows(one: Told) -> list[Row]:
     """All about one line of the pane."""
     if isinstance(one.what, Moment):
-        return [labelled(clock(one.what.time_s), one.what.text), labelled("From", one.what.source)]
+        return [labelled(seconds(one.what.time_s), one.what.text), labelled("From", one.what.source)]
     return finding_rows(one.what, one.cause)
 
 
 def finding_rows(finding: Finding, cause: Finding | None = None) -> list[Row]:
     """A finding with its numbers, where they come from, and what it led to."""
-    span = clock(finding.onset_s)
+    span = seconds(finding.onset_s)
     if finding.end_s > finding.onset_s:
-        span += f" to {clock(finding.end_s)}"
+        span += f" to {seconds(finding.end_s)}"
     rows = [heading(finding.title), labelled("When", span + (", after the impact" if finding.after_impact else ""))]
     rows += [labelled("Seen by", finding.evidence)] if finding.evidence else []
     rows += [labelled("From", finding.source)] if finding.source else []
     if cause is not None:
-        rows.append(labelled("Explained by", f"{cause.title} ({clock(cause.onset_s)})"))
+        rows.append(labelled("Explained by", f"{cause.title} ({seconds(cause.onset_s)})"))
     rows += [
-        labelled("" if place else "It led to", f"{below.title} ({clock(below.onset_s)})")
+        labelled("" if place else "It led to", f"{below.title} ({seconds(below.onset_s)})")
         for place, below in enumerate(finding.consequences)
     ]
     return rows
@@ -91,7 +91,7 @@ def verdict_line(health: Health, glyphs: Glyphs) -> Content:
     if first is None:
         return robot + Content("nothing out of the ordinary was found")
     sign = {"critical": f"{glyphs.fault} ", "warning": "! ", "info": ""}[first.severity]
-    return Content.assemble(robot, (sign + clean(first.title), "bold"), f" at {clock(first.onset_s)}")
+    return Content.assemble(robot, (sign + clean(first.title), "bold"), f" at {seconds(first.onset_s)}")
 
 
 def standing(diagnosis: Diagnosis, glyphs: Glyphs) -> list[Content]:
@@ -165,7 +165,7 @@ def fit_rows(diagnosis: Diagnosis) -> list[Row]:
 
 def hypothesis_item(one: Hypothesis, finding: Finding | None) -> tuple[Content, Content]:
     """An explanation that is no cause of the list: how likely it is, what it is, and when it began."""
-    when = "" if finding is None else f", from {clock(finding.onset_s)}"
+    when = "" if finding is None else f", from {seconds(finding.onset_s)}"
     kind = {"hardware": "a part of the robot", "world": "what the robot met", "parameter": "a parameter"}
     head = Content.assemble(f"{percent(one.probability):>5} ", text(hypothesis_text(one), "bold"))
     return head, Content(f"      {kind[one.what]}{when}" if one.name and one.what in kind else "")

@@ -349,7 +349,7 @@ class WalkScreen(PanesScreen):
             self.fetch("unchanged", lambda _job: self.engine.predict(case, {}), self._unchanged_predicted)
 
     def _unchanged_predicted(self, answer: Fix | CareError) -> None:
-        if not isinstance(answer, CareError):  # without it the odds stand alone, which is no failure
+        if not isinstance(answer, CareError):  # without it the probability stands alone, which is no failure
             self.session.unchanged = answer
             self.draw()
 

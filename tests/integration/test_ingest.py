@@ -15,7 +15,7 @@ import pytest
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
 from care_core.tables.ingest import by_reason, ingest, journal_of
-from care_core.tables.rows import Row
+from care_core.tables.rows import TableRow
 from tests.conftest import Care
 
 ROOT = Path(__file__).parents[2]
@@ -91,7 +91,7 @@ def test_killed_and_interrupted_it_ends_with_the_same_table(logs: Path, suffix: 
     assert not journal_of(out).exists()
 
 
-def unlucky(path: Path, schema: Schema) -> list[Row]:
+def unlucky(path: Path, schema: Schema) -> list[TableRow]:
     if path.name == "01.BIN":
         os._exit(9)
     return [{"log": path.name, "mission": 1}]

@@ -34,11 +34,11 @@ def _nobody(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monkey
 
 
 def fake_predict(case: Case, changes: Mapping[str, float]) -> Fix:
-    """Half the odds for every change that is not LAND_SPEED to 50."""
+    """Half the probability for every change that is not LAND_SPEED to 50."""
     options = {option.name: option for option in sample.OPTIONS}
     made = tuple(Change(options[name], case.diagnosis.run.config.get(name, 0.0), to) for name, to in changes.items())
-    odds = 0.02 if not changes else 0.9 if changes.get("LAND_SPEED") == 50 else 0.45
-    return Fix(made, odds, sample.PREDICTED)
+    probability = 0.02 if not changes else 0.9 if changes.get("LAND_SPEED") == 50 else 0.45
+    return Fix(made, probability, sample.PREDICTED)
 
 
 def fake_diff(case: Case, fix: Fix, side: DiffSide) -> str:

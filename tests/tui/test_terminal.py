@@ -89,7 +89,7 @@ def test_from_start_to_the_exported_report(tmp_path: Path, sample: str) -> None:
     terminal.expect("Objectives")
     terminal.expect("mission_time")  # diagnosed, at the first fault
     terminal.press("\r", "LAND_SPEED")  # its causes
-    terminal.press("\r", "Odds of no fault")  # the fix
+    terminal.press("\r", "Probability of no fault")  # the fix
     terminal.press("\r", "+++ suggested")  # the diff
     terminal.press("\r", "care.triage/1")  # the report
     terminal.press("\r", "Write the report to")

@@ -134,7 +134,7 @@ async def test_what_happened_is_marked_on_the_axis_of_time_and_n_goes_from_mark_
 
 
 @needs_sample
-async def test_odds_follow_the_value_that_is_typed() -> None:
+async def test_probability_follow_the_value_that_is_typed() -> None:
     app = real()
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4")

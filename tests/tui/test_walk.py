@@ -144,7 +144,7 @@ async def test_a_cause_that_was_in_no_fix_comes_back_without_being_ticked(make_a
         assert walk(app).session.basket.ticked == {"LAND_SPEED": 50.0}, "ticked by hand meanwhile: it stays"
 
 
-async def test_the_boxes_decide_the_odds_and_what_diff_and_report_hold(make_app: MakeApp) -> None:
+async def test_the_boxes_decide_the_probability_and_what_diff_and_report_hold(make_app: MakeApp) -> None:
     app = make_app(sample.faulty())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "4")
@@ -275,7 +275,7 @@ async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
         assert "none found, 1 not ruled out" in title(app)
-        assert "not ruled out, 2 % odds if changed alone" in items(app)
+        assert "not ruled out, 2 % probability alone" in items(app)
         assert "costs" not in text(app)
         lines = text(app).splitlines()
         assert "No answer" in lines[0]

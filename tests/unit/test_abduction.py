@@ -26,9 +26,9 @@ def test_values_are_conditioned_as_simulated(runs: int) -> None:
     if runs == 2:
         near &= np.abs(second - 1.4) < 0.1
         seen.append(1.4)
-    centre, spread = next_value(KIN, np.array([5.0, 5.0]), 3.0, np.array(seen) + 3.0)
+    centre, sd = next_value(KIN, np.array([5.0, 5.0]), 3.0, np.array(seen) + 3.0)
     assert centre[1] == pytest.approx(5.0 + after[near].mean(), abs=0.05)
-    assert spread[1] == pytest.approx(after[near].std(), abs=0.05)
+    assert sd[1] == pytest.approx(after[near].std(), abs=0.05)
 
 
 @pytest.mark.parametrize("passed", [[False], [True], [False, False], [False, True]])

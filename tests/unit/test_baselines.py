@@ -53,9 +53,9 @@ def test_the_classifier_ranks_by_what_each_reset_brings(frame: pd.DataFrame) -> 
     met_all = ((frame.success == 1) & (frame.time <= 175) & (frame.energy <= 20)).to_numpy()
     classifier = PlainClassifier(frame, met_all, NAMES)
     config = {**DEFAULTS, "min_sats": 13.0, "inert": 0.9}
-    odds = classifier.odds([config, DEFAULTS])
-    assert odds.shape == (2,)
-    assert 0 <= odds[0] < odds[1] <= 1
+    probability = classifier.probability([config, DEFAULTS])
+    assert probability.shape == (2,)
+    assert 0 <= probability[0] < probability[1] <= 1
     assert classifier.rank(config, DEFAULTS, ["inert", "min_sats"]) == ["min_sats", "inert"]
-    again = PlainClassifier(frame, met_all, NAMES).odds([config, DEFAULTS])
-    np.testing.assert_array_equal(odds, again)
+    again = PlainClassifier(frame, met_all, NAMES).probability([config, DEFAULTS])
+    np.testing.assert_array_equal(probability, again)

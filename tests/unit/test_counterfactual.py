@@ -39,13 +39,13 @@ def world(
 
 @QUICK
 @given(driven=CONFIGS, other=CONFIGS)
-def test_odds_are_probabilities_and_intervals_hold_their_value(
+def test_probabilities_are_probabilities_and_intervals_hold_their_value(
     planted: Profile, driven: dict[str, float], other: dict[str, float]
 ) -> None:
     run = planted_run(**driven)
     here = World(planted.model, run.config, {**run.metrics, **run.objectives}, BOUNDS)
-    odds = here.odds([driven, other])
-    assert ((odds >= 0) & (odds <= 1)).all()
+    probability = here.probability([driven, other])
+    assert ((probability >= 0) & (probability <= 1)).all()
     for name in planted.model.outcomes:
         p = here.predict(name, [driven, other])
         assert ((p.p_ok >= 0) & (p.p_ok <= 1)).all()
@@ -61,9 +61,9 @@ def test_predictions_do_not_depend_on_the_order_of_configurations(
     here = world(planted, speed=1.5)
     order = data.draw(st.permutations(range(len(configs))))
     shuffled = [configs[i] for i in order]
-    np.testing.assert_allclose(here.odds(configs)[order], here.odds(shuffled), atol=1e-9)
-    alone = [here.odds([config])[0] for config in configs]
-    np.testing.assert_allclose(here.odds(configs), alone, atol=1e-9)
+    np.testing.assert_allclose(here.probability(configs)[order], here.probability(shuffled), atol=1e-9)
+    alone = [here.probability([config])[0] for config in configs]
+    np.testing.assert_allclose(here.probability(configs), alone, atol=1e-9)
 
 
 def test_without_a_change_the_next_run_is_between_this_one_and_what_was_expected(planted: Profile) -> None:
@@ -93,8 +93,8 @@ def test_a_second_failure_is_evidence_against_chance(planted: Profile) -> None:
     once = world(planted, {"armed": 1.0, "success": 0.0})
     twice = replace(once, repeats=({"armed": 1.0, "success": 0.0},))
     rescued = replace(once, repeats=({"armed": 1.0, "success": 1.0},))
-    odds = [w.predict("success", [DEFAULTS]).p_ok[0] for w in (twice, once, rescued)]
-    assert odds[0] < odds[1] < odds[2]
+    probability = [w.predict("success", [DEFAULTS]).p_ok[0] for w in (twice, once, rescued)]
+    assert probability[0] < probability[1] < probability[2]
 
 
 def test_an_objective_without_a_mechanism_counts_with_its_base_rate(planted: Profile) -> None:
@@ -102,8 +102,8 @@ def test_an_objective_without_a_mechanism_counts_with_its_base_rate(planted: Pro
     blind = replace(world(planted, {}), model=replace(planted.model, outcomes=outcomes))
     rate = blind.base_rates()["time"]
     assert 0 < rate < 1
-    others = world(planted, {}, {name: BOUNDS[name] for name in outcomes}).odds([DEFAULTS])[0]
-    assert blind.odds([DEFAULTS])[0] == pytest.approx(rate * others)
+    others = world(planted, {}, {name: BOUNDS[name] for name in outcomes}).probability([DEFAULTS])[0]
+    assert blind.probability([DEFAULTS])[0] == pytest.approx(rate * others)
 
 
 def test_an_unknown_outcome_is_predicted_from_the_options_alone(planted: Profile) -> None:
@@ -138,13 +138,13 @@ def test_a_stage_passed_speaks_for_the_run(planted: Profile) -> None:
 
 def test_all_thresholds_count_and_only_those_in_force(planted: Profile) -> None:
     config = [{**DEFAULTS, "accel": 2.4}]
-    every = world(planted, {}).odds(config)[0]
-    some = world(planted, {}, {"time": BOUNDS["time"], "success": BOUNDS["success"]}).odds(config)[0]
+    every = world(planted, {}).probability(config)[0]
+    some = world(planted, {}, {"time": BOUNDS["time"], "success": BOUNDS["success"]}).probability(config)[0]
     assert every < some
-    assert world(planted, {}, {}).odds(config)[0] == 1.0
+    assert world(planted, {}, {}).probability(config)[0] == 1.0
 
 
-def test_without_a_threshold_there_are_no_odds(planted: Profile) -> None:
+def test_without_a_threshold_there_are_no_probability(planted: Profile) -> None:
     p = world(planted, {}, {}).predict("time", [DEFAULTS])
     assert np.isnan(p.p_ok[0])
     assert np.isfinite(p.value[0])
@@ -157,8 +157,8 @@ def test_objectives_that_move_together_count_once(planted: Profile) -> None:
     config = [{**DEFAULTS, "speed": 3.0, "accel": 2.2}]
     apart, together = (World(m, DEFAULTS, {}, bounds) for m in (planted.model, model))
     each = [apart.predict(name, config).p_ok[0] for name in bounds]
-    assert together.odds(config)[0] == pytest.approx(min(each))
-    assert apart.odds(config)[0] == pytest.approx(each[0] * each[1])
+    assert together.probability(config)[0] == pytest.approx(min(each))
+    assert apart.probability(config)[0] == pytest.approx(each[0] * each[1])
 
 
 def test_a_bound_above_and_a_bound_below_are_complements(planted: Profile) -> None:
@@ -167,7 +167,7 @@ def test_a_bound_above_and_a_bound_below_are_complements(planted: Profile) -> No
     assert below + above == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("op", "odds"), [("<=", TAIL), (">=", 1 - TAIL)])
-def test_a_bound_outside_what_the_target_can_be(planted: Profile, op: str, odds: float) -> None:
+@pytest.mark.parametrize(("op", "probability"), [("<=", TAIL), (">=", 1 - TAIL)])
+def test_a_bound_outside_what_the_target_can_be(planted: Profile, op: str, probability: float) -> None:
     bound = Threshold(op, -5.0)  # type: ignore[arg-type]
-    assert world(planted, bounds={"time": bound}).predict("time", [DEFAULTS]).p_ok[0] == pytest.approx(odds)
+    assert world(planted, bounds={"time": bound}).predict("time", [DEFAULTS]).p_ok[0] == pytest.approx(probability)

@@ -44,7 +44,7 @@ def test_direction(response: list[float], direction: str) -> None:
     assert average_causal_effect(response, 1.0).direction == direction
 
 
-def test_a_variable_without_spread_is_moved_by_nothing() -> None:
+def test_a_variable_without_variation_is_moved_by_nothing() -> None:
     assert average_causal_effect([0, 1], 0.0).magnitude == 0.0
 
 

@@ -169,7 +169,7 @@ def test_confidence_follows_how_many_resamples_have_a_path(planted: Profile, sup
 
 
 def _summary(low: float, high: float) -> Summary:
-    return Summary(count=100, mean=5.0, spread=3.0, quantiles=tuple(low + (high - low) * i / 20 for i in range(21)))
+    return Summary(count=100, mean=5.0, sd=3.0, quantiles=tuple(low + (high - low) * i / 20 for i in range(21)))
 
 
 def test_the_experiment_separates_the_two_leading_causes(planted: Profile) -> None:

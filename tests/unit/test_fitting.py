@@ -48,36 +48,36 @@ def test_intervals_hold_what_they_promise() -> None:
     noise = 0.2 * RNG(2).standard_t(5, size=1200)
     m = fitted(x, 2 * x[:, 0] + noise[:200])
     y = 2 * new[:, 0] + noise[200:]
-    spread = np.sqrt(m.latent_spread(new) ** 2 + m.noise_spread**2)
-    below = m.share_below(((y if m.transform == "identity" else np.log(y)) - m.latent(new)) / spread)
+    sd = np.sqrt(m.latent_sd(new) ** 2 + m.noise_sd**2)
+    below = m.share_below(((y if m.transform == "identity" else np.log(y)) - m.latent(new)) / sd)
     assert 0.74 < ((below > 0.1) & (below < 0.9)).mean() < 0.86
 
 
-def test_odds_are_better_than_the_base_rate_and_calibrated() -> None:
+def test_probabilities_are_better_than_the_base_rate_and_calibrated() -> None:
     x = RNG(0).uniform(-1, 1, (1300, 4))
     chance = 1 / (1 + np.exp(-(4 * x[:, 0] + 3 * x[:, 1] ** 2 - 1)))
     y = (RNG(1).random(1300) < chance).astype(float)
     m = fitted(x[:300], y[:300], binary=True)
-    odds, seen = m.odds(x[300:]), y[300:]
+    probability, seen = m.probability(x[300:]), y[300:]
     base = y[:300].mean()
 
     def log_loss(p: FloatArray) -> float:
         return float(-(seen * np.log(p) + (1 - seen) * np.log(1 - p)).mean())
 
-    assert log_loss(odds) < 0.8 * log_loss(np.full(1000, base))
-    assert log_loss(odds) < 1.1 * log_loss(chance[300:])
-    assert calibration_error(odds, seen) < 0.07
+    assert log_loss(probability) < 0.8 * log_loss(np.full(1000, base))
+    assert log_loss(probability) < 1.1 * log_loss(chance[300:])
+    assert calibration_error(probability, seen) < 0.07
 
 
-def test_odds_of_what_no_input_explains_are_the_base_rate() -> None:
+def test_probability_of_what_no_input_explains_are_the_base_rate() -> None:
     x, y = RNG(0).uniform(size=(200, 3)), (RNG(1).random(200) < 0.2).astype(float)
-    odds = fitted(x, y, binary=True).odds(RNG(2).uniform(size=(50, 3)))
-    np.testing.assert_allclose(odds, y.mean(), atol=0.1)
+    probability = fitted(x, y, binary=True).probability(RNG(2).uniform(size=(50, 3)))
+    np.testing.assert_allclose(probability, y.mean(), atol=0.1)
 
 
 def test_all_of_one_class_is_no_error() -> None:
-    odds = fitted(RNG(0).uniform(size=(30, 2)), np.ones(30), binary=True).odds(np.array([[0.5, 0.5]]))
-    assert odds[0] > 0.9
+    probability = fitted(RNG(0).uniform(size=(30, 2)), np.ones(30), binary=True).probability(np.array([[0.5, 0.5]]))
+    assert probability[0] > 0.9
 
 
 def test_a_constant_input_and_a_constant_target_are_no_error() -> None:

@@ -74,9 +74,9 @@ def test_a_ratio_is_walked_in_ratios(planted: Profile) -> None:
 def test_one_planted_cause_needs_one_change(planted: Profile) -> None:
     here = world(planted, reserve=58)
     found = search(here, BY_NAME, ["reserve", "speed"], DEFAULTS)
-    assignment, odds = found[smallest_good(found)]
+    assignment, probability = found[smallest_good(found)]
     assert set(assignment) == {"reserve"}
-    assert odds == pytest.approx(here.odds([{**here.config, **assignment}])[0])
+    assert probability == pytest.approx(here.probability([{**here.config, **assignment}])[0])
 
 
 def test_two_planted_causes_need_two(planted: Profile) -> None:
@@ -92,9 +92,9 @@ def test_sets_grow_by_one_and_stay_inside(planted: Profile, driven: dict[str, fl
     free = sorted(name for name in driven if driven[name] != DEFAULTS[name])
     found = search(here, BY_NAME, free, DEFAULTS)
     assert [len(assignment) for assignment, _ in found] == list(range(1, 1 + min(len(found), MAX_CHANGES)))
-    for assignment, odds in found:
+    for assignment, probability in found:
         assert set(assignment) <= set(free)
-        assert 0 <= odds <= 1
+        assert 0 <= probability <= 1
         assert all(BY_NAME[name].accepts(value) for name, value in assignment.items())
         assert all(planted.model.supports(name, value) for name, value in assignment.items())
 
@@ -109,27 +109,27 @@ def test_nothing_free_nothing_found(planted: Profile) -> None:
 def test_a_nearer_value_than_the_reference_has_a_step_of_margin(planted: Profile, speed: float, radius: float) -> None:
     here = world(planted, speed=speed, radius=radius)
     back = {"speed": DEFAULTS["speed"], "radius": DEFAULTS["radius"]}
-    chosen, odds = settled(here, BY_NAME, back, DEFAULTS)
-    floor = here.odds([{**here.config, **back}])[0] - NEARLY
-    assert odds >= floor - 1e-12
+    chosen, probability = settled(here, BY_NAME, back, DEFAULTS)
+    floor = here.probability([{**here.config, **back}])[0] - NEARLY
+    assert probability >= floor - 1e-12
     name = "radius"  # settled last, so the other one is at its final value
     values = candidate_values(BY_NAME[name], here.config[name], DEFAULTS[name], planted.model)
     step = values.index(chosen[name])
     if step:
         beyond = {**here.config, **chosen, name: values[step + 1]}
-        assert here.odds([beyond])[0] >= floor
+        assert here.probability([beyond])[0] >= floor
 
 
 def test_the_best_value_alone(planted: Profile) -> None:
     here = world(planted, reserve=58)
     best = best_alone(here, BY_NAME, "reserve", DEFAULTS)
     assert best is not None
-    assert best[1] == pytest.approx(here.odds([{**here.config, "reserve": best[0]}])[0])
+    assert best[1] == pytest.approx(here.probability([{**here.config, "reserve": best[0]}])[0])
     assert best[1] > 0.8
 
 
 @pytest.mark.parametrize(
-    ("odds", "chosen"),
+    ("probability", "chosen"),
     [
         ([0.8], 0),
         ([0.8, 0.85], 0),
@@ -139,20 +139,20 @@ def test_the_best_value_alone(planted: Profile) -> None:
         ([0.4, 0.3, 0.2], 0),
     ],
 )
-def test_one_more_change_must_be_worth_it(odds: list[float], chosen: int) -> None:
-    assert smallest_good([({str(j): 0.0 for j in range(i + 1)}, p) for i, p in enumerate(odds)]) == chosen
+def test_one_more_change_must_be_worth_it(probability: list[float], chosen: int) -> None:
+    assert smallest_good([({str(j): 0.0 for j in range(i + 1)}, p) for i, p in enumerate(probability)]) == chosen
 
 
 def test_a_fix_tells_every_objective_and_the_change_that_does_most_first(planted: Profile) -> None:
     here = world(planted, speed=1.4, planner=2)
     fix = to_fix(here, BY_NAME, {"planner": 1.0, "speed": 5.0}, 0.9)
     assert set(fix.predicted) == {"success", "time", "energy"}
-    alone = [here.odds([{**here.config, c.option.name: c.suggested}])[0] for c in fix.changes]
+    alone = [here.probability([{**here.config, c.option.name: c.suggested}])[0] for c in fix.changes]
     assert alone == sorted(alone, reverse=True)
     assert {c.option.name: (c.current, c.suggested) for c in fix.changes} == {"speed": (1.4, 5.0), "planner": (2, 1.0)}
 
 
-def test_without_a_threshold_a_prediction_has_no_odds(planted: Profile) -> None:
+def test_without_a_threshold_a_prediction_has_no_probability(planted: Profile) -> None:
     run = planted_run()
     here = World(planted.model, run.config, {}, {})
     p = prediction(here, "time", run.config)

@@ -190,7 +190,7 @@ def test_verified_fixes_have_a_file_of_their_own_and_the_profile_stays_sound(
     for number, (p, worked) in enumerate(((0.9, True), (0.85, True), (0.5, False), (0.7, None))):
         history.add_verification(verification_of(number, p, worked))
     text = write_record(tmp_path / "husky", track_record(history.verifications())).read_text(encoding="utf-8")
-    assert "Of 3 fixes that were made and verified after the next run, 2 worked; the odds promised 2.2" in text
+    assert "Of 3 fixes that were made and verified after the next run, 2 worked; the probabilities promised 2.2" in text
     assert care("profiles", "check", tmp_path / "husky").code == 0
     with pytest.raises(CareError):
         write_record(tmp_path / "none", track_record(()))

@@ -14,7 +14,7 @@ from care_core.variables import Threshold
 from tests.planted import SCHEMA, TIME, planted_run, with_variable
 
 BOUNDS = thresholds_in_force(SCHEMA, {})
-SUMMARIES = {"time": Summary(count=100, mean=150, spread=20, quantiles=tuple(100.0 + 5 * i for i in range(21)))}
+SUMMARIES = {"time": Summary(count=100, mean=150, sd=20, quantiles=tuple(100.0 + 5 * i for i in range(21)))}
 MODEL = Model(
     schema_digest="", graph=CausalGraph(()), edges={}, bidirected=(), effects={}, paths={}, outcomes={},
     summaries=SUMMARIES, skill={}, training=Training(origin="", runs=100, seed=0, alpha=0.01, resamples=0),

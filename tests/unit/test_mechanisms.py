@@ -32,7 +32,7 @@ def mechanism(*, binary: bool = False, transform: Transform = "identity", n: int
         reads=np.arange(2),
         log_inputs=np.array([False, True]),
         centre=np.array([1.0, 0.5]),
-        spread=np.array([2.0, 1.5]),
+        sd=np.array([2.0, 1.5]),
         kernel=kernel,
         points=points,
         targets=targets,
@@ -53,9 +53,9 @@ def test_restored_undoes_transformed(transform: Transform) -> None:
 
 
 @given(arrays(float, (4, 2), elements=SETTINGS))
-def test_odds_stay_off_zero_and_one(x: FloatArray) -> None:
-    odds = mechanism(binary=True).odds(x)
-    assert ((odds >= TAIL) & (odds <= 1 - TAIL)).all()
+def test_probability_stay_off_zero_and_one(x: FloatArray) -> None:
+    probability = mechanism(binary=True).probability(x)
+    assert ((probability >= TAIL) & (probability <= 1 - TAIL)).all()
 
 
 @given(st.lists(SETTINGS, min_size=1, max_size=20))
@@ -69,7 +69,7 @@ def test_the_distribution_of_errors_never_falls(z: list[float]) -> None:
 def test_predictions_do_not_depend_on_the_order_of_rows(x: FloatArray, order: list[int]) -> None:
     m = mechanism()
     np.testing.assert_allclose(m.latent(x)[order], m.latent(x[order]), rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(m.latent_spread(x)[order], m.latent_spread(x[order]), rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(m.latent_sd(x)[order], m.latent_sd(x[order]), rtol=1e-9, atol=1e-12)
 
 
 @given(arrays(float, (6, 2), elements=st.floats(-5, 5)))
@@ -83,10 +83,10 @@ def test_a_covariance_is_symmetric_and_never_negative(x: FloatArray) -> None:
 
 def test_a_change_is_known_better_than_the_values_it_lies_between() -> None:
     m, x = mechanism(), np.array([[0.0, 1.0], [3.0, 9.0], [1.0, 2.0]])
-    change, spread = m.change(x, x[:1])
+    change, sd = m.change(x, x[:1])
     np.testing.assert_allclose(change, m.latent(x) - m.latent(x[:1]), atol=1e-9)
-    assert spread[0] < 1e-4
-    assert (spread <= 2 * m.latent_spread(x).max() + 1e-6).all()
+    assert sd[0] < 1e-4
+    assert (sd <= 2 * m.latent_sd(x).max() + 1e-6).all()
 
 
 def test_far_away_the_model_falls_back_to_the_mean_and_knows_nothing() -> None:
@@ -111,7 +111,7 @@ def test_a_value_that_has_no_logarithm_is_not_an_error() -> None:
 @pytest.mark.parametrize("binary", [False, True])
 def test_expected_is_in_the_targets_own_unit(binary: bool) -> None:
     m, x = mechanism(binary=binary, transform="identity" if binary else "log"), np.array([[0.0, 1.0]])
-    np.testing.assert_allclose(m.expected(x), m.odds(x) if binary else np.exp(m.latent(x)))
+    np.testing.assert_allclose(m.expected(x), m.probability(x) if binary else np.exp(m.latent(x)))
 
 
 def test_columns_follow_the_names() -> None:

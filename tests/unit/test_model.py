@@ -219,7 +219,7 @@ def test_a_missing_file_says_to_train(folder: Path, name: str) -> None:
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=21, max_size=21).map(sorted), st.floats(-2e6, 2e6), st.floats(0, 1e6))
 def test_a_percentile_is_a_share_that_never_falls(quantiles: list[float], value: float, more: float) -> None:
-    summary = Summary(count=9, mean=0, spread=1, quantiles=tuple(quantiles))
+    summary = Summary(count=9, mean=0, sd=1, quantiles=tuple(quantiles))
     assert 0 <= summary.percentile(value) <= summary.percentile(value + more) <= 1
     assert (summary.low, summary.high) == (quantiles[0], quantiles[-1])
 

@@ -115,14 +115,14 @@ def test_a_run_lost_at_a_stage_that_no_option_moves_is_not_laid_to_a_later_one(p
     outcomes, mechanisms = fit_outcomes(frame, SMALL, GRAPH, np.random.default_rng(0), effort=QUICK)
     assert [s.variable for s in outcomes["success"].stages] == ["armed", "located", "success"]
     rate = frame.located.mean()
-    assert mechanisms["stage:located"].odds(np.zeros((1, 0)))[0] == pytest.approx(rate, abs=0.05)
+    assert mechanisms["stage:located"].probability(np.zeros((1, 0)))[0] == pytest.approx(rate, abs=0.05)
     model: Model = replace(planted.model, outcomes=outcomes, mechanisms=mechanisms)
     lost = World(model, {"gain": 0.6}, {"armed": 1.0, "located": 0.0, "success": 0.0}, {"success": Threshold(">=", 1)})
     flown = World(model, {"gain": 0.6}, {"armed": 1.0, "located": 1.0, "success": 1.0}, lost.thresholds)
     configs = [{"gain": g} for g in (0.3, 0.5, 0.6, 0.7)]
     # What was met may not be met again, but no other gain brings it back.
-    assert lost.odds(configs).max() < lost.odds([lost.config])[0] + 0.02
-    assert lost.odds(configs).max() < 0.7 * rate < rate < flown.odds(configs).max()
+    assert lost.probability(configs).max() < lost.probability([lost.config])[0] + 0.02
+    assert lost.probability(configs).max() < 0.7 * rate < rate < flown.probability(configs).max()
 
 
 def test_an_objective_that_nothing_moves_has_no_outcome() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from care_core.configs.driven import clock, configuration, differing, remark
+from care_core.configs.driven import configuration, differing, remark
 from care_core.configs.loading import read_configs, resolve
 from care_core.diagnose import provenance
 from care_core.diagnose.judging import judge
@@ -18,6 +18,7 @@ from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema, read_schema
 from care_core.profile.store import Profile, load_profile
 from care_core.run import Run, Setting
+from care_core.text import clock
 from care_core.vehicles.self_written import SELF_WRITTEN, is_self_written
 from tests.made import made_run
 
@@ -86,7 +87,7 @@ def test_an_option_that_changed_on_the_mission_is_told(move_base: Schema) -> Non
         Setting(parameter, value, "x", changed_at_s=at) for value, at in ((0.01, None), (0.02, 75.0), (0.05, 133.9))
     )
     assert notes(move_base, (), {}, changes={parameter: history, "/other": history}) == (
-        "occdist_scale was changed during the mission from 0.01 to 0.02 at 01:15, to 0.05 at 02:13;"
+        "occdist_scale was changed during the mission from 0.01 to 0.02 at 01:15, to 0.05 at 02:14;"
         " the last value is judged",
     )
 
@@ -119,7 +120,7 @@ def test_the_history_of_a_value_in_a_comment() -> None:
         Setting("A", 16.0, "PARM", default=50.0, changed_at_s=133.0),
         Setting("A", 20.5, "PARM", default=50.0, changed_at_s=3600.0),
     )
-    assert remark(history, source=True) == "50 -> 16 at 02:13 -> 20.5 at 60:00, default 50, from PARM"
+    assert remark(history, source=True) == "50 -> 16 at 02:13 -> 20.5 at 1:00:00, default 50, from PARM"
     assert remark(history[:1]) == ""
     assert clock(None) == "an unknown time"
 

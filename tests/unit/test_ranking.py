@@ -14,7 +14,7 @@ from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
 from care_core.causal.model import EdgeRecord
 from care_core.diagnose.ranking import (
-    _carriers,
+    _mediators,
     _shapley,
     best_paths,
     describe_path,
@@ -41,18 +41,18 @@ def test_shapley_values_add_up_to_the_whole_change(game: tuple[int, list[float]]
     n, worth = game
     names = [f"x{i}" for i in range(n)]
 
-    def odds(sets: Sequence[frozenset[str]]) -> NDArray[np.float64]:
+    def probability(sets: Sequence[frozenset[str]]) -> NDArray[np.float64]:
         return np.array([worth[sum(2 ** names.index(name) for name in s)] for s in sets])
 
-    assert _shapley(names, odds).sum() == pytest.approx(worth[-1] - worth[0], abs=1e-9)
+    assert _shapley(names, probability).sum() == pytest.approx(worth[-1] - worth[0], abs=1e-9)
 
 
 def test_shapley_values_share_an_interaction_and_ignore_a_bystander() -> None:
-    def odds(sets: Sequence[frozenset[str]]) -> NDArray[np.float64]:
+    def probability(sets: Sequence[frozenset[str]]) -> NDArray[np.float64]:
         return np.array([0.8 * ({"a", "b"} <= s) + 0.1 * ("c" in s) for s in sets])
 
-    np.testing.assert_allclose(_shapley(["a", "b", "c", "d"], odds), [0.4, 0.4, 0.1, 0.0], atol=1e-12)
-    assert _shapley([], odds).shape == (0,)
+    np.testing.assert_allclose(_shapley(["a", "b", "c", "d"], probability), [0.4, 0.4, 0.1, 0.0], atol=1e-12)
+    assert _shapley([], probability).shape == (0,)
 
 
 def test_contributions_add_up_to_what_a_full_reset_would_bring(planted: Profile) -> None:
@@ -167,7 +167,7 @@ def test_a_path_is_not_led_over_an_edge_that_carries_nothing(planted: Profile) -
 
 
 def test_a_check_that_did_not_act_carried_nothing(planted: Profile) -> None:
-    assert "armed" not in _carriers(world(planted, speed=1.4), SCHEMA)
+    assert "armed" not in _mediators(world(planted, speed=1.4), SCHEMA)
     refused = world(planted, min_sats=13)
-    assert _carriers(refused, SCHEMA) == {"armed", "success"}
-    assert "time" in _carriers(world(planted, speed=1.4), SCHEMA)  # it may have cost energy
+    assert _mediators(refused, SCHEMA) == {"armed", "success"}
+    assert "time" in _mediators(world(planted, speed=1.4), SCHEMA)  # it may have cost energy

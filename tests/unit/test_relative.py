@@ -119,14 +119,14 @@ def test_errors_of_left_out_groups_are_those_of_refitting_without_them() -> None
     x, y, groups = grouped()
     inputs = Inputs.all_read(("a", "b"), np.zeros(2, dtype=bool))
     m = fit(x, y, inputs, binary=False, rng=np.random.default_rng(0), effort=QUICK, transform="identity").mechanism
-    errors, spreads = left_out(m.kernel, m.points, m.targets, groups)
+    errors, error_sd = left_out(m.kernel, m.points, m.targets, groups)
     own = groups == 3
     rest, noise = m.points[~own], m.kernel.noise**2 + 1e-6
     weights = np.linalg.solve(m.kernel.among(rest) + noise * np.eye(len(rest)), m.targets[~own])
     np.testing.assert_allclose(errors[own], m.targets[own] - m.kernel(m.points[own], rest) @ weights, atol=1e-6)
     alone, _ = left_out(m.kernel, m.points, m.targets)
     assert np.abs(errors).mean() > 1.3 * np.abs(alone).mean()
-    assert spreads.mean() > 0
+    assert error_sd.mean() > 0
 
 
 @pytest.mark.parametrize(

@@ -100,7 +100,7 @@ def test_no_text_of_a_log_can_steer_a_terminal_or_a_table() -> None:
 def test_markdown_can_be_pasted_into_a_ticket() -> None:
     text = to_markdown(build_document(made_diagnosis()))
     assert text.startswith("# Triage of a.BIN\n\nProfile arducopter fits in part: firmware")
-    assert "\n\n**Fault**: `mission_time`. Change `land_speed` from 16 to 50: 90% odds" in text
+    assert "\n\n**Fault**: `mission_time`. Change `land_speed` from 16 to 50: 90% probability" in text
     assert "land_speed → land_time → mission_time" in text
     assert "```diff\n--- as driven" in text
 
@@ -137,10 +137,10 @@ def test_faults_that_move_together_are_shown_once_and_others_apart() -> None:
         assert [fault.objective for fault in document.faults] == ["mission_time", "energy"]
 
 
-def test_alternatives_are_offered_with_their_odds() -> None:
+def test_alternatives_are_offered_with_their_probability() -> None:
     diagnosis = made_diagnosis()
-    assert "or land_speed 16 -> 50: 90% odds" in to_text(diagnosis)
-    assert "- `land_speed` from 16 to 50: 90% odds" in to_markdown(build_document(diagnosis))
+    assert "or land_speed 16 -> 50: 90% probability" in to_text(diagnosis)
+    assert "- `land_speed` from 16 to 50: 90% probability" in to_markdown(build_document(diagnosis))
 
 
 def test_the_other_headlines() -> None:
@@ -187,14 +187,14 @@ def test_what_explains_the_failure_comes_before_the_parameters() -> None:
     assert "led to: control was lost" in text
 
 
-def test_markdown_gives_odds_for_a_yes_or_no_objective_and_a_unit_for_a_measured_one() -> None:
+def test_markdown_gives_probability_for_a_yes_or_no_objective_and_a_unit_for_a_measured_one() -> None:
     diagnosis = made_diagnosis()
     fix = diagnosis.fix
     assert fix is not None
     name = next(o.variable.name for o in diagnosis.objectives if o.variable.kind == "functional")
     predicted = {**fix.predicted, name: Prediction(0.94, 1.0, 1.0, p_ok=0.94)}
     text = to_markdown(build_document(replace(diagnosis, fix=replace(fix, predicted=predicted))))
-    assert f"| `{name}` | 94% odds |" in text
+    assert f"| `{name}` | 94% probability |" in text
     assert re.search(r"\| `mission_time` \| .* to .*\) s \|", text)
 
 

@@ -41,7 +41,7 @@ def test_calibration_error_is_the_mean_distance() -> None:
     assert calibration_error(p, y) == pytest.approx(0.4 * 0.25)
 
 
-def test_what_has_no_truth_or_no_odds_does_not_count() -> None:
+def test_what_has_no_truth_or_no_probability_does_not_count() -> None:
     found = score(np.array([0.5, np.nan, 0.5]), np.array([1.0, 1.0, np.nan]))
     assert found is not None
     assert found.runs == 1

@@ -36,7 +36,7 @@ def test_a_faster_robot_is_predicted_to_meet_its_time(slow: Question) -> None:
 
 @settings(deadline=None, max_examples=30)
 @given(speed=st.floats(1, 10), accel=st.floats(0.5, 4))
-def test_odds_are_odds_and_an_answer_repeats(slow: Question, speed: float, accel: float) -> None:
+def test_probabilities_are_probabilities_and_an_answer_repeats(slow: Question, speed: float, accel: float) -> None:
     answer = slow.ask({"speed": speed, "accel": accel})
     assert 0 <= answer.p_ok <= 1
     assert answer == slow.ask({"speed": speed, "accel": accel})

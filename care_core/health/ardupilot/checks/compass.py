@@ -121,8 +121,8 @@ def _odd_one(compasses: list[Table], other: int) -> int:
             return float(np.nanmedian(length(gaps)))
 
         return 1 if from_third(compasses[0]) >= from_third(compasses[other - 1]) else other
-    spread = [float(np.nanstd(length(table[axis] for axis in AXES))) for table in (compasses[0], compasses[other - 1])]
-    return 1 if spread[0] >= spread[1] else other
+    sd = [float(np.nanstd(length(table[axis] for axis in AXES))) for table in (compasses[0], compasses[other - 1])]
+    return 1 if sd[0] >= sd[1] else other
 
 
 def _gravity(flight: Flight, start: float, is_used: bool) -> Severity:
