@@ -69,7 +69,6 @@ def printed(command: str, folder: Path) -> str:
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "COLUMNS": "80",
         "NO_COLOR": "1",
-        "CARE_HISTORY": str(folder / ".history.sqlite"),
         "XDG_DATA_HOME": str(folder / ".data"),
         "PYTHONPATH": str(ROOT),
     }

@@ -30,3 +30,16 @@ def test_the_commands_print_what_the_document_says(document: Path, tmp_path: Pat
 def test_links_lead_somewhere(document: Path) -> None:
     for target in _LINK.findall(document.read_text(encoding="utf-8")):
         assert (document.parent / target).exists(), target
+
+
+def test_troubleshooting_quotes_what_is_really_said() -> None:
+    code = "".join(
+        path.read_text(encoding="utf-8") for room in ("care_core", "care_tui") for path in (ROOT / room).rglob("*.py")
+    )
+    said = re.sub(r'"\s*(?:rf|f|r)?"', "", code)
+    rows = re.findall(
+        r"^\| `([^`]+)`", (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    assert len(rows) > 20
+    parts = [part.strip() for row in rows for part in re.split(r"\.\.\.|\d+", row)]
+    assert not [part for part in parts if len(part) > 3 and part not in said]
