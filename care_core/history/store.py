@@ -108,19 +108,19 @@ class History:
         )
 
     def triages(self, profile: str | None = None, limit: int = -1) -> tuple[Triaged, ...]:
-        """The remembered triages, the newest first. Raises HistoryError."""
+        """The remembered triages, the latest first: by order, for a robot's clock may jump. Raises HistoryError."""
         rows = self._read(
             "select at, log_path, mission, document from triages where ? is null or profile = ?"
-            " order by at desc, id desc limit ?",
+            " order by id desc limit ?",
             (profile, profile, limit),
         )
         return tuple(Triaged(at, path, mission, self._document(text)) for at, path, mission, text in rows)
 
     def verifications(self, profile: str | None = None) -> tuple[Verified, ...]:
-        """The remembered verifications, the newest first. Raises HistoryError."""
+        """The remembered verifications, the latest first. Raises HistoryError."""
         rows = self._read(
             "select at, profile, version, p_fixed, worked, document from verifications where ? is null or profile = ?"
-            " order by at desc, id desc",
+            " order by id desc",
             (profile, profile),
         )
         return tuple(
