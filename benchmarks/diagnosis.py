@@ -26,12 +26,11 @@ from care_core.causal.abduction import Kinship, next_passes
 from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import FloatArray
 from care_core.causal.model import UNKNOWN_PERSISTENCE
-from care_core.diagnose.judging import read_and_judge
+from care_core.diagnose.judging import read_and_judge, world_of
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.reference import profile_config
 from care_core.diagnose.triage import triage
-from care_core.diagnose.worlds import world_of
 from care_core.extract.select import choose_profile
 from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
 from care_core.learn.skill import all_met, calibration_error, held_out_probabilities, reliability

@@ -75,11 +75,11 @@ class _Care:
         seen = {
             v.name: row[v.name] for v in (*self.schema.metrics, *self.schema.objectives) if np.isfinite(row[v.name])
         }
-        world = World(self.model, config, seen, self.bounds)
+        world = World(self.model, config, seen, self.bounds, reference=here, variables=self.schema.variables)
         best: dict[str, float] = {}
         unknown: dict[str, float] = {}
         for objective in self.bounds:
-            for suspect in suspects(world, self.schema, objective, here):
+            for suspect in suspects(world, objective, self.schema.known):
                 if suspect.contribution > 0:
                     kind = best if suspect.is_identified else unknown
                     kind[suspect.option] = max(kind.get(suspect.option, 0.0), suspect.contribution)

@@ -30,11 +30,10 @@ from benchmarks.diagnosis import abducted
 from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import FloatArray
 from care_core.causal.model import Model, Training
-from care_core.diagnose.judging import Judged, read_and_judge
+from care_core.diagnose.judging import Judged, read_and_judge, world_of
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Diagnosis
 from care_core.diagnose.triage import triage
-from care_core.diagnose.worlds import world_of
 from care_core.extract.select import choose_profile
 from care_core.learn.baselines import PlainClassifier
 from care_core.learn.fitting import Effort
@@ -222,7 +221,8 @@ def _count(
     found: Faults, judged: Judged, diagnosis: Diagnosis, profile: Profile, truth: Mapping[str, object],
     fixing: Sequence[frozenset[str]], peer: PlainClassifier,
 ) -> None:  # fmt: skip
-    world, reference = world_of(judged, profile), judged.reference.config
+    world = world_of(judged, profile)
+    reference = world.reference
     off = deviating(world.config, reference)
     causes = sorted((c for fault in diagnosis.faults for c in fault.causes), key=lambda c: (c.rank, -c.contribution))
     rankings = {

@@ -69,6 +69,10 @@ class Evidence:
     circumstance: str | None = None
     """What the run met, where the message speaks of no parameter."""
 
+    def __str__(self) -> str:
+        meaning = f" ({self.says})" if self.says else ""
+        return f"this run says: {self.text}{meaning}"
+
 
 @dataclass(frozen=True, slots=True)
 class Check:
@@ -170,3 +174,11 @@ class Run:
         """The run's value of a variable of any role, None when the run does not hold it."""
         parts: tuple[Mapping[str, Value], ...] = (self.config, self.context, self.metrics, self.objectives)
         return next((part[name] for part in parts if name in part), None)
+
+    @property
+    def refused_by(self) -> frozenset[str]:
+        """Options that the check reads which refused this mission, and whose value sets it off.
+
+        Only a refusal is proof: the mission ended there. A message in flight says what happened, not why.
+        """
+        return frozenset(option for e in self.evidence if e.kind == "refusal" for option in e.options)

@@ -17,8 +17,10 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from care_core.causal.counterfactual import World
 from care_core.learn.train import TrainSettings
 from care_core.profile.schema import Schema
+from care_core.profile.store import Profile
 from care_core.run import LogInfo, MissionInfo, Run, Unavailable, Value
 from care_core.variables import Role, Threshold, Variable
 
@@ -57,6 +59,7 @@ SCHEMA = Schema(
     variables={v.name: v for v in VARIABLES},
     digest="d" * 64,
 )
+BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
 DEFAULTS = {v.name: float(v.default or 0.0) for v in OPTIONS}
 NOISE = ("sats", "speed", "error", "replans", "hold", "sag", "time", "energy")
 CALM = dict.fromkeys(NOISE, 0.0)
@@ -131,6 +134,19 @@ def planted_run(noise: Mapping[str, float] = CALM, /, **options: float) -> Run:
     """A run with these options off their default."""
     config = {**DEFAULTS, **options}
     return run_of(config, fly(config, noise))
+
+
+def world_of(
+    profile: Profile, run: Run, observed: Mapping[str, object] | None = None, bounds: Mapping[str, Threshold] = BOUNDS
+) -> World:
+    """A run ready to be asked, held against the defaults; what it met is read off unless `observed` is given."""
+    seen = {**run.metrics, **run.objectives} if observed is None else observed
+    return World(profile.model, run.config, seen, bounds, reference=DEFAULTS, variables=SCHEMA.variables)
+
+
+def planted_world(profile: Profile, /, **options: float) -> World:
+    """The world of a run with these options off their default."""
+    return world_of(profile, planted_run(**options))
 
 
 def with_variable(schema: Schema, variable: Variable) -> Schema:

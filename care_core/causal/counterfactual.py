@@ -9,7 +9,7 @@ and for another day apart (`Model.training.persistence`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -18,7 +18,7 @@ from care_core.causal.abduction import kinship, next_passes, next_value
 from care_core.causal.mechanisms import LEAST, TAIL, FloatArray, Mechanism, columns, restored, transformed
 from care_core.causal.model import UNKNOWN_PERSISTENCE, Model, OutcomeRecord, StageRecord
 from care_core.run import is_known
-from care_core.variables import Threshold
+from care_core.variables import Threshold, Variable
 
 INTERVAL = (0.1, 0.9)
 
@@ -50,6 +50,12 @@ class World:
     """Metrics and objectives of other runs of the same configuration under the same conditions."""
     conditions: Conditions = "same"
     """Which next run is promised: one under the conditions of this run, or one on another day."""
+    reference: Config = field(default_factory=dict)
+    """The configuration that the run is held against, under what this run met."""
+    variables: Mapping[str, Variable] = field(default_factory=dict)
+    """What the profile says of each variable, by name."""
+    kept: frozenset[str] = frozenset()
+    """Options that stay as they are."""
 
     def predict(self, objective: str, configs: Sequence[Config]) -> Predicted:
         """The objective under each configuration, given what this run met."""

@@ -8,9 +8,8 @@ from itertools import product
 import numpy as np
 
 from care_core.causal.counterfactual import Config, World
-from care_core.causal.model import Model
 from care_core.diagnose.records import Fix, Prediction
-from care_core.variables import Change, Variable
+from care_core.variables import Change, Role, Variable
 
 MAX_CHANGES = 4
 STEPS = 5
@@ -28,12 +27,13 @@ MAX_ALTERNATIVES = 3
 Assignment = Mapping[str, float]
 
 
-def candidate_values(variable: Variable, current: float, reference: float, model: Model) -> tuple[float, ...]:
+def candidate_values(world: World, name: str) -> tuple[float, ...]:
     """Acceptable values inside the training support, from the reference towards the run's value.
 
     An option marked `safety` is only moved towards its default, never past it, so no value here is looser; codes have
     no order, so of a safety option's codes only the default is left.
     """
+    variable, current, reference = world.variables[name], world.config[name], world.reference[name]
     if variable.labels:
         codes = () if variable.safety else (code for code, _ in variable.labels)
         steps: Iterable[float] = (reference, *codes)
@@ -44,41 +44,37 @@ def candidate_values(variable: Variable, current: float, reference: float, model
     else:
         steps = np.linspace(reference, current, STEPS + 1)[:-1]
     snapped = dict.fromkeys(variable.snap(float(step)) for step in steps)
-    return tuple(v for v in snapped if v != current and variable.accepts(v) and model.supports(variable.name, v))
+    return tuple(v for v in snapped if v != current and variable.accepts(v) and world.model.supports(name, v))
 
 
-def search(
-    world: World, options: Mapping[str, Variable], candidates: Collection[str], reference: Config
-) -> list[tuple[Assignment, float]]:
+def search(world: World, candidates: Collection[str]) -> list[tuple[Assignment, float]]:
     """Best sets of changes by size (index 0: one change), each with the probability that all thresholds are met.
 
     Beam search: every option alone back to its reference (yes-or-no options and codes to any other value), then the
     best sets widened by one option at a time. `settled` then looks for values nearer to the run's.
     """
-    values = {name: found for name in candidates if (found := _starts(world, options[name], reference[name]))}
+    values = {name: found for name in candidates if (found := _starts(world, name))}
     singles = [{name: value} for name, found in values.items() for value in found]
-    beam = _ranked(world, options, singles)[:BEAM]
+    beam = _ranked(world, singles)[:BEAM]
     found_sets = []
     while beam:
         found_sets.append(_surest(world, beam))
         if len(found_sets) == MAX_CHANGES:
             break
-        beam = _ranked(world, options, _widened((a for a, _ in beam), values))[:BEAM]
+        beam = _ranked(world, _widened((a for a, _ in beam), values))[:BEAM]
     return found_sets
 
 
-def _starts(world: World, option: Variable, reference: float) -> tuple[float, ...]:
-    values = candidate_values(option, world.config[option.name], reference, world.model)
-    return values if _is_unordered(option) else values[:1]
+def _starts(world: World, name: str) -> tuple[float, ...]:
+    values = candidate_values(world, name)
+    return values if _is_unordered(world.variables[name]) else values[:1]
 
 
 def _is_unordered(option: Variable) -> bool:
     return bool(option.labels) or option.type == "bool"
 
 
-def settled(
-    world: World, options: Mapping[str, Variable], assignment: Assignment, reference: Config
-) -> tuple[Assignment, float]:
+def settled(world: World, assignment: Assignment) -> tuple[Assignment, float]:
     """The same options with values as near to the run's as is safe, and the probability of that.
 
     A nearer value than the reference is taken only where the value one step nearer still would do nearly as well: the
@@ -87,35 +83,30 @@ def settled(
     chosen = dict(assignment)
     floor = float(world.probability([{**world.config, **chosen}])[0]) - NEARLY
     for name in assignment:
-        if not _is_unordered(options[name]):
-            values = candidate_values(options[name], world.config[name], reference[name], world.model)
+        if not _is_unordered(world.variables[name]):
+            values = candidate_values(world, name)
             reached = world.probability([{**world.config, **chosen, name: value} for value in values])
             works = int(np.argmin(reached >= floor)) if (reached < floor).any() else len(values)
             chosen[name] = values[max(0, works - 2)]
     return chosen, float(world.probability([{**world.config, **chosen}])[0])
 
 
-def best_alone(
-    world: World, options: Mapping[str, Variable], name: str, reference: Config
-) -> tuple[float, float] | None:
+def best_alone(world: World, name: str) -> tuple[float, float] | None:
     """The value of one option to suggest when nothing else changes, and its probability."""
-    ranked = _ranked(world, options, [{name: value} for value in _starts(world, options[name], reference[name])])
+    ranked = _ranked(world, [{name: value} for value in _starts(world, name)])
     if not ranked:
         return None
-    assignment, probability = settled(world, options, ranked[0][0], reference)
+    assignment, probability = settled(world, ranked[0][0])
     return assignment[name], probability
 
 
-def needs_unsafe(
-    world: World, options: Mapping[str, Variable], candidates: Collection[str], reference: Config, enough: float
-) -> str | None:
+def needs_unsafe(world: World, enough: float) -> str | None:
     """A `safety` option that would fix the run only if it were moved past its default, which is never suggested."""
-    for name in sorted(candidates):
-        option = options[name]
-        if not option.safety or option.range is None:
+    for name, option in sorted(world.variables.items()):
+        if option.role is not Role.OPTION or name in world.kept or not option.safety or option.range is None:
             continue
         values = {option.snap(float(value)) for value in np.linspace(*option.range, STEPS + 1)}
-        default = reference[name]
+        default = world.reference[name]
         past = [v for v in values if v != default and (v - default) * (world.config[name] - default) <= 0]
         if past and world.probability([{**world.config, name: value} for value in past]).max() >= enough:
             return name
@@ -140,14 +131,12 @@ def _surest(world: World, beam: Sequence[tuple[Assignment, float]]) -> tuple[Ass
     return equals[int(np.argmin(np.round(doubt, 2)))]
 
 
-def _ranked(
-    world: World, options: Mapping[str, Variable], sets: Sequence[Assignment]
-) -> list[tuple[Assignment, float]]:
+def _ranked(world: World, sets: Sequence[Assignment]) -> list[tuple[Assignment, float]]:
     if not sets:
         return []
     reached = world.probability([{**world.config, **assignment} for assignment in sets])
     moved = [
-        sum(options[name].distance(world.config[name], value) for name, value in assignment.items())
+        sum(world.variables[name].distance(world.config[name], value) for name, value in assignment.items())
         for assignment in sets
     ]
     order = np.argsort(-(reached - DISTANCE_COST * np.array(moved)), kind="stable")
@@ -163,9 +152,10 @@ def smallest_good(found: list[tuple[Assignment, float]]) -> int:
     return chosen
 
 
-def to_fix(world: World, options: Mapping[str, Variable], assignment: Assignment, probability: float) -> Fix:
+def to_fix(world: World, assignment: Assignment, probability: float) -> Fix:
     """The set as a record, with every objective's predicted outcome; changes in the order of what each does alone."""
     alone = {name: world.probability([{**world.config, name: value}])[0] for name, value in assignment.items()}
+    options = world.variables
     order = sorted(assignment, key=lambda name: (-alone[name], name))
     config = {**world.config, **assignment}
     return Fix(

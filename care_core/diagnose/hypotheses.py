@@ -17,7 +17,7 @@ import math
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from care_core.causal.counterfactual import Config, World
+from care_core.causal.counterfactual import World
 from care_core.diagnose.ranking import Suspect as Option
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.health.records import Finding, Severity, Suspect
@@ -46,7 +46,6 @@ def explain(
     world: World,
     broken: Sequence[ObjectiveResult],
     found: Mapping[str, Sequence[Option]],
-    reference: Config,
     refused: Container[str],
     findings: Iterable[Finding],
     verdict: FitVerdict,
@@ -65,7 +64,7 @@ def explain(
     options: dict[str, float] = {}
     chance = []
     for name in (result.variable.name for result in broken):
-        excess, by_chance = _added(before, name, reference)
+        excess, by_chance = _added(before, name)
         chance.append(by_chance)
         total = sum(max(0.0, suspect.weight) for suspect in found[name])
         for suspect in found[name] if total else ():
@@ -82,11 +81,11 @@ def without_parameters(findings: Sequence[Finding], *, failed: bool = False) -> 
     return weigh({}, 0.0, findings, "no")
 
 
-def _added(before: World, objective: str, reference: Config) -> tuple[float, float]:
+def _added(before: World, objective: str) -> tuple[float, float]:
     """What this configuration adds to the probability that the objective breaks, and what the reference has of it."""
     if objective not in before.model.outcomes:
         return UNKNOWN, UNKNOWN
-    asked = [before.config, reference]
+    asked = [before.config, before.reference]
     here, there = 1.0 - before.predict(objective, asked).p_ok
     added = float(here - there)
     if before.model.outcomes[objective].stages:

@@ -139,10 +139,17 @@ def judge(
         results = (_judge_one(o, run.objectives.get(o.name), bounds.get(o.name)) for o in schema.objectives)
         return Judged(run, bounds, own, tuple(results), tuple(map(_judge_check, run.checks)))
     reference = reference_of(run, schema, model, good)
-    world = World(model, {**reference.config, **run.config}, {**run.metrics, **run.objectives}, bounds)
+    world = World(
+        model,
+        {**reference.config, **run.config},
+        {**run.metrics, **run.objectives},
+        bounds,
+        reference=reference.config,
+        variables=schema.variables,
+    )
     needs: dict[str, Need] = {}
     for objective in schema.objectives:
-        need = need_of(objective.name, world, reference) if objective.relative and objective.name not in own else None
+        need = need_of(objective.name, world) if objective.relative and objective.name not in own else None
         if need is not None and objective.relative is not None:
             needs[objective.name] = need
             bounds[objective.name] = objective.relative.for_need(need.value)
@@ -157,6 +164,39 @@ def judge(
         for objective in schema.objectives
     )
     return Judged(run, bounds, own, tuple(results), tuple(map(_judge_check, run.checks)), reference=reference)
+
+
+def world_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> World:
+    """This run, ready to be asked. Options that no source holds are taken to be at their reference, and so are those
+    that were never read: their value changed nothing.
+
+    Args:
+        kept: options that stay as they are.
+    """
+    run, reference = judged.run, judged.reference.config
+    unread = unread_options(profile.schema, run)
+    return World(
+        profile.model,
+        {**reference, **{name: value for name, value in run.config.items() if name not in unread}},
+        {**run.metrics, **run.objectives},
+        judged.bounds,
+        [{**other.run.metrics, **other.run.objectives} for other in judged.repeats],
+        reference=reference,
+        variables=profile.schema.variables,
+        kept=frozenset(kept),
+    )
+
+
+def unread_options(schema: Schema, run: Run) -> frozenset[str]:
+    """Options that only modes read which this run never entered; none where the log does not say."""
+    if not run.modes:
+        return frozenset()
+    entered = {mode.casefold() for mode in run.modes}
+    return frozenset(
+        option.name
+        for option in schema.options
+        if option.modes and not entered & {mode.casefold() for mode in option.modes}
+    )
 
 
 def meaningful(

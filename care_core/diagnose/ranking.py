@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Container, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from care_core.causal.counterfactual import Config, World
-from care_core.causal.graph import CausalGraph
+from care_core.causal.graph import CausalGraph, Edge
 from care_core.causal.mechanisms import FloatArray, columns
 from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.configs.driven import same_value
 from care_core.diagnose.records import PathNode
 from care_core.diagnose.symptoms import pointers
-from care_core.profile.schema import Schema
 from care_core.run import Evidence, Run, is_known
+from care_core.variables import Role
 
 FELT = 0.05
 """Effect times support, in standard deviations, from which an edge is taken to carry something of this run."""
@@ -55,7 +55,7 @@ def deviating(config: Config, reference: Config) -> tuple[str, ...]:
 
 
 def suspects(
-    world: World, schema: Schema, objective: str, reference: Config, said: Sequence[Evidence] = ()
+    world: World, objective: str, known: Container[Edge] = (), said: Sequence[Evidence] = ()
 ) -> tuple[Suspect, ...]:
     """Options off their reference that have a causal path to the objective, the likeliest cause first.
 
@@ -66,18 +66,20 @@ def suspects(
 
     Options whose effect is not identified are among them, to be told and not to be ranked (`is_identified`): theirs is
     an association.
+
+    Args:
+        known: direct effects that people know of, learned or not.
+        said: what this run's messages say.
     """
-    off = deviating(world.config, reference)
-    paths = best_paths(world.model, objective, off, _mediators(world, schema))
+    off = deviating(world.config, world.reference)
+    paths = best_paths(world.model, objective, off, _mediators(world))
     effects = {name: world.model.effects.get((name, objective)) for name in paths}
     names = list(paths)
     learned = [name for name in names if effects[name] is not None and objective in world.model.outcomes]
-    shares = _shapley(
-        learned, lambda sets: world.predict(objective, [_reset(world.config, reference, s) for s in sets]).p_ok
-    )
+    shares = _shapley(learned, lambda sets: world.predict(objective, [_reset(world, s) for s in sets]).p_ok)
     contribution = {**dict.fromkeys(names, 0.0), **dict(zip(learned, map(float, shares), strict=True))}
     unexplained = max(0.0, 1.0 - sum(max(0.0, share) for share in contribution.values()))
-    pointer = pointers(world, schema, objective, names, reference, said)
+    pointer = pointers(world, objective, names, known, said)
     found = [
         Suspect(
             option=name,
@@ -92,9 +94,7 @@ def suspects(
     return tuple(sorted(found, key=lambda s: (-s.weight, -s.total_effect, s.option)))
 
 
-def not_ruled_out(
-    world: World, objective: str, reference: Config, schema: Schema, found: Sequence[Suspect]
-) -> tuple[Suspect, ...]:
+def not_ruled_out(world: World, objective: str, found: Sequence[Suspect]) -> tuple[Suspect, ...]:
     """Other options off their reference, the farthest first: a few hundred runs do not show every effect.
 
     They have no path in the graph, and get a direct one of no effect.
@@ -102,10 +102,10 @@ def not_ruled_out(
     named = {suspect.option for suspect in found}
     others = [
         name
-        for name in deviating(world.config, reference)
+        for name in deviating(world.config, world.reference)
         if name not in named and (name, objective) not in world.model.effects
     ]
-    others.sort(key=lambda name: -schema.variables[name].distance(world.config[name], reference[name]))
+    others.sort(key=lambda name: -world.variables[name].distance(world.config[name], world.reference[name]))
     return tuple(Suspect(name, 0.0, CausalPath((name, objective), 0.0), None) for name in others)
 
 
@@ -135,10 +135,12 @@ def best_paths(
     return found
 
 
-def _mediators(world: World, schema: Schema) -> frozenset[str]:
+def _mediators(world: World) -> frozenset[str]:
     """Metrics and objectives that may have carried this run's fault: known, and no event that stayed away as usual."""
     found = set()
-    for variable in (*schema.metrics, *schema.objectives):
+    for variable in world.variables.values():
+        if variable.role not in (Role.METRIC, Role.OBJECTIVE):
+            continue
         value, summary = world.observed.get(variable.name), world.model.summaries.get(variable.name)
         is_usual = variable.type == "bool" and summary is not None and value == round(summary.quantile(0.5))
         if isinstance(value, (int, float)) and not is_usual:
@@ -146,8 +148,8 @@ def _mediators(world: World, schema: Schema) -> frozenset[str]:
     return frozenset(found)
 
 
-def _reset(config: Config, reference: Config, names: frozenset[str]) -> dict[str, float]:
-    return {**config, **{name: reference[name] for name in names}}
+def _reset(world: World, names: frozenset[str]) -> dict[str, float]:
+    return {**world.config, **{name: world.reference[name] for name in names}}
 
 
 def _shapley(names: Sequence[str], worth: Callable[[Sequence[frozenset[str]]], FloatArray]) -> FloatArray:
@@ -167,7 +169,7 @@ def _shapley(names: Sequence[str], worth: Callable[[Sequence[frozenset[str]]], F
     return mean
 
 
-def describe_path(path: CausalPath, world: World, schema: Schema, run: Run, reference: Config) -> tuple[PathNode, ...]:
+def describe_path(path: CausalPath, world: World, run: Run) -> tuple[PathNode, ...]:
     """The path as this run met it: at each node its value, and what the reference configuration would give."""
     nodes = []
     for i, name in enumerate(path.nodes):
@@ -176,9 +178,9 @@ def describe_path(path: CausalPath, world: World, schema: Schema, run: Run, refe
         nodes.append(
             PathNode(
                 name=name,
-                unit=schema.variables[name].unit,
+                unit=world.variables[name].unit,
                 value=value if is_known(value) else None,
-                expected=_expected(name, world, reference),
+                expected=_expected(name, world),
                 effect=None if edge is None else edge.signed_effect,
                 support=None if i == len(path.edges) else 0.0 if edge is None else edge.support,
             )
@@ -186,7 +188,8 @@ def describe_path(path: CausalPath, world: World, schema: Schema, run: Run, refe
     return tuple(nodes)
 
 
-def _expected(name: str, world: World, reference: Config) -> float | None:
+def _expected(name: str, world: World) -> float | None:
+    reference = world.reference
     if name in reference:
         return reference[name]
     if name in world.model.outcomes:

@@ -84,10 +84,10 @@ def _by_default(setting: Setting) -> Setting | None:
     return replace(setting, value=setting.default)
 
 
-def need_of(name: str, world: World, reference: Reference) -> Need | None:
+def need_of(name: str, world: World) -> Need | None:
     """What the reference configuration would need of an objective in this run's place; None where nothing tells."""
     if name not in world.model.outcomes:
         return None
-    p = world.predict(name, [reference.config])
+    p = world.predict(name, [world.reference])
     value, low, high = (float(part[0]) for part in (p.value, p.low, p.high))
     return Need(value, low, high) if np.isfinite((value, low, high)).all() and value > 0 else None

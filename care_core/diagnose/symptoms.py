@@ -8,14 +8,14 @@ takes many runs to be learned, a phase or an error that few options act on needs
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from care_core.causal.counterfactual import Config, World
+from care_core.causal.graph import Edge
 from care_core.causal.mechanisms import LEAST, Mechanism, columns, transformed
-from care_core.profile.schema import Schema
 from care_core.run import Evidence
 
 UNLEARNED = 0.02
@@ -33,7 +33,7 @@ class Pointer:
 
 
 def pointers(
-    world: World, schema: Schema, objective: str, names: Sequence[str], reference: Config, said: Sequence[Evidence]
+    world: World, objective: str, names: Sequence[str], known: Container[Edge], said: Sequence[Evidence]
 ) -> dict[str, Pointer]:
     """What the metrics and the messages of this run say about the options `names`. The shares add up to 1, or are 0.
 
@@ -43,10 +43,10 @@ def pointers(
     """
     shown: dict[str, dict[str, float]] = {name: {} for name in names}
     for metric, correlation in world.model.witnesses.get(objective, {}).items():
-        for name, part in _split(world, schema, metric, correlation, names, reference).items():
+        for name, part in _split(world, metric, correlation, names, known).items():
             shown[name][metric] = part
     spoken = dict.fromkeys(names, 0.0)
-    for message in said if schema.variables[objective].kind == "functional" else ():
+    for message in said if world.variables[objective].kind == "functional" else ():
         for name in spoken.keys() & set(message.options):
             spoken[name] += (REFUSED if message.kind == "refusal" else SAID) / len(message.options)
     total = {name: spoken[name] + sum(shown[name].values()) for name in names}
@@ -58,11 +58,12 @@ def pointers(
 
 
 def _split(
-    world: World, schema: Schema, metric: str, correlation: float, names: Sequence[str], reference: Config
+    world: World, metric: str, correlation: float, names: Sequence[str], known: Container[Edge]
 ) -> Mapping[str, float]:
     mechanism, seen = world.model.mechanisms[metric], world.known(metric)
     if seen is None or not names or (not mechanism.binary and seen <= LEAST[mechanism.transform]):
         return {}
+    reference = world.reference
     configs = [reference, world.config, *({**world.config, name: reference[name]} for name in names)]
     expected, here, *back = _latent(mechanism, configs)
     value = 2 * seen - 1 if mechanism.binary else float(transformed(np.array(seen), mechanism.transform))
@@ -73,8 +74,8 @@ def _split(
     moved = {}
     for name, there in zip(names, back, strict=True):
         moved[name] = max(0.0, float(np.sign(off)) * (here - there) / scale)
-        if (name, metric) in schema.known:
-            moved[name] += UNLEARNED * schema.variables[name].distance(reference[name], world.config[name])
+        if (name, metric) in known:
+            moved[name] += UNLEARNED * world.variables[name].distance(reference[name], world.config[name])
     whole = sum(moved.values())
     return {name: correlation * off * part / whole for name, part in moved.items() if part > 0}
 

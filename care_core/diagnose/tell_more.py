@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from care_core.causal.counterfactual import Config, World
+from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import FloatArray
 from care_core.diagnose.fixes import candidate_values
 from care_core.diagnose.ranking import Suspect
 from care_core.diagnose.records import Experiment, Fault
 from care_core.run import Run, Unavailable
-from care_core.variables import Variable
 
 TELLING = 0.15
 """Probability by which an experiment's outcome must differ between two causes to be worth a run."""
@@ -26,9 +25,8 @@ MET = "what this run met"
 
 
 def tell_more(
-    world: World, faults: Sequence[Fault], run: Run, options: Mapping[str, Variable], reference: Config,
-    keep: Collection[str], unranked: Mapping[str, Sequence[Suspect]],
-) -> tuple[str, ...]:  # fmt: skip
+    world: World, faults: Sequence[Fault], run: Run, unranked: Mapping[str, Sequence[Suspect]]
+) -> tuple[str, ...]:
     """Sentences for an operator, the most useful first; empty where nothing would help.
 
     Args:
@@ -38,18 +36,17 @@ def tell_more(
     for fault in faults:
         objective = fault.objective.variable.name
         advice += [
-            f"change only {name} to {options[name].show(reference[name])} and run again: the training runs cannot tell "
-            f"what it does to {objective}"
+            f"{_change_back(world, name)} and run again: the training runs cannot tell what it does to {objective}"
             for name in [suspect.option for suspect in unranked[objective]][:HYPOTHESES]
-            if name not in keep
+            if name not in world.kept
         ]
         advice += [
-            f"change only {name} to {options[name].show(reference[name])} and run again: a change that nobody "
-            f"chose for a reason would settle whether {name} causes it"
+            f"{_change_back(world, name)} and run again: a change that nobody chose for a reason would settle whether "
+            f"{name} causes it"
             for name in _chosen(world, fault)
-            if name not in keep
+            if name not in world.kept
         ]
-        found = experiment(world, fault, options, reference, keep)
+        found = experiment(world, fault)
         if found is not None:
             advice.append(str(found))
     if not advice:
@@ -58,6 +55,10 @@ def tell_more(
             "or the vehicle); if not, it is what this run met"
         )
     return tuple(dict.fromkeys(advice))
+
+
+def _change_back(world: World, name: str) -> str:
+    return f"change only {name} to {world.variables[name].show(world.reference[name])}"
 
 
 def _chosen(world: World, fault: Fault) -> list[str]:
@@ -81,9 +82,7 @@ def _unrecorded(faults: Sequence[Fault], run: Run) -> Iterator[str]:
             yield f"{told}: {value.reason} ({value.hint})"
 
 
-def experiment(
-    world: World, fault: Fault, options: Mapping[str, Variable], reference: Config, keep: Collection[str] = ()
-) -> Experiment | None:
+def experiment(world: World, fault: Fault) -> Experiment | None:
     """The single change whose outcome differs most between the leading causes, None where none differs enough.
 
     The first pair of causes that any change separates is taken; a cause that stands alone is set against what the run
@@ -91,40 +90,38 @@ def experiment(
     """
     leading = [cause.option.name for cause in fault.causes if not cause.is_lead][:HYPOTHESES]
     pairs = list(combinations(leading, 2)) or [(name, MET) for name in leading]
-    found = (_separating(world, fault.objective.variable.name, pair, options, reference, keep) for pair in pairs)
+    found = (_separating(world, fault.objective.variable.name, pair) for pair in pairs)
     return next((one for one in found if one is not None), None)
 
 
-def _separating(
-    world: World, objective: str, pair: tuple[str, str], options: Mapping[str, Variable], reference: Config,
-    keep: Collection[str],
-) -> Experiment | None:  # fmt: skip
+def _separating(world: World, objective: str, pair: tuple[str, str]) -> Experiment | None:
     changes = [
         (name, value)
         for name in pair
-        if name in options and name not in keep
-        for value in candidate_values(options[name], world.config[name], reference[name], world.model)
+        if name in world.variables and name not in world.kept
+        for value in candidate_values(world, name)
     ]
     if not changes or objective not in world.model.outcomes:
         return None
-    promised = [_probability_if(world, objective, cause, pair, changes, reference) for cause in pair]
+    promised = [_probability_if(world, objective, cause, pair, changes) for cause in pair]
     best = int(np.argmax(np.abs(promised[0] - promised[1])))
     if abs(promised[0][best] - promised[1][best]) < TELLING:
         return None
     name, value = changes[best]
-    return Experiment(objective, options[name], value, ((pair[0], promised[0][best]), (pair[1], promised[1][best])))
+    return Experiment(
+        objective, world.variables[name], value, ((pair[0], promised[0][best]), (pair[1], promised[1][best]))
+    )
 
 
 def _probability_if(
-    world: World, objective: str, cause: str, pair: tuple[str, str], changes: Sequence[tuple[str, float]],
-    reference: Config,
-) -> FloatArray:  # fmt: skip
+    world: World, objective: str, cause: str, pair: tuple[str, str], changes: Sequence[tuple[str, float]]
+) -> FloatArray:
     """Probability of a good outcome after each change, shape (m,), if one of the pair is the cause, the other not.
 
     The other did nothing, so it is taken to have been at its reference all along, and changing it changes nothing. The
     run's noise is abducted anew: what the other cost in the model is put down to the cause and to what the run met.
     """
-    inert = {name: reference[name] for name in pair if name != cause and name in reference}
+    inert = {name: world.reference[name] for name in pair if name != cause and name in world.reference}
     there = replace(world, config={**world.config, **inert})
     configs = [{**there.config, **({name: value} if name == cause else {})} for name, value in changes]
     return there.predict(objective, configs).p_ok

@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from care_core.causal.counterfactual import Config, World
+from care_core.causal.counterfactual import World
 from care_core.diagnose import provenance
 from care_core.diagnose.advice import believed, falls_short, outweighed
 from care_core.diagnose.circumstances import circumstances, unusual
-from care_core.diagnose.evidence import refused_by, said
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
     Assignment,
@@ -27,7 +26,7 @@ from care_core.diagnose.fixes import (
     to_fix,
 )
 from care_core.diagnose.hypotheses import explain, without_parameters
-from care_core.diagnose.judging import Judged, check_wishes
+from care_core.diagnose.judging import Judged, check_wishes, unread_options, world_of
 from care_core.diagnose.ranking import (
     Suspect,
     describe_path,
@@ -38,7 +37,6 @@ from care_core.diagnose.ranking import (
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Note, ObjectiveResult
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
-from care_core.diagnose.worlds import unread_options, world_of
 from care_core.health.records import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
@@ -65,10 +63,8 @@ class _Case:
     choice: ProfileChoice
     run: Run
     world: World
-    reference: Config
     source: str
     """Whose the reference is."""
-    keep: Collection[str]
     unranked: Mapping[str, tuple[Suspect, ...]]
     """Per objective the options off their reference whose effect the training runs cannot tell, the likeliest first."""
     assumed: frozenset[str]
@@ -130,22 +126,20 @@ def diagnose(
             choice, run, objectives, (), None, missions=judged.missions, health=health, hypotheses=explained
         )
     report("ranking the causes", 0.7)
-    reference = judged.reference.config
-    world = world_of(judged, profile)
+    world = world_of(judged, profile, keep)
     weighed = {
-        result.variable.name: suspects(world, schema, result.variable.name, reference, run.evidence)
-        for result in broken
+        result.variable.name: suspects(world, result.variable.name, schema.known, run.evidence) for result in broken
     }
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
     assumed = frozenset(v.name for v in schema.options) - frozenset(run.config)
-    case = _Case(profile, choice, run, world, reference, judged.reference.source, keep, unranked, assumed)
+    case = _Case(profile, choice, run, world, judged.reference.source, unranked, assumed)
     unheard = {result.variable.name: _out_of_reach(case, result) for result in broken}
     faults = tuple(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
         for name, result in ((result.variable.name, result) for result in broken)
     )
-    hypotheses = explain(world, broken, weighed, reference, refused_by(run), health.findings, choice.fit.verdict)
+    hypotheses = explain(world, broken, weighed, run.refused_by, health.findings, choice.fit.verdict)
     report("searching for a fix", 0.85)
     fixes = believed(_fixes(case, {s.option for group in found.values() for s in group}), hypotheses)
     out_of_reach = next(filter(None, unheard.values()), None)
@@ -167,9 +161,7 @@ def diagnose(
         notes=_notes(case, broken),
         missions=judged.missions,
         rivals=circumstances(run, world, schema) if unsure else (),
-        tell_more=tell_more(world, faults, run, schema.variables, reference, keep, unranked)
-        if unsure and not out_of_reach
-        else (),
+        tell_more=tell_more(world, faults, run, unranked) if unsure and not out_of_reach else (),
         health=health,
         hypotheses=hypotheses,
     )
@@ -186,8 +178,8 @@ def unjudged(log: LogInfo, settings: Mapping[str, Setting], choice: ProfileChoic
 def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
     """Options that cost this run, those that a failed check names first; where none of them convinces, a few leads
     that are not ruled out behind them."""
-    others = not_ruled_out(case.world, result.variable.name, case.reference, case.profile.schema, found)
-    refused = refused_by(case.run) if result.variable.kind == "functional" else frozenset()
+    others = not_ruled_out(case.world, result.variable.name, found)
+    refused = case.run.refused_by if result.variable.kind == "functional" else frozenset()
     first = [suspect for suspect in (*found, *others) if suspect.option in refused]
     named = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION]
     if not first and (not named or named[0].contribution < CONVINCING):
@@ -202,9 +194,9 @@ def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], to
 def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) -> Cause:
     name, world = suspect.option, case.world
     option = case.profile.schema.variables[name]
-    is_predictable = result.variable.name in world.model.outcomes and name not in case.keep
-    best = best_alone(world, case.profile.schema.variables, name, case.reference) if is_predictable else None
-    path = describe_path(suspect.path, world, case.profile.schema, case.run, case.reference)
+    is_predictable = result.variable.name in world.model.outcomes and name not in world.kept
+    best = best_alone(world, name) if is_predictable else None
+    path = describe_path(suspect.path, world, case.run)
     in_support = world.model.supports(name, world.config[name])
     support = (suspect.effect.support if suspect.effect is not None else None) or 0.0
     changed = world.config if best is None else {**world.config, name: best[0]}
@@ -222,7 +214,7 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         confidence=_confidence(case, result, suspect, in_support, support),
         in_support=in_support,
         notes=_cause_notes(case, suspect, in_support, support),
-        is_lead=suspect.weight < MIN_CONTRIBUTION and name not in refused_by(case.run),
+        is_lead=suspect.weight < MIN_CONTRIBUTION and name not in case.run.refused_by,
     )
 
 
@@ -251,7 +243,7 @@ def _confidence(case: _Case, result: ObjectiveResult, suspect: Suspect, in_suppo
     if case.choice.fit.verdict != "fits":
         return "low"
     if not in_support or support < LOW_SUPPORT or contribution < UNSURE:
-        return "medium" if suspect.option in refused_by(case.run) else "low"
+        return "medium" if suspect.option in case.run.refused_by else "low"
     effect = suspect.effect
     if effect is not None and effect.robustness is not None and effect.strongest is not None:
         # Operators chose the options: no table can rule a hidden reason out.
@@ -282,35 +274,29 @@ def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float
             f"{effect.objective} would do as well (the strongest recorded one explains {effect.strongest:.0%})"
         )
         notes.append(Note(text))
-    if suspect.option in case.keep:
+    if suspect.option in case.world.kept:
         notes.append(Note("pinned by --keep: not changed"))
     notes += map(Note, change_notes(case.profile.schema.variables[suspect.option]))
-    notes += [
-        Note(said(evidence), "in_the_log") for evidence in case.run.evidence if suspect.option in evidence.options
-    ]
+    notes += [Note(str(evidence), "in_the_log") for evidence in case.run.evidence if suspect.option in evidence.options]
     return tuple(notes)
 
 
 def _fixes(case: _Case, options: set[str]) -> list[Fix]:
     """The suggested fix first, then up to three that trade changes for probability or take another way."""
-    variables = case.profile.schema.variables
     # Options off their reference that break another objective matter too once this fault is gone.
-    every = options | {name for name in deviating(case.world.config, case.reference) if _has_effect(case, name)}
-    free = sorted(every - set(case.keep))
-    found = search(case.world, variables, free, case.reference)
+    every = options | {name for name in deviating(case.world.config, case.world.reference) if _has_effect(case, name)}
+    free = sorted(every - case.world.kept)
+    found = search(case.world, free)
     if not found:
         return []
     chosen = smallest_good(found)
     others = [found[i] for i in range(len(found)) if i != chosen and abs(i - chosen) == 1]
     without = [name for name in free if name not in found[chosen][0]]
-    detour = search(case.world, variables, without, case.reference)
+    detour = search(case.world, without)
     others += [detour[smallest_good(detour)]] if detour else []
     useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
     ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
-    return [
-        to_fix(case.world, variables, *settled(case.world, variables, assignment, case.reference))
-        for assignment, _probability in ranked
-    ]
+    return [to_fix(case.world, *settled(case.world, assignment)) for assignment, _probability in ranked]
 
 
 def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]) -> bool:
@@ -338,8 +324,7 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
     has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
     if has_cause and fixes and fixes[0].p_fixed >= enough:
         return None
-    options = {option.name: option for option in case.profile.schema.options}
-    unsafe = needs_unsafe(case.world, options, options.keys() - set(case.keep), case.reference, enough)
+    unsafe = needs_unsafe(case.world, enough)
     if unsafe is not None:
         return f"only '{unsafe}' past its default is likely to help, and a safety option is never made looser"
     if not has_cause:
@@ -347,7 +332,7 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
             "no option that this profile models explains the fault: look at what the run met "
             "(wind, battery, positioning, obstacles) or at parameters outside the profile"
         )
-    pinned = f", with {', '.join(sorted(case.keep))} kept as it is" if case.keep else ""
+    pinned = f", with {', '.join(sorted(case.world.kept))} kept as it is" if case.world.kept else ""
     return f"no change inside the acceptable ranges is likely enough to meet every threshold{pinned}"
 
 
@@ -356,7 +341,7 @@ def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
     if result.variable.kind == "functional":
         return _new_way_to_fail(case)
     name, bound = result.variable.name, result.threshold
-    summary = case.world.model.summary_at(name, case.reference)
+    summary = case.world.model.summary_at(name, case.world.reference)
     if bound is None or summary is None:
         return None
     best = summary.low if bound.op in ("<=", "<") else summary.high
@@ -380,7 +365,7 @@ def _new_way_to_fail(case: _Case) -> str | None:
 
 
 def _off(case: _Case) -> frozenset[str]:
-    return frozenset(deviating(case.run.config, case.reference))
+    return frozenset(deviating(case.run.config, case.world.reference))
 
 
 def _promise(world: World, broken: Sequence[str]) -> str:
@@ -394,7 +379,7 @@ def _promise(world: World, broken: Sequence[str]) -> str:
 
 def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
     notes = list(case.choice.fit.reasons)
-    off = len(deviating(case.world.config, case.reference))
+    off = len(deviating(case.world.config, case.world.reference))
     notes.append(f"judged against {case.source}: {off} options of this run are off it")
     for name in (result.variable.name for result in broken):
         unknown = ", ".join(suspect.option for suspect in case.unranked[name])

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from care_core.causal.counterfactual import Config, World
+from care_core.causal.counterfactual import World
 from care_core.configs.driven import option_value
 from care_core.diagnose.fixes import change_notes, prediction
-from care_core.diagnose.judging import Judged
+from care_core.diagnose.judging import Judged, world_of
 from care_core.diagnose.records import ObjectiveResult, Prediction
-from care_core.diagnose.worlds import world_of
 from care_core.errors import UsageError, nearest
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
@@ -53,8 +52,6 @@ class Question:
     schema: Schema
     run: Run
     world: World
-    reference: Config
-    """The configuration that faults are judged against, under what this run met."""
     objectives: tuple[ObjectiveResult, ...]
 
     def ask(self, changes: Mapping[str, float]) -> Answer:
@@ -112,7 +109,6 @@ def question(judged: Judged, profile: Profile, choice: ProfileChoice) -> Questio
         schema=profile.schema,
         run=judged.run,
         world=world_of(judged, profile),
-        reference=judged.reference.config,
         objectives=judged.results,
     )
     asked.ask({})  # The mechanisms invert their covariance when first asked, which nobody should wait for at a key.

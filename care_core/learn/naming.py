@@ -53,8 +53,9 @@ def by_engine(schema: Schema, model: Model, fault: FaultFile) -> list[str]:
     total: dict[str, float] = {}
     for i, config in enumerate(_configs(schema, fault)):
         seen = {name: float(fault.runs[name].iloc[i]) for name in measured}
-        world = World(model, config, seen, {fault.objective: bound})
-        for suspect in suspects(world, schema, fault.objective, usual_values(schema, fault, config)):
+        usual = usual_values(schema, fault, config)
+        world = World(model, config, seen, {fault.objective: bound}, reference=usual, variables=schema.variables)
+        for suspect in suspects(world, fault.objective, schema.known):
             total[suspect.option] = total.get(suspect.option, 0.0) + suspect.weight / FAULTY_RUNS
     return [name for name in sorted(total, key=lambda name: (-total[name], name)) if total[name] > 0]
 

@@ -13,7 +13,7 @@ from care_core.causal.mechanisms import TAIL
 from care_core.profile.store import Profile
 from care_core.run import Unavailable
 from care_core.variables import Threshold
-from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run
+from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run, world_of
 
 BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
 CONFIGS = st.fixed_dictionaries(
@@ -32,9 +32,7 @@ def world(
     **options: float,
 ) -> World:
     """The world of a run with these options off their default; what it met is read off unless `observed` is given."""
-    run = planted_run(**options)
-    seen = {**run.metrics, **run.objectives} if observed is None else observed
-    return World(profile.model, run.config, seen, bounds)
+    return world_of(profile, planted_run(**options), observed, bounds)
 
 
 @QUICK
@@ -43,7 +41,7 @@ def test_probabilities_are_probabilities_and_intervals_hold_their_value(
     planted: Profile, driven: dict[str, float], other: dict[str, float]
 ) -> None:
     run = planted_run(**driven)
-    here = World(planted.model, run.config, {**run.metrics, **run.objectives}, BOUNDS)
+    here = world_of(planted, run)
     probability = here.probability([driven, other])
     assert ((probability >= 0) & (probability <= 1)).all()
     for name in planted.model.outcomes:

@@ -13,11 +13,9 @@ from hypothesis import strategies as st
 
 from care_core.causal.model import Summary
 from care_core.diagnose.circumstances import circumstances
-from care_core.diagnose.evidence import refused_by
-from care_core.diagnose.judging import judge, read_and_judge
+from care_core.diagnose.judging import judge, read_and_judge, world_of
 from care_core.diagnose.tell_more import experiment
 from care_core.diagnose.triage import diagnose, triage
-from care_core.diagnose.worlds import world_of
 from care_core.errors import ProfileError
 from care_core.extract.select import choose_profile
 from care_core.logs.opening import open_log
@@ -98,7 +96,7 @@ def test_a_refusing_check_puts_its_option_first_and_is_quoted(planted: Profile) 
     run = refused_run(min_sats=14, speed=8.0)
     diagnosis = diagnose(judge(run, SCHEMA, planted.model), planted, CHOICE)
     (fault,) = diagnosis.faults
-    assert refused_by(run) == {"min_sats"}
+    assert run.refused_by == {"min_sats"}
     assert fault.causes[0].option.name == "min_sats"
     assert any("too few satellites" in note.text for note in fault.causes[0].notes)
 
@@ -113,7 +111,7 @@ def test_a_refusing_check_names_an_option_that_the_model_knows_nothing_of(plante
 
 def test_a_message_in_flight_is_a_note_and_no_proof(planted: Profile) -> None:
     run = replace(refused_run(min_sats=14), evidence=(Evidence(3.0, "tracking", "failsafe", ("speed",)),))
-    assert refused_by(run) == frozenset()
+    assert run.refused_by == frozenset()
     assert diagnose(judge(run, SCHEMA, planted.model), planted, CHOICE).faults[0].causes[0].option.name == "min_sats"
 
 
@@ -177,15 +175,13 @@ def test_the_experiment_separates_the_two_leading_causes(planted: Profile) -> No
     judged = judge(run, SCHEMA, planted.model, {"time": 183.0})
     diagnosis = diagnose(judged, planted, CHOICE)
     (fault,) = diagnosis.faults
-    reference = judged.reference.config
-    world = world_of(judged, planted)
-    found = experiment(world, fault, SCHEMA.variables, reference)
+    found = experiment(world_of(judged, planted), fault)
     assert found is not None
     (first, p_first), (second, p_second) = found.if_cause
     assert {first, second} <= {cause.option.name for cause in fault.causes} | {"what this run met"}
     assert abs(p_first - p_second) >= 0.15
     assert found.option.name in (first, second)
-    assert experiment(world, fault, SCHEMA.variables, reference, keep=(first, second)) is None
+    assert experiment(world_of(judged, planted, (first, second)), fault) is None
 
 
 def test_where_nothing_is_off_its_reference_a_repeat_is_advised(planted: Profile) -> None:
@@ -230,6 +226,6 @@ def test_every_recorded_refusal_names_the_option_that_set_its_check_off(recorded
             check = next(check for check in REFUSED if check in evidence.text)
             assert set(evidence.options) <= set(REFUSED[check])
             assert evidence.options
-            assert diagnosis.faults[0].causes[0].option.name in refused_by(diagnosis.run)
+            assert diagnosis.faults[0].causes[0].option.name in diagnosis.run.refused_by
             seen.append(check)
     assert seen

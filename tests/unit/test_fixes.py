@@ -21,16 +21,16 @@ from care_core.diagnose.fixes import (
 )
 from care_core.profile.store import Profile
 from care_core.variables import Role, Variable
-from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run
+from tests.planted import DEFAULTS, OPTIONS, planted_run, planted_world, world_of
 
-BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
 BY_NAME = {option.name: option for option in OPTIONS}
 QUICK = settings(deadline=None, max_examples=40)
 
 
-def world(profile: Profile, **options: float) -> World:
-    run = planted_run(**options)
-    return World(profile.model, run.config, {**run.metrics, **run.objectives}, BOUNDS)
+def candidates(planted: Profile, option: Variable, current: float, reference: float) -> tuple[float, ...]:
+    name = option.name
+    here = World(planted.model, {name: current}, {}, {}, reference={name: reference}, variables={name: option})
+    return candidate_values(here, name)
 
 
 @given(data=st.data(), option=st.sampled_from(OPTIONS))
@@ -39,7 +39,7 @@ def test_every_candidate_is_acceptable_supported_and_a_change(
 ) -> None:
     low, high = option.range or (-1.0, 3.0)
     current, reference = (data.draw(st.floats(low - (high - low), high + (high - low))) for _ in range(2))
-    values = candidate_values(option, current, reference, planted.model)
+    values = candidates(planted, option, current, reference)
     assert len(set(values)) == len(values)
     for value in values:
         assert value != current
@@ -49,48 +49,48 @@ def test_every_candidate_is_acceptable_supported_and_a_change(
 
 @given(current=st.integers(0, 80))
 def test_a_safety_option_only_moves_towards_its_default(planted: Profile, current: int) -> None:
-    values = candidate_values(BY_NAME["reserve"], float(current), 20.0, planted.model)
+    values = candidates(planted, BY_NAME["reserve"], float(current), 20.0)
     assert all(value >= 20 for value in values) or current < 20
     assert all(min(current, 20) <= value <= max(current, 20) for value in values if current >= 10)
 
 
 def test_of_a_safety_options_codes_only_the_default_is_left(planted: Profile) -> None:
-    assert candidate_values(replace(BY_NAME["planner"], safety=True), 2.0, 1.0, planted.model) == (1.0,)
-    assert candidate_values(replace(BY_NAME["planner"], safety=True), 1.0, 1.0, planted.model) == ()
+    assert candidates(planted, replace(BY_NAME["planner"], safety=True), 2.0, 1.0) == (1.0,)
+    assert candidates(planted, replace(BY_NAME["planner"], safety=True), 1.0, 1.0) == ()
 
 
 @pytest.mark.parametrize(
     ("name", "current", "first"), [("speed", 1.5, 5.0), ("planner", 2, 1), ("filter", 0, 1), ("accel", 4.0, 1.5)]
 )
 def test_the_reference_comes_first(planted: Profile, name: str, current: float, first: float) -> None:
-    assert candidate_values(BY_NAME[name], current, DEFAULTS[name], planted.model)[0] == first
+    assert candidates(planted, BY_NAME[name], current, DEFAULTS[name])[0] == first
 
 
 def test_a_ratio_is_walked_in_ratios(planted: Profile) -> None:
     gain = Variable("gain", Role.OPTION, range=(0.01, 10.0), default=0.1)
-    assert candidate_values(gain, 10.0, 0.1, planted.model) == (0.1, 0.2512, 0.631, 1.585, 3.981)
+    assert candidates(planted, gain, 10.0, 0.1) == (0.1, 0.2512, 0.631, 1.585, 3.981)
 
 
 def test_one_planted_cause_needs_one_change(planted: Profile) -> None:
-    here = world(planted, reserve=58)
-    found = search(here, BY_NAME, ["reserve", "speed"], DEFAULTS)
+    here = planted_world(planted, reserve=58)
+    found = search(here, ["reserve", "speed"])
     assignment, probability = found[smallest_good(found)]
     assert set(assignment) == {"reserve"}
     assert probability == pytest.approx(here.probability([{**here.config, **assignment}])[0])
 
 
 def test_two_planted_causes_need_two(planted: Profile) -> None:
-    here = world(planted, speed=1.4, planner=2)
-    found = search(here, BY_NAME, ["planner", "radius", "speed"], DEFAULTS)
+    here = planted_world(planted, speed=1.4, planner=2)
+    found = search(here, ["planner", "radius", "speed"])
     assert set(found[smallest_good(found)][0]) == {"speed", "planner"}
 
 
 @QUICK
 @given(driven=st.fixed_dictionaries({o.name: st.floats(*o.range).map(o.snap) for o in OPTIONS if o.range is not None}))
 def test_sets_grow_by_one_and_stay_inside(planted: Profile, driven: dict[str, float]) -> None:
-    here = world(planted, **driven)
+    here = planted_world(planted, **driven)
     free = sorted(name for name in driven if driven[name] != DEFAULTS[name])
-    found = search(here, BY_NAME, free, DEFAULTS)
+    found = search(here, free)
     assert [len(assignment) for assignment, _ in found] == list(range(1, 1 + min(len(found), MAX_CHANGES)))
     for assignment, probability in found:
         assert set(assignment) <= set(free)
@@ -100,20 +100,20 @@ def test_sets_grow_by_one_and_stay_inside(planted: Profile, driven: dict[str, fl
 
 
 def test_nothing_free_nothing_found(planted: Profile) -> None:
-    assert search(world(planted, reserve=58), BY_NAME, [], DEFAULTS) == []
-    assert best_alone(world(planted), BY_NAME, "reserve", DEFAULTS) is None
+    assert search(planted_world(planted, reserve=58), []) == []
+    assert best_alone(planted_world(planted), "reserve") is None
 
 
 @QUICK
 @given(speed=st.floats(1.0, 2.0), radius=st.floats(0.75, 1.0))
 def test_a_nearer_value_than_the_reference_has_a_step_of_margin(planted: Profile, speed: float, radius: float) -> None:
-    here = world(planted, speed=speed, radius=radius)
+    here = planted_world(planted, speed=speed, radius=radius)
     back = {"speed": DEFAULTS["speed"], "radius": DEFAULTS["radius"]}
-    chosen, probability = settled(here, BY_NAME, back, DEFAULTS)
+    chosen, probability = settled(here, back)
     floor = here.probability([{**here.config, **back}])[0] - NEARLY
     assert probability >= floor - 1e-12
     name = "radius"  # settled last, so the other one is at its final value
-    values = candidate_values(BY_NAME[name], here.config[name], DEFAULTS[name], planted.model)
+    values = candidate_values(here, name)
     step = values.index(chosen[name])
     if step:
         beyond = {**here.config, **chosen, name: values[step + 1]}
@@ -121,8 +121,8 @@ def test_a_nearer_value_than_the_reference_has_a_step_of_margin(planted: Profile
 
 
 def test_the_best_value_alone(planted: Profile) -> None:
-    here = world(planted, reserve=58)
-    best = best_alone(here, BY_NAME, "reserve", DEFAULTS)
+    here = planted_world(planted, reserve=58)
+    best = best_alone(here, "reserve")
     assert best is not None
     assert best[1] == pytest.approx(here.probability([{**here.config, "reserve": best[0]}])[0])
     assert best[1] > 0.8
@@ -144,8 +144,8 @@ def test_one_more_change_must_be_worth_it(probability: list[float], chosen: int)
 
 
 def test_a_fix_tells_every_objective_and_the_change_that_does_most_first(planted: Profile) -> None:
-    here = world(planted, speed=1.4, planner=2)
-    fix = to_fix(here, BY_NAME, {"planner": 1.0, "speed": 5.0}, 0.9)
+    here = planted_world(planted, speed=1.4, planner=2)
+    fix = to_fix(here, {"planner": 1.0, "speed": 5.0}, 0.9)
     assert set(fix.predicted) == {"success", "time", "energy"}
     alone = [here.probability([{**here.config, c.option.name: c.suggested}])[0] for c in fix.changes]
     assert alone == sorted(alone, reverse=True)
@@ -154,8 +154,7 @@ def test_a_fix_tells_every_objective_and_the_change_that_does_most_first(planted
 
 def test_without_a_threshold_a_prediction_has_no_probability(planted: Profile) -> None:
     run = planted_run()
-    here = World(planted.model, run.config, {}, {})
-    p = prediction(here, "time", run.config)
+    p = prediction(world_of(planted, run, {}, {}), "time", run.config)
     assert p.p_ok is None
     assert p.status() == "not_evaluated"
     assert p.low < p.value < p.high

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from care_core.diagnose.judging import judge, verdict
-from care_core.diagnose.worlds import unread_options
+from care_core.diagnose.judging import judge, unread_options, verdict
 from care_core.extract.modes import mode_names
 from care_core.extract.registry import Mission
 from care_core.profile.schema import read_schema

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
 from care_core.causal.model import EdgeRecord
 from care_core.diagnose.ranking import (
@@ -23,17 +22,11 @@ from care_core.diagnose.ranking import (
 )
 from care_core.diagnose.reference import profile_config
 from care_core.profile.store import Profile
-from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run, with_variable
+from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run, planted_world, with_variable
 
-BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
 GAMES = st.integers(1, 6).flatmap(
     lambda n: st.tuples(st.just(n), st.lists(st.floats(0, 1), min_size=2**n, max_size=2**n))
 )
-
-
-def world(profile: Profile, **options: float) -> World:
-    run = planted_run(**options)
-    return World(profile.model, run.config, {**run.metrics, **run.objectives}, BOUNDS)
 
 
 @given(GAMES)
@@ -56,15 +49,15 @@ def test_shapley_values_share_an_interaction_and_ignore_a_bystander() -> None:
 
 
 def test_contributions_add_up_to_what_a_full_reset_would_bring(planted: Profile) -> None:
-    here = world(planted, speed=1.4, planner=2, reserve=45, accel=0.6)
-    found = suspects(here, SCHEMA, "time", DEFAULTS)
+    here = planted_world(planted, speed=1.4, planner=2, reserve=45, accel=0.6)
+    found = suspects(here, "time")
     before, after = here.predict("time", [here.config, {**here.config, **DEFAULTS}]).p_ok
     assert sum(s.contribution for s in found) == pytest.approx(after - before)
     assert [s.contribution for s in found] == sorted((s.contribution for s in found), reverse=True)
 
 
 def test_only_options_off_their_reference_with_a_path_are_suspects(planted: Profile) -> None:
-    found = suspects(world(planted, speed=1.4, accel=3.0, inert=0.0), SCHEMA, "time", DEFAULTS)
+    found = suspects(planted_world(planted, speed=1.4, accel=3.0, inert=0.0), "time")
     names = {s.option for s in found}
     assert "speed" in names
     assert "planner" not in names
@@ -79,9 +72,8 @@ def test_only_options_off_their_reference_with_a_path_are_suspects(planted: Prof
 def test_an_effect_that_is_not_identified_is_not_ranked(planted: Profile) -> None:
     effects = dict(planted.model.effects)
     effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
-    here = world(planted, speed=1.4, planner=2)
-    blind = World(replace(planted.model, effects=effects), here.config, here.observed, here.thresholds)
-    found = suspects(blind, SCHEMA, "time", DEFAULTS)
+    here = planted_world(planted, speed=1.4, planner=2)
+    found = suspects(replace(here, model=replace(planted.model, effects=effects)), "time")
     assert [s.option for s in found if not s.is_identified] == ["speed"]
 
 
@@ -111,10 +103,8 @@ def test_one_path_an_option_the_strongest(planted: Profile) -> None:
 
 
 def test_a_path_tells_what_the_run_met_and_what_it_would_have(planted: Profile) -> None:
-    run, here = planted_run(reserve=58), world(planted, reserve=58)
-    path = describe_path(
-        best_paths(planted.model, "time", [o.name for o in OPTIONS])["reserve"], here, SCHEMA, run, DEFAULTS
-    )
+    run, here = planted_run(reserve=58), planted_world(planted, reserve=58)
+    path = describe_path(best_paths(planted.model, "time", [o.name for o in OPTIONS])["reserve"], here, run)
     option, hold, time = path
     assert (option.value, option.expected) == (58, 20)
     assert hold.value == run.metrics["hold_s"]
@@ -127,19 +117,15 @@ def test_a_path_tells_what_the_run_met_and_what_it_would_have(planted: Profile) 
 
 
 def test_a_decreasing_edge_is_negative(planted: Profile) -> None:
-    run, here = planted_run(speed=1.4), world(planted, speed=1.4)
-    path = describe_path(
-        best_paths(planted.model, "time", [o.name for o in OPTIONS])["speed"], here, SCHEMA, run, DEFAULTS
-    )
+    run, here = planted_run(speed=1.4), planted_world(planted, speed=1.4)
+    path = describe_path(best_paths(planted.model, "time", [o.name for o in OPTIONS])["speed"], here, run)
     signs = {node.name: node.effect for node in path if node.effect is not None}
     assert signs["mean_speed"] < 0 < signs["speed"]
 
 
 def test_a_refused_mission_has_unknown_values_on_the_path(planted: Profile) -> None:
-    run, here = planted_run(min_sats=14), world(planted, min_sats=14)
-    path = describe_path(
-        best_paths(planted.model, "success", [o.name for o in OPTIONS])["radius"], here, SCHEMA, run, DEFAULTS
-    )
+    run, here = planted_run(min_sats=14), planted_world(planted, min_sats=14)
+    path = describe_path(best_paths(planted.model, "success", [o.name for o in OPTIONS])["radius"], here, run)
     assert [node.value for node in path] == [0.5, None, 0.0]
 
 
@@ -167,7 +153,7 @@ def test_a_path_is_not_led_over_an_edge_that_carries_nothing(planted: Profile) -
 
 
 def test_a_check_that_did_not_act_carried_nothing(planted: Profile) -> None:
-    assert "armed" not in _mediators(world(planted, speed=1.4), SCHEMA)
-    refused = world(planted, min_sats=13)
-    assert _mediators(refused, SCHEMA) == {"armed", "success"}
-    assert "time" in _mediators(world(planted, speed=1.4), SCHEMA)  # it may have cost energy
+    assert "armed" not in _mediators(planted_world(planted, speed=1.4))
+    refused = planted_world(planted, min_sats=13)
+    assert _mediators(refused) == {"armed", "success"}
+    assert "time" in _mediators(planted_world(planted, speed=1.4))  # it may have cost energy

@@ -2,20 +2,13 @@ from __future__ import annotations
 
 import pytest
 
-from care_core.causal.counterfactual import World
 from care_core.diagnose.ranking import suspects
 from care_core.diagnose.symptoms import pointers
 from care_core.profile.store import Profile
 from care_core.run import Evidence
-from tests.planted import CALM, DEFAULTS, SCHEMA, planted_run
+from tests.planted import planted_world
 
 NAMES = ("speed", "accel", "radius", "reserve", "min_sats", "planner")
-
-
-def world(profile: Profile, /, **options: float) -> World:
-    run = planted_run(CALM, **options)
-    bounds = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
-    return World(profile.model, run.config, {**run.metrics, **run.objectives}, bounds)
 
 
 @pytest.mark.parametrize(
@@ -29,26 +22,26 @@ def world(profile: Profile, /, **options: float) -> World:
 def test_the_metric_that_is_off_points_at_what_moved_it(
     planted: Profile, objective: str, cause: str, metric: str, options: dict[str, float]
 ) -> None:
-    found = pointers(world(planted, **options), SCHEMA, objective, NAMES, DEFAULTS, ())
+    found = pointers(planted_world(planted, **options), objective, NAMES, (), ())
     assert sum(p.share for p in found.values()) == pytest.approx(1.0)
     assert max(found, key=lambda name: found[name].share) == cause
     assert found[cause].metric == metric
 
 
 def test_a_run_like_the_reference_points_at_nothing(planted: Profile) -> None:
-    found = pointers(world(planted), SCHEMA, "time", NAMES, DEFAULTS, ())
+    found = pointers(planted_world(planted), "time", NAMES, (), ())
     assert {pointer.share for pointer in found.values()} == {0.0}
 
 
 def test_a_check_that_refused_the_mission_outweighs_every_metric(planted: Profile) -> None:
-    here = world(planted, min_sats=13, speed=1.5)
+    here = planted_world(planted, min_sats=13, speed=1.5)
     refusal = Evidence(1.0, "not enough satellites", "refusal", ("min_sats",))
-    found = pointers(here, SCHEMA, "success", NAMES, DEFAULTS, (refusal,))
+    found = pointers(here, "success", NAMES, (), (refusal,))
     assert found["min_sats"].share > 0.5
-    assert suspects(here, SCHEMA, "success", DEFAULTS, (refusal,))[0].option == "min_sats"
+    assert suspects(here, "success", said=(refusal,))[0].option == "min_sats"
 
 
 def test_what_no_contribution_explains_is_laid_to_the_symptoms(planted: Profile) -> None:
-    for suspect in suspects(world(planted, reserve=58, speed=4.0), SCHEMA, "time", DEFAULTS):
+    for suspect in suspects(planted_world(planted, reserve=58, speed=4.0), "time"):
         assert suspect.weight >= suspect.contribution - 1e-12
         assert suspect.weight <= 1.0 + 1e-9
