@@ -99,6 +99,7 @@ class LogInfo:
 
 
 FitVerdict = Literal["fits", "partly", "no"]
+FIT_WORDS: Mapping[FitVerdict, str] = {"fits": "fits", "partly": "fits in part", "no": "does not fit"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,10 +109,6 @@ class Fit:
     verdict: FitVerdict
     reasons: tuple[str, ...] = ()
     """What is missing or differs, one clause each; empty where it fits."""
-
-    def __str__(self) -> str:
-        said = {"fits": "fits", "partly": "fits in part", "no": "does not fit"}[self.verdict]
-        return f"{said}: {'; '.join(self.reasons)}" if self.reasons else said
 
     def but(self, *reasons: str) -> Fit:
         """The fit with more found that differs: in part at best."""

@@ -24,6 +24,11 @@ def _shown(character: str) -> str:
     return character if character.isprintable() or unicodedata.category(character) == "Zs" else ascii(character)[1:-1]
 
 
+def figures(value: float, digits: int = 3) -> str:
+    """A measured number with as many digits as it is worth, a large one without a power of ten: 0.0123, 71800."""
+    return f"{float(f'{value:.{digits}g}'):.15g}"
+
+
 def wrapped(text: str, first: str = "", rest: str | None = None) -> list[str]:
     """The text, made safe, in lines of at most `WIDTH` columns; `rest` indents the later ones, as wide as `first` if
     not given."""
@@ -41,7 +46,9 @@ def clock(time_s: float | None) -> str:
 
 
 def seconds(time_s: float | None) -> str:
-    """A time of a log as exact as an operator needs it: 61.3 s, from ten minutes on 12:05."""
+    """A time of a log as exact as an operator needs it: 61.3 s, from ten minutes on 12:05, from an hour on 1:02:05."""
     if time_s is None or not math.isfinite(time_s):
         return "?"
-    return f"{time_s:.1f} s" if abs(time_s) < 600 else f"{int(time_s // 60)}:{int(time_s % 60):02d}"
+    if abs(time_s) < 600:
+        return f"{time_s:.1f} s"
+    return clock(math.floor(time_s))

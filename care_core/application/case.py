@@ -127,7 +127,8 @@ def open_case(request: Request, progress: Progress) -> Case:
             try:
                 reading = _read(log, profile, choice, request, configs, progress, sha256)
             except NoMissionError as err:
-                choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, err.message.rstrip("."))))
+                reason = err.message[:1].lower() + err.message[1:].rstrip(".")
+                choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, reason)))
         if reading is None:
             return Case(_unjudged(log, choice, health, sha256), (), log, None, request.configs)
         diagnosis = _diagnose(reading, health, request, progress)

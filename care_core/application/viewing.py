@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from care_core.diagnose.records import ObjectiveResult
     from care_core.history.store import Triaged
     from care_core.logs.base import Log
+    from care_core.run import FitVerdict
     from care_core.vehicles import Kind
 
 TEXTS = {
@@ -151,6 +152,7 @@ class Past:
     log: str
     mission: int
     profile: str
+    fit: FitVerdict
     verdict: str
     cause: str
     values: Mapping[str, float | None]
@@ -158,17 +160,19 @@ class Past:
 
 
 def past_runs() -> list[Past]:
-    """What the local history holds, the newest first; nothing where it is switched off."""
-    from care_core.history.store import History, history_path
+    """What the local history holds, the newest first. Raises CareError where it is switched off."""
+    from care_core.history.store import SWITCH, History, history_path
 
     path = history_path()
-    if path is None or not path.is_file():
+    if path is None:
+        raise CareError("The history is switched off.", hint=f"Unset {SWITCH} to have runs remembered.")
+    if not path.is_file():
         return []
     return [_past(triaged) for triaged in History(path).triages()]
 
 
 def _past(triaged: Triaged) -> Past:
-    from care_core.report.history import verdict_of
+    from care_core.report.history import fit_of, profile_of, verdict_of
 
     document = triaged.document
     causes = [cause["option"] for fault in document["faults"] for cause in fault["causes"]]
@@ -176,7 +180,8 @@ def _past(triaged: Triaged) -> Past:
         at=triaged.at,
         log=document["log"]["path"],
         mission=triaged.mission,
-        profile=document["profile"]["name"],
+        profile=profile_of(document),
+        fit=fit_of(document),
         verdict=verdict_of(document),
         cause=causes[0] if causes else "",
         values={entry["name"]: entry["value"] for entry in document["objectives"]},

@@ -16,6 +16,7 @@ from care_core.diagnose.records import Circumstance
 from care_core.profile.schema import Schema, Side
 from care_core.profile.store import Profile
 from care_core.run import Run, is_known
+from care_core.text import figures
 from care_core.variables import Role, Variable
 
 BEYOND = 0.1
@@ -40,13 +41,19 @@ def unusual(run: Run, profile: Profile) -> tuple[str, ...]:
     found = [run.mission.mismatch] if run.mission.mismatch else []
     for variable in profile.schema.contexts:
         value, summary = run.context.get(variable.name), profile.model.summaries.get(variable.name)
-        if summary is None or not is_known(value):
+        is_asked = run.checks and variable.about == "mission"  # of a flight that followed no mission
+        if summary is None or not is_known(value) or is_asked:
             continue
         margin = max(BEYOND * (summary.high - summary.low), NEAR * abs(summary.high))
         if not summary.low - margin <= value <= summary.high + margin:
-            what = f"{variable.doc or variable.name} of {value:.3g} {variable.unit}".rstrip()
-            found.append(f"{what} is outside the training runs ({summary.low:.3g} to {summary.high:.3g})")
+            what = f"{variable.doc or variable.name} of {figures(value)} {variable.unit}".rstrip()
+            found.append(f"{what} is outside the training runs ({_seen(summary)})")
     return tuple(found)
+
+
+def _seen(summary: Summary) -> str:
+    low, high = figures(summary.low), figures(summary.high)
+    return f"always {low}" if low == high else f"{low} to {high}"
 
 
 def _shown(run: Run, world: World, schema: Schema) -> Iterator[Circumstance]:
@@ -72,7 +79,7 @@ def _context(name: str, variable: Variable, side: Side, value: float, world: Wor
     low, high = _span(summary)
     unit = f" {variable.unit}".rstrip()
     rarity = "no training run" if share == 0 else f"{share:.0%} of the training runs"
-    text = f"{variable.doc or variable.name}: {value:.3g}{unit}; {rarity} had more"
+    text = f"{variable.doc or variable.name}: {figures(value)}{unit}; {rarity} had more"
     if side == "low":
         text = f"{text.removesuffix('more')}less"
     return Circumstance(name, variable.name, value, variable.unit, low, high, share, text)
@@ -88,7 +95,8 @@ def _metric(name: str, variable: Variable, side: Side, value: float, world: Worl
         return None
     low, high = _span(summary)
     unit = f" {variable.unit}".rstrip()
-    text = f"{variable.doc or variable.name}: {value:.3g}{unit} where this configuration explains {expected:.3g}{unit}"
+    explained = f"{figures(expected)}{unit}"
+    text = f"{variable.doc or variable.name}: {figures(value)}{unit} where this configuration explains {explained}"
     return Circumstance(name, variable.name, value, variable.unit, low, high, share, text)
 
 
@@ -108,8 +116,8 @@ def _unsupported(run: Run, world: World, schema: Schema) -> Iterator[Circumstanc
         if _same(value, summary.low) or _same(value, summary.high):
             continue
         low, high = _span(summary)
-        text = f"{variable.doc or variable.name}: {value:.3g} {variable.unit}".rstrip()
-        text += f" is outside the training runs ({summary.low:.3g} to {summary.high:.3g})"
+        text = f"{variable.doc or variable.name}: {figures(value)} {variable.unit}".rstrip()
+        text += f" is outside the training runs ({_seen(summary)})"
         yield Circumstance("outside support", variable.name, value, variable.unit, low, high, 0.0, text)
 
 

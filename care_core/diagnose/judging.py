@@ -210,21 +210,18 @@ def meaningful(
     found = dict(run.objectives)
     for objective in schema.objectives:
         name = objective.name
-        if objective.kind == "functional" or not is_known(found.get(name)):
+        if objective.kind == "functional":
             continue
-        if not accomplished:
-            found[name] = _meaningless(run)
+        if run.checks:
+            found[name] = Unavailable("no mission was flown")
+        elif not is_known(found.get(name)):
+            continue
+        elif not accomplished:
+            found[name] = Unavailable("the mission was not accomplished, so its value means nothing")
         elif run.mission.mismatch and name not in judged_anyway:
             hint = f"give this mission's bound with --threshold {name}=VALUE"
             found[name] = Unavailable(run.mission.mismatch, hint)
     return found
-
-
-def _meaningless(run: Run) -> Unavailable:
-    """Why the value of a mission that was not accomplished is withheld."""
-    if run.checks:
-        return Unavailable("no mission was flown, so its value means nothing", "judge a flight of the mission")
-    return Unavailable("mission was not accomplished, so its value means nothing", "repair the mission first")
 
 
 def _accomplished(run: Run, schema: Schema, bounds: Mapping[str, Threshold]) -> bool:

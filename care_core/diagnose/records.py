@@ -8,6 +8,7 @@ from typing import Literal
 
 from care_core.health.records import NOTHING_SEEN, Health
 from care_core.run import MissionInfo, ProfileChoice, Run, shown
+from care_core.text import figures
 from care_core.variables import Change, Threshold, Variable
 
 Status = Literal["ok", "fault", "not_evaluated"]
@@ -60,7 +61,7 @@ class ObjectiveResult:
         """What the threshold was made of, empty where it is a fixed one."""
         if self.need is None or self.threshold is None or self.variable.relative is None:
             return ""
-        need = f"{self.need.value:.3g} {self.variable.unit}".rstrip()
+        need = f"{figures(self.need.value)} {self.variable.unit}".rstrip()
         if self.threshold.value == self.variable.relative.at_least or self.variable.relative.ratio == 1:
             return f"the reference configuration needs {need} for this mission"
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"

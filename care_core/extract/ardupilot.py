@@ -298,7 +298,7 @@ def mission_success(mission: Mission, args: Args) -> Value:
     if not _is_armed(mission):
         return 0.0
     if not flew_automatically(mission):
-        return Unavailable("no mission was flown", "judge a flight of the mission")
+        return Unavailable("no mission was flown")
     if _failed(mission):
         return 0.0
     return _mission_flown(mission) if mission.ended else _CUT

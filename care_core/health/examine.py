@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from importlib import import_module
 
-from care_core.health.records import TOO_SHORT, Finding, Health
+from care_core.health.records import TOO_SHORT, WHOLE_LOG, Finding, Health
 from care_core.logs.base import Log, LogFormat
 
 _ARDUPILOT, _PX4 = "care_core.health.ardupilot.examining", "care_core.health.px4"
@@ -42,7 +42,7 @@ def examine(log: Log) -> Health:
         log.duration_s,
         "info",
         f"{log.duration_s:.1f} s of log",
-        "the whole log",
+        WHOLE_LOG,
         "world",
     )
     return replace(health, findings=(nothing,))

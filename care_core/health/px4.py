@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -382,9 +382,10 @@ def _refused(flight: Px4Flight) -> Iterable[Finding]:
     """A vehicle that was not ready to fly and never armed."""
     if not flight.complaints or flight.armed:
         return ()
-    standing: Sequence[str] = list(dict.fromkeys(text for _, text in flight.complaints))
+    standing = list(dict.fromkeys(_NOT_READY.sub("", text) for _, text in flight.complaints))
     first, last = flight.complaints[0][0], flight.complaints[-1][0]
-    evidence = f"{'; '.join(standing[-3:])} ({counted(len(flight.complaints), 'complaint')}), and it never armed"
-    title = f"not ready to fly: {_NOT_READY.sub('', standing[-1])}"
+    others = "".join(f"{text}; " for text in standing[-3:-1])
+    evidence = f"{others}{counted(len(flight.complaints), 'complaint')}, and it never armed"
+    title = f"not ready to fly: {standing[-1]}"
     source = f"{MESSAGES} of the preflight checks"
     return (Finding("prearm", title, first, max(last, first), "warning", evidence, source, "parameter"),)

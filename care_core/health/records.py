@@ -77,6 +77,8 @@ class Finding:
     """Later findings that this one explains."""
 
 
+WHOLE_LOG = "the whole log"
+"""Source of the finding that says no more than that the log holds too little."""
 TOO_SHORT = "too little is recorded to say anything of a run"
 NOT_FLOWN = "the vehicle never armed: no run of it is in this log"
 

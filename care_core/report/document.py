@@ -209,6 +209,7 @@ class TriageDocument(Strict):
     schema_: Literal["care.triage/1"] = Field(
         default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
     )
+    fit: FitEntry = FitEntry(verdict="fits", reasons=[])
     profile: ProfileEntry | None
     """None where no profile fits the log."""
     log: LogEntry
@@ -219,7 +220,6 @@ class TriageDocument(Strict):
     faults: list[FaultEntry]
     fix: FixEntry | None
     abstained: str | None
-    fit: FitEntry = FitEntry(verdict="fits", reasons=[])
     account: list[MomentEntry] = Field(default_factory=list)
     """What happened, in order of time."""
     findings: list[FindingEntry] = Field(default_factory=list)

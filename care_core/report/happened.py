@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict
 
 from care_core.diagnose.records import Hypothesis, What
 from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
-from care_core.report.wording import SEVERITY_WORDS, hypothesis_text
+from care_core.report.wording import SEVERITY_WORDS, hypothesis_text, noted
 from care_core.run import Fit, FitVerdict
 from care_core.text import clean, seconds, wrapped
 
@@ -118,22 +118,6 @@ def _finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def fit_text(profile: str, fit: Fit | FitEntry) -> str:
-    """The first line of every output: which profile (empty: none), and how well it fits."""
-    reasons = "; ".join(fit.reasons)
-    if not profile:
-        return f"No profile fits: {reasons}"
-    said, caution = _FIT_WORDS[fit.verdict]
-    return f"Profile {profile} {said}{f': {reasons}' if reasons else ''}{caution}"
-
-
-_FIT_WORDS: dict[FitVerdict, tuple[str, str]] = {
-    "fits": ("fits", ""),
-    "partly": ("fits in part", " (confidence low at most)"),
-    "no": ("does not fit", " (nothing is advised)"),
-}
-
-
 def finding_sentence(finding: FindingEntry) -> str:
     """A finding of a document with its numbers and what it led to."""
     late = ", after the impact" if finding.after_impact else ""
@@ -149,7 +133,8 @@ def account_lines(account: Sequence[Moment | MomentEntry], robot: str = "", most
     """The account as text; of a long one the lines that say most about a failure."""
     if not account:
         return
-    yield from wrapped(f"What happened{f' ({robot})' if robot else ''}")
+    is_named = not robot or account[0].kind == "vehicle"
+    yield from wrapped("What happened" if is_named else f"What happened ({robot})")
     told = telling(account, most)
     for moment in told:
         yield from wrapped(moment.text, f"  {seconds(moment.time_s):>9}  ")
@@ -171,11 +156,14 @@ def telling(account: Sequence[M], most: int) -> list[M]:
 
 def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
     """The findings as text, consequences under what explains them; that nothing was found is said plainly."""
-    if not findings:
+    shown = noted(findings)
+    if findings and not shown:
+        return
+    if not shown:
         yield "Findings: nothing out of the ordinary, as far as this log lets itself be checked"
         return
-    yield "Findings, the first cause first"
-    for finding in findings:
+    yield "Findings" if len(shown) == 1 else "Findings, the first cause first"
+    for finding in shown:
         late = ", after the impact" if finding.after_impact else ""
         head = f"  {SEVERITY_WORDS[finding.severity]:<8}  "
         yield from wrapped(f"{finding.title}, at {seconds(finding.onset_s)}{late}", head)

@@ -11,6 +11,8 @@ from pydantic import ConfigDict, Field
 from care_core.history.store import HistoryError, Triaged, Verified
 from care_core.history.track_record import TrackRecord, sparkline, track_record, trends
 from care_core.report.document import Strict
+from care_core.report.wording import fit_words
+from care_core.run import FitVerdict
 from care_core.text import clean
 
 SCHEMA_ID: Final = "care.history/1"
@@ -19,12 +21,13 @@ _SPARKS = 30
 
 
 class PastTriage(Strict):
-    """`profile` is empty where none fitted; `verdict` says in words how the run went; `options` are those that the
-    suggested fix changes, none without a fix."""
+    """`profile` is empty where none fitted, `fit` says how well it did; `verdict` says in words how the run went;
+    `options` are those that the suggested fix changes, none without a fix."""
 
     at: str
     log: str
     mission: int
+    fit: FitVerdict
     profile: str
     faults: list[str]
     verdict: str
@@ -88,7 +91,8 @@ def _past(triaged: Triaged) -> PastTriage:
         at=triaged.at,
         log=clean(triaged.log_path),
         mission=triaged.mission,
-        profile=document["profile"]["name"] if document["profile"] else "",
+        fit=fit_of(document),
+        profile=profile_of(document),
         faults=[fault["objective"] for fault in document["faults"]],
         verdict=verdict_of(document),
         cause=causes[0] if causes else None,
@@ -97,18 +101,29 @@ def _past(triaged: Triaged) -> PastTriage:
     )
 
 
+def profile_of(document: Mapping[str, Any]) -> str:
+    """The profile of a remembered run, empty where none fitted."""
+    return document["profile"]["name"] if document["profile"] else ""
+
+
+def fit_of(document: Mapping[str, Any]) -> FitVerdict:
+    """How well it fitted; the oldest records say nothing of that."""
+    verdict: FitVerdict = document.get("fit", {}).get("verdict", "fits")
+    return verdict
+
+
 def verdict_of(document: Mapping[str, Any]) -> str:
     """How a remembered run went, in a clause: the first critical finding, the objectives outside their thresholds, and
     "no fault" only where everything was evaluated and nothing critical was found."""
     critical = [finding["title"] for finding in document.get("findings", ()) if finding["severity"] == "critical"]
     broken = [entry["name"] for entry in document["objectives"] if entry["status"] == "fault"]
-    unknown = [entry["name"] for entry in document["objectives"] if entry["status"] == "not_evaluated"]
+    statuses = {entry["status"] for entry in document["objectives"]}
     said = [*critical[:1], *([f"FAULT {', '.join(broken)}"] if broken else [])]
     if said:
         return clean("; ".join(said))
-    if document.get("fit", {}).get("verdict") == "no":
-        return "no profile fits"
-    return "not all evaluated" if unknown or not document["objectives"] else "no fault"
+    if "ok" not in statuses:
+        return "not evaluated"
+    return "not all evaluated" if "not_evaluated" in statuses else "no fault"
 
 
 def _record(record: TrackRecord) -> PromiseRecord:
@@ -134,7 +149,8 @@ def _lines(document: HistoryDocument, ascii: bool) -> Iterator[str]:
     for past in document.triages:
         when = past.at[:16].replace("T", " ")
         fix = "" if past.p_fixed is None else f"  change {', '.join(past.options)} ({past.p_fixed:.0%})"
-        yield clean(f"{when}  {Path(past.log).name}  {past.profile or '-'}  {past.verdict}{fix}")
+        fit = fit_words(past.profile, past.fit).removeprefix("Profile ")
+        yield clean(f"{when}  {Path(past.log).name}  {fit}  {past.verdict}{fix}")
     if document.trends:
         yield ""
         yield "Trends, oldest to newest"

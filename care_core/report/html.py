@@ -19,9 +19,9 @@ from care_core.report.document import (
     SinceEntry,
     wanted_text,
 )
-from care_core.report.happened import finding_sentence, fit_text
+from care_core.report.happened import finding_sentence
 from care_core.report.together import listed, together
-from care_core.report.wording import SEVERITY_WORDS, hypothesis_text
+from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import shown
 from care_core.text import seconds
@@ -94,12 +94,13 @@ def _happened(report: Report) -> Iterator[str]:
     if report.hypotheses:
         yield "<h2>What explains it</h2>"
         yield from _list(f"{h.probability:.0%}: {escape(hypothesis_text(h))}" for h in report.hypotheses)
-    if report.findings:
+    findings = noted(report.findings)
+    if findings:
         yield "<h2>Findings, the first cause first</h2>"
         yield from _list(
             f'<span class="status {_SEVERITY_CLASSES[f.severity]}">{SEVERITY_WORDS[f.severity]}</span> '
             f"{escape(finding_sentence(f))}"
-            for f in report.findings
+            for f in findings
         )
     if report.account:
         yield "<h2>What happened</h2>"
@@ -113,7 +114,8 @@ def _verdict(report: Report) -> str:
         f"<code>{escape(objective.name)}</code>" for objective in report.objectives if objective.status == "fault"
     )
     if not broken and (worst or not report.objectives):
-        return f"<strong>Fault</strong>: {'; '.join(worst)}." if worst else "<strong>Not evaluated.</strong>"
+        unknown = f"<strong>Not evaluated</strong>: {escape(unjudged(report.findings))}."
+        return f"<strong>Fault</strong>: {'; '.join(worst)}." if worst else unknown
     found = f"<strong>Fault</strong>: {broken}." if broken else "<strong>No fault found.</strong>"
     if not broken and any(objective.status == "not_evaluated" for objective in report.objectives):
         found += " Not everything could be evaluated."

@@ -23,8 +23,8 @@ from care_core.report.happened import (
     finding_entries,
     finding_lines,
     fit_entry,
-    fit_text,
 )
+from care_core.report.wording import fit_text
 from care_core.run import Damage, MissionInfo, ProfileChoice
 from care_core.text import clean, clock, wrapped
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
 
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
 from care_core.health.records import Health
-from care_core.report.happened import account_lines, finding_lines, finding_text, fit_text, hypothesis_lines
+from care_core.report.happened import account_lines, finding_lines, finding_text, hypothesis_lines
 from care_core.report.together import listed, together
-from care_core.report.wording import critical
+from care_core.report.wording import critical, fit_text, unjudged
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
 from care_core.variables import Variable
@@ -46,7 +47,10 @@ def to_text(diagnosis: Diagnosis) -> str:
 
 def _headline(diagnosis: Diagnosis) -> Iterator[str]:
     yield from wrapped(fit_text(diagnosis.profile.name, diagnosis.profile.fit))
-    broken = [_measured(objective) for objective in diagnosis.objectives if objective.status == "fault"]
+    faulty = [objective for objective in diagnosis.objectives if objective.status == "fault"]
+    missed = [objective.variable.name for objective in faulty if objective.variable.kind == "functional"]
+    broken = [f"{', '.join(missed)} not met"] if missed else []
+    broken += [_measured(objective) for objective in faulty if objective.variable.kind != "functional"]
     unknown = [objective.variable.name for objective in diagnosis.objectives if objective.status == "not_evaluated"]
     if broken:
         yield from wrapped("; ".join(broken), "FAULT: ")
@@ -80,9 +84,7 @@ def _without_profile(health: Health) -> str:
     worst = [finding_text(one) for one in critical(health)[:2]]
     if worst:
         return f"FAULT: {'; '.join(worst)}"
-    if health.too_little:
-        return f"NOT EVALUATED: {health.too_little}"
-    return "NOT EVALUATED: no limit of this mission is known; what happened is told below"
+    return f"NOT EVALUATED: {unjudged(health.findings)}"
 
 
 def _measured(objective: ObjectiveResult) -> str:
@@ -93,8 +95,9 @@ def _measured(objective: ObjectiveResult) -> str:
 
 def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     run, profile = diagnosis.run, diagnosis.profile
-    facts = "".join(f", {name} {fact}" for name, fact in run.log.facts.items())
-    mission = f"mission {run.mission.index} of {run.mission.count}"
+    told = ("vehicle", "frame") if diagnosis.health.account else ()  # the account begins with them
+    facts = "".join(f", {name} {fact}" for name, fact in run.log.facts.items() if name not in told)
+    mission = f"{'flight' if run.checks else 'mission'} {run.mission.index} of {run.mission.count}"
     duration = f"{run.mission.end_s - run.mission.start_s:.0f} s"
     which = f", {mission}" if run.mission.count else ""
     yield from wrapped(f"{Path(run.log.path).name}{which}, {duration}{facts}", "Log      ")
@@ -111,7 +114,7 @@ def _missions(diagnosis: Diagnosis) -> Iterator[str]:
     """Every mission of a log that holds several, with its verdict."""
     if len(diagnosis.missions) < 2:
         return
-    yield "Missions of this log"
+    yield "Flights of this log" if diagnosis.run.checks else "Missions of this log"
     for verdict in diagnosis.missions:
         one = verdict.mission
         here = "  <- this report" if one.index == diagnosis.run.mission.index else ""
@@ -125,16 +128,17 @@ def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
         return
     yield "Objectives"
     name_width = max((len(objective.variable.name) for objective in diagnosis.objectives), default=0)
-    for objective in diagnosis.objectives:
-        value = "-" if objective.value is None else f"{objective.value:.4g}"
-        wanted = "" if objective.threshold is None else f"{objective.threshold}"
-        word = STATUS_WORDS[objective.status]
-        line = f"  {word:<13}  {objective.variable.name:<{name_width}}  {value:>8}  {wanted} {objective.variable.unit}"
-        yield line.rstrip()
-        if objective.basis:
-            yield from wrapped(objective.basis, " " * 17)
-        if objective.reason:
-            yield from wrapped(objective.reason, " " * 17)
+    for reason, group in groupby(diagnosis.objectives, key=lambda objective: objective.reason):
+        for objective in group:
+            name, word = objective.variable.name, STATUS_WORDS[objective.status]
+            value = "-" if objective.value is None else f"{objective.value:.4g}"
+            bound = "" if objective.value is None or objective.threshold is None else f"{objective.threshold}"
+            wanted = f"{bound} {objective.variable.unit if bound else ''}"
+            yield f"  {word:<13}  {name:<{name_width}}  {value:>8}  {wanted}".rstrip()
+            if objective.basis and objective.value is not None:
+                yield from wrapped(objective.basis, " " * 17)
+        if reason:
+            yield from wrapped(reason, " " * 17)
 
 
 def _paths(fault: Fault) -> list[list[str]]:

@@ -19,7 +19,8 @@ from care_core.report.document import (
     predicted_objective,
     profile_entry,
 )
-from care_core.report.happened import fit_text
+from care_core.report.happened import FitEntry, fit_entry
+from care_core.report.wording import fit_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
 
@@ -48,6 +49,7 @@ class WhatIfDocument(Strict):
     schema_: Literal["care.whatif/1"] = Field(
         default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
     )
+    fit: FitEntry
     profile: ProfileEntry
     log: str
     changes: list[AskedChange]
@@ -64,6 +66,7 @@ def whatif_schema() -> dict[str, Any]:
 def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
     """The answer as a document."""
     return WhatIfDocument(
+        fit=fit_entry(question.profile.fit),
         profile=profile_entry(question.profile),
         log=clean(question.run.log.path),
         changes=[

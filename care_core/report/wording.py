@@ -2,15 +2,46 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, TypeVar
 
 from care_core.diagnose.records import Hypothesis
-from care_core.health.records import Finding, Health, Severity
+from care_core.health.records import WHOLE_LOG, Finding, Health, Severity
+from care_core.run import FIT_WORDS, FitVerdict
 
 if TYPE_CHECKING:
-    from care_core.report.happened import HypothesisEntry
+    from care_core.report.happened import FindingEntry, FitEntry, HypothesisEntry
+    from care_core.run import Fit
 
+NO_LIMIT = "no limit of this mission is known; what happened is told below"
 SEVERITY_WORDS: dict[Severity, str] = {"critical": "CRITICAL", "warning": "WARNING", "info": "note"}
+
+F = TypeVar("F", bound="Finding | FindingEntry")
+
+
+def fit_words(profile: str, verdict: FitVerdict) -> str:
+    """Which profile, empty for none, and how well it fits."""
+    return f"Profile {profile} {FIT_WORDS[verdict]}" if profile else "No profile fits"
+
+
+def fit_text(profile: str, fit: Fit | FitEntry) -> str:
+    """The first line of every output: which profile (empty: none), and how well it fits."""
+    reasons = "; ".join(fit.reasons)
+    caution = {"fits": "", "partly": " (confidence low at most)", "no": " (nothing is advised)"}[fit.verdict]
+    return f"{fit_words(profile, fit.verdict)}{f': {reasons}' if reasons else ''}{caution if profile else ''}"
+
+
+def noted(findings: Sequence[F]) -> list[F]:
+    """The findings but the one that says only that the log holds too little: the headline says so."""
+    return [one for one in findings if one.source != WHOLE_LOG]
+
+
+def unjudged(findings: Sequence[Finding | FindingEntry]) -> str:
+    """Why nothing is judged where no profile fits: what kept the vehicle from arming, or that too little is there."""
+    refused = next((one.title for one in findings if one.kind == "prearm"), "")
+    if refused:
+        return f"{refused} (it never armed)"
+    return next((one.title for one in findings if one.source == WHOLE_LOG), NO_LIMIT)
 
 
 def critical(health: Health) -> list[Finding]:

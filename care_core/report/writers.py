@@ -22,9 +22,9 @@ from care_core.report.document import (
     TriageDocument,
     wanted_text,
 )
-from care_core.report.happened import finding_sentence, fit_text
+from care_core.report.happened import finding_sentence
 from care_core.report.together import listed, together
-from care_core.report.wording import SEVERITY_WORDS, hypothesis_text
+from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
 from care_core.run import shown
 from care_core.text import seconds
 
@@ -47,7 +47,7 @@ def published(report: Report) -> dict[str, Any]:
 
 
 def to_yaml(report: Report) -> str:
-    """The document with the unified diff and the commands that apply it."""
+    """The document with the unified diff and the commands that apply it, below how well the profile fits."""
     data = report.model_dump(by_alias=True)
     if report.diff:
         data["diff"] = LiteralScalarString(report.diff)
@@ -55,7 +55,7 @@ def to_yaml(report: Report) -> str:
     yaml.width = _YAML_WIDTH
     stream = StringIO()
     yaml.dump(data, stream)
-    return stream.getvalue()
+    return f"# {fit_text(report.profile.name if report.profile else '', report.fit)}\n{stream.getvalue()}"
 
 
 def to_markdown(report: Report) -> str:
@@ -70,7 +70,7 @@ def _markdown(report: Report) -> Iterator[str]:
     yield ""
     yield _verdict(report)
     yield from _listed("What explains it", (f"{h.probability:.0%}: {hypothesis_text(h)}" for h in report.hypotheses))
-    told = (f"{SEVERITY_WORDS[one.severity]}: {finding_sentence(one)}" for one in report.findings)
+    told = (f"{SEVERITY_WORDS[one.severity]}: {finding_sentence(one)}" for one in noted(report.findings))
     yield from _listed("Findings, the first cause first", told)
     if report.account:
         yield from ("", "## What happened", "")
@@ -120,7 +120,7 @@ def _verdict(report: Report) -> str:
     if not broken and worst:
         return f"**Fault**: {'; '.join(worst)}."
     if not broken and report.fit.verdict == "no":
-        return "**Not evaluated**: no limit of this mission is known; what happened is told below."
+        return f"**Not evaluated**: {_escape(unjudged(report.findings))}."
     if not broken:
         unknown = any(objective.status == "not_evaluated" for objective in report.objectives)
         return "**No fault found**, but not everything could be evaluated." if unknown else "**No fault found.**"

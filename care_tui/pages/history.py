@@ -9,6 +9,7 @@ from typing import ClassVar
 from textual.content import Content
 
 from care_core.application.viewing import Past, past_runs
+from care_core.report.wording import fit_words
 from care_core.text import clean
 from care_tui.pages.page import Fetch, Page, View, sentence
 from care_tui.render.rows import ASCII, Row, Rows, labelled, padded, text
@@ -60,13 +61,18 @@ class HistoryPage(Page):
     def _item(self, past: Past) -> Content:
         mark = "*" if past == self._marked else " "
         line = Content(f"{mark} {past.at[:16].replace('T', ' ')}  ")
-        return line + padded(_named(past), 26, "bold") + text(f" {past.verdict}")
+        fit = "" if past.fit == "fits" else f"  ({fit_words(past.profile, past.fit).removeprefix('Profile ')})"
+        return line + padded(_named(past), 26, "bold") + text(f" {past.verdict}") + text(fit, "dim")
 
     def _detail(self, index: int, runs: list[Past]) -> list[Row]:
         past, other = runs[index], self._marked
         if other is not None and other != past:
             return comparison(past, other)
-        rows = [labelled("Log", past.log), labelled("Profile", past.profile), labelled("Verdict", past.verdict)]
+        rows = [
+            labelled("Log", past.log),
+            labelled("Fit", fit_words(past.profile, past.fit)),
+            labelled("Verdict", past.verdict),
+        ]
         if past.cause:
             rows.append(labelled("First cause", past.cause))
         until = [run for run in reversed(runs[index:]) if run.profile == past.profile]

@@ -9,7 +9,7 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.health.records import Finding, Health, Moment, Severity
-from care_core.report.wording import SEVERITY_WORDS, hypothesis_text
+from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
 from care_core.text import clean, seconds
 from care_tui.render.objectives import damage
 from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, text, warning
@@ -40,7 +40,7 @@ class Told:
 def told(health: Health) -> list[Told]:
     """Findings, the first cause first and what each led to below it; then the account in order of time."""
     lines = []
-    for finding in health.findings:
+    for finding in noted(health.findings):
         lines += [Told(finding), *(Told(below, finding) for below in finding.consequences)]
     return [*lines, *(Told(moment) for moment in health.account)]
 
@@ -87,7 +87,7 @@ def verdict_line(health: Health, glyphs: Glyphs) -> Content:
     robot = Content(clean(f"{health.robot}: " if health.robot else ""))
     first = next(iter(health.findings), None)
     if health.too_little:
-        return robot + Content(health.too_little)
+        return robot + Content(clean(unjudged(health.findings) if health.findings else health.too_little))
     if first is None:
         return robot + Content("nothing out of the ordinary was found")
     sign = {"critical": f"{glyphs.fault} ", "warning": "! ", "info": ""}[first.severity]
@@ -97,10 +97,9 @@ def verdict_line(health: Health, glyphs: Glyphs) -> Content:
 def standing(diagnosis: Diagnosis, glyphs: Glyphs) -> list[Content]:
     """How far the answer carries, for every step: the fit of the profile, then what limits the answer besides."""
     profile, fit = diagnosis.profile, diagnosis.profile.fit
-    name = clean(f"{profile.name} {profile.version}".strip()) or "Profile"
     style = {"fits": "", "partly": "$text-warning", "no": "bold $text-error"}[fit.verdict]
     mark = "" if fit.verdict == "fits" else "! "
-    lines = [Content.styled(f"{mark}{name} {clean(str(fit))}", style)]
+    lines = [Content.styled(f"{mark}{clean(fit_text(profile.name, fit))}", style)]
     limits = warnings_of(diagnosis)
     if limits:
         lines.append(Content.styled("! " + clean("; ".join(limits)), "$text-warning"))

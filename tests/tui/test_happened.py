@@ -69,7 +69,7 @@ async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         assert walk(app).step == 1
-        assert pinned(app)[0].startswith("! arducopter 1.0 does not fit: it is a rover")
+        assert pinned(app)[0].startswith("! Profile arducopter does not fit: it is a rover")
         assert "motor 2 lost thrust" in items(app)
         assert "What keeps the nearest from fitting" in text(app)
         assert "- it is a rover, the profile is of a copter" in text(app)
@@ -103,7 +103,7 @@ async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_v
         for key in "123456yb":
             await settle(pilot, key)
             fit, warnings = pinned(app)
-            assert fit.startswith("! arducopter 1.0 fits in part: the firmware is 4.3.6, ")
+            assert fit.startswith("! Profile arducopter fits in part: the firmware is 4.3.6, ")
             assert warnings.startswith("! 142 bytes that are no message")
             assert all(len(line) <= 78 for line in (fit, warnings))
             assert app.screen.query_one(Pinned).size.height == 2

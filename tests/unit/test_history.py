@@ -171,8 +171,8 @@ NAMED = {"kind": "crash", "title": "it hit the \x1bground", "severity": "critica
         (["ok", "ok"], {"findings": [NAMED]}, "it hit the \\x1bground"),
         (["ok", "fault"], {"findings": [NAMED]}, "it hit the \\x1bground; FAULT o1"),
         (["ok", "not_evaluated"], {}, "not all evaluated"),
-        ([], {}, "not all evaluated"),
-        (["not_evaluated"], {"fit": {"verdict": "no", "reasons": []}}, "no profile fits"),
+        ([], {}, "not evaluated"),
+        (["not_evaluated"], {"fit": {"verdict": "no", "reasons": []}}, "not evaluated"),
         (["ok"], {"findings": [{**NAMED, "severity": "info"}]}, "no fault"),
     ],
 )

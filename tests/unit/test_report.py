@@ -27,8 +27,8 @@ from care_core.run import Damage, Fit, ProfileChoice
 from care_core.text import clean
 from tests.made import DRIVEN, ENERGY, HOSTILE, LAND_SPEED, made_diagnosis
 
-KEYS = ["schema", "profile", "log", "config", "context", "metrics", "objectives", "faults", "fix", "abstained"]
-HAPPENED = ["fit", "account", "findings", "hypotheses"]
+KEYS = ["schema", "fit", "profile", "log", "config", "context", "metrics", "objectives", "faults", "fix", "abstained"]
+HAPPENED = ["account", "findings", "hypotheses"]
 ADDED = [*HAPPENED, "notes", "sources", "since", "missions", "evidence", "rivals", "tell_more", "dismissed"]
 
 

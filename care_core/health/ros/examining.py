@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from care_core.health.records import Health, Moment
+from care_core.health.records import Health
 from care_core.health.ros import plan
 from care_core.health.ros.account import account
 from care_core.health.ros.find import find
@@ -21,11 +21,7 @@ def examine(log: Log) -> Health:
     """What happened in a ROS 1 bag or a ROS 2 recording."""
     recording = Recording.read(cast(RosLog, log))
     findings = find(recording)
-    told = account(recording)
-    too_little = "" if findings else _too_little(recording)
-    if too_little:
-        told = (*told, Moment(recording.duration_s, "recording", too_little, "recording"))
-    return Health(_robot(recording), told, findings, too_little)
+    return Health(_robot(recording), account(recording), findings, "" if findings else _too_little(recording))
 
 
 def _robot(recording: Recording) -> str:
