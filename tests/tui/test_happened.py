@@ -110,7 +110,7 @@ async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_v
     app = make_app(replace(sample.all_ok(), profile=sample.fitting("fits")))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
-        assert pinned(app)[0] == "arducopter 1.0 fits"
+        assert pinned(app)[0] == "Profile arducopter fits"
 
 
 async def test_parts_parameters_and_chance_compete_in_one_ranking(make_app: MakeApp) -> None:
