@@ -42,11 +42,11 @@ _Constructor.add_constructor("tag:yaml.org,2002:int", _Constructor.construct_yam
 
 def load(text: str) -> Any:
     """The data of a text, None where it is empty. Raises PlainYamlError."""
-    yaml = YAML(typ="safe")
-    yaml.Constructor = _Constructor
+    safe = YAML(typ="safe")
+    safe.Constructor = _Constructor
     with _explained():
         _check(text)
-        return yaml.load(text)
+        return safe.load(text)
 
 
 def compose(text: str) -> Node | None:

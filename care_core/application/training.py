@@ -85,9 +85,10 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
     """The source's `profile.yaml` for the other robot, its comments kept."""
     from ruamel.yaml import YAML
 
-    yaml = YAML(typ="rt")  # keeps comments; like `safe` it builds no object that a tag names
-    yaml.width = 120
-    data: Any = yaml.load(text)
+    # Keeps comments; like `safe` it builds no object that a tag names. The text was read within limits before.
+    round_trip = YAML(typ="rt")
+    round_trip.width = 120
+    data: Any = round_trip.load(text)
     source = data["name"]
     data["name"] = name
     data["platform"] = f"{name}, carried over from: {data.get('platform', source)}"
@@ -100,7 +101,7 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
         if "default" in entry and not low <= entry["default"] <= high:
             del entry["default"]
     stream = StringIO()
-    yaml.dump(data, stream)
+    round_trip.dump(data, stream)
     return stream.getvalue()
 
 

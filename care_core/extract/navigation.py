@@ -7,7 +7,9 @@ looks like: commands to stand or to turn on the spot, reversals of the turn comm
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
+from typing import TypeVar
 
 import numpy as np
 
@@ -35,7 +37,100 @@ from care_core.run import Unavailable, Value
 _CRAWL_M = 0.3
 """How much nearer a goal must have come in the last fifth of its time to count as under way."""
 
+T = TypeVar("T")
+_Ends = list[tuple[float, float]]
+
 _TOO_SHORT = Unavailable("too few messages while a goal was active", "record the whole mission")
+
+
+# Parts of a drive, and what is measured on one
+
+
+def _odometry(drive: Drive) -> Odometry | Unavailable:
+    return missing(drive.topics.odometry) if drive.odometry is None else drive.odometry
+
+
+def _placed(drive: Drive) -> Odometry | Unavailable:
+    """Odometry in the frame of the goals, to measure distances to them."""
+    if drive.odometry is None:
+        return missing(drive.topics.odometry)
+    if any(math.isnan(leg.x) for leg in drive.legs):
+        return Unavailable("the log does not say where the goals lie", "ros2 bag record /goal_pose /plan")
+    frames = {leg.frame.strip("/") for leg in drive.legs} - {""}
+    own = drive.odometry.frame.strip("/")
+    if own and frames - {own}:
+        other = ", ".join(sorted(frames))
+        hint = "name in the mission section a topic of nav_msgs/Odometry in the goals' frame"
+        return Unavailable(f"goals are in frame {other}, odometry is in {own}", hint)
+    return drive.odometry
+
+
+def _commands(drive: Drive) -> Commands | Unavailable:
+    return missing(drive.topics.commands) if drive.commands is None else drive.commands
+
+
+def _goal_distance(odometry: Odometry, legs: Sequence[Leg]) -> Floats:
+    """Distance to the active goal, m, shape (n,)."""
+    x, y = np.array([leg.x for leg in legs]), np.array([leg.y for leg in legs])
+    distance: Floats = np.hypot(odometry.x - x[odometry.leg], odometry.y - y[odometry.leg])
+    return distance
+
+
+def _progress(odometry: Odometry, legs: Sequence[Leg]) -> list[float]:
+    """How much nearer each goal came, m."""
+    distance = _goal_distance(odometry, legs)
+    made = []
+    for number in range(len(legs)):
+        inside = distance[odometry.leg == number]
+        made.append(float(inside[0] - inside[-1]) if len(inside) else 0.0)
+    return made
+
+
+def _lateral(odometry: Odometry, number: int, leg: Leg) -> Floats:
+    """Distance from the straight line to a goal, m, one per sample of its leg."""
+    inside = odometry.leg == number
+    x, y = odometry.x[inside], odometry.y[inside]
+    if not len(x) or (length := math.hypot(leg.x - x[0], leg.y - y[0])) < TOLERANCE_M:
+        return np.empty(0)
+    offsets: Floats = np.abs((leg.x - x[0]) * (y - y[0]) - (leg.y - y[0]) * (x - x[0])) / length
+    return offsets
+
+
+def _ends(drive: Drive, *, only_reached: bool = False) -> _Ends | Unavailable:
+    """Distance (m) and heading error (rad) at the end of each leg, never an empty list."""
+    odometry = _placed(drive)
+    if isinstance(odometry, Unavailable):
+        return odometry
+    ends = []
+    for number, leg in enumerate(drive.legs):
+        rows = np.flatnonzero(odometry.leg == number)
+        if len(rows) and (leg.reached(drive.timeout_s) or not only_reached):
+            last = rows[-1]
+            offset = leg.offset(float(odometry.x[last]), float(odometry.y[last]))
+            ends.append((offset, angle_between(leg.yaw, float(odometry.yaw[last]))))
+    return ends or Unavailable("no goal was reached", "see why its goals failed")
+
+
+def _arrivals(drive: Drive) -> _Ends | Unavailable:
+    """The same of the legs whose goal was reached."""
+    return _ends(drive, only_reached=True)
+
+
+def of_drive(
+    part: Callable[[Drive], T | Unavailable],
+) -> Callable[[Callable[[Drive, T, Args], Value]], Callable[[Mission, Args], Value]]:
+    """Make an extractor of what is measured on a part of the drive; where the part is missing, that is the answer."""
+
+    def wrap(measure: Callable[[Drive, T, Args], Value]) -> Callable[[Mission, Args], Value]:
+        @wraps(measure)
+        def extract(mission: Mission, args: Args) -> Value:
+            drive = mission.shared(analyse)
+            found = part(drive)
+            return found if isinstance(found, Unavailable) else measure(drive, found, args)
+
+        return extract
+
+    return wrap
 
 
 # Goals and time
@@ -113,12 +208,9 @@ def goal_time(mission: Mission, args: Args) -> Value:
 
 
 @extractor("time_per_metre", needs={}, parts=("goals", "odometry"), unit="s/m")
-def time_per_metre(mission: Mission, args: Args) -> Value:
+@of_drive(_placed)
+def time_per_metre(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Time with a goal per metre of way made towards the goals."""
-    drive = mission.shared(analyse)
-    odometry = _placed(drive)
-    if isinstance(odometry, Unavailable):
-        return odometry
     made_m = sum(_progress(odometry, drive.legs))
     if made_m < 0.1:
         return Unavailable("the robot made no way towards its goals", "see what it was commanded")
@@ -132,12 +224,9 @@ def time_per_metre(mission: Mission, args: Args) -> Value:
     unit="",
     args={"within_m": numeric("how near counts, 0.6 m unless given")},
 )
-def goals_approached(mission: Mission, args: Args) -> Value:
+@of_drive(_ends)
+def goals_approached(drive: Drive, left: _Ends, args: Args) -> Value:
     """Share of the mission's goals that the robot was near to when they ended, reached or not."""
-    left = _at_end(mission, only_reached=False)
-    if isinstance(left, Unavailable):
-        return left
-    drive = mission.shared(analyse)
     within_m = float(args.get("within_m", 0.6))
     return sum(distance <= within_m for distance, _ in left) / (len(drive.goals) or len(drive.legs))
 
@@ -152,13 +241,10 @@ def goals_approached(mission: Mission, args: Args) -> Value:
         "within_m": numeric("how near to the goal, 0.6 m unless given"),
     },
 )
-def first_failure(mission: Mission, args: Args) -> Value:
+@of_drive(_placed)
+def first_failure(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """1 when the first goal that was not reached failed in this way, else 0: `given_up` by the stack; out of time
     `unsettled` near the goal, `crawling` (it still came nearer, a share of the way too slow), or `stuck` on the way."""
-    drive = mission.shared(analyse)
-    odometry = _placed(drive)
-    if isinstance(odometry, Unavailable):
-        return odometry
     number = next((i for i, leg in enumerate(drive.legs) if not leg.reached(drive.timeout_s)), None)
     return 0.0 if number is None else float(_way_of_failing(drive, odometry, number, args) == args.get("how"))
 
@@ -198,53 +284,47 @@ def passages_passed(mission: Mission, args: Args) -> Value:
 
 
 @extractor("path_length", needs={}, parts=("goals", "odometry"), unit="m")
-def path_length(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def path_length(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Length of the odometry's path."""
-    odometry = _odometry(mission.shared(analyse))
-    return odometry if isinstance(odometry, Unavailable) else float(odometry.step_m.sum())
+    return float(odometry.step_m.sum())
 
 
 @extractor("detour", needs={}, parts=("goals", "odometry"), unit="m")
-def detour(mission: Mission, args: Args) -> Value:
+@of_drive(_placed)
+def detour(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Path driven beyond the way made towards the goals."""
-    drive = mission.shared(analyse)
-    odometry = _placed(drive)
-    if isinstance(odometry, Unavailable):
-        return odometry
     return float(odometry.step_m.sum()) - sum(_progress(odometry, drive.legs))
 
 
 @extractor("lateral_error", needs={}, parts=("goals", "odometry"), unit="m")
-def lateral_error(mission: Mission, args: Args) -> Value:
+@of_drive(_placed)
+def lateral_error(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Mean distance from the straight line between where a goal was sent and where it lies."""
-    drive = mission.shared(analyse)
-    odometry = _placed(drive)
-    if isinstance(odometry, Unavailable):
-        return odometry
     offsets = [_lateral(odometry, number, leg) for number, leg in enumerate(drive.legs)]
     joined = np.concatenate(offsets)
     return float(joined.mean()) if len(joined) else _TOO_SHORT
 
 
 @extractor("distance_left", needs={}, parts=("goals", "odometry"), unit="m")
-def distance_left(mission: Mission, args: Args) -> Value:
+@of_drive(_ends)
+def distance_left(drive: Drive, left: _Ends, args: Args) -> Value:
     """Largest distance to a goal when it ended: the goal tolerance where all were reached, else where it got stuck."""
-    left = _at_end(mission, only_reached=False)
-    return left if isinstance(left, Unavailable) else max(distance for distance, _ in left)
+    return max(distance for distance, _ in left)
 
 
 @extractor("arrival_error", needs={}, parts=("goals", "odometry"), unit="m")
-def arrival_error(mission: Mission, args: Args) -> Value:
+@of_drive(_arrivals)
+def arrival_error(drive: Drive, left: _Ends, args: Args) -> Value:
     """Mean distance to the reached goals on arrival."""
-    left = _at_end(mission, only_reached=True)
-    return left if isinstance(left, Unavailable) else float(np.mean([distance for distance, _ in left]))
+    return float(np.mean([distance for distance, _ in left]))
 
 
 @extractor("heading_error", needs={}, parts=("goals", "odometry"), unit="rad")
-def heading_error(mission: Mission, args: Args) -> Value:
+@of_drive(_arrivals)
+def heading_error(drive: Drive, left: _Ends, args: Args) -> Value:
     """Mean error of the heading on arrival at the reached goals."""
-    left = _at_end(mission, only_reached=True)
-    return left if isinstance(left, Unavailable) else float(np.mean([angle for _, angle in left]))
+    return float(np.mean([angle for _, angle in left]))
 
 
 @extractor(
@@ -254,12 +334,9 @@ def heading_error(mission: Mission, args: Args) -> Value:
     unit="s",
     args={"within_m": numeric("how near to the goal, 0.5 m unless given")},
 )
-def settling_time(mission: Mission, args: Args) -> Value:
+@of_drive(_placed)
+def settling_time(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Mean time near a goal before it ended: hunting for position and heading."""
-    drive = mission.shared(analyse)
-    odometry = _placed(drive)
-    if isinstance(odometry, Unavailable):
-        return odometry
     near = _goal_distance(odometry, drive.legs) <= float(args.get("within_m", 0.5))
     return float(odometry.dt[near].sum()) / len(drive.legs)
 
@@ -268,35 +345,31 @@ def settling_time(mission: Mission, args: Args) -> Value:
 
 
 @extractor("drive_speed", needs={}, parts=("goals", "odometry"), unit="m/s")
-def drive_speed(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def drive_speed(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Mean forward speed while driving."""
-    odometry = _odometry(mission.shared(analyse))
-    if isinstance(odometry, Unavailable):
-        return odometry
     driving = np.abs(odometry.speed) >= MOVING_MPS
     return float(np.abs(odometry.speed[driving]).mean()) if driving.any() else 0.0
 
 
 @extractor("top_speed", needs={}, parts=("goals", "odometry"), unit="m/s")
-def top_speed(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def top_speed(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """95th percentile of the forward speed."""
-    odometry = _odometry(mission.shared(analyse))
-    return odometry if isinstance(odometry, Unavailable) else float(np.percentile(np.abs(odometry.speed), 95))
+    return float(np.percentile(np.abs(odometry.speed), 95))
 
 
 @extractor("top_turn_rate", needs={}, parts=("goals", "odometry"), unit="rad/s")
-def top_turn_rate(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def top_turn_rate(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """95th percentile of the turn rate."""
-    odometry = _odometry(mission.shared(analyse))
-    return odometry if isinstance(odometry, Unavailable) else float(np.percentile(np.abs(odometry.turn), 95))
+    return float(np.percentile(np.abs(odometry.turn), 95))
 
 
 @extractor("drive_acceleration", needs={}, parts=("goals", "odometry"), unit="m/s^2")
-def drive_acceleration(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def drive_acceleration(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """99th percentile of the change of forward speed."""
-    odometry = _odometry(mission.shared(analyse))
-    if isinstance(odometry, Unavailable):
-        return odometry
     step_s = np.diff(odometry.t)
     usable = (step_s > 0) & (step_s <= 1.0)
     if not usable.any():
@@ -311,39 +384,32 @@ def drive_acceleration(mission: Mission, args: Args) -> Value:
     unit="",
     args={"of": one_of("share of the time, or longest in s; share unless given", "share", "longest")},
 )
-def standstill(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def standstill(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Not moving while a goal is active: share of that time, or the longest stretch of it."""
-    odometry = _odometry(mission.shared(analyse))
-    if isinstance(odometry, Unavailable):
-        return odometry
     if args.get("of") == "longest":
         return longest(odometry.stands, odometry.dt)
     return share(odometry.stands, odometry.dt)
 
 
 @extractor("no_way_time", needs={}, parts=("goals", "odometry"), unit="s")
-def no_way_time(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def no_way_time(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Longest time without forward motion while a goal is active, turning on the spot included."""
-    odometry = _odometry(mission.shared(analyse))
-    if isinstance(odometry, Unavailable):
-        return odometry
     return longest(np.abs(odometry.speed) < MOVING_MPS, odometry.dt)
 
 
 @extractor("total_turn", needs={}, parts=("goals", "odometry"), unit="rad")
-def total_turn(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def total_turn(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Sum of all turning, left and right alike."""
-    odometry = _odometry(mission.shared(analyse))
-    return odometry if isinstance(odometry, Unavailable) else float((np.abs(odometry.turn) * odometry.dt).sum())
+    return float((np.abs(odometry.turn) * odometry.dt).sum())
 
 
 @extractor("start_delay", needs={}, parts=("goals", "odometry"), unit="s")
-def start_delay(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def start_delay(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Mean time from sending a goal to the first motion."""
-    drive = mission.shared(analyse)
-    odometry = _odometry(drive)
-    if isinstance(odometry, Unavailable):
-        return odometry
     moving = ~odometry.stands
     delays = []
     for number, leg in enumerate(drive.legs):
@@ -356,11 +422,9 @@ def start_delay(mission: Mission, args: Args) -> Value:
 
 
 @extractor("commanded_speed", needs={}, parts=("goals", "commands"), unit="m/s")
-def commanded_speed(mission: Mission, args: Args) -> Value:
+@of_drive(_commands)
+def commanded_speed(drive: Drive, commands: Commands, args: Args) -> Value:
     """Mean commanded forward speed among commands to drive."""
-    commands = _commands(mission.shared(analyse))
-    if isinstance(commands, Unavailable):
-        return commands
     driving = np.abs(commands.speed) >= MOVING_MPS
     return float(commands.speed[driving].mean()) if driving.any() else 0.0
 
@@ -372,11 +436,9 @@ def commanded_speed(mission: Mission, args: Args) -> Value:
     unit="",
     args={"order": one_of("stand, spot_turn or reverse; stand unless given", "stand", "spot_turn", "reverse")},
 )
-def commanded_share(mission: Mission, args: Args) -> Value:
+@of_drive(_commands)
+def commanded_share(drive: Drive, commands: Commands, args: Args) -> Value:
     """Share of the time with a goal that the robot was commanded to stand, to turn on the spot, or to back up."""
-    commands = _commands(mission.shared(analyse))
-    if isinstance(commands, Unavailable):
-        return commands
     order = args.get("order", "stand")
     if order == "spot_turn":
         return share(commands.turns_on_spot, commands.dt)
@@ -386,12 +448,10 @@ def commanded_share(mission: Mission, args: Args) -> Value:
 
 
 @extractor("blocked_share", needs={}, parts=("goals", "odometry", "commands"), unit="")
-def blocked_share(mission: Mission, args: Args) -> Value:
+@of_drive(_odometry)
+def blocked_share(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Share of the time with a goal that forward motion was commanded and none came: contact, slip, a dead drive."""
-    drive = mission.shared(analyse)
-    odometry, commands = _odometry(drive), _commands(drive)
-    if isinstance(odometry, Unavailable):
-        return odometry
+    commands = _commands(drive)
     if isinstance(commands, Unavailable):
         return commands
     latest = np.clip(np.searchsorted(commands.t, odometry.t, side="right") - 1, 0, len(commands.t) - 1)
@@ -400,11 +460,9 @@ def blocked_share(mission: Mission, args: Args) -> Value:
 
 
 @extractor("turn_reversals", needs={}, parts=("goals", "commands"), unit="1/min")
-def turn_reversals(mission: Mission, args: Args) -> Value:
+@of_drive(_commands)
+def turn_reversals(drive: Drive, commands: Commands, args: Args) -> Value:
     """How often per minute the commanded turn changes side: a planner that cannot decide."""
-    commands = _commands(mission.shared(analyse))
-    if isinstance(commands, Unavailable):
-        return commands
     sides = np.sign(commands.turn[np.abs(commands.turn) >= TURNING_RADPS])
     total_s = float(commands.dt.sum())
     return float(np.count_nonzero(np.diff(sides))) / total_s * 60 if total_s > 0 else _TOO_SHORT
@@ -417,12 +475,9 @@ def turn_reversals(mission: Mission, args: Args) -> Value:
     unit="s",
     args={"percentile": numeric("0 to 100, 50 unless given")},
 )
-def command_interval(mission: Mission, args: Args) -> Value:
+@of_drive(_commands)
+def command_interval(drive: Drive, commands: Commands, args: Args) -> Value:
     """Time between commands while a goal is active: the controller's real period and, at the top, its stalls."""
-    drive = mission.shared(analyse)
-    commands = _commands(drive)
-    if isinstance(commands, Unavailable):
-        return commands
     inside = [np.diff(commands.t[(commands.t >= leg.sent_s) & (commands.t <= leg.end_s)]) for leg in drive.legs]
     intervals = np.concatenate(inside)
     return float(np.percentile(intervals, float(args.get("percentile", 50)))) if len(intervals) else _TOO_SHORT
@@ -471,72 +526,3 @@ def rosout_count(mission: Mission, args: Args) -> Value:
     node = str(args.get("node", "")).casefold()
     said = zip(table["level"].tolist(), table["name"].tolist(), table["msg"].tolist(), strict=True)
     return float(sum(one >= level and node in name.casefold() and text in msg.casefold() for one, name, msg in said))
-
-
-# Parts
-
-
-def _odometry(drive: Drive) -> Odometry | Unavailable:
-    return missing(drive.topics.odometry) if drive.odometry is None else drive.odometry
-
-
-def _placed(drive: Drive) -> Odometry | Unavailable:
-    """Odometry in the frame of the goals, to measure distances to them."""
-    if drive.odometry is None:
-        return missing(drive.topics.odometry)
-    if any(math.isnan(leg.x) for leg in drive.legs):
-        return Unavailable("the log does not say where the goals lie", "ros2 bag record /goal_pose /plan")
-    frames = {leg.frame.strip("/") for leg in drive.legs} - {""}
-    own = drive.odometry.frame.strip("/")
-    if own and frames - {own}:
-        other = ", ".join(sorted(frames))
-        hint = "name in the mission section a topic of nav_msgs/Odometry in the goals' frame"
-        return Unavailable(f"goals are in frame {other}, odometry is in {own}", hint)
-    return drive.odometry
-
-
-def _commands(drive: Drive) -> Commands | Unavailable:
-    return missing(drive.topics.commands) if drive.commands is None else drive.commands
-
-
-def _goal_distance(odometry: Odometry, legs: Sequence[Leg]) -> Floats:
-    """Distance to the active goal, m, shape (n,)."""
-    x, y = np.array([leg.x for leg in legs]), np.array([leg.y for leg in legs])
-    distance: Floats = np.hypot(odometry.x - x[odometry.leg], odometry.y - y[odometry.leg])
-    return distance
-
-
-def _progress(odometry: Odometry, legs: Sequence[Leg]) -> list[float]:
-    """How much nearer each goal came, m."""
-    distance = _goal_distance(odometry, legs)
-    made = []
-    for number in range(len(legs)):
-        inside = distance[odometry.leg == number]
-        made.append(float(inside[0] - inside[-1]) if len(inside) else 0.0)
-    return made
-
-
-def _lateral(odometry: Odometry, number: int, leg: Leg) -> Floats:
-    """Distance from the straight line to a goal, m, one per sample of its leg."""
-    inside = odometry.leg == number
-    x, y = odometry.x[inside], odometry.y[inside]
-    if not len(x) or (length := math.hypot(leg.x - x[0], leg.y - y[0])) < TOLERANCE_M:
-        return np.empty(0)
-    offsets: Floats = np.abs((leg.x - x[0]) * (y - y[0]) - (leg.y - y[0]) * (x - x[0])) / length
-    return offsets
-
-
-def _at_end(mission: Mission, *, only_reached: bool) -> list[tuple[float, float]] | Unavailable:
-    """Distance (m) and heading error (rad) at the end of each leg, never an empty list."""
-    drive = mission.shared(analyse)
-    odometry = _placed(drive)
-    if isinstance(odometry, Unavailable):
-        return odometry
-    ends = []
-    for number, leg in enumerate(drive.legs):
-        rows = np.flatnonzero(odometry.leg == number)
-        if len(rows) and (leg.reached(drive.timeout_s) or not only_reached):
-            last = rows[-1]
-            offset = leg.offset(float(odometry.x[last]), float(odometry.y[last]))
-            ends.append((offset, angle_between(leg.yaw, float(odometry.yaw[last]))))
-    return ends or Unavailable("no goal was reached", "see why its goals failed")

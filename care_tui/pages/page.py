@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Generic, Literal, TypeVar, cast
@@ -65,9 +66,9 @@ class Page:
     def glyphs(self) -> Glyphs:
         return self.screen.glyphs
 
+    @abstractmethod
     def view(self) -> View:
         """What to show now."""
-        raise NotImplementedError
 
     def enter(self) -> None:
         """The page comes into view."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import ClassVar
 
 from textual.content import Content
@@ -48,9 +49,9 @@ class DiagnosisPage(StepPage):
         bar = progress_bar(fraction, self.glyphs)
         return View(title, lambda _: Rows([labelled("Doing", step), labelled("Done", bar)]))
 
+    @abstractmethod
     def view_of_diagnosis(self) -> View:
         """What to show once there is one."""
-        raise NotImplementedError
 
 
 def failure_rows(session: Session) -> Rows:

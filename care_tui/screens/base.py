@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -31,14 +32,14 @@ class CareScreen(Screen[None]):
         )
         yield from self.compose_body()
 
+    @abstractmethod
     def compose_body(self) -> ComposeResult:
         """The screen's own widgets."""
-        raise NotImplementedError
 
     def described(self, binding: Binding) -> str:
         """What a key does here, in a word or two."""
         return binding.description
 
+    @abstractmethod
     def help_text(self) -> str:
         """One or two sentences for the help screen on what can be done here."""
-        raise NotImplementedError

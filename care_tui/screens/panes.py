@@ -5,6 +5,7 @@ The widgets are made once. Going to another page changes what they hold, so only
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
@@ -48,9 +49,9 @@ class PanesScreen(CareScreen):
         self._jobs: dict[str, Job] = {}
 
     @property
+    @abstractmethod
     def page(self) -> Page:
         """The page in view."""
-        raise NotImplementedError
 
     def compose_body(self) -> ComposeResult:
         yield Static(classes="title", markup=False)
@@ -176,9 +177,9 @@ class PanesScreen(CareScreen):
         else:
             self.leave()
 
+    @abstractmethod
     def leave(self) -> None:
         """Go back to where the operator came from."""
-        raise NotImplementedError
 
     # Work outside the event loop
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from itertools import takewhile
 from typing import ClassVar
 
@@ -36,13 +37,13 @@ class LineView(ScrollView, can_focus=True, inherit_bindings=False):
         self._changed: dict[int, tuple[int, int]] = {}
 
     @property
+    @abstractmethod
     def line_count(self) -> int:
         """How many lines there are in all."""
-        raise NotImplementedError
 
+    @abstractmethod
     def line(self, y: int) -> Content:
         """Line y of the whole text, counted from 0."""
-        raise NotImplementedError
 
     @property
     def text_width(self) -> int:
