@@ -10,7 +10,7 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check bench docs profiles screenshots walk fuzz kills matrix clean
+.PHONY: demo test check bench docs profiles screenshots walk fuzz kills matrix sbom clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
@@ -53,6 +53,13 @@ kills: $(DEV)
 
 matrix:
 	$(PYTHON) -m benchmarks.matrix
+
+# What a base installation holds, by name, version and license: build/sbom.json (CycloneDX).
+sbom:
+	rm -rf build/sbom && $(PYTHON) -m venv build/sbom && $(PYTHON) -m venv build/sbom-tool
+	build/sbom/bin/python -m pip install --quiet --disable-pip-version-check .
+	build/sbom-tool/bin/python -m pip install --quiet --disable-pip-version-check 'cyclonedx-bom>=4'
+	build/sbom-tool/bin/cyclonedx-py environment --output-reproducible --pyproject pyproject.toml -o build/sbom.json build/sbom/bin/python
 
 clean:
 	rm -rf $(VENV) build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
