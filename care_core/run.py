@@ -76,11 +76,14 @@ class Evidence:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A plain question to a run that flew no mission: did it take off, did it land. 1 is yes and well, 0 is no."""
+    """A plain question to a run that no limit judges: did it take off, did it land. 1 is yes and well, 0 is no."""
 
     name: str
     value: Value
     doc: str
+    """What is so where all is well: "it left the ground"."""
+    otherwise: str = ""
+    """What is said where it is not: "a failsafe acted"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +164,7 @@ class Run:
     changes: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
     """Per parameter that changed during the mission: the value it began with, and each later one until its end."""
     checks: tuple[Check, ...] = ()
-    """What a run without a mission is judged by; empty where there was one."""
+    """What a run is judged by that flew no mission, or that no profile fits; empty where a profile judges it."""
     modes: tuple[str, ...] = ()
     """The modes that were in force during the mission; empty where the log does not say."""
     sources: Mapping[str, str] = field(default_factory=dict)

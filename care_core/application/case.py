@@ -130,7 +130,7 @@ def open_case(request: Request, progress: Progress) -> Case:
                 reason = err.message[:1].lower() + err.message[1:].rstrip(".")
                 choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, reason)))
         if reading is None:
-            return Case(_unjudged(log, choice, health, sha256), (), log, None, request.configs)
+            return Case(_plainly(log, choice, health, request, sha256), (), log, None, request.configs)
         diagnosis = _diagnose(reading, health, request, progress)
     return Case(diagnosis, reading.profile.schema.options, log, reading, request.configs)
 
@@ -185,10 +185,15 @@ def _candidates(log: Log, name: str | None) -> tuple[list[Profile], str]:
     return [replace(profile, schema=spelled(profile.schema, log)) for profile in profiles], left_out
 
 
-def _unjudged(log: Log, choice: ProfileChoice, health: Health, sha256: Sha256) -> Diagnosis:
-    from care_core.diagnose.triage import unjudged
+def _plainly(log: Log, choice: ProfileChoice, health: Health, request: Request, sha256: Sha256) -> Diagnosis:
+    """The diagnosis of a log that no profile fits: by what its robot says of itself, where it holds a run at all."""
+    from care_core.diagnose.judging import judge_plainly
+    from care_core.diagnose.triage import unjudged, without_profile
     from care_core.extract.read import log_info
 
+    judged = judge_plainly(log, mission=request.mission, sha256=sha256)
+    if judged is not None:
+        return without_profile(judged, choice, health)
     settings = {name: history[-1] for name, history in log.settings().items()}
     return unjudged(log_info(log, sha256()), settings, choice, health)
 
@@ -271,10 +276,8 @@ def report_of(diagnosis: Diagnosis, format: ReportFormat) -> str:
 
 def exit_code(diagnosis: Diagnosis) -> ExitCode:
     """What the diagnosis means for the process that asked for it."""
-    statuses = {objective.status for objective in diagnosis.objectives}
-    if "fault" in statuses or any(finding.severity == "critical" for finding in diagnosis.health.findings):
-        return ExitCode.FAULT
-    return ExitCode.NOT_EVALUATED if "not_evaluated" in statuses or not statuses else ExitCode.OK
+    codes = {"fault": ExitCode.FAULT, "not_evaluated": ExitCode.NOT_EVALUATED, "ok": ExitCode.OK}
+    return codes[diagnosis.status]
 
 
 def fixes(diagnosis: Diagnosis) -> tuple[Fix, ...]:

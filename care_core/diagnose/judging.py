@@ -12,6 +12,7 @@ from care_core.configs.loading import ConfigFile, resolve
 from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, Status
 from care_core.diagnose.reference import Good, Reference, need_of, reference_of
 from care_core.errors import UsageError, nearest
+from care_core.extract.plain import read_plain_runs
 from care_core.extract.read import mission_number, read_runs
 from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
@@ -36,7 +37,7 @@ class Judged:
     """The operator's."""
     results: tuple[ObjectiveResult, ...]
     checks: tuple[ObjectiveResult, ...] = ()
-    """What a run without a mission is judged by."""
+    """What a run without a mission, or without a profile, is judged by."""
     configs: tuple[ConfigFile, ...] = ()
     """The operator's configuration files, in the order they are loaded."""
     given: Mapping[str, Setting] = field(default_factory=dict)
@@ -86,15 +87,31 @@ def read_and_judge(
     )
 
 
+def judge_plainly(log: Log, *, mission: int | None = None, sha256: Sha256 | None = None) -> Judged | None:
+    """Judge one run of a log that no profile fits by what its robot says of itself; None where the log holds no run.
+
+    Without a profile there is no limit, so no value of the run is judged, only what it did.
+
+    Raises:
+        CareError: the log holds no such mission.
+    """
+    runs = read_plain_runs(log, sha256)
+    if not runs:
+        return None
+    judged = [Judged(run, {}, {}, (), tuple(map(_judge_check, run.checks))) for run in runs]
+    verdicts = tuple(verdict(one) for one in judged)
+    return replace(judged[mission_number(mission, len(runs)) - 1], missions=verdicts)
+
+
 def verdict(judged: Judged) -> MissionVerdict:
     """What became of a mission, in short: what was broken, else why it could not be judged."""
     everything = (*judged.results, *judged.checks)
     broken = [result.variable.name for result in everything if result.status == "fault"]
     if broken:
         return MissionVerdict(judged.run.mission, "fault", ", ".join(broken))
-    if judged.checks:
+    if judged.checks and judged.results:
         return MissionVerdict(judged.run.mission, "ok", "no mission was flown")
-    unknown = [result for result in judged.results if result.status == "not_evaluated"]
+    unknown = [result for result in everything if result.status == "not_evaluated"]
     reason = unknown[0].reason if unknown else ""
     return MissionVerdict(judged.run.mission, "not_evaluated" if unknown else "ok", reason)
 
@@ -289,4 +306,5 @@ def _judge_one(
 
 def _judge_check(check: Check) -> ObjectiveResult:
     variable = Variable(check.name, Role.OBJECTIVE, type="bool", doc=check.doc, kind="functional", threshold=_YES)
-    return _judge_one(variable, check.value, _YES)
+    result = _judge_one(variable, check.value, _YES)
+    return replace(result, reason=check.otherwise) if result.status == "fault" else result

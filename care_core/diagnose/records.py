@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from care_core.health.records import NOTHING_SEEN, Health
-from care_core.run import MissionInfo, ProfileChoice, Run, shown
+from care_core.health.records import NOTHING_SEEN, Health, Severity
+from care_core.run import FitVerdict, MissionInfo, ProfileChoice, Run, shown
 from care_core.text import figures
 from care_core.variables import Change, Threshold, Variable
 
@@ -28,7 +28,7 @@ class Need:
 
 @dataclass(frozen=True, slots=True)
 class ObjectiveResult:
-    """An objective of this run against its threshold. `reason` says why it was not evaluated."""
+    """An objective of this run against its threshold. `reason`: why it was not evaluated, or how it failed."""
 
     variable: Variable
     value: float | None
@@ -39,6 +39,10 @@ class ObjectiveResult:
     """Share (0 to 1) of the profile's training runs with a smaller value."""
     need: Need | None = None
     """What the threshold is a multiple of, where it is no fixed one."""
+
+    @property
+    def name(self) -> str:
+        return self.variable.name
 
     @property
     def is_sure(self) -> bool:
@@ -65,6 +69,14 @@ class ObjectiveResult:
         if self.threshold.value == self.variable.relative.at_least or self.variable.relative.ratio == 1:
             return f"the reference configuration needs {need} for this mission"
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"
+
+
+def overall(objectives: Collection[Status], severities: Collection[Severity], fit: FitVerdict) -> Status:
+    """What a whole run came to. Not evaluated is not OK; nor is a warning where no profile gives it a limit."""
+    if "fault" in objectives or "critical" in severities:
+        return "fault"
+    doubted = "not_evaluated" in objectives or not objectives or (fit == "no" and "warning" in severities)
+    return "not_evaluated" if doubted else "ok"
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,3 +272,9 @@ class Diagnosis:
     health: Health = NOTHING_SEEN
     hypotheses: tuple[Hypothesis, ...] = ()
     """What explains the failure, the likeliest first; empty where nothing failed."""
+
+    @property
+    def status(self) -> Status:
+        """What the whole run came to."""
+        statuses = {objective.status for objective in self.objectives}
+        return overall(statuses, {one.severity for one in self.health.findings}, self.profile.fit.verdict)

@@ -175,6 +175,21 @@ def unjudged(log: LogInfo, settings: Mapping[str, Setting], choice: ProfileChoic
     return Diagnosis(choice, run, (), (), None, health=health, hypotheses=explained)
 
 
+def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Diagnosis:
+    """The answer for a run that no profile fits: what it did and what failed, and no cause by parameters."""
+    broken = tuple(result for result in judged.checks if result.status == "fault")
+    return Diagnosis(
+        choice,
+        judged.run,
+        judged.checks,
+        tuple(Fault(result, ()) for result in broken),
+        None,
+        missions=judged.missions,
+        health=health,
+        hypotheses=without_parameters(health.findings, failed=bool(broken)),
+    )
+
+
 def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
     """Options that cost this run, those that a failed check names first; where none of them convinces, a few leads
     that are not ruled out behind them."""

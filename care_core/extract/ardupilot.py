@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.extract.asked import asked
-from care_core.extract.flight import AIRBORNE_M, NEEDS, Flight, analyse, messages, waypoint_offsets
-from care_core.extract.modes import flew_automatically, kind_flown, mode_names
+from care_core.extract.flight import AIRBORNE_M, NEEDS, Flight, analyse, messages, metres_between, waypoint_offsets
+from care_core.extract.modes import flew_automatically, kind_flown, mode_names, modes_in_force
 from care_core.extract.registry import (
     MISSION_KINDS,
     Args,
@@ -32,7 +32,7 @@ from care_core.extract.registry import (
 from care_core.logs.base import Table, Wanted
 from care_core.logs.plausible import is_alive, plausible
 from care_core.run import Check, Evidence, Unavailable, Value, is_known
-from care_core.vehicles import error_kind, error_words, motor_outputs
+from care_core.vehicles import error_kind, error_words, flies, mode_name, motor_outputs
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +44,13 @@ _SAID_AFTER_S = 0.6
 """A crash disarms first and is said then; telemetry knows a disarming to half a second (its heartbeats)."""
 _TOOK_OFF, _LANDED = (16, 28), (18,)
 """EV records of the land detector."""
-_GROUNDED = frozenset(("rover", "sub", "tracker"))
+_DRIVES = frozenset(("rover",))
+_GLIDES = frozenset(("plane", "quadplane"))
+"""What lands where it finds room: its last height says little."""
+_COMPLETE = ("Mission Complete", "Mission complete")
+"""What a rover (AR mode_auto.cpp) and a submarine say when no item is left."""
+_MOVED_M = 5.0
+"""A receiver that stands still wanders by its accuracy, 2 to 3 m."""
 _PHASE_ARGS = {
     "phase": one_of(
         "only this part of the flight: takeoff, leg, return, return_climb, return_cruise, descent, touchdown",
@@ -117,6 +123,13 @@ class ArduPilotFlight(MissionKind):
 
     def checks(self, mission: Mission) -> tuple[Check, ...]:
         return () if not _is_armed(mission) or flew_automatically(mission) else tuple(_plain_checks(mission))
+
+    def outcome(self, mission: Mission) -> tuple[Check, ...]:
+        if _is_armed(mission):
+            return tuple(_plain_checks(mission, and_mission=True))
+        asked_for = any(text.startswith("Arm:") for _, text in _refusals(mission.tables.get("MSG")))
+        never = 0.0 if asked_for else Unavailable("the vehicle never armed, and nobody asked it to")
+        return (Check("armed", never, "the vehicle armed", "arming was refused"),)
 
     def modes(self, mission: Mission) -> tuple[str, ...]:
         return mode_names(mission)
@@ -240,25 +253,69 @@ def _nothing_to_judge(mission: Mission, flight: Flight) -> Unavailable | None:
     return None
 
 
-def _plain_checks(mission: Mission) -> Iterator[Check]:
-    """What a flight that flew no mission is judged by."""
+def _plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Check]:
+    """What a flight or drive is judged by that no limit belongs to; with its mission, where one was begun."""
     failed = bool(_has_event(mission, "crash"))
     yield Check("armed", 1.0, "the vehicle armed")
-    flies = kind_flown(mission) not in _GROUNDED
-    if flies:
-        yield Check("took_off", _took_off(mission, failed=failed), "it left the ground")
-    yield Check("no_crash", 1.0 - failed, "the autopilot reported no crash")
-    yield Check("no_failsafe", 1.0 - _has_event(mission, "failsafe"), "no failsafe acted")
-    if flies:
+    kind = kind_flown(mission)
+    if flies(kind):
+        yield Check("took_off", _took_off(mission, failed=failed), "it left the ground", "it never left the ground")
+    elif and_mission and kind in _DRIVES:
+        yield Check("moved", _moved(mission), "it moved")
+    done: Value = 0.0
+    if and_mission and any(mode.way == "mission" for mode in mission.shared(modes_in_force)):
+        done = _mission_done(mission)
+        yield Check("mission_success", done, "every waypoint of the mission was reached", _short_of(mission))
+    yield Check("no_crash", 1.0 - failed, "the autopilot reported no crash", "the autopilot reported a crash")
+    acted = _has_event(mission, "failsafe")
+    yield Check("no_failsafe", 1.0 - acted, "no failsafe acted", "a failsafe acted")
+    if flies(kind):
         landed = Unavailable("it crashed") if failed else _landed(mission)
-        yield Check("landed", landed, "it was on the ground at the end")
+        yield Check("landed", landed, "it was on the ground at the end", "it was disarmed above the ground")
+    elif done == 1.0 and not mission.ended:
+        return  # what stands on the ground when all is done comes to no harm by staying armed
     at_end: Value = 1.0 - _forced(mission) if mission.ended else _CUT
-    yield Check("disarmed", at_end, "it was disarmed, and not by force in flight")
+    yield Check("disarmed", at_end, "it was disarmed, and not by force in flight", "it was disarmed by force")
+
+
+def _mission_done(mission: Mission) -> Value:
+    """1 where the vehicle says that its mission is complete or reached every waypoint of it, 0 where it was still at it
+    when it was disarmed; what somebody broke off is no failure of the mission."""
+    said = messages(mission.tables.get("MSG"), mission.start_s, mission.end_s + _SAID_AFTER_S)
+    if any(text.startswith(_COMPLETE) for _, text in said):
+        return 1.0
+    flight = mission.shared(analyse)
+    unknown = _nothing_to_judge(mission, flight)
+    if unknown is not None:
+        return unknown
+    if flight.reached >= len(flight.waypoints):
+        return 1.0
+    if not mission.ended:
+        return _CUT
+    last = mission.shared(modes_in_force)[-1]
+    if last.way == "mission":
+        return 0.0
+    name = mode_name(kind_flown(mission), last.number)
+    return Unavailable(f"{_short_of(mission)}, and the last mode was {name}", "judge a run that ends in its mission")
+
+
+def _short_of(mission: Mission) -> str:
+    flight = mission.shared(analyse)
+    return f"{flight.reached} of the mission's {len(flight.waypoints)} waypoints were reached"
+
+
+def _moved(mission: Mission) -> Value:
+    """1 where its position changed by more than positions do that stand still; to stay is no failure."""
+    position = mission.table("POS")
+    if not has(position, "Lat", "Lng"):
+        return Unavailable("the log holds no position", "record POS", "POS")
+    far = metres_between(position["Lat"], position["Lng"])
+    return 1.0 if far > _MOVED_M else Unavailable(f"it stayed within {far:.1f} m")
 
 
 def _took_off(mission: Mission, *, failed: bool) -> Value:
     heights = _heights(mission)
-    flew = bool(heights.max() > AIRBORNE_M) if len(heights) else _detected(mission, _TOOK_OFF)
+    flew = (len(heights) and bool(heights.max() > AIRBORNE_M)) or _detected(mission, _TOOK_OFF)
     if flew or failed:
         return float(flew)
     return Unavailable("it never left the ground" if len(heights) else "the log holds no height")
@@ -270,7 +327,10 @@ def _landed(mission: Mission) -> Value:
     if not mission.ended:
         return _CUT
     heights = _heights(mission)
-    return float(heights[-1] <= AIRBORNE_M if len(heights) else _detected(mission, _LANDED))
+    low = bool(heights[-1] <= AIRBORNE_M) if len(heights) else _detected(mission, _LANDED)
+    if not low and kind_flown(mission) in _GLIDES:
+        return Unavailable(f"it was disarmed {heights[-1]:.0f} m above home" if len(heights) else "nothing says so")
+    return float(low)
 
 
 def _heights(mission: Mission) -> Floats:

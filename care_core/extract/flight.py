@@ -49,7 +49,8 @@ _NAV_WAYPOINT = 16
 _HOMEWARD = (20, 21)  # MAV_CMD_NAV_RETURN_TO_LAUNCH, MAV_CMD_NAV_LAND
 _AT_HEIGHT_M = 0.5
 _STARTED = re.compile(r"Mission: (\d+) ")
-_REACHED = re.compile(r"Reached command #(\d+)")
+_REACHED = re.compile(r"Reached (?:command|waypoint) #(\d+)")
+"""A copter reaches commands, a plane and a rover waypoints."""
 
 Floats = NDArray[np.float64]
 
@@ -180,6 +181,12 @@ def waypoint_offsets(waypoints: Sequence[Waypoint], expected: Sequence[Sequence[
         north, east = _offset((lat, lng), waypoint.lat, waypoint.lng)
         offsets.append(math.hypot(north, east, waypoint.alt_m - alt_m))
     return offsets
+
+
+def metres_between(lat: Floats, lng: Floats) -> float:
+    """Diagonal in metres of the area that positions, in degrees, each of shape (n,), lie in."""
+    north, east = (float(np.ptp(one[np.isfinite(one)])) * _METRES_PER_DEGREE for one in (lat, lng))
+    return math.hypot(north, east * math.cos(math.radians(float(np.nanmedian(lat)))))
 
 
 def messages(table: Table | None, start_s: float = -math.inf, end_s: float = math.inf) -> list[tuple[float, str]]:

@@ -34,7 +34,7 @@ from care_core.extract.drive import (
 )
 from care_core.extract.registry import Args, Mission, MissionKind, numeric, points
 from care_core.logs.base import Table, Wanted
-from care_core.run import Evidence, Unavailable
+from care_core.run import Check, Evidence, Unavailable, Value
 
 ROSOUT = ("/rosout", "/rosout_agg")
 
@@ -119,6 +119,19 @@ class GoalMissions(MissionKind):
         """Failed goals, recoveries, standstill, and warnings of the log: each kind of message once, with its count."""
         found = (*_failed_goals(mission), *_recoveries(mission), *_stuck(mission), *_warnings(mission))
         return tuple(sorted(found, key=lambda one: one.time_s))
+
+    def outcome(self, mission: Mission) -> tuple[Check, ...]:
+        """Whether the goals were reached; one that its sender cancelled or replaced is no failure of the robot."""
+        legs = mission.shared(analyse).legs
+        reached = sum(leg.status == Status.SUCCEEDED for leg in legs)
+        failed = sum(leg.status in (Status.ABORTED, Status.REJECTED, Status.LOST) for leg in legs)
+        word = f"{reached} of {len(legs)} goals were reached"
+        value: Value = 1.0 if reached else Unavailable(f"{word}, the others were cancelled or left open")
+        if failed:
+            value = 0.0
+        elif legs[-1].status is None:
+            value = Unavailable("the log ends before the last goal was answered", "record until it is")
+        return (Check("goals_reached", value, "every goal that was not taken back was reached", word),)
 
 
 def _split(legs: Sequence[Leg], spec: Args) -> list[list[Leg]]:

@@ -15,7 +15,8 @@ import care_core.extract.ardupilot
 import care_core.extract.asked
 import care_core.extract.battery
 import care_core.extract.nav2
-import care_core.extract.navigation  # noqa: F401
+import care_core.extract.navigation
+import care_core.extract.px4  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
@@ -24,7 +25,7 @@ from care_core.logs.digest import Sha256, hashing
 from care_core.logs.plausible import clock_doubt, dead_sources
 from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
-from care_core.run import Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value
+from care_core.run import Check, Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value
 from care_core.variables import Role, Variable
 
 
@@ -139,7 +140,8 @@ class _Source:
         found = kind.missions(tables, log.duration_s, schema.mission)
         missions = tuple(one for one in found if math.isfinite(one.start_s) and math.isfinite(one.end_s))
         if not missions:
-            nothing = f"The log holds no mission that profile '{schema.name}' can read."
+            reader = f"profile '{schema.name}'" if schema.name else "care"
+            nothing = f"The log holds no mission that {reader} can read."
             raise NoMissionError(
                 "No message of the log has a time stamp, so nothing of a mission can be judged." if found else nothing,
                 hint="Look at what was recorded with 'care inspect'.",
@@ -176,9 +178,12 @@ class _Source:
             ),
             evidence=tuple(_pointed(evidence, self.schema, config) for evidence in self.kind.evidence(mission)),
             changes=_changes(self.settings, mission),
-            checks=() if self.doubts[index] else self.kind.checks(mission),
+            checks=() if self.doubts[index] else self._checks(mission),
             modes=self.kind.modes(mission),
         )
+
+    def _checks(self, mission: Mission) -> tuple[Check, ...]:
+        return self.kind.checks(mission) if self.schema.objectives else self.kind.outcome(mission)
 
     def _values(self, role: Role, mission: Mission, doubt: str) -> dict[str, Value]:
         if doubt:

@@ -137,6 +137,10 @@ class MissionKind(ABC):
         """What a run that had no mission is judged by; none where there was one."""
         return ()
 
+    def outcome(self, mission: Mission) -> tuple[Check, ...]:
+        """What any run is judged by where no profile fits: by what its robot says of itself, and by no limit."""
+        return ()
+
     def modes(self, mission: Mission) -> tuple[str, ...]:
         """The modes in force during the mission, by name; none where the log does not say."""
         return ()

@@ -21,8 +21,8 @@ from care_core.report.document import (
 )
 from care_core.report.happened import finding_sentence
 from care_core.report.together import listed, together
-from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
-from care_core.report.writers import STATUS_WORDS
+from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted
+from care_core.report.writers import STATUS_WORDS, plain_verdict
 from care_core.run import shown
 from care_core.text import seconds
 
@@ -109,13 +109,15 @@ def _happened(report: Report) -> Iterator[str]:
 
 
 def _verdict(report: Report) -> str:
+    if report.fit.verdict == "no":
+        status, said = plain_verdict(report)
+        return f"<strong>{STATUS_WORDS[status].capitalize()}</strong>: {escape(said)}."
     worst = [escape(one.title) for one in report.findings if one.severity == "critical" and not one.after_impact]
     broken = ", ".join(
         f"<code>{escape(objective.name)}</code>" for objective in report.objectives if objective.status == "fault"
     )
-    if not broken and (worst or not report.objectives):
-        unknown = f"<strong>Not evaluated</strong>: {escape(unjudged(report.findings))}."
-        return f"<strong>Fault</strong>: {'; '.join(worst)}." if worst else unknown
+    if not broken and worst:
+        return f"<strong>Fault</strong>: {'; '.join(worst)}."
     found = f"<strong>Fault</strong>: {broken}." if broken else "<strong>No fault found.</strong>"
     if not broken and any(objective.status == "not_evaluated" for objective in report.objectives):
         found += " Not everything could be evaluated."

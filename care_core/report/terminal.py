@@ -9,10 +9,9 @@ from pathlib import Path
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
-from care_core.health.records import Health
 from care_core.report.happened import account_lines, finding_lines, finding_text, hypothesis_lines
 from care_core.report.together import listed, together
-from care_core.report.wording import critical, fit_text, unjudged
+from care_core.report.wording import critical, fit_text, said_without_profile
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
 from care_core.variables import Variable
@@ -34,7 +33,7 @@ def to_text(diagnosis: Diagnosis) -> str:
         _origin(diagnosis),
         _missions(diagnosis),
         _objectives(diagnosis),
-        *(_causes(faults) for faults in together(diagnosis.faults, _paths)),
+        *(_causes(faults) for faults in _explained(diagnosis)),
         _fix(diagnosis),
         _evidence(diagnosis),
         _since(diagnosis),
@@ -52,10 +51,10 @@ def _headline(diagnosis: Diagnosis) -> Iterator[str]:
     broken = [f"{', '.join(missed)} not met"] if missed else []
     broken += [_measured(objective) for objective in faulty if objective.variable.kind != "functional"]
     unknown = [objective.variable.name for objective in diagnosis.objectives if objective.status == "not_evaluated"]
-    if broken:
+    if diagnosis.profile.fit.verdict == "no":
+        yield from wrapped(_without_profile(diagnosis), f"{STATUS_WORDS[diagnosis.status]}: ")
+    elif broken:
         yield from wrapped("; ".join(broken), "FAULT: ")
-    elif diagnosis.profile.fit.verdict == "no":
-        yield from wrapped(_without_profile(diagnosis.health))
     elif diagnosis.run.checks:
         yield from wrapped("no mission was flown, and nothing failed in the flight itself", "NO MISSION: ")
     elif unknown:
@@ -79,12 +78,10 @@ def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
     return f"Change {changes}: {fix.p_fixed:.0%} probability that all objectives are met{sure}"
 
 
-def _without_profile(health: Health) -> str:
-    """The headline of a log that nothing could be judged in: what is told of it, never that it was fine."""
-    worst = [finding_text(one) for one in critical(health)[:2]]
-    if worst:
-        return f"FAULT: {'; '.join(worst)}"
-    return f"NOT EVALUATED: {unjudged(health.findings)}"
+def _without_profile(diagnosis: Diagnosis) -> str:
+    """The headline of a run that no profile fits."""
+    worst = [finding_text(one) for one in critical(diagnosis.health)]
+    return said_without_profile(diagnosis.status, diagnosis.objectives, worst, diagnosis.health.findings)
 
 
 def _measured(objective: ObjectiveResult) -> str:
@@ -139,6 +136,11 @@ def _objectives(diagnosis: Diagnosis) -> Iterator[str]:
                 yield from wrapped(objective.basis, " " * 17)
         if reason:
             yield from wrapped(reason, " " * 17)
+
+
+def _explained(diagnosis: Diagnosis) -> list[Sequence[Fault]]:
+    """Faults that share their causes together; none where no profile could name any."""
+    return [] if diagnosis.profile.fit.verdict == "no" else list(together(diagnosis.faults, _paths))
 
 
 def _paths(fault: Fault) -> list[list[str]]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeVar
 
-from care_core.diagnose.records import Hypothesis
+from care_core.diagnose.records import Hypothesis, ObjectiveResult, Status
 from care_core.health.records import WHOLE_LOG, Finding, Health, Severity
 from care_core.run import FIT_WORDS, FitVerdict
 
 if TYPE_CHECKING:
+    from care_core.report.document import ObjectiveEntry
     from care_core.report.happened import FindingEntry, FitEntry, HypothesisEntry
     from care_core.run import Fit
 
@@ -44,9 +45,34 @@ def unjudged(findings: Sequence[Finding | FindingEntry]) -> str:
     return next((one.title for one in findings if one.source == WHOLE_LOG), NO_LIMIT)
 
 
+NO_LIMITS = "no profile fits: no limits for time and energy, no causes by parameters"
+WORST_NAMED = 2
+"""Findings in a headline."""
+
+
 def critical(health: Health) -> list[Finding]:
     """Findings that would stop a mission, those after the impact left out."""
     return [one for one in health.findings if one.severity == "critical" and not one.after_impact]
+
+
+def said_without_profile(
+    status: Status,
+    objectives: Sequence[ObjectiveResult | ObjectiveEntry],
+    worst: Sequence[str],
+    findings: Sequence[Finding | FindingEntry],
+) -> str:
+    """The verdict on a run that no profile fits: what failed, or how far nothing did; never more than was judged."""
+    if status == "fault":
+        broken = [one.reason or one.name for one in objectives if one.status == "fault"]
+        return "; ".join((*worst[:WORST_NAMED], *broken))
+    if status == "ok":
+        return f"nothing that could be judged failed ({NO_LIMITS})"
+    unknown = [one.name for one in objectives if one.status == "not_evaluated"]
+    if not objectives or len(unknown) == len(objectives):
+        return unjudged(findings)
+    if unknown:
+        return f"nothing failed, but {', '.join(unknown)} could not be evaluated ({NO_LIMITS})"
+    return f"nothing failed in the run itself, but its findings have no limits to be held against ({NO_LIMITS})"
 
 
 def hypothesis_text(one: Hypothesis | HypothesisEntry) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.scalarstring import LiteralScalarString
 
+from care_core.diagnose.records import Status, overall
 from care_core.report.document import (
     CauseEntry,
     FixEntry,
@@ -24,7 +25,7 @@ from care_core.report.document import (
 )
 from care_core.report.happened import finding_sentence
 from care_core.report.together import listed, together
-from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
+from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, said_without_profile
 from care_core.run import shown
 from care_core.text import seconds
 
@@ -110,7 +111,18 @@ def _listed(title: str, sentences: Iterable[str]) -> Iterator[str]:
         yield from ("", f"## {title}", "", *lines)
 
 
+def plain_verdict(report: Report) -> tuple[Status, str]:
+    """The verdict of a document on a run that no profile fits, and what it says."""
+    severities = {one.severity for one in report.findings}
+    status = overall({one.status for one in report.objectives}, severities, report.fit.verdict)
+    worst = [one.title for one in report.findings if one.severity == "critical" and not one.after_impact]
+    return status, said_without_profile(status, report.objectives, worst, report.findings)
+
+
 def _verdict(report: Report) -> str:
+    if report.fit.verdict == "no":
+        status, said = plain_verdict(report)
+        return f"**{STATUS_WORDS[status].capitalize()}**: {_escape(said)}."
     broken = [objective.name for objective in report.objectives if objective.status == "fault"]
     names = ", ".join(f"`{name}`" for name in broken)
     if report.abstained:
@@ -119,8 +131,6 @@ def _verdict(report: Report) -> str:
     worst = [_escape(one.title) for one in report.findings if one.severity == "critical" and not one.after_impact]
     if not broken and worst:
         return f"**Fault**: {'; '.join(worst)}."
-    if not broken and report.fit.verdict == "no":
-        return f"**Not evaluated**: {_escape(unjudged(report.findings))}."
     if not broken:
         unknown = any(objective.status == "not_evaluated" for objective in report.objectives)
         return "**No fault found**, but not everything could be evaluated." if unknown else "**No fault found.**"

@@ -10,7 +10,7 @@ from care_core.vehicles.modes import Way, mode_name, mode_number, reason_words, 
 from care_core.vehicles.motors import Motor, motor_outputs, motors_of
 from care_core.vehicles.parameters import Spelling, renamed, spelled_in, spellings
 from care_core.vehicles.self_written import is_self_written
-from care_core.vehicles.vehicle import Kind, Vehicle, vehicle_of
+from care_core.vehicles.vehicle import Kind, Vehicle, flies, vehicle_of
 
 __all__ = [
     "Kind",
@@ -21,6 +21,7 @@ __all__ = [
     "error_kind",
     "error_words",
     "event_words",
+    "flies",
     "is_over",
     "is_self_written",
     "method_words",

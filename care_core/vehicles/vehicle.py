@@ -34,6 +34,14 @@ _SUB_FRAMES = {
 }  # fmt: skip
 
 
+_GROUNDED = frozenset(("rover", "sub", "tracker"))
+
+
+def flies(kind: Kind) -> bool:
+    """Whether a vehicle leaves the ground; one that is unknown may."""
+    return kind not in _GROUNDED
+
+
 @dataclass(frozen=True, slots=True)
 class Vehicle:
     """What a vehicle is."""

@@ -34,6 +34,11 @@ class ObjectivesPage(DiagnosisPage):
     ENTER = "Causes"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"type_threshold"})
 
+    @property
+    def _is_empty(self) -> bool:
+        """Without a profile a run is still judged by what its robot says of itself."""
+        return super()._is_empty and not self.session.diagnosis.objectives
+
     def view_of_diagnosis(self) -> View:
         diagnosis, glyphs = self.session.diagnosis, self.glyphs
         results = diagnosis.objectives

@@ -9,6 +9,8 @@ from benchmarks.wild_logs import outcome_of, wild_files
 from care_core.errors import ExitCode
 from tests.conftest import Care
 
+WENT_WELL = {"px4_events.ulg"}
+"""A simulated take-off, return and landing."""
 SECONDS = 10.0
 EVERY = 4
 """The commands add words to what is tried on every log: so many of them will do."""
@@ -20,8 +22,9 @@ def test_every_wild_log_has_an_outcome(recorded: Path) -> None:
     for path, outcome in outcomes.items():
         assert outcome.sentence.strip(), path
         assert outcome.seconds < SECONDS, path
-        # None of them is a mission of an installed profile that went well from its start to its end.
-        assert outcome.triage_code in set(ExitCode) - {ExitCode.OK}, path
+        # None of them is a mission of an installed profile; of all the others few went well from start to end.
+        assert outcome.triage_code in set(ExitCode), path
+        assert outcome.triage_code != ExitCode.OK or path.name in WENT_WELL, path
         assert (outcome.kind == "refused") <= (outcome.triage_code == ExitCode.UNREADABLE), path
     kinds = {outcome.kind for outcome in outcomes.values()}
     assert kinds == {"read", "damage", "refused"}

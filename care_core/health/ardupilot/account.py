@@ -37,6 +37,7 @@ from care_core.vehicles import (
     error_kind,
     error_words,
     event_words,
+    flies,
     is_over,
     method_words,
     mode_name,
@@ -366,7 +367,7 @@ def _end(flight: Flight) -> Iterator[Moment]:
     if not is_armed:
         return
     where = ""
-    if flight.height is not None:
+    if flight.height is not None and flies(flight.vehicle.kind):
         t, height = flight.height
         known = np.isfinite(height)
         if known.any() and t[known][-1] > flight.end_s - 5.0 and height[known][-1] > _IN_AIR_M:

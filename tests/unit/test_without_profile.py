@@ -1,0 +1,238 @@
+"""Runs that no profile fits are judged by what was flown or driven: what failed is said, never more than was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import StoragePlugin
+
+from care_core.application.case import Request, exit_code, open_case
+from care_core.diagnose.judging import judge_plainly
+from care_core.diagnose.records import overall
+from care_core.errors import ExitCode
+from care_core.extract.registry import MISSION_KINDS, Mission
+from care_core.logs.base import Table
+from care_core.logs.opening import open_log
+from care_core.report.document import build_document
+from care_core.report.html import to_html
+from care_core.report.terminal import to_text
+from care_core.report.writers import to_markdown
+from care_core.run import Check, Unavailable, Value, is_known
+from tests.nav2_drive import recorded
+from tests.rewritten import write_text
+from tests.ros_samples import write_bag
+from tests.unit.test_ardupilot_extract import HOME, KIND, METRES, flight, table
+from tests.unit.test_px4_health import states
+
+ROVER = {"firmware": "ArduRover V4.5.4", "vehicle": "rover"}
+PLANE = {"firmware": "ArduPlane V4.4.0", "vehicle": "fixed wing"}
+SUB = {"firmware": "ArduSub V4.1.0", "vehicle": "submarine"}
+PX4 = MISSION_KINDS["px4_flight"]
+SAMPLES = Path(__file__).parents[2] / "samples"
+
+
+def checks(found: tuple[Check, ...]) -> dict[str, Value]:
+    return {check.name: check.value for check in found}
+
+
+def judged(facts: Mapping[str, str], mode: int, **replaced: Table | None) -> dict[str, Value]:
+    """The checks of the flight of `test_ardupilot_extract`, taken for another vehicle's, in one mode."""
+    (mission,) = KIND.missions(flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced), 75.0, {})
+    return checks(KIND.outcome(replace(mission, facts=facts)))
+
+
+def said(*texts: tuple[float, str]) -> Table:
+    return table(list(texts), "Message")
+
+
+def test_a_rover_that_completes_its_mission_is_fine_by_all_that_can_be_judged() -> None:
+    found = judged(
+        ROVER, 10, MSG=said((20.0, "Mission: 2 WP"), (30.0, "Reached waypoint #2"), (69.0, "Mission Complete"))
+    )
+    assert found == dict.fromkeys(
+        ("armed", "moved", "mission_success", "no_crash", "no_failsafe", "disarmed"), 1.0
+    )  # fmt: skip
+
+
+def test_a_mission_that_the_vehicle_was_still_at_when_it_was_disarmed_failed() -> None:
+    assert judged(ROVER, 10, MSG=said((20.0, "Mission: 2 WP")))["mission_success"] == 0.0
+
+
+def test_a_mission_that_the_pilot_broke_off_is_no_failure_of_the_vehicle() -> None:
+    modes = table([(0.0, 10), (40.0, 4)], "ModeNum")
+    (mission,) = KIND.missions(flight(MODE=modes, MSG=said((20.0, "Mission: 2 WP"))), 75.0, {})
+    value = checks(KIND.outcome(replace(mission, facts=ROVER)))["mission_success"]
+    assert isinstance(value, Unavailable)
+    assert value.reason == "0 of the mission's 1 waypoints were reached, and the last mode was Hold"
+
+
+def test_a_rover_whose_log_stops_when_all_is_done_is_fine_and_one_on_its_way_is_not_known() -> None:
+    armed = table([(10.0, 1, 0)], "ArmState", "Forced")
+    assert "disarmed" not in judged(ROVER, 10, ARM=armed, MSG=said((69.0, "Mission Complete")))
+    assert not is_known(judged(ROVER, 10, ARM=armed, MSG=said((20.0, "Mission: 2 WP")))["disarmed"])
+    assert not is_known(judged(ROVER, 0, ARM=armed)["disarmed"])
+
+
+def test_a_rover_that_stays_where_it_is_did_not_fail_by_it() -> None:
+    at = np.arange(0.0, 75.0, 0.5)
+    still = Table(
+        at, {"Lat": np.full_like(at, HOME[0]), "Lng": HOME[1] + 0.5 * np.sin(at) / METRES, "RelHomeAlt": 0 * at}
+    )
+    assert not is_known(judged(ROVER, 0, POS=still)["moved"])
+
+
+@pytest.mark.parametrize("facts", [ROVER, SUB])
+def test_what_stays_on_the_ground_or_in_the_water_neither_takes_off_nor_lands(facts: Mapping[str, str]) -> None:
+    assert {"took_off", "landed"}.isdisjoint(judged(facts, 0))
+
+
+def test_a_plane_may_land_above_home() -> None:
+    at = np.arange(0.0, 75.0, 0.5)
+    level = np.zeros_like(at)
+    hill = Table(at, {"Lat": level + HOME[0], "Lng": level + HOME[1], "RelHomeAlt": np.minimum(at, 30.0)})
+    assert not is_known(judged(PLANE, 5, POS=hill)["landed"])
+    assert judged(PLANE, 5)["landed"] == 1.0
+    assert judged(PLANE, 10)["mission_success"] == 1.0
+
+
+def test_a_failsafe_a_crash_and_a_forced_disarm_are_faults_of_any_vehicle() -> None:
+    found = judged(
+        ROVER,
+        0,
+        ERR=table([(50.0, 17, 1), (60.0, 12, 1)], "Subsys", "ECode"),
+        ARM=table([(10.0, 1, 0), (70.0, 0, 1)], "ArmState", "Forced"),
+    )
+    assert (found["no_failsafe"], found["no_crash"], found["disarmed"]) == (0.0, 0.0, 0.0)
+
+
+def test_a_refusal_is_a_fault_only_where_somebody_asked_to_arm() -> None:
+    for text, value in (("Arm: Gyros inconsistent", 0.0), ("PreArm: Gyros inconsistent", None)):
+        (mission,) = KIND.missions(flight(ARM=None, MSG=said((2.0, text))), 75.0, {})
+        (check,) = KIND.outcome(mission)
+        assert check.value == value if value is not None else not is_known(check.value)
+
+
+# --- PX4 ---------------------------------------------------------------------------------------------------------
+
+
+def px4(**status: Any) -> dict[str, Value]:
+    landed = status.pop("landed", [(0.0, 1), (12.0, 0), (49.5, 1)])
+    result = status.pop("result", None)
+    told = {"arming_state": [(0.0, 1), (10.0, 2), (50.0, 1)], "nav_state": [(0.0, 3)], "failsafe": [(0.0, 0)], **status}
+    tables = {"vehicle_status": states(**told), "vehicle_land_detected": states(landed=landed)}
+    if result is not None:
+        tables["mission_result"] = states(finished=result)
+    (mission,) = PX4.missions(tables, 60.0, {})
+    return checks(PX4.outcome(mission))
+
+
+def test_a_px4_mission_that_was_finished_is_fine() -> None:
+    found = px4(result=[(0.0, 0), (40.0, 1)])
+    assert found == dict.fromkeys(
+        ("armed", "took_off", "mission_success", "no_crash", "no_failsafe", "landed", "disarmed"), 1.0
+    )
+    assert not is_known(px4()["mission_success"])
+
+
+def test_px4_says_what_failed() -> None:
+    assert px4(failsafe=[(0.0, 0), (30.0, 1)])["no_failsafe"] == 0.0
+    assert px4(failure_detector_status=[(0.0, 0), (30.0, 2)])["no_crash"] == 0.0
+    assert px4(nav_state=[(0.0, 2), (30.0, 13)])["no_crash"] == 0.0
+    assert px4(landed=[(0.0, 1), (12.0, 0)])["landed"] == 0.0
+    assert not is_known(px4(landed=[(0.0, 1)])["took_off"])
+    assert not is_known(px4(arming_state=[(0.0, 1), (10.0, 2)])["disarmed"])
+
+
+def test_every_arming_of_a_px4_log_is_a_run() -> None:
+    status = states(arming_state=[(0.0, 1), (10.0, 2), (20.0, 1), (30.0, 2)])
+    spans = [
+        (round(m.start_s, 3), round(m.end_s, 3), m.ended) for m in PX4.missions({"vehicle_status": status}, 60.0, {})
+    ]
+    assert spans == [(10.0, 20.0, True), (30.0, 60.0, False)]
+
+
+# --- ROS ---------------------------------------------------------------------------------------------------------
+
+
+def goals(*statuses: int | None) -> Value:
+    kind = MISSION_KINDS["actionlib_goals"]
+    count = len(statuses)
+    sent = {
+        "goal_id.id": np.array([f"g{i}" for i in range(count)], object),
+        "goal.target_pose.header.frame_id": np.array(["map"] * count, object),
+        **{f"goal.target_pose.pose.position.{axis}": 9.0 * np.arange(count) for axis in "xy"},
+        **{f"goal.target_pose.pose.orientation.{axis}": np.zeros(count) + (axis == "w") for axis in "xyzw"},
+    }
+    answered = [i for i, status in enumerate(statuses) if status is not None]
+    results = {
+        "status.goal_id.id": np.array([f"g{i}" for i in answered], object),
+        "status.status": np.array([statuses[i] for i in answered], float),
+        "status.text": np.array([""] * len(answered), object),
+    }
+    tables = {
+        "/move_base/goal": Table(np.linspace(0.0, 10.0 * (count - 1), count), sent),
+        "/move_base/result": Table(10.0 * np.array(answered, float) + 8.0, results),
+    }
+    missions: tuple[Mission, ...] = kind.missions(tables, 100.0, {"goal_timeout_s": 1e9})
+    (check,) = kind.outcome(missions[-1])
+    return check.value
+
+
+def test_goals_reached_are_fine_failed_ones_a_fault_and_cancelled_ones_neither() -> None:
+    assert goals(3, 3) == 1.0
+    assert goals(3, 4) == 0.0
+    assert goals(3, 2) == 1.0
+    assert not is_known(goals(2))
+    assert not is_known(goals(3, None))
+
+
+def test_a_recorded_drive_is_judged_without_its_profile(tmp_path: Path) -> None:
+    found = judge_plainly(open_log(recorded(tmp_path / "drive", StoragePlugin.MCAP)))
+    assert found is not None
+    assert [check.variable.name for check in found.checks] == ["goals_reached"]
+
+
+def test_a_log_without_a_run_is_not_judged(tmp_path: Path) -> None:
+    write_bag(tmp_path / "a.bag")
+    assert judge_plainly(open_log(tmp_path / "a.bag")) is None
+
+
+# --- the whole -----------------------------------------------------------------------------------------------------
+
+
+def test_what_a_run_came_to() -> None:
+    assert overall(["ok"], [], "no") == "ok"
+    assert overall(["ok"], ["info"], "no") == "ok"
+    assert overall(["ok"], ["warning"], "no") == "not_evaluated"
+    assert overall(["ok"], ["warning"], "fits") == "ok"
+    assert overall(["ok", "not_evaluated"], [], "no") == "not_evaluated"
+    assert overall([], [], "no") == "not_evaluated"
+    assert overall(["ok"], ["critical"], "fits") == "fault"
+    assert overall(["ok", "fault"], [], "no") == "fault"
+
+
+def test_a_failed_run_of_a_stranger_is_a_fault_without_causes_by_parameters(tmp_path: Path) -> None:
+    path = write_text(tmp_path / "rover.log", SAMPLES / "arducopter_failed.BIN")
+    path.write_text(path.read_text().replace("ArduCopter V", "ArduRover V"))
+    diagnosis = open_case(Request(path), lambda _step, _share: None).diagnosis
+    assert diagnosis.profile.fit.verdict == "no"
+    assert {one.name for one in diagnosis.objectives} >= {"armed", "no_crash", "no_failsafe"}
+    assert diagnosis.fix is None
+    assert not any(one.what == "parameter" for one in diagnosis.hypotheses)
+    assert "Causes of" not in to_text(diagnosis)
+    good = tuple(replace(one, value=1.0, status="ok", reason="") for one in diagnosis.objectives)
+    fine = replace(diagnosis, objectives=good, faults=(), health=replace(diagnosis.health, findings=()))
+    assert exit_code(fine) == ExitCode.OK
+    for text in (to_text(fine), to_markdown(build_document(fine)), to_html(build_document(fine))):
+        flat = " ".join(text.split())
+        assert "no profile fits: no limits for time and energy, no causes by parameters" in flat
+    bad = (replace(good[0], value=0.0, status="fault", reason="a failsafe acted"), *good[1:])
+    failed = replace(fine, objectives=bad)
+    assert exit_code(failed) == ExitCode.FAULT
+    assert "FAULT: a failsafe acted" in to_text(failed)
+    assert "**Fault**: a failsafe acted" in to_markdown(build_document(failed))
