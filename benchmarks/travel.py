@@ -46,7 +46,7 @@ from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, load_profile
 
-EFFORT = Effort(points=500, iterations=40)
+EFFORT = Effort(points=500, iterations=40, folds=5)
 MEASURED = ("mission_time", "energy")
 APART = ("path_length", "legs", "hold_time", "commanded_speed", "takeoff_height", "return_distance", "hover_power")
 """Contexts by which the distance of a mission from those of training is told, each in standard deviations."""

@@ -29,6 +29,11 @@ ValueType = Literal["float", "int", "bool", "enum"]
 _COMPARE = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt, "==": operator.eq}
 
 
+SAME_SHARE, SAME_LEAST = 0.05, 0.5
+"""Two missions are the same where their numbers differ by no more: home is never in the same place to the metre, and a
+leg more is one."""
+
+
 @dataclass(frozen=True, slots=True)
 class Threshold:
     """The bound an objective must keep, in the objective's unit."""
@@ -62,6 +67,25 @@ class RelativeThreshold:
     def __str__(self) -> str:
         floor = "" if self.at_least is None else f", or {self.at_least:g}"
         return f"{self.op} {self.ratio:g} x what the reference configuration needs{floor}"
+
+
+@dataclass(frozen=True, slots=True)
+class OwnLimit:
+    """What an objective's threshold is where it is the operator's: the file that holds it, and the mission that it
+    belongs to (contexts by name; empty: any mission)."""
+
+    source: str
+    mission: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def mismatch(self, context: Mapping[str, object]) -> str:
+        """Why a run is of another mission, in one clause; empty where it is of this one."""
+        for name, wanted in self.mission.items():
+            value = context.get(name)
+            if not isinstance(value, (int, float)):
+                return f"the limit of {self.source} is for another mission, or {name} is not known"
+            if abs(value - wanted) > max(SAME_SHARE * abs(wanted), SAME_LEAST):
+                return f"the limit of {self.source} is for a mission with {name} {wanted:g}, this one has {value:.4g}"
+        return ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +124,8 @@ class Variable:
     threshold: Threshold | None = None
     relative: RelativeThreshold | None = None
     """The bound of an objective that has no fixed one."""
+    own_limit: OwnLimit | None = None
+    """Where the bound is from, where it is not the profile's."""
     about: About = "world"
     """What a context tells of."""
     nominal: Extract | None = None

@@ -56,6 +56,8 @@ class Request:
     """Other logs of the same configuration under the same conditions: diagnosed together, the first log reported."""
     since: Path | None = None
     """The log of a good run; what changed since then is told as evidence, and it is the reference."""
+    site: Path | None = None
+    """A site file with the operator's own limits; that of the user's configuration folder when None."""
     reference: Path | None = None
     """A configuration file, or a log, that the operator vouches for: the reference, even before that of `since`."""
 
@@ -210,6 +212,7 @@ def _read(
     from care_core.diagnose.judging import read_and_judge, with_repeats
 
     progress("reading the log", 0.2)
+    profile = with_own_limits(profile, request.site)
     good = _good(request, profile)
     judged = read_and_judge(
         log, profile, configs=configs, thresholds=request.thresholds, mission=request.mission, good=good, sha256=sha256
@@ -221,6 +224,17 @@ def _read(
                 read_and_judge(other, profile, configs=configs, thresholds=request.thresholds, good=good, sha256=digest)
             )
     return Reading(profile, choice, configs, with_repeats(judged, repeats))
+
+
+def with_own_limits(profile: Profile, site: Path | None) -> Profile:
+    """The profile with the limits of the site file in place of its own. Raises ConfigError for one that is unsound."""
+    from care_core.profile.site import load_site
+
+    found = load_site(site)
+    if found is None:
+        return profile
+    schema = found.applied(profile.schema)
+    return profile if schema is profile.schema else replace(profile, schema=schema)
 
 
 def _good(request: Request, profile: Profile) -> Good | None:

@@ -150,6 +150,7 @@ def judge(
         good: the configuration to judge against, where the operator named one.
     """
     own = dict(thresholds or {})
+    schema = _without_limits_of(own, schema)
     bounds = thresholds_in_force(schema, own)
     run = replace(run, objectives=meaningful(run, schema, bounds, own))
     if model is None:
@@ -235,10 +236,17 @@ def meaningful(
             continue
         elif not accomplished:
             found[name] = Unavailable("the mission was not accomplished, so its value means nothing")
-        elif run.mission.mismatch and name not in judged_anyway:
+        elif name not in judged_anyway and (mismatch := _of_another_mission(objective, run)):
             hint = f"give this mission's bound with --threshold {name}=VALUE"
-            found[name] = Unavailable(run.mission.mismatch, hint)
+            found[name] = Unavailable(mismatch, hint)
     return found
+
+
+def _of_another_mission(objective: Variable, run: Run) -> str:
+    """Why the threshold in force is not one of this run's mission, empty where it is."""
+    if objective.own_limit is None:
+        return run.mission.mismatch
+    return objective.own_limit.mismatch(run.context)
 
 
 def _accomplished(run: Run, schema: Schema, bounds: Mapping[str, Threshold]) -> bool:
@@ -251,13 +259,20 @@ def _accomplished(run: Run, schema: Schema, bounds: Mapping[str, Threshold]) -> 
     return True
 
 
+def _without_limits_of(named: Container[str], schema: Schema) -> Schema:
+    """The schema without the site file's limits of objectives that the operator bounds for this run."""
+    freed = {o.name: replace(o, own_limit=None) for o in schema.objectives if o.own_limit and o.name in named}
+    return replace(schema, variables={**schema.variables, **freed}) if freed else schema
+
+
 def thresholds_in_force(schema: Schema, overrides: Mapping[str, float]) -> dict[str, Threshold]:
     """The profile's thresholds with the operator's values put in."""
     bounds: dict[str, Threshold] = {}
     for objective in schema.objectives:
         bound = objective.threshold
         if objective.name in overrides:
-            bound = Threshold(bound.op if bound else "<=", overrides[objective.name])
+            declared = bound or objective.relative
+            bound = Threshold(declared.op if declared else "<=", overrides[objective.name])
         if bound is not None:
             bounds[objective.name] = bound
     return bounds

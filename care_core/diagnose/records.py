@@ -62,7 +62,13 @@ class ObjectiveResult:
 
     @property
     def basis(self) -> str:
-        """What the threshold was made of, empty where it is a fixed one."""
+        """What the threshold was made of and where it is written, empty where it is the profile's fixed one."""
+        own = self.variable.own_limit
+        parts = (self._made_of, "" if own is None or self.threshold is None else f"limit of {own.source}")
+        return "; ".join(part for part in parts if part)
+
+    @property
+    def _made_of(self) -> str:
         if self.need is None or self.threshold is None or self.variable.relative is None:
             return ""
         need = f"{figures(self.need.value)} {self.variable.unit}".rstrip()

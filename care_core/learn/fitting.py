@@ -26,9 +26,11 @@ class Effort:
 
     points: int
     iterations: int
+    folds: int = 0
+    """Parts of the missions that are left out in turn to learn how far off a mechanism is on a mission it never saw."""
 
 
-OUTCOME = Effort(points=600, iterations=60)
+OUTCOME = Effort(points=600, iterations=60, folds=5)
 """For objectives: probabilities and fixes rest on them."""
 METRIC = Effort(points=300, iterations=30)
 """For metrics and edges: they draw the path and size its edges."""
@@ -149,6 +151,46 @@ def fit(
         calibration=calibration,
     )
     return Fitted(mechanism, _loss(mechanism, errors, error_sd))
+
+
+def tested_on_missions_left_out(
+    mechanism: Mechanism,
+    x: FloatArray,
+    y: FloatArray,
+    inputs: Inputs,
+    *,
+    rng: np.random.Generator,
+    effort: Effort,
+    groups: NDArray[np.int64],
+) -> Mechanism:
+    """The mechanism with the errors of mechanisms that were fitted without the missions they are tested on.
+
+    `left_out` keeps the relevances and the noise that all missions together chose, which flatters: intervals of 80 %
+    held 72 % of the times of missions that are new altogether. Cross-conformal levels (Vovk 2015; Barber et al. 2021,
+    CV+) hold what they promise as far as the next mission is one like these.
+
+    Args:
+        x, y, inputs, groups: as for `fit`; `mechanism` is what it made of them.
+    """
+    missions = np.unique(groups)
+    if mechanism.binary or effort.folds < 2 or len(missions) < 2 * effort.folds:
+        return mechanism
+    part = dict(zip(missions.tolist(), rng.permutation(len(missions)) % effort.folds, strict=True))
+    fold = np.array([part[group] for group in groups.tolist()])
+    if len(y) - np.bincount(fold).max() < MIN_ROWS:
+        return mechanism
+    read = np.zeros(len(inputs.names), dtype=bool)
+    read[mechanism.reads] = True
+    errors = np.empty(len(y))
+    for k in range(effort.folds):
+        out = fold == k
+        others = fit(
+            x[~out], y[~out], replace(inputs, read=read), binary=False, rng=rng, effort=effort,
+            transform=mechanism.transform, groups=groups[~out],
+        ).mechanism  # fmt: skip
+        sd = np.sqrt(others.latent_sd(x[out]) ** 2 + others.noise_sd**2)
+        errors[out] = (transformed(y[out], mechanism.transform) - others.latent(x[out])) / sd
+    return replace(mechanism, calibration=residual_levels(errors))
 
 
 def _loss(mechanism: Mechanism, errors: FloatArray, error_sd: FloatArray) -> float:

@@ -19,7 +19,7 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import FloatArray, Mechanism, transformed
 from care_core.causal.model import OutcomeRecord, StageRecord
 from care_core.causal.nominal import Nominal
-from care_core.learn.fitting import MIN_ROWS, Effort, Fitted, Inputs, best_transform, fit
+from care_core.learn.fitting import MIN_ROWS, Effort, Fitted, Inputs, best_transform, fit, tested_on_missions_left_out
 from care_core.learn.knowledge import with_known
 from care_core.learn.relative import missions_of, needs
 from care_core.profile.schema import Schema
@@ -238,8 +238,14 @@ def fit_on(
         groups = None if missions is None else missions[known]
         binary = set(np.unique(y)) <= {0.0, 1.0}
         found = fit(x, y, inputs, binary=binary, rng=rng, effort=effort, groups=groups)
-        best = found if best is None or found.loss < best.loss else best
-    return None if best is None else best.mechanism
+        if best is None or found.loss < best.loss:
+            best, asked = found, (x, y, inputs, groups)
+    if best is None:
+        return None
+    x, y, inputs, groups = asked
+    if groups is None:
+        return best.mechanism
+    return tested_on_missions_left_out(best.mechanism, x, y, inputs, rng=rng, effort=effort, groups=groups)
 
 
 def groups_that_move_together(schema: Schema, frame: pd.DataFrame) -> tuple[tuple[str, ...], ...]:

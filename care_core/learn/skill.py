@@ -21,7 +21,7 @@ from care_core.learn.relative import missions_of, relative
 from care_core.profile.schema import Schema
 
 BINS = 10
-FOLD = Effort(points=400, iterations=30)
+FOLD = Effort(points=400, iterations=30, folds=5)
 """Folds are fitted with less effort than the model itself, so the skill of large tables is rather understated."""
 
 

@@ -26,16 +26,18 @@ Side = Literal["low", "high"]
 """On which side of what training saw a value is bad."""
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+class Strict(BaseModel):
+    """What people write: a key that is not known is an error."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class _Threshold(_Strict):
+class _Threshold(Strict):
     op: Op
     value: float
 
 
-class _Bound(_Strict):
+class Bound(Strict):
     """An objective's threshold: a value, or a ratio to what the reference configuration needs."""
 
     op: Op
@@ -44,15 +46,21 @@ class _Bound(_Strict):
     at_least: float | None = None
 
     @model_validator(mode="after")
-    def _is_one_of_both(self) -> _Bound:
+    def _is_one_of_both(self) -> Bound:
         if (self.value is None) == (self.ratio is None):
             raise ValueError("a threshold has a 'value' or a 'ratio'")
         if self.at_least is not None and self.ratio is None:
             raise ValueError("'at_least' belongs to a 'ratio'")
         return self
 
+    def thresholds(self) -> tuple[Threshold | None, RelativeThreshold | None]:
+        """The fixed threshold and the relative one, of which there is one."""
+        if self.value is not None:
+            return Threshold(self.op, self.value), None
+        return None, None if self.ratio is None else RelativeThreshold(self.op, self.ratio, self.at_least)
 
-class _Variable(_Strict):
+
+class _Variable(Strict):
     role: Role
     type: ValueType = "float"
     unit: str = ""
@@ -65,7 +73,7 @@ class _Variable(_Strict):
     modes: list[str] = Field(default_factory=list)
     safety: bool = False
     kind: Kind | None = None
-    threshold: _Bound | None = None
+    threshold: Bound | None = None
     about: About = "world"
     nominal: dict[str, str] | None = None
     extract: dict[str, Any] | None = None
@@ -96,7 +104,7 @@ class _Variable(_Strict):
         return self
 
 
-class _Match(_Strict):
+class _Match(Strict):
     """What a log must say to be of this platform; each text is searched in the log's facts, ignoring case."""
 
     firmware: str = ""
@@ -120,7 +128,7 @@ class _Match(_Strict):
         return versions
 
 
-class _EvidenceRule(_Strict):
+class _EvidenceRule(Strict):
     text: str
     options: list[str] | dict[str, _Threshold] = Field(default_factory=list)
     says: str = ""
@@ -136,14 +144,14 @@ class _EvidenceRule(_Strict):
         return text
 
 
-class _Known(_Strict):
+class _Known(Strict):
     """What people know to act on what: every cause may act on every effect."""
 
     causes: list[str]
     effects: list[str]
 
 
-class _Profile(_Strict):
+class _Profile(Strict):
     schema_version: Literal[1]
     name: str
     version: str
@@ -364,6 +372,7 @@ def _to_variable(name: str, v: _Variable) -> Variable:
     if v.extract is not None:
         args = {key: value for key, value in v.extract.items() if key != "kind"}
         extract = Extract(str(v.extract["kind"]), args)
+    absolute, relative = (None, None) if v.threshold is None else v.threshold.thresholds()
     return Variable(
         name=name,
         role=v.role,
@@ -378,21 +387,13 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         modes=tuple(v.modes),
         safety=v.safety,
         kind=v.kind,
-        threshold=_absolute(v.threshold),
-        relative=_relative(v.threshold),
+        threshold=absolute,
+        relative=relative,
         about=v.about,
         nominal=None if v.nominal is None else Extract(v.nominal["kind"], _arguments(v.nominal)),
         extract=extract,
         order=v.order,
     )
-
-
-def _absolute(bound: _Bound | None) -> Threshold | None:
-    return None if bound is None or bound.value is None else Threshold(bound.op, bound.value)
-
-
-def _relative(bound: _Bound | None) -> RelativeThreshold | None:
-    return None if bound is None or bound.ratio is None else RelativeThreshold(bound.op, bound.ratio, bound.at_least)
 
 
 def _digest(variables: Mapping[str, Variable]) -> str:

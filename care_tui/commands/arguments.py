@@ -56,6 +56,10 @@ Reference = Annotated[
     Path | None,
     typer.Option("--reference", metavar="FILE", help="Judge against this configuration, a file or a log."),
 ]
+Site = Annotated[
+    Path | None,
+    typer.Option("--site", metavar="FILE", help="Judge by the limits of this file; your own site.yaml if absent."),
+]
 Mission = Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last.")]
 
 

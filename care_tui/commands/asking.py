@@ -19,6 +19,7 @@ from care_tui.commands.arguments import (
     Mission,
     Out,
     ProfileName,
+    Site,
     Thresholds,
     bounds,
     is_json,
@@ -38,6 +39,7 @@ def whatif(
     profile: ProfileName = None,
     config: ConfigPaths = None,
     threshold: Thresholds = None,
+    site: Site = None,
     mission: Mission = None,
     json: AsJson = False,
     out: Out = None,
@@ -49,7 +51,7 @@ def whatif(
 
     if not set_:
         raise UsageError("Nothing is asked.", hint="Change an option with --set OPTION=VALUE.", where="--set")
-    request = Request(log, profile, tuple(config or ()), thresholds=bounds(threshold or ()), mission=mission)
+    request = Request(log, profile, tuple(config or ()), thresholds=bounds(threshold or ()), site=site, mission=mission)
     with Progress() as progress:
         question = read_case(request, progress).question
     answer = question.ask(dict(parse_change(text, question.schema) for text in set_))

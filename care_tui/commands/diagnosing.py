@@ -21,6 +21,7 @@ from care_tui.commands.arguments import (
     ProfileName,
     Reference,
     Since,
+    Site,
     Thresholds,
     bounds,
 )
@@ -51,6 +52,7 @@ def triage(
     top: Annotated[int, typer.Option("--top", min=1, help="How many causes a fault may have.")] = 5,
     keep: Keep = None,
     threshold: Thresholds = None,
+    site: Site = None,
     mission: Mission = None,
     since: Since = None,
     reference: Reference = None,
@@ -68,6 +70,7 @@ def triage(
         configs=tuple(config or ()),
         keep=tuple(keep or ()),
         thresholds=bounds(threshold or ()),
+        site=site,
         top=top,
         mission=mission,
         since=since,

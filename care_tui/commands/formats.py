@@ -17,6 +17,14 @@ def _formats() -> None:
     pass
 
 
+@app.command("baseline")
+def baseline() -> None:
+    """Print the JSON Schema of 'care baseline --json'."""
+    from care_core.report.baseline import baseline_schema
+
+    _print(baseline_schema())
+
+
 @app.command("history")
 def history() -> None:
     """Print the JSON Schema of 'care history --json'."""

@@ -13,7 +13,17 @@ import typer
 
 from care_core.application.case import Request
 from care_core.errors import UsageError
-from care_tui.commands.arguments import ConfigPaths, Keep, Mission, ProfileName, Since, Thresholds, bounds
+from care_tui.commands.arguments import (
+    ConfigPaths,
+    Keep,
+    Mission,
+    ProfileName,
+    Reference,
+    Since,
+    Site,
+    Thresholds,
+    bounds,
+)
 from care_tui.console import say
 from care_tui.jobs import CAUSES
 from care_tui.places import files_of, logs_in, written_s
@@ -35,8 +45,10 @@ def open_app(
     config: ConfigPaths = None,
     keep: Keep = None,
     threshold: Thresholds = None,
+    site: Site = None,
     mission: Mission = None,
     since: Since = None,
+    reference: Reference = None,
     ascii: Annotated[bool, typer.Option("--ascii", help="Draw with nothing but ASCII.")] = False,
     no_mouse: Annotated[bool, typer.Option("--no-mouse", help="Leave the mouse to the terminal.")] = False,
     color: Annotated[str | None, typer.Option("--color", help="auto, truecolor, 256, 16 or none.")] = None,
@@ -68,9 +80,11 @@ def open_app(
             tuple(config or ()),
             keep=tuple(keep or ()),
             thresholds=bound,
+            site=site,
             top=CAUSES,
             mission=mission,
             since=since,
+            reference=reference,
         )
     raise typer.Exit(run(request, chosen))
 

@@ -1,0 +1,127 @@
+"""What `care baseline` does: logs of good runs become limits, and the limits a section of the site file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from care_core.application.case import fitting, opened
+from care_core.errors import CareError, ConfigError, LogError
+from care_core.profile.site import SITE_SCHEMA, load_site
+
+if TYPE_CHECKING:
+    from care_core.diagnose.baseline import Baseline, Proposal, Refused
+    from care_core.diagnose.judging import Judged
+    from care_core.logs.base import Log
+    from care_core.profile.store import Profile
+    from care_core.run import ProfileChoice
+
+Progress = Callable[[str, float], None]
+
+
+def baseline(places: Sequence[Path], profile: str | None, progress: Progress) -> Baseline:
+    """Limits from every good run in these logs and folders of logs.
+
+    The first log that a profile fits says which one; logs that it does not fit are refused.
+
+    Raises:
+        LogError: none of the logs can be read.
+        CareError: a place does not exist, or no profile fits any of the logs.
+    """
+    from care_core.diagnose.baseline import Baseline, Refused, differing, missions, propose
+    from care_core.logs.finding import find_logs
+
+    paths = find_logs(places)
+    refused: list[Refused] = []
+    errors: list[CareError] = []
+    runs: list[Judged] = []
+    chosen: tuple[Profile, ProfileChoice] | None = None
+    seen: dict[str, Path] = {}
+    for number, path in enumerate(paths):
+        progress(f"reading {path.name}", number / len(paths))
+        try:
+            with opened(path) as (log, sha256):
+                if sha256() in seen:
+                    refused.append(Refused(path, None, f"the same log as {seen[sha256()].name}"))
+                    continue
+                fit = fitting(log, profile if chosen is None else str(chosen[0].path))
+                good, bad = _runs_of(log, fit[0])
+        except CareError as err:
+            errors.append(err)
+            refused.append(Refused(path, None, err.message.rstrip(".")))
+            continue
+        seen[sha256()] = path
+        chosen = chosen or fit
+        runs += good
+        refused += [replace(one, log=path) for one in bad]
+    if chosen is None:
+        raise _none_read(errors)
+    found = propose(runs, chosen[0]) if runs else ()
+    return Baseline(
+        chosen[1], len(paths), tuple(runs), tuple(refused), found, missions(runs, chosen[0].schema), differing(runs)
+    )
+
+
+def _runs_of(log: Log, profile: Profile) -> tuple[list[Judged], list[Refused]]:
+    """The good runs of a log, and the others with their reason. Raises CareError."""
+    from care_core.diagnose.baseline import Refused, for_any_mission, refusal
+    from care_core.diagnose.judging import judge
+    from care_core.extract.read import read_runs
+    from care_core.health.examine import examine
+
+    schema = for_any_mission(profile.schema)
+    health = examine(log)
+    good, bad = [], []
+    for run in read_runs(log, schema):
+        judged = judge(run, schema, profile.model)
+        reason = refusal(judged, health)
+        if reason:
+            bad.append(Refused(log.path, run.mission.index if run.mission.count > 1 else None, reason))
+        else:
+            good.append(judged)
+    return good, bad
+
+
+def _none_read(errors: Sequence[CareError]) -> CareError:
+    if len(errors) == 1 or not all(isinstance(err, LogError) for err in errors):
+        return next((err for err in errors if not isinstance(err, LogError)), errors[0])
+    return LogError(f"None of the {len(errors)} logs could be read.", hint="Look at one with 'care inspect'.")
+
+
+def site_text(found: Baseline, file: Path) -> str:
+    """The site file with the limits of this profile put in; those of other profiles, and remarks, stay as they are.
+
+    Raises:
+        ConfigError: the file that is there is no site file.
+    """
+    from ruamel.yaml import YAML
+
+    yaml = YAML(typ="rt")  # keeps comments; like `safe` it builds no object that a tag names
+    yaml.width = 120
+    if file.is_file() and file.stat().st_size:
+        load_site(file)
+        data: Any = yaml.load(file.read_text(encoding="utf-8"))
+    else:
+        data = yaml.load(f"# Limits of this site, read by 'care triage' and the app. Change what you know better.\n"
+                         f"schema: {SITE_SCHEMA}\nlimits: {{}}\n")  # fmt: skip
+        data["limits"] = {}
+    proposed = {p.objective.name: _entry(p) for p in found.proposals if p.limit is not None}
+    if not proposed:
+        raise ConfigError("There is no limit to write.", hint="See why above.", where=str(file))
+    data["limits"][found.choice.name] = proposed
+    stream = StringIO()
+    yaml.dump(data, stream)
+    return stream.getvalue()
+
+
+def _entry(proposal: Proposal) -> dict[str, Any]:
+    entry: dict[str, Any] = {"op": proposal.op, "ratio" if proposal.relative else "value": proposal.limit}
+    bound = proposal.objective.relative
+    if bound is not None and bound.at_least is not None:
+        entry["at_least"] = bound.at_least
+    if proposal.mission:
+        entry["mission"] = dict(proposal.mission)
+    return entry
