@@ -24,13 +24,9 @@ check: $(DEV)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# Planted worlds need nothing; the paper and the recorded faults need CARE_SHARED.
+# All benchmarks, with what each needs of CARE_SHARED and TABLES (tables of runs), into benchmarks/RESULTS.md.
 bench: $(DEV)
-	$(BIN)/python -m benchmarks.planted
-	@if [ -n "$(CARE_SHARED)" ]; then set -e; \
-	$(BIN)/care evaluate husky-care --faults "$(CARE_SHARED)/data/care"; \
-	$(BIN)/python -m benchmarks.artifact --shared "$(CARE_SHARED)"; \
-	$(BIN)/python -m benchmarks.diagnosis --shared "$(CARE_SHARED)"; fi
+	$(BIN)/python -m benchmarks.results $(if $(TABLES),--tables $(TABLES)) $(foreach name,$(ONLY),--only $(name))
 
 docs: $(BASE)
 	$(BIN)/python -m care_core.report.extractors docs/extractors.md

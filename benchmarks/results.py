@@ -1,0 +1,135 @@
+"""All benchmarks in one go: writes benchmarks/RESULTS.md with machine, date, commit, and what each printed.
+
+    python -m benchmarks.results [--shared DIR] [--tables DIR] [--only NAME]... [--list]
+
+Each stands with its bar and the peer on the same input; a benchmark that fails, or whose data are not here, says so in
+its place. A part that is not run keeps what it printed before, under the commit it was printed at.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+from care_core.files import write_atomically
+
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "benchmarks" / "RESULTS.md"
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """A command, with `{shared}` and `{tables}` where it needs recorded data, its bar and its peer."""
+
+    name: str
+    command: str
+    bar: str
+    peer: str
+
+    def words(self, shared: Path | None, tables: Path | None) -> list[str] | None:
+        """The command as it is run; None where its data are not here."""
+        if ("{shared}" in self.command and shared is None) or ("{tables}" in self.command and tables is None):
+            return None
+        return self.command.format(shared=shared, tables=tables).split()
+
+
+BENCHMARKS = (
+    Benchmark("planted", "benchmarks.planted", "no confident wrong answer", "plain classifier"),
+    Benchmark("discovery", "benchmarks.discovery --robots 16", "the default is not beaten", "other ways of the search"),
+    Benchmark("observational", "benchmarks.observational", "fewer wrong field days than the peer", "plain classifier"),
+    Benchmark("fixes", "benchmarks.fixes", "suggested values do as well as resets", "reset to the reference"),
+    Benchmark(
+        "paper", "care_tui evaluate husky-care --faults {shared}/data/care", "F1 of the paper's rule 0.81", "CBI"
+    ),
+    Benchmark("artifact", "benchmarks.artifact --shared {shared}", "10 of 10 reproduced", "the published predictions"),
+    Benchmark(
+        "diagnosis",
+        "benchmarks.diagnosis --shared {shared} --tables {tables}",
+        "not worse than before: 25 of 25, 18 of 20 causes first",
+        "CBI, largest deviation, plain classifier",
+    ),
+    Benchmark(
+        "travel",
+        "benchmarks.travel --shared {shared} --table {tables}/arducopter.parquet",
+        "cause first in 80 %",
+        "plain classifier with the same contexts",
+    ),
+    Benchmark("ros_health", "benchmarks.ros_health {shared}/data/ros_hardware", "kind in three in 70 %", "none known"),
+    Benchmark("wild_logs", "benchmarks.wild_logs --shared {shared}", "no crash, each refusal a sentence", "none known"),
+    Benchmark("few_runs", "benchmarks.few_runs --shared {shared} --tables {tables}", "above the peers", "CBI, plain"),
+    Benchmark("learning", "benchmarks.learning --shared {shared}", "120 s, 2 GB", "causal-learn's FCI"),
+    Benchmark("ingest", "benchmarks.ingest", "1.5, 6, 3 s; 300 MB; 5 times faster", "pymavlink, rosbags, mcap"),
+    Benchmark("tui", "benchmarks.tui", "0.7 s to the first frame, 50 ms a key, 2 kB", "none"),
+)
+
+
+def main() -> None:
+    """Run what was asked for and renew its sections."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    shared = os.environ.get("CARE_SHARED")
+    parser.add_argument("--shared", type=Path, default=Path(shared) if shared else None, help="folder with `data`")
+    parser.add_argument("--tables", type=Path, help="tables of runs (benchmarks.train_profiles --tables)")
+    parser.add_argument("--only", action="append", choices=[one.name for one in BENCHMARKS])
+    parser.add_argument("--list", action="store_true")
+    asked = parser.parse_args()
+    if asked.list:
+        print("\n".join(f"{one.name:14} {one.command}" for one in BENCHMARKS))
+        return
+    sections = kept(RESULTS.read_text(encoding="utf-8") if RESULTS.is_file() else "")
+    for one in BENCHMARKS:
+        if not asked.only or one.name in asked.only:
+            print(one.name, flush=True)
+            sections[one.name] = section(one, one.words(asked.shared, asked.tables))
+            write_atomically(RESULTS, document(sections[each.name] for each in BENCHMARKS if each.name in sections))
+
+
+def kept(text: str) -> dict[str, str]:
+    """The sections of an earlier run, by name."""
+    return {part.splitlines()[0].strip(): f"## {part.rstrip()}\n" for part in re.split(r"^## ", text, flags=re.M)[1:]}
+
+
+def section(one: Benchmark, words: list[str] | None) -> str:
+    """One benchmark with what it printed."""
+    head = f"## {one.name}\n\nBar: {one.bar}. Peer: {one.peer}.\n\n"
+    if words is None:
+        return f"{head}Not run at {commit()}: its data are not here.\n"
+    began = time.monotonic()
+    ended = subprocess.run(
+        [sys.executable, "-m", *words], capture_output=True, text=True, cwd=ROOT, stdin=subprocess.DEVNULL, check=False
+    )
+    told = f"{machine()}, {date.today().isoformat()}, commit {commit()}, {time.monotonic() - began:.0f} s"
+    printed = ended.stdout.rstrip() or "(nothing)"
+    failed = "" if ended.returncode == 0 else f"\nEnded with {ended.returncode}: {ended.stderr.strip()[-300:]}\n"
+    return f"{head}`python -m {one.command}` ({told}):\n\n```\n{printed}\n```\n{failed}"
+
+
+def document(sections: Iterable[str]) -> str:
+    """The whole file."""
+    return "# Results of all benchmarks\n\nWritten by `make bench`.\n\n" + "\n".join(sections)
+
+
+def machine() -> str:
+    """What the figures were taken on."""
+    load = os.getloadavg()[0]
+    return f"{os.cpu_count()} cores {platform.machine()}, Python {platform.python_version()}, load {load:.1f}"
+
+
+def commit() -> str:
+    """The commit that is checked out."""
+    found = subprocess.run(
+        ("git", "rev-parse", "--short", "HEAD"), capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    return found.stdout.strip() or "unknown"
+
+
+if __name__ == "__main__":
+    main()
