@@ -26,6 +26,7 @@ About = Literal["mission", "vehicle", "world"]
 """What a context tells of: what was asked, what flew, or what was met. The first two are known before the start."""
 ValueType = Literal["float", "int", "bool", "enum"]
 
+_WORDS = {"true": 1.0, "yes": 1.0, "on": 1.0, "false": 0.0, "no": 0.0, "off": 0.0}
 _COMPARE = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt, "==": operator.eq}
 
 
@@ -140,6 +141,27 @@ class Variable:
         if self.labels:
             return any(value == code for code, _ in self.labels)
         return self.range is None or self.range[0] <= value <= self.range[1]
+
+    @property
+    def acceptable(self) -> str:
+        """The acceptable values in words."""
+        if self.labels:
+            return ", ".join(f"{code:g} ({label})" for code, label in self.labels)
+        return "any" if self.range is None else f"{self.range[0]:g} to {self.range[1]:g} {self.unit}".rstrip()
+
+    def code_of(self, text: str) -> float | None:
+        """The number that a word stands for: one of the labels, true or false; None where it is no such word."""
+        words = {**_WORDS, **{label.casefold(): code for code, label in self.labels}}
+        return words.get(text.strip().casefold())
+
+    def typed(self, text: str) -> float | None:
+        """What somebody typed as a value: a label, true or false, or a finite number; None where it is none."""
+        code = self.code_of(text)
+        try:
+            value = float(text) if code is None else code
+        except ValueError:
+            return None
+        return value if math.isfinite(value) else None
 
     def snap(self, value: float) -> float:
         """The nearest acceptable value of the option's type, floats to four significant digits."""

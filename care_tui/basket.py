@@ -85,29 +85,21 @@ def parsed(option: Variable, text: str) -> float:
     Raises:
         ValueError: it is none of these, or not an acceptable value; the message says what is.
     """
-    word = text.strip().casefold()
-    named = {label.casefold(): code for code, label in option.labels}
-    if option.type == "bool":
-        named |= {"true": 1.0, "yes": 1.0, "on": 1.0, "false": 0.0, "no": 0.0, "off": 0.0}
-    try:
-        value = named[word] if word in named else float(word)
-    except ValueError:
-        raise ValueError(f"'{text}' is no number. {acceptable(option)}") from None
+    value = option.typed(text)
+    if value is None:
+        raise ValueError(f"'{text}' is no number. {possible(option)}")
     # snap() also rounds floats, which is no reason to refuse what was typed.
     whole = option.type not in ("int", "bool") or value == round(value)
-    if value != value or not option.accepts(value) or not whole:
-        raise ValueError(f"{text} is not acceptable. {acceptable(option)}")
+    if not option.accepts(value) or not whole:
+        raise ValueError(f"{text} is not acceptable. {possible(option)}")
     return value
 
 
-def acceptable(option: Variable) -> str:
-    """The acceptable values of an option in words."""
+def possible(option: Variable) -> str:
+    """What may be typed for an option, in a sentence."""
     if option.labels:
-        return "Possible are " + ", ".join(f"{code:g} ({label})" for code, label in option.labels) + "."
+        return f"Possible are {option.acceptable}."
     if option.type == "bool":
         return "Possible are true and false."
     kind = "whole numbers" if option.type == "int" else "numbers"
-    if option.range is None:
-        return f"Possible are {kind}."
-    unit = f" {option.unit}" if option.unit else ""
-    return f"Possible are {kind} from {option.range[0]:g} to {option.range[1]:g}{unit}."
+    return f"Possible are {kind}." if option.range is None else f"Possible are {kind} from {option.acceptable}."

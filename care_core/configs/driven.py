@@ -17,9 +17,6 @@ SIMULATOR_PREFIX = "SIM_"
 SEVEN_DIGITS = 1e-6
 """Vehicles hold parameters in 32 bits (24 of mantissa: 6e-8 of a value), files and reports in seven digits (5e-7)."""
 
-_TRUE = frozenset({"true", "yes", "on"})
-_FALSE = frozenset({"false", "no", "off"})
-
 
 def same_value(a: float | str | None, b: float | str | None) -> bool:
     """The one answer to "the same parameter value": equal as far as a vehicle or a file holds it, `true` is 1."""
@@ -87,9 +84,10 @@ def remark(history: Sequence[Setting], *, source: bool = False) -> str:
 def option_value(option: Variable, setting: Setting) -> float | None:
     """The setting as the number that the option uses (bool: 0 or 1, enum: its code), None when it is no such value."""
     value = setting.value
-    if isinstance(value, str):
-        return _number(option, value.strip())
-    return _unscaled(option, float(value)) if math.isfinite(value) else None
+    if isinstance(value, str) and (code := option.code_of(value)) is not None:
+        return code
+    number = _as_number(value)
+    return None if number is None or not math.isfinite(number) else _unscaled(option, number)
 
 
 def parameter_value(option: Variable, value: float) -> float:
@@ -99,21 +97,6 @@ def parameter_value(option: Variable, value: float) -> float:
 
 def _unscaled(option: Variable, value: float) -> float:
     return value if option.scale == 1.0 else float(f"{value / option.scale:.7g}")
-
-
-def _number(option: Variable, text: str) -> float | None:
-    for code, label in option.labels:
-        if text.casefold() == label.casefold():
-            return code
-    if text.casefold() in _TRUE:
-        return 1.0
-    if text.casefold() in _FALSE:
-        return 0.0
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return _unscaled(option, value) if math.isfinite(value) else None
 
 
 def option_setting(option: Variable, settings: Mapping[str, Setting]) -> Setting | None:

@@ -84,7 +84,7 @@ class Question:
         option = self.schema.variables[name]
         found = []
         if not option.accepts(value):
-            found.append(f"outside the acceptable values ({acceptable(option)})")
+            found.append(f"outside the acceptable values ({option.acceptable})")
         if not self.world.model.supports(name, value):
             summary = self.world.model.summaries[name]
             found.append(f"outside the training runs ({summary.low:g} to {summary.high:g}): a guess")
@@ -93,13 +93,6 @@ class Question:
         if name not in self.run.config:
             found.append("the log does not hold its value; it is taken to be at its reference")
         return (*found, *change_notes(option))
-
-
-def acceptable(option: Variable) -> str:
-    """The option's acceptable values in words."""
-    if option.labels:
-        return ", ".join(f"{code:g} ({label})" for code, label in option.labels)
-    return "any" if option.range is None else f"{option.range[0]:g} to {option.range[1]:g} {option.unit}".rstrip()
 
 
 def question(judged: Judged, profile: Profile, choice: ProfileChoice) -> Question:
@@ -127,7 +120,7 @@ def parse_change(text: str, schema: Schema) -> tuple[str, float]:
     if number is None:
         raise UsageError(
             f"'{text}' sets no value.",
-            hint=f"Write {option.name}=VALUE; acceptable are {acceptable(option)}.",
+            hint=f"Write {option.name}=VALUE; acceptable are {option.acceptable}.",
             where="--set",
         )
     return option.name, number

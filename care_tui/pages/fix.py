@@ -9,7 +9,7 @@ from textual.content import Content
 from care_core.application.case import changes_of, fixes
 from care_core.text import clean
 from care_core.variables import Variable
-from care_tui.basket import acceptable, nudged, parsed
+from care_tui.basket import nudged, parsed, possible
 from care_tui.pages.page import View
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.fix import no_fix_rows, option_item, option_rows, outcome_rows
@@ -154,7 +154,7 @@ class FixPage(DiagnosisPage):
             return ""
 
         value = self.session.basket.values.get(option.name, current)
-        prompt = Prompt(f"What if {clean(option.name)} were", f"{value:g}", acceptable(option), check)
+        prompt = Prompt(f"What if {clean(option.name)} were", f"{value:g}", possible(option), check)
         self.screen.app.push_screen(prompt, lambda typed: self._typed(option, current, typed))
 
     def _typed(self, option: Variable, current: float, typed: str | None) -> None:

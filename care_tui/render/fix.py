@@ -9,7 +9,7 @@ from textual.content import Content
 from care_core.diagnose.records import Diagnosis, Fix, ObjectiveResult, Prediction
 from care_core.text import clean
 from care_core.variables import Variable
-from care_tui.basket import acceptable
+from care_tui.basket import possible
 from care_tui.render.rows import (
     Glyphs,
     Row,
@@ -58,7 +58,7 @@ def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs
 def option_rows(option: Variable, notes: Sequence[str], glyphs: Glyphs) -> list[Row]:
     """What an operator has to know about the option under the cursor."""
     head = Content.assemble(text(option.name, "bold"), "  ", text(option.doc or "the profile says nothing about it"))
-    rows = [Row(head, 2), Row(text(f"  {acceptable(option)}"), 2)]
+    rows = [Row(head, 2), Row(text(f"  {possible(option)}"), 2)]
     if option.parameters and option.parameters != (option.name,):
         rows.append(Row(text(f"  sets {', '.join(option.parameters)}"), 4))
     return rows + [warning("Caveat", note) for note in notes]

@@ -150,7 +150,8 @@ def test_clipping() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rate_hz", "metres"), [(rate_hz, 25.0) for rate_hz in RATES] + [(rate_hz, 9.0) for rate_hz in RATES if rate_hz >= 1]
+    ("rate_hz", "metres"),
+    [(rate_hz, 25.0) for rate_hz in RATES] + [(rate_hz, 9.0) for rate_hz in RATES if rate_hz >= 1],
 )
 def test_a_gps_jump(rate_hz: float, metres: float) -> None:
     made = Made(rate_hz)
