@@ -16,7 +16,8 @@ import care_core.extract.asked
 import care_core.extract.battery
 import care_core.extract.nav2
 import care_core.extract.navigation
-import care_core.extract.px4  # noqa: F401
+import care_core.extract.px4
+import care_core.extract.recording  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs

@@ -12,12 +12,10 @@ from scipy.stats import rankdata
 
 from care_core.errors import LearningError, nearest
 from care_core.profile.schema import Schema
+from care_core.tables.readiness import MIN_RUNS
 from care_core.variables import Role, Variable
 
 FloatArray = NDArray[np.float64]
-
-MIN_RUNS = 30
-"""Below this, Fisher's z at the default alpha sees only correlations above 0.5."""
 FORMATS = (".csv", ".parquet")
 CONDITIONS, STARTED = "conditions", "log_start"
 """What runs of one site and day share (any value); when the log of a run began."""

@@ -92,9 +92,10 @@ def _arguments(args: Mapping[str, str]) -> Iterator[str]:
 
 
 def _channels(head: str, needs: Wanted) -> Iterator[str]:
-    yield ""
-    yield f"{head}:"
-    yield ""
+    if needs:
+        yield ""
+        yield f"{head}:"
+        yield ""
     yield from (f"- `{channel}`: {', '.join(f'`{field}`' for field in fields)}" for channel, fields in needs.items())
 
 

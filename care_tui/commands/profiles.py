@@ -1,4 +1,4 @@
-"""`care profiles`: what is installed, and whether it is sound."""
+"""`care profiles`: what is installed, whether it is sound, and a first one for a robot that none is known of."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from care_core.errors import ExitCode
-from care_tui.console import emit, say
+from care_core.errors import ExitCode, UsageError
+from care_tui.console import Progress, emit, say
 
 if TYPE_CHECKING:
     from care_core.profile.schema import Schema
@@ -107,26 +107,81 @@ def _described(variable: Variable) -> str:
     return "  ".join(facts)
 
 
+@app.command("new")
+def new(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs of one robot, or folders of them.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The folder of the new profile; its name is the profile's.")],
+    force: Annotated[bool, typer.Option("--force", help="Write over the profile.yaml that is there.")] = False,
+) -> None:
+    """Write a first profile from logs. What is set, measured and could be judged, with a comment on each.
+
+    Ends with 0 written, 3 written though some logs could not be read, 4 none could be read.
+    """
+    from care_core.application.scaffolding import check_new, new_profile, summary
+    from care_core.logs.finding import find_logs
+
+    check_new(out, force=force)
+    with Progress() as progress:
+        made, failed = new_profile(find_logs(logs), out, force=force, progress=progress)
+    for path, reason in failed.items():
+        say(f"  {path}  {reason}")
+    emit(summary(made, out))
+    raise typer.Exit(ExitCode.NOT_EVALUATED if failed else ExitCode.OK)
+
+
 @app.command("check")
-def check(name: Annotated[str | None, typer.Argument(metavar="[PROFILE]")] = None) -> None:
-    """Check that profiles are sound. What can be recomputed from their files is."""
-    from care_core.application.training import relearned_problems
+def check(
+    name: Annotated[str | None, typer.Argument(metavar="[PROFILE]")] = None,
+    runs: Annotated[
+        Path | None, typer.Option("--runs", metavar="TABLE", help="Say what these runs lack to train the profile.")
+    ] = None,
+) -> None:
+    """Check that profiles are sound. What can be recomputed from their files is.
+
+    Of a profile that is not trained yet, what its runs lack.
+    """
+    from care_core.application.scaffolding import is_trained
     from care_core.extract.read import reading_plan
-    from care_core.profile.check import problems
     from care_core.profile.store import available_profiles, load_profile
 
+    if runs is not None and name is None:
+        raise UsageError("Runs are of one profile.", hint="Name it before --runs.", where="--runs")
     paths: list[Path] | list[str] = available_profiles() if name is None else [name]
     unsound = False
     for path in paths:
         profile = load_profile(path)
         if profile.schema.logs:
             reading_plan(profile.schema)
-        relearned = relearned_problems(profile)
-        found = (*problems(profile), *(relearned or ()))
-        unsound = unsound or bool(found)
-        rest = "; identification and model card not recomputed (needs the extra 'learn')" if relearned is None else ""
-        counts = f"{len(profile.schema.variables)} variables, {len(profile.model.edges)} edges"
-        emit(f"{profile.schema.name}: {'not sound' if found else 'sound'}, {counts}{rest}\n")
-        emit("".join(f"  {sentence}\n" for sentence in found))
+        if is_trained(profile):
+            unsound = not _is_sound(profile) or unsound
+        if runs is not None or not is_trained(profile):
+            _say_ready(profile, runs)
     if unsound:
         raise typer.Exit(ExitCode.USAGE)
+
+
+def _is_sound(profile: Profile) -> bool:
+    """Say what the files of a trained profile contradict."""
+    from care_core.application.training import relearned_problems
+    from care_core.profile.check import problems
+
+    relearned = relearned_problems(profile)
+    found = (*problems(profile), *(relearned or ()))
+    rest = "; identification and model card not recomputed (needs the extra 'learn')" if relearned is None else ""
+    counts = f"{len(profile.schema.variables)} variables, {len(profile.model.edges)} edges"
+    emit(f"{profile.schema.name}: {'not sound' if found else 'sound'}, {counts}{rest}\n")
+    emit("".join(f"  {sentence}\n" for sentence in found))
+    return not found
+
+
+def _say_ready(profile: Profile, runs: Path | None) -> None:
+    """Say what is missing to train a profile."""
+    from care_core.application.scaffolding import is_trained, ready_to_train
+
+    ready = ready_to_train(profile, runs)
+    if not is_trained(profile):
+        emit(f"{profile.schema.name}: sound as written, {len(profile.schema.variables)} variables, not trained yet\n")
+    emit("".join(f"  missing to train: {sentence}\n" for sentence in ready.obstacles))
+    emit("".join(f"  poorer without: {sentence}\n" for sentence in ready.gaps))
+    if not ready.obstacles:
+        emit(f"  {ready.runs} runs are enough to train with\n")

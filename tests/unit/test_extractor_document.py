@@ -32,7 +32,7 @@ def test_every_extractor_and_mission_kind_is_documented() -> None:
 
 @pytest.mark.parametrize("kind", ["actionlib_goals", "nav2_goals"])
 def test_an_empty_log_never_gives_a_number_out_of_nothing(kind: str) -> None:
-    counts = {"goals_sent", "goals_reached", "goals_ended", "goals_success", "goals_time"}
+    counts = {"goals_sent", "goals_reached", "goals_ended", "goals_success", "goals_time", "recorded_time"}
     for name, extractor in EXTRACTORS.items():
         if not extractor.parts or name in counts:
             continue

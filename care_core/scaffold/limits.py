@@ -1,0 +1,67 @@
+"""Thresholds of a first profile: from the good runs among the logs, else as ratios that hold for any mission."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from care_core.health.examine import examine
+from care_core.scaffold.measures import Measure, Measures
+from care_core.variables import RelativeThreshold, Role, Threshold, Variable
+
+RATIO = 1.3
+"""What the bundled profiles allow over what the reference configuration needs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A bound, and where it comes from. None: the objective brings its own."""
+
+    bound: Threshold | RelativeThreshold
+    remark: str
+
+
+def good_runs(measures: Measures) -> tuple[int, ...]:
+    """Places of the runs that met every functional objective, in logs without a critical finding."""
+    functional = [one for one in measures.of(Role.OBJECTIVE) if one.variable.kind == "functional"]
+    critical = {
+        id(seen): any(finding.severity == "critical" for finding in examine(seen.log).findings)
+        for seen in {id(seen): seen for seen, _ in measures.runs}.values()
+    }
+    return tuple(
+        place
+        for place, (seen, run) in enumerate(measures.runs)
+        if run.mission.ended and not critical[id(seen)] and all(_met(one, place) for one in functional)
+    )
+
+
+def _met(objective: Measure, place: int) -> bool:
+    value, bound = objective.values[place], objective.variable.threshold
+    return value is not None and bound is not None and bound.met(value)
+
+
+def limits(objectives: Sequence[Measure], good: Sequence[int], *, alike: bool) -> Mapping[str, Limit]:
+    """A limit for each objective. Absolute ones belong to a mission, so they are given only where all logs hold one.
+
+    Args:
+        good: places of the good runs.
+        alike: whether the logs hold the same mission.
+    """
+    return {one.variable.name: _limit(one, good, alike=alike) for one in objectives}
+
+
+def _limit(objective: Measure, good: Sequence[int], *, alike: bool) -> Limit:
+    variable = objective.variable
+    if variable.kind == "functional" and variable.threshold is not None:
+        return Limit(variable.threshold, "met or not met")
+    seen = [value for place in good if (value := objective.values[place]) is not None]
+    if alike and seen and min(seen) > 0:
+        worst = max(seen)
+        said = f"{RATIO:g} x the largest of {len(seen)} good runs ({min(seen):.4g} to {worst:.4g})"
+        return Limit(Threshold("<=", float(f"{RATIO * worst:.3g}")), said)
+    why = "nothing says that the logs hold the same mission" if seen else "no run was good"
+    return Limit(_ratio(variable), f"a ratio: {why}")
+
+
+def _ratio(variable: Variable) -> RelativeThreshold:
+    return variable.relative or RelativeThreshold("<=", RATIO)

@@ -1,0 +1,119 @@
+"""How missions are found in a robot's logs: the section `mission` of its profile, from what was recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from care_core.extract.drive import GOAL_TIMEOUT_S, TOLERANCE_M, Leg, Status, analyse
+from care_core.extract.registry import MISSION_KINDS
+from care_core.logs.telemetry import as_dataflash
+from care_core.profile.schema import Schema
+from care_core.scaffold.seen import Seen
+from care_core.vehicles import vehicle_of
+
+_ARMED = {"channel": "vehicle_status", "field": "arming_state", "value": 2}
+"""ARMING_STATE_ARMED of PX4's vehicle_status."""
+_TYPES = {"odometry": ("Odometry",), "commands": ("Twist", "TwistStamped"), "battery": ("BatteryState",)}
+_USUAL = {"odometry": "/odom", "commands": "/cmd_vel", "battery": "/battery_state"}
+_FLYING = ("copter", "heli", "plane", "quadplane", "unknown")
+_SLACK = 2.0
+"""A goal may take this times the longest that was reached."""
+
+
+@dataclass(frozen=True, slots=True)
+class Missions:
+    """The section, with what is said of its keys, and whether all logs hold the same mission."""
+
+    spec: Mapping[str, Any]
+    remarks: Mapping[str, str]
+    alike: bool
+
+
+def find_missions(logs: Sequence[Seen], bundled: Sequence[Schema]) -> Missions:
+    """The mission section that fits these logs best; the whole recording where they tell of no mission.
+
+    Args:
+        bundled: profiles that read such logs; one for the same kind of vehicle says how its missions are found.
+    """
+    first = logs[0]
+    if first.ecosystem == "px4":
+        whole = "armed to disarmed; no kind of mission for PX4 knows its waypoints"
+        return Missions({"kind": "recording", **_ARMED}, {"kind": whole}, False)
+    if first.ecosystem == "ardupilot":
+        kind = _vehicle_kind(first, bundled)
+        if kind and any(_found(log, {"kind": kind}) for log in logs):
+            return Missions({"kind": kind}, {"kind": "arming to disarming"}, False)
+        return _whole("no log holds a mission from arming to disarming that is known how to judge")
+    spec, remarks = _goals(logs)
+    if not spec:
+        return _whole("no goals of move_base or Nav2 are in the logs")
+    legs = _legs(logs, spec)
+    if not any(legs):
+        return _whole(f"the topics of {spec['kind']} hold no goal")
+    return _with_goals(spec, remarks, legs)
+
+
+def _whole(why: str) -> Missions:
+    return Missions({"kind": "recording"}, {"kind": f"the whole recording is the mission: {why}"}, False)
+
+
+def _vehicle_kind(first: Seen, bundled: Sequence[Schema]) -> str:
+    """The mission kind of an ArduPilot vehicle: that of a profile for its like, a flight for what flies, else none."""
+    vehicle = vehicle_of(first.log.facts, first.settings).kind
+    own = (str(one.mission.get("kind", "")) for one in bundled if one.match.get("vehicle") == vehicle)
+    return next(own, "ardupilot_flight" if vehicle in _FLYING else "")
+
+
+def _found(seen: Seen, spec: Mapping[str, Any]) -> tuple[Any, ...]:
+    kind = MISSION_KINDS[str(spec["kind"])]
+    return kind.missions(as_dataflash(seen.log).read(kind.needs(spec)), seen.log.duration_s, spec)
+
+
+def _goals(logs: Sequence[Seen]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Kind, action and topics of a robot that drives to goals; nothing where the logs name no goal server."""
+    types = {name: kind for log in logs for name, kind in log.channels.items()}
+    spec: dict[str, Any] = {}
+    ros1 = sorted(name for name, kind in types.items() if kind.endswith("MoveBaseActionGoal"))
+    nav2 = sorted(name for name in types if name.endswith("/_action/status") and "/navigate" in name)
+    if ros1:
+        spec = {"kind": "actionlib_goals", "action": ros1[0].rpartition("/")[0]}
+    elif nav2:
+        spec = {"kind": "nav2_goals", "action": [name.removesuffix("/_action/status") for name in nav2]}
+    else:
+        return {}, {}
+    remarks = {}
+    for part, kinds in _TYPES.items():
+        topics = [name for name, kind in types.items() if kind.rpartition("/")[2] in kinds]
+        if topics and _USUAL[part] not in topics:
+            spec[part] = min(topics, key=lambda name: (len(name), name))
+            others = ", ".join(sorted(set(topics) - {spec[part]}))
+            remarks[part] = f"not {others}" if others else "the only one of its type"
+    return spec, remarks
+
+
+def _legs(logs: Sequence[Seen], spec: Mapping[str, Any]) -> list[tuple[Leg, ...]]:
+    """The goals of every mission."""
+    return [mission.shared(analyse).legs for log in logs for mission in _found(log, spec)]
+
+
+def _with_goals(spec: dict[str, Any], remarks: dict[str, str], legs: Sequence[tuple[Leg, ...]]) -> Missions:
+    longest = max(legs, key=len)
+    placed = all(math.isfinite(leg.x) for leg in longest)
+    alike = placed and all(
+        leg.offset(other.x, other.y) <= TOLERANCE_M
+        for mission in legs
+        for leg, other in zip(mission, longest, strict=False)
+    )
+    if alike:
+        spec["goals"] = [[round(leg.x, 3), round(leg.y, 3)] for leg in longest]
+        remarks["goals"] = f"the same in all {len(legs)} missions; limits belong to them"
+    reached = [leg.time_s for mission in legs for leg in mission if leg.status == Status.SUCCEEDED]
+    patience = max(GOAL_TIMEOUT_S, math.ceil(_SLACK * max(reached, default=0.0)))
+    spec["goal_timeout_s"] = patience
+    spec["tolerance_m"] = TOLERANCE_M
+    slowest = f"the slowest that was reached took {max(reached):.0f} s" if reached else "no goal was reached"
+    remarks["goal_timeout_s"] = f"{slowest}; a goal reached later counts as missed"
+    return Missions(spec, remarks, alike)

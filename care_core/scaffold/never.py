@@ -1,0 +1,81 @@
+"""Parameters that are no options, and why: data, by shell patterns.
+
+Beside these stand the parameters that a vehicle writes itself (`vehicles.self_written`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from fnmatch import translate
+
+from care_core.configs.driven import SIMULATOR_PREFIX
+from care_core.scaffold.seen import Ecosystem
+from care_core.vehicles.self_written import SELF_WRITTEN
+
+_WIRING = "wiring, radio, logging and what is fitted"
+_CODES = "codes and bit masks whose meaning is not known here"
+_SIMULATOR = {"the simulated world": (f"{SIMULATOR_PREFIX}*", "SIH_*")}
+_ROBOT = "what the robot and its map are"
+
+NEVER: Mapping[Ecosystem, Mapping[str, tuple[str, ...]]] = {
+    "ardupilot": {
+        **_SIMULATOR,
+        **SELF_WRITTEN,
+        _WIRING: (
+            "SERIAL*", "SR[0-9]*_*", "FRAME", "LED_*", "SYSID_*", "MAV_*", "MAV[0-9]*_*", "BRD_*", "CAN_*", "LOG_*",
+            "NTF_*", "OSD*", "MSP_*", "RCMAP_*", "RC[0-9]*_*", "RC_*", "SERVO*", "RELAY*", "RPM*", "SCHED_*",
+            "ADSB_*", "VTX_*", "SCR_*", "DDS_*", "NET_*", "FRAME_*", "CAM*", "MNT*", "EAHRS*", "FLOW_*", "VISO_*",
+            "BATT*_MONITOR", "BATT*_PIN", "BATT*_CAPACITY", "BATT*_AMP_*", "BATT*_VOLT_MULT", "BATT*_VOLT_PIN",
+            "BATT*_CURR_PIN", "GPS*_POS*", "INS_POS*", "AHRS_ORIENTATION", "COMPASS_*", "GND_*", "BARO*",
+            "TERRAIN_*", "MIS_*", "FLTMODE*", "MODE*", "INITIAL_MODE", "ARMING_*", "DEV_*", "FORMAT_VERSION",
+            "STICK_MIXING", "GCS_*", "TELEM_*", "FFT_*",
+        ),
+        _CODES: (
+            "*_TYPE", "*_TYPE[0-9]", "*_ENABLE", "*_ENABLED", "*_ENAB", "*_OPTIONS", "*_OPT", "*_ACTION", "*_MASK",
+            "*_BITMASK", "*_ADDR", "*_BUS", "*_ORIENT*", "*_ID", "*_PIN*", "*_USE", "*_CHANNEL", "*_CHAN", "*_SRC",
+            "*_SRC[0-9]*",
+        ),
+    },
+    "px4": {
+        **_SIMULATOR,
+        **SELF_WRITTEN,
+        _WIRING: (
+            "SYS_*", "SER_*", "MAV_*", "SDLOG_*", "CA_*", "PWM_*", "UAVCAN_*", "CBRK_*", "RC*", "SENS_*",
+            "BAT*_N_CELLS", "BAT*_CAPACITY", "BAT*_SOURCE", "BAT*_V_*", "BAT*_A_*", "BAT*_I_*", "EKF2_*_POS_*",
+            "COM_FLTMODE*", "TRIG_*", "CAM_*", "MNT_*", "GPS_*", "DSHOT_*", "UXRCE_*", "IMU_GYRO_CAL*", "SYSTEM*",
+            "HIL_*", "OSD_*",
+        ),
+        _CODES: (
+            "*_EN", "*_EN_*", "*_TYPE", "*_ID", "*_CTRL", "*_MASK", "*_CFG", "*_SEL", "*_MODE", "*_REF", "*_ACT",
+            "MAN_ARM_*",
+        ),
+    },
+    "ros1": {_ROBOT: ("width", "height", "origin_*", "robot_radius", "footprint", "use_sim_time", "restore_defaults")},
+    "ros2": {
+        _ROBOT: ("width", "height", "origin_*", "robot_radius", "footprint", "use_sim_time", "robot_base*"),
+        "how its messages are sent": ("qos_overrides.*", "bond_*", "service_introspection*", "start_type_description*"),
+    },
+}  # fmt: skip
+"""Reason -> names: of a vehicle's parameter the whole name, of a node's what follows the node."""
+
+SAFETY = re.compile(
+    "|".join(map(translate, ("FS_*", "FENCE_*", "BATT*_LOW_*", "BATT*_CRT_*", "BAT*_THR", "COM_LOW_BAT_*", "GF_*",
+                             "COM_*_LOSS_*", "NAV_*LOSS*", "LOW_VOLT")))
+)  # fmt: skip
+"""Failsafes and fences: no fix may loosen them."""
+
+
+def reason_against(ecosystem: Ecosystem, parameter: str) -> str:
+    """Why a parameter is no option; '' where nothing speaks against it."""
+    name = parameter
+    if ecosystem == "ros1":
+        name = parameter.rpartition("/")[2]
+    elif ecosystem == "ros2":
+        node, dot, own = parameter.partition(".")
+        name = own if dot else node
+    spellings = {name, name.rpartition(".")[2]}
+    for reason, patterns in NEVER[ecosystem].items():
+        if any(re.fullmatch(translate(pattern), one) for pattern in patterns for one in spellings):
+            return reason
+    return ""

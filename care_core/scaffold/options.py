@@ -1,0 +1,263 @@
+"""Which parameters become options: those that somebody sets, with type, range and reference, each with its source."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from care_core.configs.driven import same_value
+from care_core.run import Setting
+from care_core.scaffold.facts import Fact, fact_of
+from care_core.scaffold.never import SAFETY, reason_against
+from care_core.scaffold.seen import Ecosystem, Seen
+from care_core.variables import Role, ValueType, Variable
+
+_SPREAD = 2.0
+"""Where nothing says what is acceptable: half to double of what was driven, for people to correct."""
+_SAMPLED = 5
+"""So many different values were chosen to cover a range: it is the one that counts."""
+_WHOLE = 20.0
+"""Vehicles log every parameter as a float. One that is whole and as large as this loses nothing by being an integer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """A variable, and where what is said of it comes from."""
+
+    variable: Variable
+    remark: str
+
+
+@dataclass(slots=True)
+class Options:
+    """What became an option, and the parameters that did not, by reason."""
+
+    chosen: list[Option] = field(default_factory=list)
+    left: dict[str, list[str]] = field(default_factory=dict)
+
+    def leave(self, parameter: str, reason: str) -> None:
+        self.left.setdefault(reason, []).append(parameter)
+
+
+@dataclass(frozen=True, slots=True)
+class _Driven:
+    """A parameter over all logs that hold it: every setting, and the value at the end of each log."""
+
+    name: str
+    settings: tuple[Setting, ...]
+    last: tuple[float | str, ...]
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The different numbers it had, the smallest first."""
+        found: list[float] = []
+        for setting in self.settings:
+            value = number(setting.value)
+            if value is not None and not any(same_value(value, known) for known in found):
+                found.append(value)
+        return tuple(sorted(found))
+
+    @property
+    def usual(self) -> float:
+        """The value that most logs end with."""
+        return Counter(value for value in map(number, self.last) if value is not None).most_common(1)[0][0]
+
+    @property
+    def default(self) -> float | None:
+        """What the source of the log calls its default."""
+        found = (number(setting.default) for setting in self.settings if setting.default is not None)
+        return next((value for value in found if value is not None), None)
+
+
+def number(value: float | str | None) -> float | None:
+    """A parameter's value as an option counts it (true: 1), to the seven digits that vehicles hold; None for text."""
+    if isinstance(value, str):
+        return {"true": 1.0, "false": 0.0}.get(value.strip().casefold())
+    return float(f"{value:.7g}") if value is not None and math.isfinite(value) else None
+
+
+def find_options(logs: Sequence[Seen], known: Mapping[str, Variable], taken: Iterable[str]) -> Options:
+    """The options of these logs.
+
+    Args:
+        known: options of the profiles that came with the program, by parameter.
+        taken: names that other variables of the profile have.
+    """
+    ecosystem = logs[0].ecosystem
+    found = Options()
+    chosen: list[tuple[_Driven, Fact | None]] = []
+    for driven in _all_driven(logs):
+        fact = fact_of(ecosystem, driven.name) if ecosystem in ("ros1", "ros2") else None
+        reason = _against(ecosystem, driven, len(logs), fact, known)
+        if reason:
+            found.leave(driven.name, reason)
+        else:
+            chosen.append((driven, fact))
+    names = _short_names([driven.name for driven, _ in chosen], known, set(taken))
+    for driven, fact in chosen:
+        option = _option(names[driven.name], driven, ecosystem, fact, known.get(driven.name))
+        if option is None:
+            found.leave(driven.name, "they are 0 and nothing says how large they may be")
+        else:
+            found.chosen.append(option)
+    return found
+
+
+def _all_driven(logs: Sequence[Seen]) -> list[_Driven]:
+    histories: dict[str, list[tuple[Setting, ...]]] = {}
+    for log in logs:
+        for name, history in log.settings.items():
+            histories.setdefault(name, []).append(history)
+    return [
+        _Driven(name, tuple(one for history in several for one in history), tuple(h[-1].value for h in several))
+        for name, several in sorted(histories.items())
+    ]
+
+
+def _against(ecosystem: Ecosystem, driven: _Driven, logs: int, fact: Fact | None, known: Mapping[str, Variable]) -> str:
+    """Why a parameter is no option; '' for one that is."""
+    reason = reason_against(ecosystem, driven.name)
+    if reason:
+        return reason
+    if any(number(value) is None for value in driven.last):
+        return "their value is a text, a list or no number"
+    if len(driven.last) < logs:
+        return f"not every log holds them (an option needs a value in all {logs})"
+    default = driven.default if fact is None or driven.default is not None else fact.default
+    is_new = len(driven.values) == 1 and driven.name not in known
+    if is_new and default is None and ecosystem in ("ardupilot", "px4"):
+        return "they never changed, and no log says their default"
+    is_set = len(driven.values) > 1 or default is None or not same_value(driven.usual, default)
+    return "" if is_set or driven.name in known else "at their default in every log"
+
+
+def _short_names(parameters: Sequence[str], known: Mapping[str, Variable], taken: set[str]) -> dict[str, str]:
+    """A name each: the one that a bundled profile has for it, else as many of its last parts as tell it apart."""
+    names: dict[str, str] = {}
+    for parameter in parameters:
+        if parameter in known and known[parameter].name not in {*taken, *names.values()}:
+            names[parameter] = known[parameter].name
+    for parameter in parameters:
+        parts = [re.sub(r"\W", "_", part) for part in re.split(r"[/.]", parameter) if part] or ["parameter"]
+        used = {*taken, *names.values()}
+        others = [other for other in parameters if other != parameter]
+        for count in range(1, len(parts) + 1):
+            name = "_".join(parts[-count:])
+            is_own = not any(_ends_alike(other, parts[-count:]) for other in others)
+            if parameter not in names and name not in used and (is_own or count == len(parts)):
+                names[parameter] = name
+        names.setdefault(parameter, f"{'_'.join(parts)}_{len(names)}")
+    return names
+
+
+def _ends_alike(other: str, parts: Sequence[str]) -> bool:
+    own = [re.sub(r"\W", "_", part) for part in re.split(r"[/.]", other) if part]
+    return own[-len(parts) :] == list(parts)
+
+
+def _option(
+    name: str, driven: _Driven, ecosystem: Ecosystem, fact: Fact | None, known: Variable | None
+) -> Option | None:
+    kind, labels, type_from = _type(driven, ecosystem, fact, known)
+    reference, reference_from = _reference(driven, ecosystem)
+    bounds = (0.0, 1.0), "yes or no"
+    if kind == "enum":
+        bounds = (min(code for code, _ in labels), max(code for code, _ in labels)), type_from
+    elif kind != "bool":
+        found = _range(driven, reference, kind, fact, known)
+        if found is None:
+            return None
+        bounds = found
+    (low, high), range_from = bounds
+    low, high = min(float(f"{low:.4g}"), reference), max(float(f"{high:.4g}"), reference)
+    variable = Variable(
+        name,
+        Role.OPTION,
+        kind,
+        unit="" if known is None else known.unit,
+        doc="" if known is None else known.doc,
+        range=(low, high),
+        default=reference,
+        labels=labels,
+        parameters=(driven.name,),
+        safety=SAFETY.match(driven.name) is not None,
+    )
+    said = [f"range: {range_from}", f"default: {reference_from}", f"type: {type_from}", _driven_as(driven)]
+    return Option(variable, "; ".join(part for part in said if part))
+
+
+def _driven_as(driven: _Driven) -> str:
+    values = driven.values
+    if len(values) == 1:
+        return f"driven as {values[0]:g} only"
+    shown = ", ".join(f"{value:g}" for value in values) if len(values) <= _SAMPLED else f"{len(values)} values"
+    return f"driven as {shown}"
+
+
+def _type(
+    driven: _Driven, ecosystem: Ecosystem, fact: Fact | None, known: Variable | None
+) -> tuple[ValueType, tuple[tuple[float, str], ...], str]:
+    if known is not None and (not known.labels or set(driven.values) <= {code for code, _ in known.labels}):
+        return known.type, known.labels, "bundled profile"
+    if fact is not None and fact.values and set(driven.values) <= {code for code, _ in fact.values}:
+        return "enum", fact.values, "bundled table"
+    if any(isinstance(value, str) for value in driven.last):
+        return "bool", (), "log"
+    if ecosystem in ("ros1", "ros2"):
+        return ("int" if all(isinstance(value, int) for value in driven.last) else "float"), (), "log"
+    everything = (*driven.values, *([] if driven.default is None else [driven.default]))
+    is_whole = all(value.is_integer() for value in everything) and max(map(abs, everything)) >= _WHOLE
+    return ("int" if is_whole else "float"), (), "its values"
+
+
+def _reference(driven: _Driven, ecosystem: Ecosystem) -> tuple[float, str]:
+    """The configuration to judge against: the firmware's; for ROS, whose defaults drive no robot, the usual one."""
+    default = driven.default
+    if ecosystem in ("ardupilot", "px4") and default is not None:
+        return default, "firmware default (log)"
+    own = "" if default is None or same_value(default, driven.usual) else f" (the node's own is {default:g})"
+    return driven.usual, f"as driven in most logs{own}"
+
+
+def _range(
+    driven: _Driven, reference: float, kind: ValueType, fact: Fact | None, known: Variable | None
+) -> tuple[tuple[float, float], str] | None:
+    """Acceptable values and what says so; None where nothing does. Holds the reference and all that was driven."""
+    values = (*driven.values, reference)
+    low, high = min(values), max(values)
+    if known is not None and known.range is not None:
+        return (min(low, known.range[0]), max(high, known.range[1])), "bundled profile, and what was driven"
+    if len(driven.values) >= _SAMPLED:
+        return (low, high), f"log, {len(driven.values)} values driven"
+    bounds, bounds_from = _bounds(driven, fact)
+    if low == high == 0:
+        return None if None in bounds else ((float(bounds[0] or 0), float(bounds[1] or 0)), bounds_from)
+    wide = low / _SPREAD if low >= 0 else low * _SPREAD, high * _SPREAD if high >= 0 else high / _SPREAD
+    held = (
+        wide[0] if bounds[0] is None else min(max(wide[0], bounds[0]), low),
+        wide[1] if bounds[1] is None else max(min(wide[1], bounds[1]), high),
+    )
+    if kind == "int":
+        held = float(math.floor(held[0])), float(math.ceil(held[1]))
+    if held[0] >= held[1]:
+        return None
+    said = "a guess, half to double of what was driven"
+    return held, f"{said}, within {bounds_from}" if bounds_from else said
+
+
+def _bounds(driven: _Driven, fact: Fact | None) -> tuple[tuple[float | None, float | None], str]:
+    """The least and the largest value that the log, else the bundled table, allows."""
+    low = next((one.low for one in driven.settings if one.low is not None), None)
+    high = next((one.high for one in driven.settings if one.high is not None), None)
+    if low is not None or high is not None:
+        return (low, high), f"{_shown(low)} to {_shown(high)} (log)"
+    if fact is not None and (fact.low is not None or fact.high is not None):
+        return (fact.low, fact.high), f"{_shown(fact.low)} to {_shown(fact.high)} (bundled table)"
+    return (None, None), ""
+
+
+def _shown(bound: float | None) -> str:
+    return "any" if bound is None else f"{bound:g}"

@@ -1,0 +1,89 @@
+"""A profile as text, with a comment on everything that its writer should look at."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from care_core.text import clean
+from care_core.variables import RelativeThreshold, Threshold, Variable
+
+WIDTH = 120
+_PLAIN = re.compile(r"[A-Za-z_/][\w./ ()-]*[\w)]|[A-Za-z]")
+_WORDS = frozenset({"true", "false", "yes", "no", "on", "off", "null", "y", "n", "none"})
+
+
+def scalar(value: object) -> str:
+    """A value as YAML: lists and mappings on one line, text quoted where it could be read as anything else."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float)):
+        return f"{value:.7g}"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{scalar(key)}: {scalar(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(scalar, value)) + "]"
+    text = clean(str(value))
+    if _PLAIN.fullmatch(text) and text.casefold() not in _WORDS:
+        return text
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def comment(text: str, indent: int = 0) -> list[str]:
+    """The text as comment lines of at most `WIDTH` columns."""
+    head = f"{' ' * indent}# "
+    return textwrap.wrap(clean(text), WIDTH, initial_indent=head, subsequent_indent=head, break_on_hyphens=False)
+
+
+def listed(names: Sequence[str], most: int = 60) -> str:
+    """Names in a sentence; of very many the first."""
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+def variable_lines(variable: Variable, remark: str = "") -> Iterator[str]:
+    """An entry of `variables`, its remark above it."""
+    yield from comment(remark, 2) if remark else ()
+    yield f"  {scalar(variable.name)}:"
+    for key, value in _entry(variable):
+        yield f"    {key}: {scalar(value)}"
+
+
+def _entry(variable: Variable) -> Iterator[tuple[str, Any]]:
+    yield "role", variable.role.value
+    if variable.type != "float":
+        yield "type", variable.type
+    if variable.about != "world":
+        yield "about", variable.about
+    if variable.labels:
+        yield "values", dict(variable.labels)
+    if variable.unit:
+        yield "unit", variable.unit
+    if variable.range is not None:
+        yield "range", list(variable.range)
+    if variable.default is not None:
+        yield "default", variable.default
+    if variable.order is not None:
+        yield "order", variable.order
+    if variable.kind is not None:
+        yield "kind", variable.kind
+    if variable.doc:
+        yield "doc", variable.doc
+    if variable.parameters:
+        yield "parameter", variable.parameters[0] if len(variable.parameters) == 1 else list(variable.parameters)
+    if variable.safety:
+        yield "safety", True
+    bound = variable.threshold or variable.relative
+    if bound is not None:
+        yield "threshold", _bound(bound)
+    if variable.extract is not None:
+        yield "extract", {"kind": variable.extract.kind, **variable.extract.args}
+
+
+def _bound(bound: Threshold | RelativeThreshold) -> dict[str, Any]:
+    if isinstance(bound, Threshold):
+        return {"op": bound.op, "value": bound.value}
+    floor = {} if bound.at_least is None else {"at_least": bound.at_least}
+    return {"op": bound.op, "ratio": bound.ratio, **floor}
