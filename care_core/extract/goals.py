@@ -129,7 +129,7 @@ class GoalMissions(MissionKind):
         value: Value = 1.0 if reached else Unavailable(f"{word}, the others were cancelled or left open")
         if failed:
             value = 0.0
-        elif legs[-1].status is None:
+        elif legs and legs[-1].status is None:
             value = Unavailable("the log ends before the last goal was answered", "record until it is")
         return (Check("goals_reached", value, "every goal that was not taken back was reached", word),)
 

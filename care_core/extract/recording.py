@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from care_core.logs.base import Table, Wanted
 from care_core.run import Evidence, Unavailable, Value
 
 KIND = "recording"
+_WHOLE = "record the whole mission"
 STATISTICS = ("mean", "min", "max", "std", "rms", "first", "last", "change")
 
 
@@ -74,6 +76,20 @@ def _numbers(table: Table, field: str) -> NDArray[np.float64] | None:
 def recorded_time(mission: Mission, args: Args) -> Value:
     """Length of the mission as its kind bounds it."""
     return mission.end_s - mission.start_s
+
+
+@extractor("outcome", needs={}, parts=("outcome",), unit="")
+def outcome(mission: Mission, args: Args) -> Value:
+    """1 where the robot's own word is that all went well, 0 where anything did not: what its kind of mission is judged
+    by without any limit."""
+    kind = MISSION_KINDS.get(str(mission.spec.get("kind", "")))
+    answers = [check.value for check in kind.outcome(mission)] if kind is not None else []
+    if any(answer == 0 for answer in answers):
+        return 0.0
+    unknown = next((answer for answer in answers if isinstance(answer, Unavailable)), None)
+    if not answers:
+        return Unavailable("nothing in the log says how the mission came out", _WHOLE)
+    return 1.0 if unknown is None else replace(unknown, hint=unknown.hint or _WHOLE)
 
 
 @extractor(

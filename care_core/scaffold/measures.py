@@ -78,7 +78,7 @@ class Measures:
 
 def find_measures(logs: Sequence[Seen], spec: Mapping[str, Any], bundled: Sequence[Schema]) -> Measures:
     """Try on the logs what the bundled profiles of the same kind of mission measure, and signals of their channels."""
-    candidates = [*_bundled_measures(str(spec["kind"]), bundled), *_objectives_of(logs, str(spec["kind"]))]
+    candidates = [*_bundled_measures(str(spec["kind"]), bundled), *_objectives_of(str(spec["kind"]))]
     types = {name: kind for log in logs for name, kind in log.channels.items()}
     named = set(MISSION_KINDS[str(spec["kind"])].needs(spec)) if spec["kind"] != "recording" else set()
     candidates += _signals(types, named, {one.name for one in candidates})
@@ -133,15 +133,14 @@ def _is_same(a: Extract | None, b: Extract | None) -> bool:
     return a is not None and b is not None and (a.kind, dict(a.args)) == (b.kind, dict(b.args))
 
 
-def _objectives_of(logs: Sequence[Seen], kind: str) -> Iterator[Variable]:
+def _objectives_of(kind: str) -> Iterator[Variable]:
     """What any recording can be judged by, where the kind of mission brings no objectives of its own."""
-    if kind != "recording":
+    if kind not in ("recording", "px4_flight"):
         return
-    if logs[0].ecosystem == "px4":
+    if kind != "recording":
         yield Variable(
-            "no_failsafe", Role.OBJECTIVE, "bool", doc="0 where the autopilot was in a failsafe, told as failsafe 1",
-            kind="functional", threshold=Threshold("<=", 0),
-            extract=Extract("signal", {"channel": "vehicle_status", "field": "failsafe", "stat": "max"}),
+            "mission_success", Role.OBJECTIVE, "bool", doc="took off, no crash, no failsafe, landed, disarmed",
+            kind="functional", threshold=Threshold("==", 1), extract=Extract("outcome"),
         )  # fmt: skip
     yield Variable(
         "mission_time", Role.OBJECTIVE, unit="s", doc="length of the mission", kind="non-functional",

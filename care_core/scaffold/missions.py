@@ -14,8 +14,6 @@ from care_core.profile.schema import Schema
 from care_core.scaffold.seen import Seen
 from care_core.vehicles import vehicle_of
 
-_ARMED = {"channel": "vehicle_status", "field": "arming_state", "value": 2}
-"""ARMING_STATE_ARMED of PX4's vehicle_status."""
 _TYPES = {"odometry": ("Odometry",), "commands": ("Twist", "TwistStamped"), "battery": ("BatteryState",)}
 _USUAL = {"odometry": "/odom", "commands": "/cmd_vel", "battery": "/battery_state"}
 _FLYING = ("copter", "heli", "plane", "quadplane", "unknown")
@@ -39,11 +37,8 @@ def find_missions(logs: Sequence[Seen], bundled: Sequence[Schema]) -> Missions:
         bundled: profiles that read such logs; one for the same kind of vehicle says how its missions are found.
     """
     first = logs[0]
-    if first.ecosystem == "px4":
-        whole = "armed to disarmed; no kind of mission for PX4 knows its waypoints"
-        return Missions({"kind": "recording", **_ARMED}, {"kind": whole}, False)
-    if first.ecosystem == "ardupilot":
-        kind = _vehicle_kind(first, bundled)
+    if first.ecosystem in ("ardupilot", "px4"):
+        kind = "px4_flight" if first.ecosystem == "px4" else _vehicle_kind(first, bundled)
         if kind and any(_found(log, {"kind": kind}) for log in logs):
             return Missions({"kind": kind}, {"kind": "arming to disarming"}, False)
         return _whole("no log holds a mission from arming to disarming that is known how to judge")

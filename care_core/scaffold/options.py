@@ -61,9 +61,9 @@ class _Driven:
         return tuple(sorted(found))
 
     @property
-    def usual(self) -> float:
-        """The value that most logs end with."""
-        return Counter(value for value in map(number, self.last) if value is not None).most_common(1)[0][0]
+    def usual(self) -> tuple[float, int]:
+        """The value that most logs end with, of several the first, and in how many."""
+        return Counter(value for value in map(number, self.last) if value is not None).most_common(1)[0]
 
     @property
     def default(self) -> float | None:
@@ -130,7 +130,7 @@ def _against(ecosystem: Ecosystem, driven: _Driven, logs: int, fact: Fact | None
     is_new = len(driven.values) == 1 and driven.name not in known
     if is_new and default is None and ecosystem in ("ardupilot", "px4"):
         return "they never changed, and no log says their default"
-    is_set = len(driven.values) > 1 or default is None or not same_value(driven.usual, default)
+    is_set = len(driven.values) > 1 or default is None or not same_value(driven.usual[0], default)
     return "" if is_set or driven.name in known else "at their default in every log"
 
 
@@ -162,7 +162,7 @@ def _option(
     name: str, driven: _Driven, ecosystem: Ecosystem, fact: Fact | None, known: Variable | None
 ) -> Option | None:
     kind, labels, type_from = _type(driven, ecosystem, fact, known)
-    reference, reference_from = _reference(driven, ecosystem)
+    reference, reference_from = _reference(driven, ecosystem, known)
     bounds = (0.0, 1.0), "yes or no"
     if kind == "enum":
         bounds = (min(code for code, _ in labels), max(code for code, _ in labels)), type_from
@@ -213,13 +213,16 @@ def _type(
     return ("int" if is_whole else "float"), (), "its values"
 
 
-def _reference(driven: _Driven, ecosystem: Ecosystem) -> tuple[float, str]:
+def _reference(driven: _Driven, ecosystem: Ecosystem, known: Variable | None) -> tuple[float, str]:
     """The configuration to judge against: the firmware's; for ROS, whose defaults drive no robot, the usual one."""
     default = driven.default
     if ecosystem in ("ardupilot", "px4") and default is not None:
         return default, "firmware default (log)"
-    own = "" if default is None or same_value(default, driven.usual) else f" (the node's own is {default:g})"
-    return driven.usual, f"as driven in most logs{own}"
+    usual, times = driven.usual
+    if times == 1 and len(driven.last) > 1 and known is not None and known.default is not None:
+        return known.default, "bundled profile, for no two logs agree"
+    own = "" if default is None or same_value(default, usual) else f" (the node's own is {default:g})"
+    return usual, f"as driven in {times} of {len(driven.last)} logs{own}"
 
 
 def _range(

@@ -13,7 +13,7 @@ LOGS = {
     "bin": ("data/arducopter/faults/f77_007.BIN", "ardupilot_flight"),
     "text": ("logs/dataflash_text/mechanical_fail.log", "ardupilot_flight"),
     "tlog": ("logs/mavlink_tlog/copter35_mixed_v1_v2.tlog", "ardupilot_flight"),
-    "px4": ("logs/px4_ulg/px4_events.ulg", "recording"),
+    "px4": ("logs/px4_ulg/px4_events.ulg", "px4_flight"),
     "ros2": ("logs/ros2_db3/tb3_gazebo_param_events", "recording"),
     "no parameters": ("logs/ros1_bag/husky_imu_odom_gps_bz2.bag", "recording"),
 }

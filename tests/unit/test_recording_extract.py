@@ -61,6 +61,16 @@ def test_what_is_no_number_is_left_out_or_unavailable() -> None:
     assert isinstance(value({"other": T}), Unavailable)
 
 
+@pytest.mark.parametrize(("failsafe", "expected"), [(0.0, 1.0), (1.0, 0.0)])
+def test_the_outcome_is_the_word_of_the_robot(failsafe: float, expected: float) -> None:
+    status = {"arming_state": np.where((T > 0) & (T < 8), 2.0, 1.0), "failsafe": np.where(T == 4, failsafe, 0.0)}
+    landed = Table(T, {"landed": np.where((T > 1) & (T < 7), 0.0, 1.0)})
+    tables = {"vehicle_status": Table(T, status), "vehicle_land_detected": landed}
+    (mission,) = MISSION_KINDS["px4_flight"].missions(tables, 9.0, {"kind": "px4_flight"})
+    assert find_extractor("outcome").compute(mission, {}) == expected
+    assert isinstance(find_extractor("outcome").compute(Mission({}, 0, 9, True, {}), {}), Unavailable)
+
+
 def test_a_profile_reads_what_its_signals_name() -> None:
     speed = Variable("speed", Role.METRIC, extract=Extract("signal", {"channel": "/speed", "field": "data"}))
     schema = Schema("s", "", "", "", {}, ("mcap",), False, {"kind": KIND, **ARMED}, (), {"speed": speed})
