@@ -104,3 +104,12 @@ def test_a_position_that_never_changes(care: Care, tmp_path: Path) -> None:
     assert code == ExitCode.NOT_EVALUATED
     assert "measures nothing" in objectives["mission_success"]["reason"]
     assert objectives["path_error_max"]["status"] == "not_evaluated"
+
+
+def test_nothing_found_is_not_said_of_a_log_whose_clock_cannot_be(tmp_path: Path, care: Care) -> None:
+    path = tmp_path / "fast.BIN"
+    path.write_bytes(restamped.dataflash(GOOD, CLOCKS["a thousand times too fast"]))
+    code, out, _ = care("inspect", path, "--json")
+    (finding,) = json.loads(out)["findings"]
+    assert code == ExitCode.OK
+    assert "clock" in finding["title"]
