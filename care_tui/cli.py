@@ -19,6 +19,7 @@ from care_tui import __version__
 from care_tui.commands import (
     asking,
     baselining,
+    collecting,
     configuring,
     diagnosing,
     formats,
@@ -78,7 +79,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Which parameter made the run fail, along which path, and what to change. 'care LOG' opens the terminal app.",
 )
-for commands in (opening, serving, diagnosing, asking, baselining, configuring, past, logs, learning):
+for commands in (opening, serving, diagnosing, asking, baselining, configuring, past, logs, collecting, learning):
     app.add_typer(commands.app)
 app.add_typer(profiles.app, name="profiles", invoke_without_command=True)
 app.add_typer(formats.app, name="schema")

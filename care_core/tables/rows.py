@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from care_core.diagnose.judging import judge
@@ -12,7 +12,7 @@ from care_core.errors import UsageError
 from care_core.extract.read import read_runs
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
-from care_core.run import Run, is_known
+from care_core.run import Run, Setting, is_known
 
 ABOUT = ("log", "mission", "log_format", "log_start", "log_sha256")
 """The columns before the variables."""
@@ -21,9 +21,13 @@ INSTALL_LEARN = "Install what it needs with: pip install 'care-tui[learn]'"
 TableRow = dict[str, str | int | float | None]
 
 
-def rows_of(path: Path, schema: Schema) -> list[TableRow]:
-    """The rows of one log; objectives that mean nothing for their mission are empty."""
-    return [_row(path, judge(run, schema, None).run, schema) for run in read_runs(open_log(path), schema)]
+def rows_of(path: Path, schema: Schema, overrides: Mapping[str, Setting] | None = None) -> list[TableRow]:
+    """The rows of one log; objectives that mean nothing for their mission are empty.
+
+    `overrides` are settings by the name of the parameter in the log, for options that the log does not hold.
+    """
+    runs = read_runs(open_log(path), schema, overrides=overrides)
+    return [_row(path, judge(run, schema, None).run, schema) for run in runs]
 
 
 def _row(path: Path, run: Run, schema: Schema) -> TableRow:

@@ -25,6 +25,14 @@ def baseline() -> None:
     _print(baseline_schema())
 
 
+@app.command("collect")
+def collect() -> None:
+    """Print the JSON Schema of 'care collect --json'."""
+    from care_core.report.collection import collect_schema
+
+    _print(collect_schema())
+
+
 @app.command("history")
 def history() -> None:
     """Print the JSON Schema of 'care history --json'."""

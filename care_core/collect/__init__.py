@@ -1,0 +1,1 @@
+"""Campaigns: configurations are chosen, the operator's command runs each, and its logs become a table of runs."""

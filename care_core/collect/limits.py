@@ -1,0 +1,102 @@
+"""Safety limits: inequalities between options, written as an operator writes them and never executed.
+
+`max_vel_x <= 0.8`, `0.2 <= inflation_radius`, `max_vel_x * sim_time <= inflation_radius + 1.5`: names of options,
+numbers, `+ - * /`, brackets, and `< <= > >=`. Whatever else a text holds is refused.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from care_core.errors import UsageError, nearest
+
+_ARITHMETIC: Mapping[type, Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
+_COMPARISONS: Mapping[type, Callable[[float, float], bool]] = {
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+}
+_LONGEST = 500
+
+
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """One inequality; `holds` says whether a configuration keeps it."""
+
+    text: str
+    _tree: ast.Compare
+
+    def holds(self, config: Mapping[str, float]) -> bool:
+        """Whether it is kept; one that cannot be computed (a division by zero) is not."""
+        try:
+            sides = [_value(side, config) for side in (self._tree.left, *self._tree.comparators)]
+        except (ZeroDivisionError, OverflowError):
+            return False
+        if not all(map(math.isfinite, sides)):
+            return False
+        pairs = zip(self._tree.ops, sides, sides[1:], strict=False)
+        return all(_COMPARISONS[type(op)](a, b) for op, a, b in pairs)
+
+    @property
+    def options(self) -> frozenset[str]:
+        """The options that it names."""
+        return frozenset(node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name))
+
+
+def parse_limit(text: str, options: Mapping[str, object]) -> Limit:
+    """A limit from its text.
+
+    Raises:
+        UsageError: it is no inequality, or names what is no option.
+    """
+    hint = "Write an inequality of options and numbers, such as 'max_vel_x * sim_time <= 1.5'."
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body if len(text) <= _LONGEST else None
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        tree = None
+    if not isinstance(tree, ast.Compare) or not all(map(_is_allowed, _parts(tree))):
+        raise UsageError(f"'{text[:80]}' is no limit.", hint=hint, where="limits")
+    limit = Limit(text.strip(), tree)
+    for name in sorted(limit.options):
+        if name not in options:
+            raise UsageError(
+                f"'{limit.text}' names '{name}', which is no option that has a value here.",
+                hint=nearest(name, options),
+                where="limits",
+            )
+    return limit
+
+
+def _parts(tree: ast.Compare) -> Iterator[ast.AST]:
+    return (node for node in ast.walk(tree) if node is not tree)
+
+
+def _is_allowed(node: ast.AST) -> bool:
+    if isinstance(node, ast.Constant):
+        return type(node.value) in (int, float)
+    return isinstance(
+        node, (ast.Name, ast.Load, ast.BinOp, ast.UnaryOp, ast.USub, ast.UAdd, *_ARITHMETIC, *_COMPARISONS)
+    )
+
+
+def _value(node: ast.expr, config: Mapping[str, float]) -> float:
+    if isinstance(node, ast.Name):
+        return float(config[node.id])
+    if isinstance(node, ast.Constant):
+        return float(node.value)  # type: ignore[arg-type]  # `_is_allowed` let numbers through alone
+    if isinstance(node, ast.UnaryOp):
+        value = _value(node.operand, config)
+        return -value if isinstance(node.op, ast.USub) else value
+    if isinstance(node, ast.BinOp):
+        return _ARITHMETIC[type(node.op)](_value(node.left, config), _value(node.right, config))
+    raise ValueError(f"{type(node).__name__} is no part of a limit")

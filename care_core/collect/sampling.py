@@ -1,0 +1,167 @@
+"""Which configurations a campaign drives, and in which order; same seed, same plan.
+
+Points of the ranges come from scipy's quasi-Monte Carlo (Owen 1998 for the scrambled Sobol' points, McKay et al. 1979 for
+Latin hypercubes). Half of the dimensions say whether an option stays at its reference, which is as evenly spread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from care_core.collect.space import Config, Floats, Space
+from care_core.errors import UsageError
+
+Method = Literal["sobol", "latin_hypercube", "uniform", "one_at_a_time", "adaptive"]
+
+_TRIES = 200
+"""So many points may break a limit for each that keeps them all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Planned:
+    """One run to be made: its number from 1, the seed that its command gets, and the run that it repeats."""
+
+    number: int
+    config: Config
+    seed: int
+    repeats: int | None = None
+
+
+def points(space: Space, method: Method, count: int, at_reference: float, seed: int) -> list[dict[str, float]]:
+    """So many different configurations beside the reference, all within the limits.
+
+    Args:
+        method: `sobol`, `latin_hypercube` or `uniform`; `adaptive` begins as `sobol`.
+        at_reference: share of the options that stay at their reference.
+
+    Raises:
+        UsageError: the limits leave too little, or scipy is not installed.
+    """
+    found: list[dict[str, float]] = []
+    seen = {_key(space, space.reference)}
+    looked = 0
+    for row in _unit_points(2 * len(space.axes), method, count, seed):
+        if len(found) == count:
+            break
+        looked += 1
+        if looked > _TRIES * count:
+            raise UsageError(
+                f"Only {len(found)} of {count} configurations were found that are new and keep all limits.",
+                hint="Ask for fewer runs, or widen the ranges or the limits.",
+            )
+        half = len(space.axes)
+        config = space.config(row[:half], [share < at_reference for share in row[half:]])
+        key = _key(space, config)
+        if key not in seen and space.allows(config):
+            seen.add(key)
+            found.append(config)
+    return found
+
+
+def one_at_a_time(space: Space, count: int) -> list[dict[str, float]]:
+    """Each option over its range with all others at the reference: the ends first, then ever finer between."""
+    found: list[dict[str, float]] = []
+    seen = {_key(space, space.reference)}
+    for share in _finer():
+        for place, axis in enumerate(space.axes):
+            shares = [0.0] * len(space.axes)
+            shares[place] = share
+            config = space.config(shares, [other is not axis for other in space.axes])
+            key = _key(space, config)
+            if key not in seen and space.allows(config) and len(found) < count:
+                seen.add(key)
+                found.append(config)
+    return found  # options with few values may not have that many
+
+
+_FINEST = 64
+
+
+def _finer() -> Iterator[float]:
+    """1, 0, 1/2, 1/4, 3/4, 1/8, ...: shares of a range, the ends and then halves of what is left."""
+    yield from (1.0, 0.0)
+    parts = 2
+    while parts <= _FINEST:
+        yield from (k / parts for k in range(1, parts, 2))
+        parts *= 2
+
+
+def with_repeats(space: Space, configs: Sequence[Config], count: int, share: float, seed: int) -> list[Planned]:
+    """The plan: the reference first, then the configurations, with repeats of earlier runs in between.
+
+    Args:
+        count: runs in all.
+        share: share of them that repeat an earlier one: the reference first, then the others from the beginning.
+    """
+    planned: list[Planned] = []
+    fresh, originals = iter((space.reference, *configs)), iter(range(1, count + 1))
+    for number in range(1, count + 1):
+        # Spread over the campaign: one that is cut short has its share of them too.
+        is_repeat = number > 1 and int(number * share) > int((number - 1) * share)
+        if is_repeat:
+            original = next(n for n in originals if planned[n - 1].repeats is None)
+            planned.append(Planned(number, planned[original - 1].config, run_seed(seed, number), original))
+            continue
+        config = next(fresh, None)
+        if config is None:
+            break
+        planned.append(Planned(number, config, run_seed(seed, number)))
+    return planned
+
+
+def repeats_among(count: int, share: float) -> int:
+    """How many runs of so many `with_repeats` makes repeats."""
+    return sum(int(n * share) > int((n - 1) * share) for n in range(2, count + 1))
+
+
+def run_seed(seed: int, number: int) -> int:
+    """The seed that the command of a run gets: every run meets conditions of its own, a repeat too."""
+    return seed * 100_000 + number
+
+
+def _key(space: Space, config: Config) -> tuple[float, ...]:
+    return tuple(config[axis.name] for axis in space.axes)
+
+
+def _unit_points(dimensions: int, method: Method, count: int, seed: int) -> Iterator[Floats]:
+    """Points of the unit cube without end: further sets with other seeds where limits refused too many."""
+    block = 0
+    while True:
+        rng = np.random.default_rng([seed, block])
+        yield from _block(dimensions, method, count, rng)
+        block += 1
+
+
+def _block(dimensions: int, method: Method, count: int, rng: np.random.Generator) -> Floats:
+    if method == "uniform":
+        return rng.random((count, dimensions))
+    qmc = quasi_monte_carlo()
+    if method == "latin_hypercube":
+        return np.asarray(qmc.LatinHypercube(d=dimensions, **_seeded(qmc, rng)).random(count))
+    # Sobol' points are balanced in powers of two.
+    power = max(int(np.ceil(np.log2(max(count, 2)))), 1)
+    return np.asarray(qmc.Sobol(d=dimensions, scramble=True, **_seeded(qmc, rng)).random_base2(power))
+
+
+def _seeded(qmc: Any, rng: np.random.Generator) -> dict[str, Any]:
+    """scipy 1.15 renamed the argument."""
+    from inspect import signature
+
+    return {"rng" if "rng" in signature(qmc.Sobol.__init__).parameters else "seed": rng}
+
+
+def quasi_monte_carlo() -> Any:
+    """scipy's `stats.qmc`. Raises UsageError where it is not installed."""
+    try:
+        from scipy.stats import qmc
+    except ModuleNotFoundError as err:
+        from care_core.tables.rows import INSTALL_LEARN
+
+        raise UsageError(
+            f"Planning a campaign needs {err.name}, which is not installed.", hint=f"{INSTALL_LEARN}."
+        ) from err
+    return qmc
