@@ -223,9 +223,8 @@ class _Work:
             return fly(self.found.campaign, run, self.found.folder, slot, self.stop, afresh=run.number in self.again)
         except OSError as err:
             hint = "Put it right and give the same command again."
-            raise UsageError(
-                f"Run {run.number} cannot be made: {err.strerror}.", hint=hint, where=str(err.filename)
-            ) from err
+            message = f"Run {run.number} cannot be made: {err.strerror}."
+            raise UsageError(message, hint=hint, where=str(err.filename or "")) from err
         finally:
             free.put(slot)
 

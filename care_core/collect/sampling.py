@@ -1,7 +1,7 @@
 """Which configurations a campaign drives, and in which order; same seed, same plan.
 
-Points of the ranges come from scipy's quasi-Monte Carlo (Owen 1998 for the scrambled Sobol' points, McKay et al. 1979 for
-Latin hypercubes). Half of the dimensions say whether an option stays at its reference, which is as evenly spread.
+Points of the ranges come from scipy's quasi-Monte Carlo (Owen 1998 for the scrambled Sobol' points, McKay et al. 1979
+for Latin hypercubes). Half of the dimensions say whether an option stays at its reference, which is as evenly spread.
 """
 
 from __future__ import annotations
@@ -43,12 +43,10 @@ def points(space: Space, method: Method, count: int, at_reference: float, seed: 
     """
     found: list[dict[str, float]] = []
     seen = {_key(space, space.reference)}
-    looked = 0
-    for row in _unit_points(2 * len(space.axes), method, count, seed):
+    for looked, row in enumerate(_unit_points(2 * len(space.axes), method, count, seed)):
         if len(found) == count:
             break
-        looked += 1
-        if looked > _TRIES * count:
+        if looked == _TRIES * count:
             raise UsageError(
                 f"Only {len(found)} of {count} configurations were found that are new and keep all limits.",
                 hint="Ask for fewer runs, or widen the ranges or the limits.",
@@ -161,7 +159,6 @@ def quasi_monte_carlo() -> Any:
     except ModuleNotFoundError as err:
         from care_core.tables.rows import INSTALL_LEARN
 
-        raise UsageError(
-            f"Planning a campaign needs {err.name}, which is not installed.", hint=f"{INSTALL_LEARN}."
-        ) from err
+        message = f"Planning a campaign needs {err.name}, which is not installed."
+        raise UsageError(message, hint=f"{INSTALL_LEARN}.") from err
     return qmc

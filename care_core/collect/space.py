@@ -1,4 +1,4 @@
-"""Where a campaign may go: the options that vary with their ranges, the reference, and the limits that nothing crosses."""
+"""Where a campaign may go: the options that vary with their ranges, the reference, the limits that nothing crosses."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Space:
             value = self.reference[axis.name]
             if not axis.holds(value):
                 raise UsageError(
-                    f"The reference of {axis.name} is {axis.option.show(value)}, outside {axis.low:g} to {axis.high:g}.",
+                    f"The reference of {axis.name} is {value:g}, outside {axis.low:g} to {axis.high:g}.",
                     hint="Correct the parameter file, or give the option its range under 'options'.",
                 )
         broken = self.broken(self.reference)
@@ -115,7 +115,7 @@ class Space:
     def allows(self, config: Config) -> bool:
         return self.broken(config) is None
 
-    def config(self, shares: Sequence[float], at_reference: Sequence[bool]) -> dict[str, float]:
+    def config(self, shares: Sequence[float] | Floats, at_reference: Sequence[bool]) -> dict[str, float]:
         """The configuration at these shares of the ranges, with some options at their reference."""
         own = {
             axis.name: self.reference[axis.name] if keep else axis.at(share)
