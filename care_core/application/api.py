@@ -92,19 +92,22 @@ def verify(
     return verify_document(promised, run, verification)
 
 
-def apply(report: str | Path, *configs: str | Path, alternative: int = 0) -> tuple[EditedFile, ...]:
+def apply(
+    report: str | Path, *configs: str | Path, alternative: int = 0, profile: str | None = None
+) -> tuple[EditedFile, ...]:
     """Configuration files with a report's fix put in; comments and order stay, and nothing is written.
 
     Args:
         configs: files in the order they are loaded, `FILE` or for ROS `NAMESPACE=FILE`.
         alternative: another of the report's fixes, from 1.
+        profile: the report's, where it is not installed under its name.
 
     Raises:
         CareError: the report suggests no change, or no file can hold it.
     """
     from care_core.application.configuring import apply_report
 
-    return apply_report(Path(report), [str(name) for name in configs], alternative)
+    return apply_report(Path(report), [str(name) for name in configs], alternative, profile)
 
 
 def _request(asked: Request | str | Path) -> Request:

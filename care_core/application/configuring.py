@@ -73,11 +73,14 @@ def _suggested(report: TriageDocument, path: Path) -> Side:
     return Side(str(path), {key: Setting(key, value, str(path)) for key, value in keys.items()}, partial=True)
 
 
-def apply_report(report: Path, configs: Sequence[str], alternative: int = 0) -> tuple[EditedFile, ...]:
+def apply_report(
+    report: Path, configs: Sequence[str], alternative: int = 0, profile: str | None = None
+) -> tuple[EditedFile, ...]:
     """Configuration files with a report's fix put in, or with one of its alternatives.
 
     Args:
         configs: files in the order they are loaded, `FILE` or for ROS `NAMESPACE=FILE`.
+        profile: name or folder; the one that the report names where it is None.
 
     Raises:
         CareError: the report suggests no change or is damaged, or no file can hold it.
@@ -93,7 +96,7 @@ def apply_report(report: Path, configs: Sequence[str], alternative: int = 0) -> 
     if alternative >= len(sets):
         held = "none" if len(sets) == 1 else f"1 to {len(sets) - 1}"
         raise UsageError(f"There is no alternative {alternative}: the report has {held}.", where="--alternative")
-    variables = load_profile(profile_of(document).name).schema.variables
+    variables = load_profile(profile or profile_of(document).name).schema.variables
     wanted = []
     for change in sets[alternative].changes:
         option = variables.get(change.option)

@@ -50,13 +50,16 @@ def apply(
     in_place: Annotated[bool, typer.Option("--in-place", help="Change the files, each kept as FILE.bak.")] = False,
     force: Force = False,
     alternative: Annotated[int, typer.Option("--alternative", min=0, help="Another of the report's fixes.")] = 0,
+    profile: Annotated[
+        str | None, typer.Option("--profile", "-p", help="The report's profile, where it is not installed.")
+    ] = None,
 ) -> None:
     """Put a report's fix into configuration files. Comments and order stay. Without -o, print the patch."""
     from care_core.application.configuring import patch_of
 
     if out is not None and in_place:
         raise UsageError("Either --out or --in-place.", hint="Leave one out.", where="--in-place")
-    edited = care_core.apply(report, *config, alternative=alternative)
+    edited = care_core.apply(report, *config, alternative=alternative, profile=profile)
     for line in _told(edited):
         say(line)
     changed = [file for file in edited if file.edits]

@@ -26,7 +26,7 @@ from care_tui.commands.opening import newest_log
 from tests.conftest import Care
 from tests.made import HEALTH, made_diagnosis
 
-COMMANDS = ("triage", "inspect", "params", "ingest", "train", "demo", "profiles", "schema")
+COMMANDS = ("triage", "inspect", "params", "ingest", "collect", "train", "demo", "profiles", "schema")
 ROOT = Path(__file__).parents[2]
 SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
 
