@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 
 from care_core.collect.sampling import Planned
 from care_core.errors import UsageError
-from care_core.tables.rows import Row
+from care_core.tables.rows import TableRow
 
 FILE = "journal.jsonl"
 FORMAT = "care.collect.journal/1"
@@ -31,7 +31,7 @@ class Done:
     attempts: int
     time_s: float
     logs: tuple[str, ...] = ()
-    rows: tuple[Row, ...] = ()
+    rows: tuple[TableRow, ...] = ()
     failure: str = ""
     unread: tuple[str, ...] = ()
     """Logs that could not be read beside those that could, and why."""

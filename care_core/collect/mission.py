@@ -26,7 +26,7 @@ from care_core.errors import CareError, ConfigError
 from care_core.files import write_atomically
 from care_core.logs.finding import logs_below
 from care_core.run import Setting
-from care_core.tables.rows import Row, rows_of
+from care_core.tables.rows import TableRow, rows_of
 
 RECORD, OUTPUT, LOGS = "ended.json", "command.log", "logs"
 
@@ -210,7 +210,7 @@ def _read(campaign: Campaign, run: Planned, folder: Path, attempts: int, time_s:
         for axis in campaign.space.axes
         for parameter in readable(axis.option)
     } | _fixed(campaign)
-    rows: list[Row] = []
+    rows: list[TableRow] = []
     reasons: list[str] = []
     logs = logs_below(folder / LOGS)
     for log in logs:
@@ -237,7 +237,7 @@ def _fixed(campaign: Campaign) -> dict[str, Setting]:
     }
 
 
-def _ignored(campaign: Campaign, run: Planned, rows: Sequence[Row]) -> tuple[str, ...]:
+def _ignored(campaign: Campaign, run: Planned, rows: Sequence[TableRow]) -> tuple[str, ...]:
     """Options that the log says were driven otherwise than asked."""
     return tuple(
         axis.name

@@ -21,7 +21,7 @@ from care_core.collect.sampling import Planned, one_at_a_time, points, repeats_a
 from care_core.configs.driven import parameter_value, readable
 from care_core.configs.edit import Wanted, apply_changes
 from care_core.errors import UsageError
-from care_core.tables.rows import Row, write_table
+from care_core.tables.rows import TableRow, write_table
 
 TABLE = "runs.csv"
 
@@ -49,7 +49,7 @@ class Collected:
     """Why it stopped before its end; '' where it did not."""
 
     @property
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[TableRow]:
         return [row for number in sorted(self.done) for row in self.done[number].rows]
 
     @property
@@ -69,7 +69,7 @@ class Collected:
         return {o.name: counts[o.name] for o in self.campaign.schema.objectives if o.threshold is not None}
 
 
-def missed(row: Row, campaign: Campaign) -> list[str]:
+def missed(row: TableRow, campaign: Campaign) -> list[str]:
     """The objectives with a fixed threshold that a mission missed."""
     return [
         objective.name
