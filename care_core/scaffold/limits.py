@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from care_core.diagnose.tolerance import upper_quantile
 from care_core.health.examine import examine
 from care_core.scaffold.measures import Measure, Measures
 from care_core.variables import RelativeThreshold, Role, Threshold, Variable
 
 RATIO = 1.3
-"""What the bundled profiles allow over what the reference configuration needs."""
+"""What the bundled profiles allow over what the reference configuration needs; used where runs are too few to tell how
+much they differ."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +59,10 @@ def _limit(objective: Measure, good: Sequence[int], *, alike: bool) -> Limit:
         return Limit(variable.threshold, "met or not met")
     seen = [value for place in good if (value := objective.values[place]) is not None]
     if alike and seen and min(seen) > 0:
+        found = upper_quantile([math.log(value) for value in seen])
+        if found is not None:
+            said = f"what 95 % of runs like the {len(seen)} good ones keep ({min(seen):.4g} to {max(seen):.4g})"
+            return Limit(Threshold("<=", float(f"{math.exp(found.high):.3g}")), said)
         worst = max(seen)
         said = f"{RATIO:g} x the largest of {len(seen)} good runs ({min(seen):.4g} to {worst:.4g})"
         return Limit(Threshold("<=", float(f"{RATIO * worst:.3g}")), said)

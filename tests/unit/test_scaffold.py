@@ -16,12 +16,14 @@ from care_core.errors import UsageError
 from care_core.logs.base import LogFormat
 from care_core.run import Setting
 from care_core.scaffold.facts import fact_of
+from care_core.scaffold.limits import RATIO, limits
+from care_core.scaffold.measures import Measure
 from care_core.scaffold.never import reason_against
 from care_core.scaffold.options import Options, find_options
 from care_core.scaffold.scaffold import scaffold
 from care_core.scaffold.seen import Seen, see
 from care_core.scaffold.writing import comment, scalar
-from care_core.variables import Role, Variable
+from care_core.variables import RelativeThreshold, Role, Threshold, Variable
 from tests.courier import EVENT, event
 from tests.made import MadeLog
 from tests.ros_samples import ROS2, SECOND_NS, START_NS, McapFile, cdr, make
@@ -141,6 +143,17 @@ def test_a_robot_of_no_known_kind_gets_signals_and_the_whole_recording(tmp_path:
 def test_logs_of_two_ecosystems_make_no_profile() -> None:
     with pytest.raises(UsageError, match="different robots"):
         scaffold([seen({"/n.a": 1.0}, ros="2"), seen({"NAVL1_PERIOD": 22.0})], "mine", [])
+
+
+def test_limits_come_from_good_runs_of_one_mission() -> None:
+    time = Variable("time", Role.OBJECTIVE, kind="non-functional")
+    measure = Measure(time, (10.0, 11.0, 90.0))
+    assert limits([measure], (0, 1), alike=True)["time"].bound == Threshold("<=", 14.3)
+    assert limits([measure], (0, 1), alike=False)["time"].bound == RelativeThreshold("<=", RATIO)
+    assert limits([measure], (), alike=True)["time"].bound == RelativeThreshold("<=", RATIO)
+    many = limits([Measure(time, (10.0, 10.1, 9.9, 10.2, 9.8, 10.0))], range(6), alike=True)["time"].bound
+    assert isinstance(many, Threshold)
+    assert 10.2 < many.value < 11.0
 
 
 @given(st.text(max_size=40))
