@@ -1,9 +1,9 @@
 """Parameters that changed their name, and with it their unit, from one firmware to the next.
 
 Copter and the VTOL half of Plane 4.7: what the firmware does on its first start after the update, as listed in
-ArduPilot's `Tools/scripts/convert_params_4_7.py`. Before: `Copter::convert_pid_parameters` and the conversion tables
-of ArduCopter/Parameters.cpp. Names whose conversion depends on other parameters (rate gains of 3.3, ARMING_CHECK) are
-left out.
+ArduPilot's `Tools/scripts/convert_params_4_7.py`; receivers in 4.6: `Tools/autotest/test_param_upgrade.py`. Before:
+`Copter::convert_pid_parameters` and the conversion tables of ArduCopter/Parameters.cpp. Names whose conversion depends
+on other parameters (rate gains of 3.3, ARMING_CHECK) are left out.
 """
 
 from __future__ import annotations
@@ -144,8 +144,16 @@ def _of_all() -> Iterator[Chain]:
     for instance in "123456789A":
         for before, after in (("MIN_CM", "MIN"), ("MAX_CM", "MAX"), ("GNDCLEAR", "GNDCLR")):
             yield _chain(f"RNGFND{instance}_{before}", (_47, f"RNGFND{instance}_{after}", 0.01))
-    yield _chain("GPS_TYPE", (_46, "GPS1_TYPE", 1))
-    yield _chain("GPS_TYPE2", (_46, "GPS2_TYPE", 1))
+    # In 4.6 each receiver got parameters of its own (ArduPilot's Tools/autotest/test_param_upgrade.py lists them).
+    for name in ("TYPE", "GNSS_MODE", "RATE_MS", "DELAY_MS", "COM_PORT"):
+        yield _chain(f"GPS_{name}", (_46, f"GPS1_{name}", 1))
+        yield _chain(f"GPS_{name}2", (_46, f"GPS2_{name}", 1))
+    for receiver in "12":
+        yield _chain(f"GPS_CAN_NODEID{receiver}", (_46, f"GPS{receiver}_CAN_NODEID", 1))
+        yield _chain(f"GPS_MB{receiver}_TYPE", (_46, f"GPS{receiver}_MB_TYPE", 1))
+        for axis in "XYZ":
+            yield _chain(f"GPS_POS{receiver}_{axis}", (_46, f"GPS{receiver}_POS_{axis}", 1))
+            yield _chain(f"GPS_MB{receiver}_OFS_{axis}", (_46, f"GPS{receiver}_MB_OFS_{axis}", 1))
 
 
 _FAMILIES: Mapping[Kind, tuple[str, ...]] = {

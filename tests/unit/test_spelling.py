@@ -6,12 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import cast
 
+import pytest
+
 from care_core.configs.changes import apply_commands
 from care_core.configs.driven import configuration
 from care_core.configs.formats import ConfigFormat
 from care_core.extract.spelling import spelled
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
+from care_core.profile.store import load_profile
 from care_core.run import Setting
 from care_core.variables import Change, Role, Variable
 
@@ -58,3 +61,30 @@ def test_a_log_without_the_parameter_leaves_the_option_as_it_is() -> None:
     option, config = option_in(OTHER=1.0)
     assert option is SPEED
     assert config == {}
+
+
+RENAMED_47: Mapping[str, tuple[str, float]] = {
+    "WPNAV_SPEED": ("WP_SPD", 0.01), "WPNAV_ACCEL": ("WP_ACC", 0.01), "WPNAV_RADIUS": ("WP_RADIUS_M", 0.01),
+    "WPNAV_JERK": ("WP_JERK", 1), "WPNAV_SPEED_UP": ("WP_SPD_UP", 0.01), "WPNAV_SPEED_DN": ("WP_SPD_DN", 0.01),
+    "PSC_POSXY_P": ("PSC_NE_POS_P", 1), "PSC_VELXY_P": ("PSC_NE_VEL_P", 1), "PSC_VELXY_I": ("PSC_NE_VEL_I", 1),
+    "PSC_VELXY_D": ("PSC_NE_VEL_D", 1), "PSC_POSZ_P": ("PSC_D_POS_P", 1), "PSC_VELZ_P": ("PSC_D_VEL_P", 1),
+    "PSC_ACCZ_P": ("PSC_D_ACC_P", 0.1), "PSC_ACCZ_I": ("PSC_D_ACC_I", 0.1), "ANGLE_MAX": ("ATC_ANGLE_MAX", 0.01),
+    "RTL_ALT": ("RTL_ALT_M", 0.01), "LAND_SPEED": ("LAND_SPD_MS", 0.01), "GPS_DELAY_MS": ("GPS1_DELAY_MS", 1),
+}  # fmt: skip
+"""The profile's options that have another name in 4.7, with the share of their value; the other 15 kept theirs."""
+
+
+def test_every_option_of_the_copter_is_read_from_firmware_4_7_and_from_4_0() -> None:
+    schema = load_profile("arducopter").schema
+    defaults = {option.name: option.default for option in schema.options}
+    held = {}
+    for name, default in defaults.items():
+        assert default is not None
+        new, scale = RENAMED_47.get(name, (name, 1))
+        held[new] = default * scale
+    assert len(held) == len(defaults) == 33
+    read = spelled(schema, cast(Log, Flown(held)))
+    driven = {name: history[0] for name, history in Flown(held).settings().items()}
+    assert configuration(read.options, driven, {})[0] == pytest.approx(defaults)
+    old = Flown({name: value for name, value in defaults.items() if value is not None}, {"firmware": "ArduCopter V4.0"})
+    assert spelled(schema, cast(Log, old)) is schema

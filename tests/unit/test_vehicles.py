@@ -170,6 +170,7 @@ def test_no_two_motors_share_a_place_unless_the_tables_do_not_say_which_is_above
 @pytest.mark.parametrize(
     ("name", "version", "now", "scale"),
     [
+        ("GPS_DELAY_MS", (4, 6), "GPS1_DELAY_MS", 1.0), ("GPS2_POS_X", (4, 5), "GPS_POS2_X", 1.0),
         ("WPNAV_SPEED", (4, 5, 4), "WPNAV_SPEED", 1.0), ("WPNAV_SPEED", (4, 7, 0), "WP_SPD", 0.01),
         ("WP_SPD", (4, 6), "WPNAV_SPEED", 100.0), ("PSC_VELXY_P", (4, 7), "PSC_NE_VEL_P", 1.0),
         ("PSC_NE_VEL_P", (3, 5), "VEL_XY_P", 1.0), ("LAND_SPEED", (4, 7), "LAND_SPD_MS", 0.01),
