@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from care_core.extract.flight import AIRBORNE_M
 from care_core.extract.registry import MISSION_KINDS, Args, Mission, MissionKind, has
 from care_core.logs.base import Table, Wanted
 from care_core.run import Check, Evidence, Unavailable, Value
@@ -16,6 +17,7 @@ from care_core.vehicles import mode_name, way_of
 from care_core.vehicles.modes import Way
 
 STATUS, LANDED, RESULT, FLAGS = "vehicle_status", "vehicle_land_detected", "mission_result", "failsafe_flags"
+POSITION = "vehicle_local_position"
 _ARMED = 2
 """arming_state: 2 has meant armed in every version (vehicle_status.msg)."""
 _GAVE_UP = 0b10001111
@@ -38,6 +40,7 @@ class Px4Flight(MissionKind):
         return {
             STATUS: ("arming_state", "nav_state", "failsafe", "failure_detector_status", "vehicle_type"),
             LANDED: ("landed",),
+            POSITION: ("z",),
             RESULT: ("finished", "failure"),
             FLAGS: ("fd_critical_failure", "fd_motor_failure"),
         }
@@ -89,6 +92,11 @@ def _checks(mission: Mission) -> Iterator[Check]:
 
 
 def _took_off(mission: Mission) -> Value:
+    """1 where it rose, or, where no height is told, the land detector said so: that also speaks up on a bench."""
+    position = mission.table(POSITION)
+    heights = position["z"][np.isfinite(position["z"])] if has(position, "z") else np.empty(0)
+    if len(heights):
+        return 1.0 if heights[0] - heights.min() > AIRBORNE_M else Unavailable("it never left the ground")
     if not has(mission.table(LANDED), "landed"):
         return Unavailable("the log does not say when it was on the ground", f"record {LANDED}", LANDED)
     flew = _ever(mission, LANDED, "landed", 0)

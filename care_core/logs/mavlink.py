@@ -33,9 +33,11 @@ from care_core.logs.mavlink_packets import (
     definitions,
     find_packets,
     frames,
+    stamped,
     stamps,
     wanted_extras,
 )
+from care_core.logs.opening import is_raw_mavlink
 from care_core.run import Damage, Setting
 
 Offsets = NDArray[np.int64]
@@ -45,6 +47,7 @@ _TYPE_GCS, _AUTOPILOT_NONE, _AUTOPILOT_ARDUPILOT, _AUTOPILOT_PX4 = 6, 8, 3, 12
 _STATION_COMPONENT = 190
 """MAVProxy writes the parameters that it fetched as a file into its log as if this component had sent them."""
 _PARAM_INTEGERS = {1: "u1", 2: "i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4"}
+_HEAD_BYTES = 4096
 _PROOF = 3
 """Packets of a message without a known definition that must agree on it."""
 _EARLIEST_S = datetime(2005, 1, 1, tzinfo=timezone.utc).timestamp()
@@ -80,7 +83,8 @@ class MavlinkLog:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._file = MappedFile(path)
-        data = self._file.bytes()
+        self._restamped = _restamped(self._file.bytes(), path)
+        data = self._bytes()
         packets = find_packets(data)
         if not len(packets):
             raise LogError("The log holds no sound MAVLink packet.", hint="Copy it again.", where=str(path))
@@ -102,7 +106,7 @@ class MavlinkLog:
         )
 
     def channels(self) -> tuple[Channel, ...]:
-        data = self._file.bytes()
+        data = self._bytes()
         found = []
         for name, (_, start) in sorted(chain(self._starts.items(), self._unknown.items())):
             t = self._times(data, start)
@@ -111,7 +115,7 @@ class MavlinkLog:
         return tuple(found)
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        data = self._file.bytes()
+        data = self._bytes()
         tables = {}
         for name, fields in wanted.items():
             if name in self._starts:
@@ -147,6 +151,8 @@ class MavlinkLog:
             facts["firmware"] = f"{firmware} {_version(tables.get('AUTOPILOT_VERSION'))}".strip()
         if self._autopilot == _AUTOPILOT_PX4:
             facts["stack"] = "PX4"
+        if self._restamped is not None:
+            facts["clock"] = "seconds since the vehicle was started, as its messages say"
         facts["system"] = f"{self.vehicle.system}.{self.vehicle.component}"
         others = [sender for sender in self._senders[1:] if sender.system != self.vehicle.system]
         if others:
@@ -159,6 +165,10 @@ class MavlinkLog:
         if not _EARLIEST_S < self._first_stamp_s < 1e11:
             return None
         return datetime.fromtimestamp(self._first_stamp_s, timezone.utc).isoformat(timespec="seconds")
+
+    def _bytes(self) -> Bytes:
+        """The packets with a stamp before each."""
+        return self._file.bytes() if self._restamped is None else self._restamped
 
     def _times(self, data: Bytes, start: Offsets) -> NDArray[np.float64]:
         return self._clock.seconds(stamps(data, start), start)
@@ -224,6 +234,21 @@ class MavlinkLog:
             Damage(text, low, float(times[at]) if at >= 0 else None)
             for (low, text), at in zip(sorted(damage), before.tolist(), strict=True)
         ]
+
+
+def _restamped(data: Bytes, path: Path) -> Bytes | None:
+    """The packets of a file that has no stamps with those that they carry themselves; None where it has stamps.
+
+    Raises:
+        LogError: it has none, and its messages carry none.
+    """
+    if not is_raw_mavlink(bytes(data[:_HEAD_BYTES])):
+        return None
+    found = stamped(data)
+    if found is None:
+        hint = "Use the .tlog that the ground station wrote beside it."
+        raise LogError("This is MAVLink without time stamps, and no message tells a time.", hint=hint, where=str(path))
+    return found
 
 
 def _walk(data: Bytes, low: int, high: int) -> tuple[list[int], list[tuple[int, int]]]:

@@ -23,6 +23,8 @@ STAMP_BYTES = 8
 V1, V2 = 0xFE, 0xFD
 _SIGNED = 0x01
 _SIGNATURE_BYTES = 13
+_BOOT_TIME, _RESTART_S = "time_boot_ms", 1.0
+"""A time so much earlier than the one before is of another start of the vehicle; less is a message overtaken."""
 _CHUNK = 1 << 22
 _BATCH = 1 << 17
 _KINDS = {
@@ -89,11 +91,57 @@ def _to_message(number: int, peer: Any) -> Message:
 
 def find_packets(data: Bytes) -> Packets:
     """Every stamped packet with the right checksum, in the order of the file; none overlaps another."""
-    pieces = [_checked(data, places) for places in _candidates(data)]
+    return _sound(data, _candidates(data), STAMP_BYTES)
+
+
+def stamped(data: Bytes) -> Bytes | None:
+    """A stream of packets without stamps as the log that a ground station would have written, by the packets' own time.
+
+    Many messages say when the vehicle sent them, in milliseconds since it was started (`time_boot_ms`); those between
+    two came between. None where no message of the stream says so.
+    """
+    padded = np.concatenate((np.zeros(STAMP_BYTES, np.uint8), data))
+    found = _sound(padded, _candidates(padded, stamped=False), 0)
+    seconds = _boot_times(padded, found)
+    if seconds is None:
+        return None
+    marker, sizes = found.start + STAMP_BYTES, found.end - found.start
+    ends = np.cumsum(sizes)
+    made = np.zeros(int(ends[-1]) if len(ends) else 0, np.uint8)
+    whole = (seconds * 1e6).astype(">u8").view(np.uint8).reshape(-1, STAMP_BYTES)
+    for low, end, at, stamp in zip((ends - sizes).tolist(), ends.tolist(), marker.tolist(), whole, strict=True):
+        made[low : low + STAMP_BYTES] = stamp
+        made[low + STAMP_BYTES : end] = padded[at : at + end - low - STAMP_BYTES]
+    return made
+
+
+def _boot_times(data: Bytes, packets: Packets) -> NDArray[np.float64] | None:
+    """When each packet was sent, seconds since the vehicle started; None where none says so."""
+    known = np.full(len(packets), np.nan)
+    senders = packets.system.astype(np.int32) << 8 | packets.component
+    for number in np.unique(packets.id).tolist():
+        field = definitions()[number].fields.get(_BOOT_TIME)
+        if field is not None:
+            rows = np.flatnonzero(packets.id == number)
+            known[rows] = decode(data, packets.start[rows], field) / 1e3
+    timed = np.isfinite(known) & (known > 0)
+    if not timed.any():
+        return None
+    speakers, counts = np.unique(senders[timed], return_counts=True)
+    rows = np.flatnonzero(timed & (senders == speakers[counts.argmax()]))
+    own = known[rows]
+    restarts = np.append(0.0, np.maximum(own[:-1] - own[1:], 0.0))
+    own = np.maximum.accumulate(own + np.cumsum(np.where(restarts > _RESTART_S, restarts, 0.0)))
+    return np.asarray(np.interp(np.arange(len(packets)), rows, own), np.float64)
+
+
+def _sound(data: Bytes, candidates: Sequence[Offsets], stamp_bytes: int) -> Packets:
+    """The candidates with the right checksum, each with so many bytes of stamp of its own; none overlaps another."""
+    pieces = [_checked(data, places) for places in candidates]
     found = Packets(*(np.concatenate(parts) for parts in zip(*map(_columns, pieces), strict=True)))
     while len(found):
         # A packet can carry another inside it, and noise can look like one: the earlier stays.
-        overlaps = np.append(False, found.start[1:] < found.end[:-1])
+        overlaps = np.append(False, found.start[1:] + STAMP_BYTES - stamp_bytes < found.end[:-1])
         if not overlaps.any():
             break
         found = found.where(~(overlaps & ~np.append(False, overlaps[:-1])))
@@ -104,13 +152,13 @@ def _columns(packets: Packets) -> tuple[NDArray[Any], ...]:
     return packets.start, packets.end, packets.id, packets.system, packets.component
 
 
-def _candidates(data: Bytes) -> list[Offsets]:
-    """Places where a packet may begin: a marker with a stamp before it whose highest byte is zero."""
+def _candidates(data: Bytes, *, stamped: bool = True) -> list[Offsets]:
+    """Places where a packet may begin: a marker, with a stamp before it whose highest byte is zero where `stamped`."""
     found: list[Offsets] = [np.empty(0, dtype=np.int64)]
     for low in range(STAMP_BYTES, len(data), _CHUNK):
         piece = data[low : low + _CHUNK]
         leads = data[low - STAMP_BYTES : low - STAMP_BYTES + len(piece)]
-        places = np.flatnonzero(((piece == V2) | (piece == V1)) & (leads == 0)) + low
+        places = np.flatnonzero(((piece == V2) | (piece == V1)) & ((leads == 0) | (not stamped))) + low
         found += [places[at : at + _BATCH] for at in range(0, len(places), _BATCH)]
     return found
 

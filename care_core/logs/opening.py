@@ -85,13 +85,17 @@ def sniff(path: Path) -> LogFormat:
         return LogFormat.DATAFLASH_BIN
     if _TEXT_FORMAT.search(head):
         return LogFormat.DATAFLASH_TEXT
-    if _frame_is_followed(head, 0, stamp=0):
-        hint = "Use the .tlog that the ground station wrote beside it."
-        raise LogError("This is MAVLink without time stamps (.tlog.raw, .rlog).", hint=hint, where=str(path))
+    if is_raw_mavlink(head):
+        return LogFormat.MAVLINK_TLOG
     is_lone_packet = len(head) > 8 and head[0] == 0 and head[8] in _MAVLINK_MARKERS
     if is_lone_packet or any(_frame_is_followed(head, at + 8) for at in range(len(head) - 8) if head[at] == 0):
         return LogFormat.MAVLINK_TLOG
     raise LogError("Not a log of a known format.", hint=_what_then(path), where=str(path))
+
+
+def is_raw_mavlink(head: bytes) -> bool:
+    """Whether a file is a stream of MAVLink packets without the time stamps of a ground station (.rlog, .tlog.raw)."""
+    return _frame_is_followed(head, 0, stamp=0)
 
 
 def _what_then(path: Path) -> str:

@@ -14,6 +14,9 @@ from care_core.logs.ros_metadata import FILE_NAME, Metadata, parse_metadata
 ROS2_SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 ROS1_SUFFIXES = (".bag", ".bag.active")
 
+RENAMED = "named in metadata.yaml but not there"
+"""The fact about a recording whose files were renamed since."""
+
 _PART = re.compile(r"^(?P<series>.+)_(?P<number>0|[1-9]\d*)\.bag(\.active)?$")
 _DATE = re.compile(r"\d{4}(-\d\d){5}")
 """What `rosbag record` puts into the name of each part: when that part was begun."""
@@ -93,7 +96,9 @@ def _ros2_bag(folder: Path, present: Sequence[str]) -> Recording:
     if len({_bare_suffix(name) for name in files}) > 1:
         raise LogError("The folder holds both .db3 and .mcap files.", hint="Name the one to read.", where=str(folder))
     flaws = tuple(Flaw(f"{name} is missing from the folder") for name in missing)
-    return Recording(tuple(folder / name for name in files), metadata, flaws)
+    gone = [name for name in listed if name not in present]
+    notes = {RENAMED: f"{', '.join(gone)}, read instead: {', '.join(others)}"} if gone and others else {}
+    return Recording(tuple(folder / name for name in files), metadata, flaws, notes)
 
 
 def _siblings(path: Path, metadata: Metadata) -> list[str]:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core import limits
-from care_core.errors import LogError
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.cdr_message import CdrDecoder
+from care_core.logs.json_message import json_decoder
 from care_core.logs.mapped import FileBytes
 from care_core.logs.ros1_message import message_decoder
 from care_core.logs.ros_message import Buffer, Decoder, MalformedMessageError, short_name
@@ -125,6 +125,10 @@ class _Broken:
     count: int
 
 
+_DECODED = ("ros1", "cdr", "json")
+"""Encodings of messages."""
+
+
 class RosLog:
     """A recording of one or more files, fulfilling `care_core.logs.base.Log`.
 
@@ -149,9 +153,6 @@ class RosLog:
             metadata: of the whole recording, where a file beside it holds it.
             missing: files that the recording should have and has not.
             notes: facts about the files.
-
-        Raises:
-            LogError: there are messages, but of encodings that are not decoded.
         """
         self.path = path
         self.format = kind
@@ -163,7 +164,6 @@ class RosLog:
         self._broken: dict[str, _Broken] = {}
         every = [times for part in parts for times in part.times_ns.values()]
         self._low_ns, self._high_ns, self._strays = _believable(every)
-        self._refuse_undecodable()
 
     @property
     def start(self) -> str | None:
@@ -314,6 +314,8 @@ class RosLog:
         one = part.connections[number]
         if one.encoding == "ros1":
             return message_decoder(one.type, one.definition, fields, self._low_ns)
+        if one.encoding == "json":
+            return json_decoder(_first(part, number), fields, self._low_ns)
         if one.encoding != "cdr":
             raise MalformedMessageError(f"they are {one.encoding or 'of no named encoding'}")
         types, wide = cdr_types(one.type, one.definition, one.language, self._metadata.distro, _first(part, number))
@@ -328,20 +330,9 @@ class RosLog:
         topics: dict[str, set[str]] = {}
         for part in self._parts:
             for connection in part.connections.values():
-                if connection.encoding not in ("ros1", "cdr"):
+                if connection.encoding not in _DECODED:
                     topics.setdefault(connection.encoding or "no named encoding", set()).add(connection.topic)
         return topics
-
-    def _refuse_undecodable(self) -> None:
-        undecodable = self._undecodable()
-        if not undecodable or any(c.encoding in ("ros1", "cdr") for p in self._parts for c in p.connections.values()):
-            return
-        raise LogError(
-            f"All its channels are {' or '.join(sorted(undecodable))}, which is not decoded:"
-            f" {', '.join(sorted(set().union(*undecodable.values())))}.",
-            hint="Record with 'ros2 bag record' or convert it, so that messages are CDR or ROS 1.",
-            where=str(self.path),
-        )
 
     @cached_property
     def _count(self) -> int:

@@ -164,9 +164,30 @@ def test_a_packet_of_another_century_is_damage(tmp_path: Path) -> None:
     assert len(log.read({"ATTITUDE": ("roll",)})["ATTITUDE"]) == 39
 
 
-def test_packets_without_stamps_are_refused_by_name(tmp_path: Path) -> None:
+def test_packets_without_stamps_have_the_time_that_they_carry(tmp_path: Path) -> None:
+    station = Station()
+    boot_ms = [1000, 1100, 1200, 1150, 1300, 60, 160, 260]  # one is overtaken, and the vehicle starts again
+    for number, ms in enumerate(boot_ms):
+        station.hear(mavlink.MAVLink_attitude_message(ms, 0.1 * number, 0.5, 0.0, 0.0, 0.0, 0.0)).hear(heartbeat())
     path = tmp_path / "a.tlog.raw"
-    path.write_bytes(b"".join(part[8:] for part in flight().parts))
+    path.write_bytes(b"".join(part[8:] for part in station.parts))
+    log, stamped = open_log(path), MavlinkLog(station.write(tmp_path / "a.tlog"))
+    assert log.facts["clock"] == "seconds since the vehicle was started, as its messages say"
+    assert log.start is None
+    counts = {channel.name: channel.count for channel in stamped.channels()}
+    assert {channel.name: channel.count for channel in log.channels()} == counts
+    told = log.read({"ATTITUDE": ("roll",)})["ATTITUDE"]
+    np.testing.assert_allclose(told["roll"], 0.1 * np.arange(8), atol=1e-6)
+    np.testing.assert_allclose(told.t, [0.0, 0.1, 0.2, 0.2, 0.3, 0.3, 0.4, 0.5], atol=1e-3)
+    assert log.damage == ()
+
+
+def test_packets_that_carry_no_time_and_have_no_stamp_are_refused_by_name(tmp_path: Path) -> None:
+    station = Station()
+    for _ in range(9):
+        station.hear(mavlink.MAVLink_vfr_hud_message(1.0, 1.0, 2, 3, 4.0, 5.0))
+    path = tmp_path / "a.rlog"
+    path.write_bytes(b"".join(part[8:] for part in station.parts))
     with pytest.raises(LogError, match="without time stamps") as caught:
         open_log(path)
     assert "tlog" in caught.value.hint

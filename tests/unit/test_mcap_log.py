@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 from mcap.writer import CompressionType, IndexType
 from rosbags.rosbag2 import StoragePlugin
 
-from care_core.errors import LogError
+from care_core.health.examine import examine
 from care_core.logs.base import LogFormat
 from care_core.logs.mcap_log import McapLog
 from care_core.logs.opening import open_log
@@ -35,6 +36,9 @@ from tests.ros_samples import (
 
 PLAIN = {"index_types": IndexType.NONE, "use_statistics": False, "repeat_channels": False, "repeat_schemas": False,
          "use_summary_offsets": False}  # fmt: skip
+
+
+JSON: dict[str, Any] = {"text": "{}", "language": "jsonschema", "encoding": "json"}
 
 
 def check(path: Path) -> McapLog:
@@ -133,19 +137,44 @@ def test_encodings_that_are_not_decoded(tmp_path: Path) -> None:
         log_file.add("/note", TEXT, START_NS, cdr(make(ROS2, TEXT, "hello")))
     log = open_log(path)
     assert [(channel.name, channel.count) for channel in log.channels()] == [("/json", 1), ("/note", 1), ("/proto", 1)]
-    assert log.facts["not decoded (json)"] == "/json"
     assert log.facts["not decoded (protobuf)"] == "/proto"
-    assert set(log.read({"/json": ("a",), "/note": ("data",)})) == {"/note"}
-    assert [damage.what for damage in log.damage] == ["/json: its messages cannot be decoded: they are json"]
+    assert set(log.read({"/proto": ("a",), "/note": ("data",)})) == {"/note"}
+    assert [damage.what for damage in log.damage] == ["/proto: its messages cannot be decoded: they are protobuf"]
 
 
-def test_a_file_with_nothing_to_decode_is_refused_by_name(tmp_path: Path) -> None:
+def test_messages_in_json_are_read_as_any_others(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    said = {"level": 4, "message": "no device", "timestamp": {"sec": START_NS // 10**9, "nsec": 5 * 10**8}}
+    scan = {"header": {"stamp": {"sec": 0, "nanosec": 0}}, "ranges": [1.5, None, 2], "info": [{"id": "a"}, {"id": "b"}]}
+    with McapFile(path) as log_file:
+        for row, (topic, name, message) in enumerate(
+            (("/log", "foxglove.Log", said), ("/scan", "sensor_msgs/msg/LaserScan", scan), ("/log", "foxglove.Log", {}))
+        ):
+            raw = json.dumps(message).encode()
+            log_file.add(topic, name, START_NS + row * 10**9, raw, **JSON)
+        log_file.add("/log", "foxglove.Log", START_NS + 3 * 10**9, b"{broken", **JSON)
+    log = open_log(path)
+    wanted = {"/log": ("level", "message", "timestamp", "name"), "/scan": ("ranges", "info.id", "header.stamp")}
+    tables = log.read(wanted)
+    words = tables["/log"]
+    assert set(words.columns) == {"level", "message", "timestamp"}
+    assert words["message"].tolist() == ["no device", ""]
+    np.testing.assert_array_equal(words["level"], [4.0, np.nan])
+    assert words["timestamp"][0] == pytest.approx(0.5 + START_NS // 10**9 - START_NS / 1e9, abs=1e-6)
+    np.testing.assert_array_equal(tables["/scan"]["ranges"][0], [1.5, np.nan, 2.0])
+    assert tables["/scan"]["info.id"][0] == ["a", "b"]
+    assert np.isnan(tables["/scan"]["header.stamp"][0])
+    assert "it is no JSON" in log.damage[0].what
+
+
+def test_a_file_with_nothing_to_decode_still_tells_when_its_messages_came(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with McapFile(path) as log_file:
         log_file.add("/proto", "x.Odometry", START_NS, b"\x08\x01", text="", language="protobuf", encoding="protobuf")
-    with pytest.raises(LogError, match="protobuf, which is not decoded: /proto") as caught:
-        open_log(path)
-    assert caught.value.hint
+    log = open_log(path)
+    assert [(channel.name, channel.count) for channel in log.channels()] == [("/proto", 1)]
+    health = examine(log)
+    assert health.too_little == "its messages are (protobuf), not ROS 1, CDR or JSON: only when they came is known"
 
 
 def test_a_service_event_does_not_hide_the_rest(tmp_path: Path) -> None:

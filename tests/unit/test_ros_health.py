@@ -12,7 +12,7 @@ from care_core.health.ros.examining import examine
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 from tests.ros_drives import ABORTED, FAILS_AT_S, SUCCEEDED, Drive
-from tests.ros_samples import ROS2, START_NS, McapFile, cdr, random_message, write_db3, write_mcap
+from tests.ros_samples import ROS2, START_NS, McapFile, cdr, imu, random_message, write_db3, write_mcap
 
 WARN, ERROR, FATAL = 30, 40, 50
 
@@ -131,6 +131,27 @@ def test_times_and_samples_of_a_recording(tmp_path: Path) -> None:
     assert times[1] - times[0] == pytest.approx(0.2)
     few = log.read({"/front/scan": ("range_max",)}, {"/front/scan": 50})["/front/scan"]
     assert few.t.tolist() == times[::4].tolist()
+
+
+@pytest.mark.parametrize(("pace", "found"), [(1.0, []), (0.9, []), (0.4, ["cpu"])])
+def test_a_simulation_that_lags_behind_real_time_is_noted(pace: float, found: list[str], tmp_path: Path) -> None:
+    with McapFile(tmp_path / "slow.mcap") as log:
+        for row in range(300):
+            own_ns = int(row * 100_000_000 * pace)
+            reading = imu(ROS2, row, own_ns)
+            log.add("/imu", "sensor_msgs/msg/Imu", START_NS + row * 100_000_000, cdr(reading))
+    health = examine(open_log(tmp_path / "slow.mcap"))
+    assert [one.kind for one in health.findings if one.kind != "log"] == found
+    assert all(one.severity == "info" for one in health.findings)
+
+
+def test_renamed_files_of_a_bag_are_noted(tmp_path: Path) -> None:
+    write_db3(tmp_path / "bag")
+    (data,) = (tmp_path / "bag").glob("*.db3")
+    data.rename(data.with_name("other.db3"))
+    (note,) = (one for one in examine(open_log(tmp_path / "bag")).findings if one.kind == "log")
+    assert note.title == "metadata.yaml names other files than those beside it"
+    assert "other.db3" in note.evidence
 
 
 KINDS_READ = (

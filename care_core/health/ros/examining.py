@@ -14,6 +14,8 @@ from care_core.logs.ros_log import RosLog
 
 SHORT_S = 5.0
 """Nothing can be said of how a robot drives in less."""
+_UNREAD = "not decoded "
+"""How the facts about encodings begin that no reader knows."""
 _STACKS = {"move_base": "move_base", "nav2": "Nav2"}
 
 
@@ -39,8 +41,13 @@ def _too_little(recording: Recording) -> str:
     senses = bool(recording.scans or recording.batteries)
     longest = max(len(table) for _, table in recording.of(*plan.ROBOT)) if drives or senses else 0
     speaks = bool(recording.said or recording.goals) or any(True for _ in recording.of(plan.DIAGNOSTICS))
+    unread = [fact.removeprefix(_UNREAD) for fact in recording.facts if fact.startswith(_UNREAD)]
+    if longest < STREAM_MESSAGES and not speaks and unread:
+        return f"its messages are {' and '.join(unread)}, not ROS 1, CDR or JSON: only when they came is known"
     if longest < STREAM_MESSAGES and not speaks:
         return "nothing in it tells of a robot: no odometry, goals, commands, laser, battery or messages"
     if recording.duration_s < SHORT_S:
         return f"{recording.duration_s:.1f} s are too short to judge a robot by"
+    if not speaks:
+        return "neither goals nor messages of nodes are recorded: what the robot was to do is not known"
     return ""

@@ -17,7 +17,9 @@ SCAN = "sensor_msgs/LaserScan"
 CLOUD = "sensor_msgs/PointCloud2"
 BATTERY = "sensor_msgs/BatteryState"
 IMU = "sensor_msgs/Imu"
-ROSOUT = ("rosgraph_msgs/Log", "rcl_interfaces/Log")
+VIEWER_LOG = ("foxglove.Log", "foxglove_msgs/Log")
+"""Messages of nodes as viewers have them, with names and levels of their own."""
+ROSOUT = ("rosgraph_msgs/Log", "rcl_interfaces/Log", *VIEWER_LOG)
 DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
 STATUS = "action_msgs/GoalStatusArray"
 TREE = "nav2_msgs/BehaviorTreeLog"
@@ -30,6 +32,9 @@ ACTION_GOAL, ACTION_RESULT = "ActionGoal", "ActionResult"
 
 ROBOT = (ODOMETRY, TWIST, TWIST_STAMPED, SCAN, BATTERY)
 """What a robot that drives publishes."""
+
+STAMPED = (ODOMETRY, SCAN, IMU)
+"""What carries the time at which the robot made it, by its own clock."""
 
 _PLANE = ("orientation.x", "orientation.y", "orientation.z", "orientation.w")
 _TWIST = ("linear.x", "linear.y", "angular.z")
@@ -44,8 +49,8 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     TWIST_STAMPED: tuple(f"twist.{one}" for one in _TWIST),
     SCAN: ("header.stamp", "angle_min", "angle_increment", "range_min", "range_max", "ranges"),
     BATTERY: ("voltage", "current", "percentage"),
-    IMU: (*(f"linear_acceleration.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "xyzw")),
-    **dict.fromkeys(ROSOUT, ("level", "name", "msg")),
+    IMU: ("header.stamp", *(f"linear_acceleration.{axis}" for axis in "xyz"), *_PLANE),
+    **dict.fromkeys(ROSOUT, ("level", "name", "msg", "message")),
     DIAGNOSTICS: ("status.level", "status.name", "status.message"),
     STATUS: ("status_list.goal_info.goal_id.uuid", "status_list.status"),
     TREE: ("event_log.node_name", "event_log.previous_status", "event_log.current_status"),

@@ -24,6 +24,12 @@ WARN, ERROR, FATAL = 4, 8, 16
 """Levels of rosgraph_msgs/Log."""
 _ROS2_LEVELS = {10: 1, 20: 2, 30: WARN, 40: ERROR, 50: FATAL}
 """Levels of rcl_interfaces/Log in those of ROS 1."""
+_VIEWER_LEVELS = {0: 2, 1: 1, 2: 2, 3: WARN, 4: ERROR, 5: FATAL}
+"""Levels of foxglove.Log (its schema: unknown, debug, info, warning, error, fatal) in those of ROS 1."""
+_LEVELS = (
+    (_ROS2_LEVELS, tuple(kind for kind in plan.ROSOUT if kind not in plan.VIEWER_LOG)),
+    (_VIEWER_LEVELS, plan.VIEWER_LOG),
+)
 
 OPEN_S = 30.0
 """A goal without an answer for longer than this at the end of a recording was not being reached."""
@@ -179,16 +185,8 @@ class Recording:
     @cached_property
     def said(self) -> tuple[Said, ...]:
         """What nodes said, in order of time; where it was recorded twice (`/rosout_agg`), once."""
-        tables = [table for _, table in self.of(*plan.ROSOUT) if set(plan.FIELDS[plan.ROSOUT[0]]) <= set(table.columns)]
-        if not tables:
-            return ()
-        table = max(tables, key=len)
-        rows = zip(table.t.tolist(), *(table[name] for name in ("level", "name", "msg")), strict=True)
-        return tuple(
-            Said(t, _ROS2_LEVELS.get(int(level), int(level)), str(name), str(text))
-            for t, level, name, text in rows
-            if np.isfinite(level)
-        )
+        spoken = [_said(table, levels) for levels, kinds in _LEVELS for _, table in self.of(*kinds)]
+        return max(spoken, key=len, default=())
 
     def severity(self, onset_s: float, otherwise: Severity = "warning") -> Severity:
         """How much something that began then matters: critical where a goal failed afterwards, or is left open at the
@@ -224,6 +222,20 @@ def yaw_of(table: Table, prefix: str) -> Floats:
     x, y, z, w = (believable(table[f"{prefix}.{axis}"], 2.0) for axis in "xyzw")
     yaw: Floats = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
     return yaw
+
+
+def _said(table: Table, levels: Mapping[int, int]) -> tuple[Said, ...]:
+    """The messages of one topic; `levels` gives the codes of its type in those of ROS 1."""
+    text = next((name for name in ("msg", "message") if name in table.columns), None)
+    if text is None or "level" not in table.columns:
+        return ()
+    names = table["name"] if "name" in table.columns else [""] * len(table)
+    rows = zip(table.t.tolist(), table["level"], names, table[text], strict=True)
+    return tuple(
+        Said(t, levels.get(int(level), int(level)), str(name), str(words))
+        for t, level, name, words in rows
+        if np.isfinite(level)
+    )
 
 
 def _odometry(topic: str, table: Table) -> Odometry | None:

@@ -70,7 +70,8 @@ def _errors(recording: Recording) -> Iterator[Finding]:
         otherwise: Severity = "critical" if downed else "warning"
         times = f", {len(own)} times" if len(own) > 1 else ""
         yield Finding(
-            about(f"{first.node} {first.text}"), f"{first.node}: {first.text[:80]}", first.time_s, own[-1].time_s,
+            about(f"{first.node} {first.text}"), ": ".join(filter(None, (first.node, first.text[:80]))), first.time_s,
+            own[-1].time_s,
             recording.severity(first.time_s, otherwise) if downed else "warning" if not recording.goals else "info",
             f'{"FATAL" if is_fatal else "ERROR"} "{first.text[:160]}"{times}', "/rosout", "hardware", 0.5,
         )  # fmt: skip

@@ -11,6 +11,7 @@ from care_core.health.records import Finding, FindingKind
 from care_core.health.ros import plan
 from care_core.health.ros.recording import WARN, Floats, Recording
 from care_core.health.ros.silence import ends_early
+from care_core.logs.recording import RENAMED
 
 OUTAGE_S, OUTAGE_PERIODS = 5.0, 10.0
 """A pause this long, and so many periods long, in several streams at once is an outage. Of 301 healthy missions, some
@@ -27,6 +28,7 @@ def check(recording: Recording) -> Iterator[Finding]:
     outages = list(_outage(recording))
     yield from outages
     yield from _ended(recording)
+    yield from _renamed(recording)
 
 
 def _qos(recording: Recording) -> Iterator[Finding]:
@@ -101,4 +103,12 @@ def _ended(recording: Recording) -> Iterator[Finding]:
             recording.severity(at) if kind in _KINDS else "info",
             f"nothing for the last {recording.duration_s - at:.0f} s, one every {period_s:.2g} s before",
             "times of recording", probability=0.6,
+        )  # fmt: skip
+
+
+def _renamed(recording: Recording) -> Iterator[Finding]:
+    if RENAMED in recording.facts:
+        yield Finding(
+            "log", "metadata.yaml names other files than those beside it", 0.0, 0.0, "info",
+            f"{RENAMED}: {recording.facts[RENAMED]}; 'ros2 bag' does not open it so", "metadata.yaml", "operation",
         )  # fmt: skip
