@@ -65,7 +65,8 @@ def _rank(finding: Finding) -> tuple[bool, int, bool, bool]:
 
 def _explains(cause: Finding, finding: Finding, reach: Leads) -> bool:
     return (
-        finding.kind in reach.get(cause.kind, frozenset())
+        not (finding.severity == "info" and finding.suspect == "parameter")  # it was set so before anything failed
+        and finding.kind in reach.get(cause.kind, frozenset())
         and cause.onset_s <= finding.onset_s + SLACK_S
         and (cause.probability >= LIKELY or finding.probability < LIKELY)
     )

@@ -466,3 +466,16 @@ def test_whatever_is_missing_or_broken_nothing_is_raised(
 def test_every_check_says_what_it_reads() -> None:
     for check in CHECKS:
         assert all(isinstance(fields, tuple) for fields in check.READS.values())
+
+
+@pytest.mark.parametrize(("drift_m", "kinds"), [(0.0, []), (6.0, ["barometer"])])
+def test_a_barometer_that_drifts_from_the_range_finder_on_the_ground_is_noted(drift_m: float, kinds: list[str]) -> None:
+    made = Made()
+    del made.table["BARO"], made.table["BARO#2"]
+    height = made.table["CTUN"]["Alt"]
+    made.table["POS"]["Lat"][:] = 47.0  # it lands where it began
+    made.table["RFND"] = {"Dist": 0.2 + np.minimum(height, 8.0), "Stat": np.full(len(made.t), 4.0)}
+    made.table["CTUN"]["BAlt"] = height + np.interp(made.t, [0, 8, 100], [0, 0, drift_m])
+    found = made.find()
+    assert [one.kind for one in found] == kinds
+    assert all(one.severity == "info" for one in found)

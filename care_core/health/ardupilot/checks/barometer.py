@@ -11,13 +11,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.health.ardupilot.flight import Flight
+from care_core.health.ardupilot.flight import Flight, Mask
 from care_core.health.ardupilot.measure import Calibration, aligned, lasting, likely, roughness, smooth
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
+from care_core.vehicles import flies
 
 READS: Wanted = {
+    "POS": ("Lat", "Lng"),
     "BARO": ("Alt", "Health"),
     "GPS": ("Status", "Alt", "NSats"),
     "RFND": ("Dist", "Stat"),
@@ -29,6 +31,9 @@ APART_M = 3.0
 DRIFT_M = 10.0
 NOISE_M = 0.5
 """Standard deviation from record to record: three times what a barometer resolves."""
+_LOW_M, _BEGAN_M, _NO_RANGE_M, _RANGE_GOOD = 3.0, 10.0, 0.02, 4
+"""Where barometer and range finder are compared; RangeFinder::Status::Good is 4 (AP_RangeFinder.h)."""
+_METRES_PER_DEGREE = 111_319.5
 _GOOD_SATS = 8
 _LASTS_S = 5.0
 _CALIBRATION: Calibration = ((1.0, 0.8), (2.0, 0.97))
@@ -37,7 +42,8 @@ _CALIBRATION: Calibration = ((1.0, 0.8), (2.0, 0.97))
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """A barometer that is not to be believed."""
+    """A barometer that is not to be believed, and one that a range finder contradicts near the ground."""
+    yield from _contradicted(flight)
     baros = [table.where(flight.watch(table.t)) for table in flight.all("BARO", "Alt")]
     baros = [table for table in baros if len(table) >= 5 and np.ptp(table["Alt"]) > 0]
     if not baros:
@@ -72,6 +78,48 @@ def find(flight: Flight) -> Iterator[Finding]:
         f"it {said}", "BARO.Alt against its neighbours, BARO of the second, GPS.Alt; Copter's pre-arm check allows 1 m",
         probability=likely(max(peaks), _CALIBRATION),
     )  # fmt: skip
+
+
+def _contradicted(flight: Flight) -> Iterator[Finding]:
+    """A barometer that moved away from the range finder, low and where the vehicle began: terrain explains it not."""
+    baro = flight.one("BARO", "Alt") or flight.one("CTUN", "BAlt")
+    ranger = flight.one("RFND", "Dist") or flight.one("CTUN", "SAlt")
+    if baro is None or ranger is None or not flies(flight.vehicle.kind):
+        return
+    (t, height), (at, distance) = _column(baro, "Alt", "BAlt"), _column(ranger, "Dist", "SAlt")
+    near = (distance > _NO_RANGE_M) & (distance < _LOW_M)
+    if "Stat" in ranger.columns:
+        near &= ranger["Stat"] == _RANGE_GOOD
+    near &= _where_it_began(flight, at)
+    if near.sum() < 20 or np.ptp(distance[near]) == 0:
+        return
+    at, distance = at[near], distance[near]
+    apart = np.interp(at, t, height) - distance
+    apart = smooth(at, apart - np.median(apart[: max(len(apart) // 20, 3)]), 3.0)
+    spans = lasting(at, np.abs(apart) > APART_M, _LASTS_S, gap_s=5.0)
+    if spans:
+        most = float(np.quantile(np.abs(apart)[np.abs(apart) > APART_M], 0.9))
+        yield Finding(
+            "barometer", "barometer and range finder are at odds", spans[0][0], spans[-1][1], "info",
+            f"they moved {most:.1f} m apart within {_LOW_M:g} m of the ground (limit {APART_M:g} m)",
+            "BARO or CTUN.BAlt against RFND or CTUN.SAlt; Copter's pre-arm check allows 1 m to the estimator",
+            probability=0.3,
+        )  # fmt: skip
+
+
+def _column(table: Table, *names: str) -> tuple[Floats, Floats]:
+    """Times and values of the first of these fields that a table has."""
+    return table.t, next(table[name] for name in names if name in table.columns)
+
+
+def _where_it_began(flight: Flight, t: Floats) -> Mask:
+    """Which of these times are within some metres of the first position; all where the log holds none."""
+    track = flight.one("POS", "Lat", "Lng")
+    if track is None:
+        return np.ones(len(t), dtype=bool)
+    north = (track["Lat"] - track["Lat"][0]) * _METRES_PER_DEGREE
+    east = (track["Lng"] - track["Lng"][0]) * _METRES_PER_DEGREE * np.cos(np.radians(track["Lat"][0]))
+    return np.asarray(np.interp(t, track.t, np.hypot(north, east)) < _BEGAN_M)
 
 
 def _noise(flight: Flight, t: Floats, height: Floats) -> Floats:
