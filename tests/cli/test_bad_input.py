@@ -133,7 +133,7 @@ def test_names_of_files_do_not_steer_the_terminal(care: Care, tmp_path: Path) ->
     for name in ("e\x1b[31m[red]x\x07\n.BIN", os.fsdecode(b"n\xff\xfe.BIN")):
         path = tmp_path / name
         try:
-            shutil.copy(SAMPLE, path)
+            shutil.copy(GOOD, path)
         except OSError:
             pytest.skip("the file system refuses such names")
         for command in (("triage",), ("triage", "--json"), ("triage", "--markdown"), ("inspect",)):
@@ -155,7 +155,6 @@ def test_a_closed_stream_is_no_error(closed: str) -> None:
 
 def test_every_json_is_as_published(care: Care, log: Path, tmp_path: Path) -> None:
     report = report_of(care, log, tmp_path)
-    assert care("triage", log, "--json").code == 1  # remembered
     printed = {
         "triage": care("triage", log, "--json"),
         "inspect": care("inspect", log, "--json"),
