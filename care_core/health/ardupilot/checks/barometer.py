@@ -82,15 +82,14 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def _contradicted(flight: Flight) -> Iterator[Finding]:
     """A barometer that moved away from the range finder, low and where the vehicle began: terrain explains it not."""
-    baro = flight.one("BARO", "Alt") or flight.one("CTUN", "BAlt")
-    ranger = flight.one("RFND", "Dist") or flight.one("CTUN", "SAlt")
+    baro = _first(flight, ("BARO", "Alt"), ("CTUN", "BAlt"))
+    ranger = _first(flight, ("RFND", "Dist"), ("CTUN", "SAlt"))
     if baro is None or ranger is None or not flies(flight.vehicle.kind):
         return
-    (t, height), (at, distance) = _column(baro, "Alt", "BAlt"), _column(ranger, "Dist", "SAlt")
-    near = (distance > _NO_RANGE_M) & (distance < _LOW_M)
-    if "Stat" in ranger.columns:
-        near &= ranger["Stat"] == _RANGE_GOOD
-    near &= _where_it_began(flight, at)
+    (_, t, height), (table, at, distance) = baro, ranger
+    near = (distance > _NO_RANGE_M) & (distance < _LOW_M) & _where_it_began(flight, at)
+    if "Stat" in table.columns:
+        near &= table["Stat"] == _RANGE_GOOD
     if near.sum() < 20 or np.ptp(distance[near]) == 0:
         return
     at, distance = at[near], distance[near]
@@ -107,9 +106,13 @@ def _contradicted(flight: Flight) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _column(table: Table, *names: str) -> tuple[Floats, Floats]:
-    """Times and values of the first of these fields that a table has."""
-    return table.t, next(table[name] for name in names if name in table.columns)
+def _first(flight: Flight, *places: tuple[str, str]) -> tuple[Table, Floats, Floats] | None:
+    """The first of these messages and fields that the log holds: the message, its times, the field's values."""
+    for name, field in places:
+        table = flight.one(name, field)
+        if table is not None:
+            return table, table.t, table[field]
+    return None
 
 
 def _where_it_began(flight: Flight, t: Floats) -> Mask:
