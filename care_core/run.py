@@ -170,6 +170,11 @@ class Run:
     sources: Mapping[str, str] = field(default_factory=dict)
     """Per option of `config` where its value came from: a record or topic of the log, or file:line."""
 
+    @property
+    def noun(self) -> str:
+        """What to call it: a mission, or a run that was no mission or is judged without one."""
+        return "run" if self.checks else "mission"
+
     def value(self, name: str) -> Value | None:
         """The run's value of a variable of any role, None when the run does not hold it."""
         parts: tuple[Mapping[str, Value], ...] = (self.config, self.context, self.metrics, self.objectives)

@@ -33,7 +33,8 @@ def wrapped(text: str, first: str = "", rest: str | None = None) -> list[str]:
     """The text, made safe, in lines of at most `WIDTH` columns; `rest` indents the later ones, as wide as `first` if
     not given."""
     indent = " " * len(first) if rest is None else rest
-    return textwrap.wrap(clean(text), WIDTH, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+    lines = textwrap.wrap(clean(text), WIDTH, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+    return [line.replace("\u00a0", " ") for line in lines]  # what must stand on one line was held together by them
 
 
 def clock(time_s: float | None) -> str:

@@ -29,6 +29,8 @@ ValueType = Literal["float", "int", "bool", "enum"]
 _WORDS = {"true": 1.0, "yes": 1.0, "on": 1.0, "false": 0.0, "no": 0.0, "off": 0.0}
 _COMPARE = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt, "==": operator.eq}
 
+ASSUMED = " (assumed)"
+"""Stands behind a value that no source of a run holds, wherever it is shown."""
 
 SAME_SHARE, SAME_LEAST = 0.05, 0.5
 """Two missions are the same where their numbers differ by no more: home is never in the same place to the metre, and a
@@ -198,6 +200,10 @@ class Variable:
             return "true" if value else "false"
         return f"{value:.6g}"
 
+    def driven(self, value: float | None, is_assumed: bool) -> str:
+        """The value that a run had, marked where no source holds it."""
+        return f"{self.show(value)}{ASSUMED if is_assumed else ''}"
+
 
 @dataclass(frozen=True, slots=True)
 class Change:
@@ -209,6 +215,13 @@ class Change:
     notes: tuple[str, ...] = ()
     in_support: bool = True
     """False for a value that no training run came near: what is predicted of it is a guess."""
+    is_assumed: bool = False
+    """Whether no source holds the current value: it is taken to be at its reference."""
 
     def __str__(self) -> str:
-        return f"{self.option.name} {self.option.show(self.current)} -> {self.option.show(self.suggested)}"
+        return f"{self.option.name} {self.values}"
+
+    @property
+    def values(self) -> str:
+        """From what to what, without the unit."""
+        return f"{self.option.driven(self.current, self.is_assumed)} -> {self.option.show(self.suggested)}"

@@ -74,7 +74,7 @@ CAUSES = 10
 def open_and_warm(request: Request, progress: Progress) -> Case:
     """The case with its question made, so that the first key in the fix waits for nothing. Raises CareError."""
     case = open_case(request, progress)
-    if case.reading is not None:
+    if case.reading is not None and not case.diagnosis.run.checks:
         _ = case.reading.question
     return case
 

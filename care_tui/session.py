@@ -148,11 +148,13 @@ class Session:
 
     def current(self, option: Variable) -> float | None:
         """The option's value in this run; where no source holds it, what the engine took it to be."""
-        for fault in self.diagnosis.faults:
-            for cause in fault.causes:
-                if cause.option.name == option.name:
-                    return cause.current
-        return self.diagnosis.run.config.get(option.name, option.default)
+        reading = self.case and self.case.reading
+        reference = reading.judged.reference.config if reading else {}
+        return self.diagnosis.run.config.get(option.name, reference.get(option.name, option.default))
+
+    def is_assumed(self, option: Variable) -> bool:
+        """Whether no source holds the option's value."""
+        return option.name not in self.diagnosis.run.config
 
     def decided(self) -> Diagnosis:
         """The diagnosis with the ticked changes as its fix, and the causes set aside."""

@@ -11,7 +11,6 @@ from care_core.application.case import Case
 from care_core.errors import CareError
 
 if TYPE_CHECKING:
-    from care_core.diagnose.records import ObjectiveResult
     from care_core.history.store import Triaged
     from care_core.logs.base import Log
     from care_core.run import FitVerdict
@@ -86,32 +85,6 @@ def _worded(channel: str, values: list[object], kind: Kind) -> tuple[str, str]:
     if channel == "EV":
         return "event", event_words(int(float(str(values[0])))) if values else ""
     return "message", str(values[0]) if values else ""
-
-
-@dataclass(frozen=True, slots=True)
-class MissionVerdict:
-    """One mission of a log, and how it went."""
-
-    index: int
-    start_s: float
-    end_s: float
-    ended: bool
-    results: tuple[ObjectiveResult, ...]
-
-
-def missions_of(case: Case) -> list[MissionVerdict]:
-    """Every mission of the log, judged as the one of the case was; none where no profile fits."""
-    from care_core.diagnose.judging import judge
-    from care_core.extract.read import read_runs
-
-    if case.reading is None:
-        return []
-    profile, own = case.reading.profile, case.reading.judged.own
-    return [
-        MissionVerdict(run.mission.index, run.mission.start_s, run.mission.end_s, run.mission.ended, judged.results)
-        for run in read_runs(log_of(case), profile.schema)
-        for judged in [judge(run, profile.schema, profile.model, own)]
-    ]
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,6 +56,8 @@ class World:
     """What the profile says of each variable, by name."""
     kept: frozenset[str] = frozenset()
     """Options that stay as they are."""
+    assumed: frozenset[str] = frozenset()
+    """Options that no source of the run holds: taken to be at their reference."""
 
     def predict(self, objective: str, configs: Sequence[Config]) -> Predicted:
         """The objective under each configuration, given what this run met."""

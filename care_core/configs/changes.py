@@ -20,7 +20,8 @@ def unified_diff(run: Run, changes: Sequence[Change]) -> str:
         setting = run.settings.get(parameter)
         current = None if setting is None else option_value(option, setting)
         was = change.current if current is None else current
-        driven[parameter] = line_of(option, parameter, parameter_value(option, was))
+        if not (change.is_assumed and current is None):
+            driven[parameter] = line_of(option, parameter, parameter_value(option, was))
         fixed[parameter] = line_of(option, parameter, suggested)
     lines = difflib.unified_diff(
         [driven[parameter] for parameter in sorted(driven)],

@@ -160,7 +160,14 @@ def to_fix(world: World, assignment: Assignment, probability: float) -> Fix:
     config = {**world.config, **assignment}
     return Fix(
         changes=tuple(
-            Change(options[name], world.config[name], assignment[name], change_notes(options[name])) for name in order
+            Change(
+                options[name],
+                world.config[name],
+                assignment[name],
+                change_notes(options[name]),
+                is_assumed=name in world.assumed,
+            )
+            for name in order
         ),
         p_fixed=probability,
         predicted={name: prediction(world, name, config) for name in world.model.outcomes},

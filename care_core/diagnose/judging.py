@@ -108,12 +108,12 @@ def verdict(judged: Judged) -> MissionVerdict:
     everything = (*judged.results, *judged.checks)
     broken = [result.variable.name for result in everything if result.status == "fault"]
     if broken:
-        return MissionVerdict(judged.run.mission, "fault", ", ".join(broken))
+        return MissionVerdict(judged.run.mission, "fault", ", ".join(broken), everything)
     if judged.checks and judged.results:
-        return MissionVerdict(judged.run.mission, "ok", "no mission was flown")
+        return MissionVerdict(judged.run.mission, "ok", "no mission was flown", everything)
     unknown = [result for result in everything if result.status == "not_evaluated"]
     reason = unknown[0].reason if unknown else ""
-    return MissionVerdict(judged.run.mission, "not_evaluated" if unknown else "ok", reason)
+    return MissionVerdict(judged.run.mission, "not_evaluated" if unknown else "ok", reason, everything)
 
 
 def with_repeats(first: Judged, others: Sequence[Judged]) -> Judged:
@@ -202,6 +202,7 @@ def world_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> Worl
         reference=reference,
         variables=profile.schema.variables,
         kept=frozenset(kept),
+        assumed=frozenset(option.name for option in profile.schema.options) - frozenset(run.config),
     )
 
 

@@ -93,6 +93,7 @@ class MissionVerdict:
     status: Status
     reason: str
     """What was broken, or why it could not be judged; empty where all is well."""
+    results: tuple[ObjectiveResult, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +158,8 @@ class Cause:
     confidence: Confidence
     in_support: bool
     notes: tuple[Note, ...] = ()
+    is_assumed: bool = False
+    """Whether no source holds the current value: it is taken to be at its reference."""
     is_lead: bool = False
     """Not shown to cost this run anything, only not ruled out: what to look at next when no cause convinces."""
 
@@ -176,6 +179,11 @@ class Fix:
     changes: tuple[Change, ...]
     p_fixed: float
     predicted: Mapping[str, Prediction]
+
+    @property
+    def is_guess(self) -> bool:
+        """Whether it takes a value that no training run came near: beside every probability that is said."""
+        return not all(change.in_support for change in self.changes)
 
 
 @dataclass(frozen=True, slots=True)

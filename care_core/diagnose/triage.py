@@ -67,8 +67,6 @@ class _Case:
     """Whose the reference is."""
     unranked: Mapping[str, tuple[Suspect, ...]]
     """Per objective the options off their reference whose effect the training runs cannot tell, the likeliest first."""
-    assumed: frozenset[str]
-    """Options that no source holds: taken to be at their reference."""
 
 
 def triage(
@@ -132,8 +130,7 @@ def diagnose(
     }
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
-    assumed = frozenset(v.name for v in schema.options) - frozenset(run.config)
-    case = _Case(profile, choice, run, world, judged.reference.source, unranked, assumed)
+    case = _Case(profile, choice, run, world, judged.reference.source, unranked)
     unheard = {result.variable.name: _out_of_reach(case, result) for result in broken}
     faults = tuple(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
@@ -229,6 +226,7 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         confidence=_confidence(case, result, suspect, in_support, support),
         in_support=in_support,
         notes=_cause_notes(case, suspect, in_support, support),
+        is_assumed=name in world.assumed,
         is_lead=suspect.weight < MIN_CONTRIBUTION and name not in case.run.refused_by,
     )
 
@@ -410,8 +408,8 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
     unread = [name for name in unread_options(case.profile.schema, case.run) if name in _off(case)]
     if unread:
         notes.append(f"no suspect, as no mode that reads it was entered: {', '.join(unread)}")
-    if case.assumed:
-        names = sorted(case.assumed)
+    if case.world.assumed:
+        names = sorted(case.world.assumed)
         shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
         notes.append(f"not in the log, taken to be at their reference: {shown}")
     return tuple(notes)

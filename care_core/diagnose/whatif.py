@@ -16,6 +16,8 @@ from care_core.profile.store import Profile
 from care_core.run import ProfileChoice, Run, Setting
 from care_core.variables import Change, Role, Variable
 
+NO_MISSION_HINT = "Ask with the log of a mission, or with another flight of this one: --mission N."
+
 
 @dataclass(frozen=True, slots=True)
 class Outlook:
@@ -38,10 +40,9 @@ class Answer:
     p_ok_now: float
 
     @property
-    def guessed(self) -> str:
-        """What is said beside every probability where a value leaves the training runs; '' where none does."""
-        names = [change.option.name for change in self.changes if not change.in_support]
-        return f"a guess: {', '.join(names)} outside the training runs" if names else ""
+    def is_guess(self) -> bool:
+        """Whether a value leaves the training runs, which is said beside every probability."""
+        return not all(change.in_support for change in self.changes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +68,7 @@ class Question:
                     value,
                     self.warnings(name, value),
                     world.model.supports(name, value),
+                    name in world.assumed,
                 )
                 for name, value in changes.items()
             ),
@@ -90,13 +92,15 @@ class Question:
             found.append(f"outside the training runs ({summary.low:g} to {summary.high:g}): a guess")
         if not any(name in mechanism.inputs for mechanism in self.world.model.mechanisms.values()):
             found.append("no effect was seen in training")
-        if name not in self.run.config:
-            found.append("the log does not hold its value; it is taken to be at its reference")
+        if name in self.world.assumed:
+            found.append("no source holds its value: it is assumed to be at its reference")
         return (*found, *change_notes(option))
 
 
 def question(judged: Judged, profile: Profile, choice: ProfileChoice) -> Question:
-    """Get a run ready to be asked."""
+    """Get a run ready to be asked. Raises UsageError for one without a mission, whose outcome nobody can predict."""
+    if judged.run.checks:
+        raise UsageError("No mission was flown, so no outcome of one can be predicted.", hint=NO_MISSION_HINT)
     asked = Question(
         profile=choice,
         schema=profile.schema,

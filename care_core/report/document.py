@@ -38,7 +38,7 @@ from care_core.report.happened import (
 )
 from care_core.run import Evidence, ProfileChoice, Value, is_known
 from care_core.text import clean
-from care_core.variables import Change, Kind, Op
+from care_core.variables import ASSUMED, Change, Kind, Op
 
 SCHEMA_ID: Final = "care.triage/1"
 
@@ -113,6 +113,8 @@ class CauseEntry(Strict):
     path_ace: float | None
     contribution: float | None
     current: int | float
+    assumed: bool = False
+    """Whether no source holds `current`."""
     suggested: int | float | None
     predicted: PredictedValue | None
     p_fixed: float | None
@@ -132,12 +134,21 @@ class ChangeEntry(Strict):
     parameter: str | list[str]
     from_: int | float = Field(validation_alias="from", serialization_alias="from")
     to: int | float
+    assumed: bool = False
+    """Whether no source holds `from`."""
     reboot_required: bool
+
+    @property
+    def values(self) -> str:
+        """From what to what."""
+        return f"from {self.from_:g}{ASSUMED if self.assumed else ''} to {self.to:g}"
 
 
 class FixSet(Strict):
     changes: list[ChangeEntry]
     p_fixed: float
+    guess: bool = False
+    """Whether a value is one that no training run came near."""
     predicted: dict[str, PredictedObjective]
 
 
@@ -407,6 +418,7 @@ def _cause(cause: Cause, warnings: tuple[str, ...]) -> CauseEntry:
         path_ace=_finite(cause.path_ace),
         contribution=_finite(cause.contribution),
         current=plain_number(cause.current),
+        assumed=cause.is_assumed,
         suggested=None if cause.suggested is None else plain_number(cause.suggested),
         predicted=None if cause.predicted is None else _predicted(cause.predicted),
         p_fixed=_finite(cause.p_fixed),
@@ -435,6 +447,7 @@ def _fix(fix: Fix, alternatives: tuple[Fix, ...]) -> FixEntry:
     return FixEntry(
         changes=chosen.changes,
         p_fixed=chosen.p_fixed,
+        guess=chosen.guess,
         predicted=chosen.predicted,
         alternatives=[_fix_set(alternative) for alternative in alternatives],
     )
@@ -445,6 +458,7 @@ def _fix_set(fix: Fix) -> FixSet:
     return FixSet(
         changes=[_change(change) for change in fix.changes],
         p_fixed=fix.p_fixed,
+        guess=fix.is_guess,
         predicted={name: entry for name, entry in entries.items() if entry is not None},
     )
 
@@ -456,5 +470,6 @@ def _change(change: Change) -> ChangeEntry:
         parameter=parameters[0] if len(parameters) == 1 else list(parameters),
         from_=plain_number(parameter_value(change.option, change.current)),
         to=plain_number(parameter_value(change.option, change.suggested)),
+        assumed=change.is_assumed,
         reboot_required=change.option.reboot_required,
     )

@@ -21,10 +21,11 @@ from care_core.report.document import (
 )
 from care_core.report.happened import finding_sentence
 from care_core.report.together import listed, together
-from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted
+from care_core.report.wording import SEVERITY_WORDS, chance, fit_text, hypothesis_text, noted
 from care_core.report.writers import STATUS_WORDS, plain_verdict
 from care_core.run import shown
 from care_core.text import seconds
+from care_core.variables import ASSUMED
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8886; --ok: #16803c; --fault: #c0261c; --unknown: #9a6a00; }
@@ -125,10 +126,12 @@ def _verdict(report: Report) -> str:
         return f"{found} <strong>No answer</strong>: {escape(report.abstained)}"
     if report.fix is None:
         return found
-    changes = ", ".join(
-        f"<code>{escape(change.option)}</code> from {change.from_:g} to {change.to:g}" for change in report.fix.changes
-    )
-    return f"{found} Change {changes}: {report.fix.p_fixed:.0%} probability that all objectives are met."
+    likely = f"{chance(report.fix.p_fixed, report.fix.guess)} that all objectives are met"
+    return f"{found} Change {_changes(report.fix)}: {likely}."
+
+
+def _changes(fix: FixSet) -> str:
+    return ", ".join(f"<code>{escape(change.option)}</code> {change.values}" for change in fix.changes)
 
 
 def _objective_row(objective: ObjectiveEntry) -> tuple[str, ...]:
@@ -151,7 +154,7 @@ def _cause_row(cause: CauseEntry) -> tuple[str, ...]:
         str(cause.rank),
         f"<code>{escape(cause.option)}</code>",
         " → ".join(escape(node) for node in cause.path),
-        f"{cause.current:g}",
+        f"{cause.current:g}{ASSUMED if cause.assumed else ''}",
         "" if cause.suggested is None else f"{cause.suggested:g}",
         "" if cause.p_fixed is None else f"{cause.p_fixed:.0%}",
         cause.confidence + ("" if cause.in_support else ", outside the training runs"),
@@ -163,8 +166,8 @@ def _fix(report: Report, fix: FixEntry) -> Iterator[str]:
     yield "<h2>Fix</h2>"
     objectives = {objective.name: objective for objective in report.objectives}
     rows = (
-        (f"<code>{escape(name)}</code>", escape(_prediction(objectives[name], predicted)), _status(predicted.status))
-        for name, predicted in fix.predicted.items()
+        (f"<code>{escape(name)}</code>", escape(_prediction(objectives[name], one, fix.guess)), _status(one.status))
+        for name, one in fix.predicted.items()
     )
     yield from _table(("Objective", "Predicted (80 %)", "Status"), rows)
     yield f"<pre>{chr(10).join(_diff_line(line) for line in report.diff.splitlines())}</pre>"
@@ -188,18 +191,15 @@ def _since(since: SinceEntry) -> Iterator[str]:
     yield from _table(("Parameter", "Option", "Then", "Now"), rows)
 
 
-def _prediction(objective: ObjectiveEntry, predicted: PredictedObjective) -> str:
+def _prediction(objective: ObjectiveEntry, predicted: PredictedObjective, is_guess: bool) -> str:
     """A yes-or-no objective has a probability, not a value."""
     if objective.kind == "functional":
-        return f"{predicted.value:.0%} probability"
+        return chance(predicted.value, is_guess)
     return f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
 
 
 def _alternative(fix: FixSet) -> str:
-    changes = ", ".join(
-        f"<code>{escape(change.option)}</code> {change.from_:g} to {change.to:g}" for change in fix.changes
-    )
-    return f"{changes}: {fix.p_fixed:.0%} probability"
+    return f"{_changes(fix)}: {chance(fix.p_fixed, fix.guess)}"
 
 
 def _diff_line(line: str) -> str:

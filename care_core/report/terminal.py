@@ -11,7 +11,7 @@ from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
 from care_core.report.happened import account_lines, finding_lines, finding_text, hypothesis_lines
 from care_core.report.together import listed, together
-from care_core.report.wording import critical, fit_text, said_without_profile
+from care_core.report.wording import chance, critical, fit_text, said_without_profile
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
 from care_core.variables import Variable
@@ -75,7 +75,7 @@ def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
     confidence = next((cause.confidence for cause in causes if cause.option.name in changed), None)
     changes = ", ".join(map(str, fix.changes))
     sure = f", {confidence} confidence in the cause" if confidence else ""
-    return f"Change {changes}: {fix.p_fixed:.0%} probability that all objectives are met{sure}"
+    return f"Change {changes}: {chance(fix.p_fixed, fix.is_guess)} that all objectives are met{sure}"
 
 
 def _without_profile(diagnosis: Diagnosis) -> str:
@@ -94,7 +94,7 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     run, profile = diagnosis.run, diagnosis.profile
     told = ("vehicle", "frame") if diagnosis.health.account else ()  # the account begins with them
     facts = "".join(f", {name} {fact}" for name, fact in run.log.facts.items() if name not in told)
-    mission = f"{'flight' if run.checks else 'mission'} {run.mission.index} of {run.mission.count}"
+    mission = f"{run.noun} {run.mission.index} of {run.mission.count}"
     duration = f"{run.mission.end_s - run.mission.start_s:.0f} s"
     which = f", {mission}" if run.mission.count else ""
     yield from wrapped(f"{Path(run.log.path).name}{which}, {duration}{facts}", "Log      ")
@@ -111,7 +111,7 @@ def _missions(diagnosis: Diagnosis) -> Iterator[str]:
     """Every mission of a log that holds several, with its verdict."""
     if len(diagnosis.missions) < 2:
         return
-    yield "Flights of this log" if diagnosis.run.checks else "Missions of this log"
+    yield f"{diagnosis.run.noun.capitalize()}s of this log"
     for verdict in diagnosis.missions:
         one = verdict.mission
         here = "  <- this report" if one.index == diagnosis.run.mission.index else ""
@@ -155,14 +155,14 @@ def _causes(faults: Sequence[Fault]) -> Iterator[str]:
         yield "  none was found among the options of the profile"
     for cause in shown:
         yield from _cause(cause)
-    leads = [f"{c.option.name} ({c.option.show(c.current)})" for c in fault.causes if c.is_lead]
+    leads = [f"{c.option.name} ({c.option.driven(c.current, c.is_assumed)})" for c in fault.causes if c.is_lead]
     if leads:
         yield from wrapped(f"not ruled out: {', '.join(leads)}", "  ", "    ")
 
 
 def _cause(cause: Cause) -> Iterator[str]:
     option = cause.option
-    change = option.show(cause.current)
+    change = option.driven(cause.current, cause.is_assumed)
     if cause.suggested is not None:
         change += f" -> {option.show(cause.suggested)}"
     facts = [f"{cause.confidence} confidence"]
@@ -189,19 +189,20 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     fix = diagnosis.fix
     if fix is None:
         return
-    yield f"Fix ({fix.p_fixed:.0%} probability that all objectives are met)"
+    yield from wrapped(f"Fix ({chance(fix.p_fixed, fix.is_guess)} that all objectives are met)")
     for change in fix.changes:
         option = change.option
         restart = ", needs a restart" if option.reboot_required else ""
-        values = f"{option.show(change.current)} -> {option.show(change.suggested)} {option.unit}".rstrip()
+        values = f"{change.values} {option.unit}".rstrip()
         yield from wrapped(f"{option.name}  {values}{restart}", "  ", "    ")
         for note in change.notes:
             yield from wrapped(note, "    ! ")
     for objective in (result.variable for result in diagnosis.objectives):
         if objective.name in fix.predicted:
-            yield from wrapped(_prediction(objective, fix.predicted[objective.name]), "  ", "    ")
+            yield from wrapped(_prediction(objective, fix.predicted[objective.name], fix.is_guess), "  ", "    ")
     for other in diagnosis.alternatives:
-        yield from wrapped(f"or {', '.join(map(str, other.changes))}: {other.p_fixed:.0%} probability", "  ", "     ")
+        likely = chance(other.p_fixed, other.is_guess)
+        yield from wrapped(f"or {', '.join(map(str, other.changes))}: {likely}", "  ", "     ")
     yield ""
     yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix.changes).splitlines())
     yield ""
@@ -211,9 +212,10 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     )
 
 
-def _prediction(objective: Variable, predicted: Prediction) -> str:
+def _prediction(objective: Variable, predicted: Prediction, is_guess: bool) -> str:
     """A yes-or-no objective has a probability, not a value."""
-    probability = STATUS_WORDS[predicted.status()] if predicted.p_ok is None else f"{predicted.p_ok:.0%} probability"
+    likely = None if predicted.p_ok is None else chance(predicted.p_ok, is_guess)
+    probability = likely or STATUS_WORDS[predicted.status()]
     if objective.kind == "functional":
         return f"predicted {objective.name}: {probability}"
     interval = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()

@@ -20,7 +20,7 @@ from care_core.report.document import (
     profile_entry,
 )
 from care_core.report.happened import FitEntry, fit_entry
-from care_core.report.wording import fit_text
+from care_core.report.wording import chance, fit_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
 
@@ -31,6 +31,8 @@ class AskedChange(Strict):
     option: str
     from_: int | float = Field(validation_alias="from", serialization_alias="from")
     to: int | float
+    assumed: bool
+    """Whether no source holds `from`."""
     notes: list[str]
 
 
@@ -55,6 +57,8 @@ class WhatIfDocument(Strict):
     changes: list[AskedChange]
     objectives: list[OutlookEntry]
     p_ok: float
+    guess: bool
+    """Whether a value is one that no training run came near."""
     p_ok_unchanged: float
 
 
@@ -74,6 +78,7 @@ def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
                 option=change.option.name,
                 from_=plain_number(change.current),
                 to=plain_number(change.suggested),
+                assumed=change.is_assumed,
                 notes=[clean(note) for note in change.notes],
             )
             for change in answer.changes
@@ -88,6 +93,7 @@ def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
             for outlook in answer.outlooks
         ],
         p_ok=answer.p_ok,
+        guess=answer.is_guess,
         p_ok_unchanged=answer.p_ok_now,
     )
 
@@ -109,28 +115,27 @@ def _lines(question: Question, answer: Answer) -> Iterator[str]:
     yield ""
     for change in answer.changes:
         option = change.option
-        values = f"{option.show(change.current)} -> {option.show(change.suggested)} {option.unit}".rstrip()
+        values = f"{change.values} {option.unit}".rstrip()
         # Whoever reads the value must not miss what speaks against it.
         yield from wrapped("; ".join((f"{option.name}  {values}", *change.notes)), "", "  ")
     yield ""
     width = max((len(outlook.objective.variable.name) for outlook in answer.outlooks), default=0)
-    guess = f"; {answer.guessed}" if answer.guessed else ""
     for outlook in answer.outlooks:
-        yield from wrapped(_outlook(outlook) + guess, f"{outlook.objective.variable.name:<{width}}  ")
+        yield from wrapped(_outlook(outlook, answer.is_guess), f"{outlook.objective.variable.name:<{width}}  ")
     if any(o.objective.variable.kind == "functional" and o.predicted.status() == "fault" for o in answer.outlooks):
         yield from wrapped("The mission is likely to fail; the other values are those of a mission that does not.")
     yield ""
     yield from wrapped(
-        f"Probability that all objectives are met: {answer.p_ok:.0%} with the change, "
-        f"{answer.p_ok_now:.0%} if the same configuration runs again{guess}"
+        f"{chance(answer.p_ok, answer.is_guess)} that all objectives are met with the change, "
+        f"{answer.p_ok_now:.0%} if the same configuration runs again"
     )
 
 
-def _outlook(outlook: Outlook) -> str:
+def _outlook(outlook: Outlook, is_guess: bool) -> str:
     result, predicted = outlook.objective, outlook.predicted
     unit = result.variable.unit
-    probability = "" if predicted.p_ok is None else f"{predicted.p_ok:.0%} probability"
-    unchanged = "" if outlook.now.p_ok is None else f" ({outlook.now.p_ok:.0%} unchanged)"
+    probability = "" if predicted.p_ok is None else chance(predicted.p_ok, is_guess)
+    unchanged = "" if outlook.now.p_ok is None else f", {outlook.now.p_ok:.0%} unchanged"
     if result.variable.kind == "functional":
         return f"{STATUS_WORDS[result.status]} in this run -> {probability}{unchanged}"
     here = "not evaluated" if result.value is None else f"{result.value:.4g}"

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from care_core.report.happened import FindingEntry, FitEntry, HypothesisEntry
     from care_core.run import Fit
 
+GUESS = "\u00a0probability\u00a0(a\u00a0guess)"
 NO_LIMIT = "no limit of this mission is known; what happened is told below"
 SEVERITY_WORDS: dict[Severity, str] = {"critical": "CRITICAL", "warning": "WARNING", "info": "note"}
 
@@ -30,6 +31,11 @@ def fit_text(profile: str, fit: Fit | FitEntry) -> str:
     reasons = "; ".join(fit.reasons)
     caution = {"fits": "", "partly": " (confidence low at most)", "no": " (nothing is advised)"}[fit.verdict]
     return f"{fit_words(profile, fit.verdict)}{f': {reasons}' if reasons else ''}{caution if profile else ''}"
+
+
+def chance(share: float, is_guess: bool = False) -> str:
+    """A probability in words. No line is broken before its warning: an operator may read that line alone."""
+    return f"{share:.0%}{GUESS if is_guess else ' probability'}"
 
 
 def noted(findings: Sequence[F]) -> list[F]:

@@ -25,9 +25,10 @@ from care_core.report.document import (
 )
 from care_core.report.happened import finding_sentence
 from care_core.report.together import listed, together
-from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, said_without_profile
+from care_core.report.wording import SEVERITY_WORDS, chance, fit_text, hypothesis_text, noted, said_without_profile
 from care_core.run import shown
 from care_core.text import seconds
+from care_core.variables import ASSUMED
 
 STATUS_WORDS = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
 
@@ -137,11 +138,12 @@ def _verdict(report: Report) -> str:
     if report.fix is None:
         return f"**Fault**: {names}."
     fix = report.fix
-    return f"**Fault**: {names}. Change {_changes(fix)}: {fix.p_fixed:.0%} probability that all objectives are met."
+    likely = f"{chance(fix.p_fixed, fix.guess)} that all objectives are met"
+    return f"**Fault**: {names}. Change {_changes(fix)}: {likely}."
 
 
 def _changes(fix: FixSet) -> str:
-    return ", ".join(f"`{change.option}` from {change.from_:g} to {change.to:g}" for change in fix.changes)
+    return ", ".join(f"`{change.option}` {change.values}" for change in fix.changes)
 
 
 def _objective_row(objective: ObjectiveEntry) -> tuple[str, ...]:
@@ -155,7 +157,8 @@ def _cause_row(cause: CauseEntry) -> tuple[str, ...]:
     probability = cause.confidence if cause.p_fixed is None else f"{cause.p_fixed:.0%}, {cause.confidence}"
     if not cause.in_support:
         probability += ", outside the training runs"
-    return str(cause.rank), f"`{cause.option}`", " → ".join(cause.path), f"{cause.current:g}", suggested, probability
+    driven = f"{cause.current:g}{ASSUMED if cause.assumed else ''}"
+    return str(cause.rank), f"`{cause.option}`", " → ".join(cause.path), driven, suggested, probability
 
 
 def _fix_section(report: Report, fix: FixEntry) -> Iterator[str]:
@@ -163,7 +166,7 @@ def _fix_section(report: Report, fix: FixEntry) -> Iterator[str]:
     yield ""
     objectives = {objective.name: objective for objective in report.objectives}
     rows = (
-        (f"`{name}`", _prediction(objectives[name], predicted), STATUS_WORDS[predicted.status])
+        (f"`{name}`", _prediction(objectives[name], predicted, fix.guess), STATUS_WORDS[predicted.status])
         for name, predicted in fix.predicted.items()
     )
     yield from _table(("Objective", "Predicted (80 %)", "Status"), rows)
@@ -179,7 +182,7 @@ def _fix_section(report: Report, fix: FixEntry) -> Iterator[str]:
         yield ""
         yield "Or:"
         yield ""
-        yield from (f"- {_changes(other)}: {other.p_fixed:.0%} probability" for other in fix.alternatives)
+        yield from (f"- {_changes(other)}: {chance(other.p_fixed, other.guess)}" for other in fix.alternatives)
 
 
 def _since_section(since: SinceEntry) -> Iterator[str]:
@@ -198,10 +201,10 @@ def _since_section(since: SinceEntry) -> Iterator[str]:
     yield from _table(("Parameter", "Option", "Then", "Now"), rows)
 
 
-def _prediction(objective: ObjectiveEntry, predicted: PredictedValue) -> str:
+def _prediction(objective: ObjectiveEntry, predicted: PredictedValue, is_guess: bool) -> str:
     """A yes-or-no objective has a probability, not a value."""
     if objective.kind == "functional":
-        return f"{predicted.value:.0%} probability"
+        return chance(predicted.value, is_guess)
     return f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
 
 

@@ -57,8 +57,8 @@ class AccountPage(StepPage):
 
     @property
     def _is_the_answer(self) -> bool:
-        """Whether the account is all there is: no profile fits, so nothing is judged."""
-        return self.session.diagnosis.profile.fit.verdict == "no"
+        """Whether the account is all there is: nothing is judged."""
+        return not self.session.diagnosis.objectives
 
     def open(self, index: int | None) -> None:
         if self._is_the_answer:

@@ -44,8 +44,8 @@ class CausesPage(DiagnosisPage):
     def ranked(self) -> list[Explanation]:
         """Parts, parameters, what was met and chance in one ranking, then the causes that it does not name."""
         causes = {cause.option.name: cause for cause in self.session.causes}
-        if self.session.fault is None and self.session.diagnosis.objectives:
-            return []
+        if self.session.fault is None and self._has_causes:
+            return []  # of an objective that was kept
         found = [
             Explanation(causes.pop(one.name, None) if one.what == "parameter" else None, one)
             for one in self.session.diagnosis.hypotheses
@@ -65,6 +65,13 @@ class CausesPage(DiagnosisPage):
         findings = self.session.diagnosis.health.findings
         return next((finding for finding in findings if hypothesis.name and finding.title == hypothesis.name), None)
 
+    @property
+    def _has_causes(self) -> bool:
+        return any(fault.causes for fault in self.session.diagnosis.faults)
+
+    def works(self, action: str) -> bool:
+        return super().works(action) and (action != "dismiss" or bool(self.session.causes))
+
     def option_at(self, index: int | None) -> str | None:
         """The option of the cause at this place, None where there is none."""
         cause = None if index is None else self.ranked()[index].cause
@@ -76,11 +83,12 @@ class CausesPage(DiagnosisPage):
 
     def _title(self) -> Content:
         result, faults, fault = self.session.result, self.session.diagnosis.faults, self.session.fault
+        if self.session.diagnosis.hypotheses and not self._has_causes:
+            unfit = self.session.diagnosis.profile.fit.verdict == "no"
+            why = "no profile fits" if unfit else "no mission was flown" if self.session.diagnosis.run.checks else ""
+            return Content("What explains it" + (f"; {why}, so no parameter is judged" if why else ""))
         if result is None:
-            explained = bool(self.session.diagnosis.hypotheses)
-            return Content(
-                "What explains it; no profile fits, so no parameter is judged" if explained else "No objective"
-            )
+            return Content("No objective")
         title = Content.assemble("Causes of ", (clean(result.variable.name), "bold"), self._alike(fault))
         if fault is not None and fault.causes and all(cause.is_lead for cause in fault.causes):
             title += Content(f": none found, {len(fault.causes)} not ruled out")

@@ -23,6 +23,7 @@ SIDES: dict[DiffSide, str] = {
 class DiffPage(DiagnosisPage):
     name = "Diff"
     NOTHING = "nothing is to be changed"
+    NEEDS_MISSION = True
     HELP = (
         "Lines with - are what is, lines with + what is suggested. f compares with the file given by --config instead. "
         "c copies the diff. Enter goes to the report. Nothing is written to the robot."

@@ -23,6 +23,7 @@ NAME_WIDTH = 26
 class FixPage(DiagnosisPage):
     name = "Fix"
     NOTHING = "no change is suggested"
+    NEEDS_MISSION = True
     HELP = (
         "Space ticks a change, + and - nudge its value, = types one. The probability follows at once. a loads the next "
         "alternative, s the suggestion, u takes the last change back. Every option of the profile is here: / finds "
@@ -34,7 +35,7 @@ class FixPage(DiagnosisPage):
     )
 
     def enter(self) -> None:
-        if self.session.state == "data":
+        if self.session.state == "data" and not self._is_empty:
             self.walk.predict_unchanged()
 
     def view_of_diagnosis(self) -> View:
@@ -48,7 +49,8 @@ class FixPage(DiagnosisPage):
             probability = None if value is None else alone.get((option.name, value))
             shown = "" if probability is None else f"alone {percent(probability)}"
             ticked = option.name in basket.ticked
-            return (option_item(option, session.current(option), value, ticked, shown, width, glyphs),)
+            current, is_assumed = session.current(option), session.is_assumed(option)
+            return (option_item(option, current, is_assumed, value, ticked, shown, width, glyphs),)
 
         index, session.option = self._place(options), None
         listing = Listing(len(options), item, lambda i: f"{options[i].name} {options[i].doc}")
@@ -71,8 +73,7 @@ class FixPage(DiagnosisPage):
             )
         changes = f"{count} change{'' if count == 1 else 's'}"
         now = "" if session.unchanged is None else f"  (as driven {percent(session.unchanged.p_fixed)})"
-        guess = shown is not None and not all(change.in_support for change in shown.changes)
-        outside = " a guess, outside the training runs" if guess else ""
+        outside = " a guess, outside the training runs" if shown is not None and shown.is_guess else ""
         return Content.assemble(
             "Probability of no fault ", (probability, "bold"), outside, now, (f"  {changes}", "dim")
         )

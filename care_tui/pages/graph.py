@@ -9,6 +9,7 @@ from textual.content import Content
 
 from care_core.application.case import Case
 from care_core.run import is_known
+from care_core.text import figures
 from care_tui.pages.page import Page, View, sentence
 from care_tui.render.rows import Row, Rows, heading, labelled, measure, padded, percent, warning
 from care_tui.screens.panes import PanesScreen
@@ -49,9 +50,11 @@ class GraphPage(Page):
 
     def view(self) -> View:
         if self._case.model is None or not self._trail:
-            return View(Content("Causal model"), lambda _: sentence("The profile has no model of this."))
+            fits = self._case.diagnosis.profile.fit.verdict != "no"
+            why = "The profile has no model of this." if fits else "No profile fits this log: there is no model of it."
+            return View(Content("Causal model"), lambda _: sentence(why))
         node, links = self._trail[-1], self._links(self._trail[-1])
-        title = Content.assemble("Around ", (node, "bold"), f"  {self._counts(links)}")
+        title = Content.assemble("Around ", (node, "bold"), f"  {self._counts(links)}", ("  effects in spreads", "dim"))
         listing = Listing(len(links), lambda i, width: (self._item(links[i], width),), lambda i: links[i].name)
         return View(title, lambda i: self._detail(node, None if i is None else links[i]), listing)
 
@@ -95,17 +98,21 @@ class GraphPage(Page):
     def _about(self, name: str) -> list[Row]:
         case, run = self._case, self._case.diagnosis.run
         variable = case.schema.variables.get(name) if case.schema else None
-        value = run.value(name)
+        value, unit = run.value(name), "" if variable is None else variable.unit
         rows = [heading(name)]
         if variable is not None:
-            shown = measure(value, variable.unit) if is_known(value) else "not known in this run"
+            shown = "not known in this run"
+            if is_known(value):
+                shown = variable.show(value) if variable.labels else measure(value, unit)
             rows += [labelled("Role", variable.role.value), labelled("This run", shown)]
             if variable.doc:
                 rows.append(labelled("About", variable.doc))
-        summary = case.model.summaries.get(name) if case.model else None
+        reference = case.reading.judged.reference.config if case.reading else {}
+        summary = case.model.summary_at(name, reference) if case.model else None
         if summary is not None:
             middle = summary.quantiles[len(summary.quantiles) // 2]
-            rows.append(labelled("Training", f"{summary.low:.4g} to {summary.high:.4g}, middle {middle:.4g}"))
+            span = f"{figures(summary.low)} to {measure(summary.high, unit)}, middle {measure(middle, unit)}"
+            rows.append(labelled("Training", span))
         return rows
 
     def open(self, index: int | None) -> None:

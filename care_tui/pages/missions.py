@@ -5,10 +5,10 @@ from __future__ import annotations
 from textual.content import Content
 
 from care_core.application.case import Case
-from care_core.application.viewing import MissionVerdict, missions_of
+from care_core.diagnose.records import MissionVerdict
 from care_core.text import seconds
-from care_tui.pages.page import Fetch, Page, View, sentence
-from care_tui.render.objectives import objective_item, worst
+from care_tui.pages.page import Page, View, sentence
+from care_tui.render.objectives import objective_item
 from care_tui.render.rows import Row, Rows, status, text, warning
 from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
@@ -23,51 +23,46 @@ class MissionsPage(Page):
 
     def __init__(self, screen: PanesScreen, case: Case) -> None:
         super().__init__(screen)
-        self._case = case
-        self._found: Fetch[list[MissionVerdict]] = Fetch(self, "missions")
+        self._diagnosis = case.diagnosis
         self._placed = False
 
-    def enter(self) -> None:
-        self._found.start(lambda: missions_of(self._case))
-
     def view(self) -> View:
-        return self._found.view("Missions of the log", self._show)
-
-    def _show(self, missions: list[MissionVerdict]) -> View:
-        count = f"{len(missions)} mission{'' if len(missions) == 1 else 's'}"
-        title = Content(f"Missions of the log  {count}")
+        missions = self._diagnosis.missions
         if not missions:
-            return View(title, lambda _: sentence("No profile fits this log, so no mission is judged."))
+            none = "No profile fits this log, so no mission is judged."
+            return View(Content("Missions of the log"), lambda _: sentence(none))
+        count = f"{len(missions)} {self._diagnosis.run.noun}{'' if len(missions) == 1 else 's'}"
         listing = Listing(
             len(missions),
             lambda i, _width: (self._item(missions[i]),),
-            lambda i: f"{missions[i].index} {' '.join(_broken(missions[i]))}",
+            lambda i: f"{missions[i].mission.index} {missions[i].reason}",
         )
         here, self._placed = None if self._placed else self._here - 1, True
-        return View(title, lambda i: Rows([]) if i is None else self._detail(missions[i]), listing, here)
+        return View(Content(f"The log holds {count}"), self._detail, listing, here)
+
+    def leads_to(self) -> str:
+        return self.ENTER if self._diagnosis.missions else ""
 
     @property
     def _here(self) -> int:
         """The mission that is diagnosed now, from 1."""
-        return self._case.diagnosis.run.mission.index
+        return self._diagnosis.run.mission.index
 
-    def _item(self, mission: MissionVerdict) -> Content:
-        mark = self.glyphs.here if mission.index == self._here else " "
-        span = f"{seconds(mission.start_s)} to {seconds(mission.end_s)}"
-        verdict = status(worst(mission.results), self.glyphs)
-        return Content.assemble(
-            f"{mark} {mission.index:>3}  {span:<22}  ", verdict, text(f"  {', '.join(_broken(mission))}")
-        )
+    def _item(self, verdict: MissionVerdict) -> Content:
+        one = verdict.mission
+        mark = self.glyphs.here if one.index == self._here else " "
+        span = f"{seconds(one.start_s)} to {seconds(one.end_s)}"
+        head = Content.assemble(f"{mark} {one.index:>3}  {span:<22}  ", status(verdict.status, self.glyphs))
+        return head + text(f"  {verdict.reason}")
 
-    def _detail(self, mission: MissionVerdict) -> Rows:
-        rows = [Row(objective_item(result, NAME_WIDTH, self.glyphs), 2) for result in mission.results]
-        return Rows(rows if mission.ended else [warning("Mission", "the log stops before the mission does"), *rows])
+    def _detail(self, index: int | None) -> Rows:
+        if index is None:
+            return Rows([])
+        verdict = self._diagnosis.missions[index]
+        rows = [Row(objective_item(result, NAME_WIDTH, self.glyphs), 2) for result in verdict.results]
+        cut = warning("Mission", "the log stops before the mission does")
+        return Rows(rows if verdict.mission.ended else [cut, *rows])
 
     def open(self, index: int | None) -> None:
-        missions = self._found.answer
-        if isinstance(missions, list) and index is not None:
-            self.walk.diagnose_mission(missions[index].index)
-
-
-def _broken(mission: MissionVerdict) -> list[str]:
-    return [result.variable.name for result in mission.results if result.status == "fault"]
+        if index is not None:
+            self.walk.diagnose_mission(self._diagnosis.missions[index].mission.index)

@@ -39,6 +39,10 @@ class ObjectivesPage(DiagnosisPage):
         """Without a profile a run is still judged by what its robot says of itself."""
         return super()._is_empty and not self.session.diagnosis.objectives
 
+    @property
+    def _unjudged(self) -> str:
+        return "" if self.session.diagnosis.objectives else super()._unjudged
+
     def view_of_diagnosis(self) -> View:
         diagnosis, glyphs = self.session.diagnosis, self.glyphs
         results = diagnosis.objectives

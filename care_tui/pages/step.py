@@ -24,19 +24,32 @@ class DiagnosisPage(StepPage):
     """A step that needs a diagnosis: says so while there is none."""
 
     NOTHING: ClassVar[str] = ""
-    """What there is not where no profile fits; empty for a step that has something to show all the same."""
+    """What there is not where nothing is judged; empty for a step that has something to show all the same."""
+    NEEDS_MISSION: ClassVar[bool] = False
+    """Whether a flight without a mission leaves nothing to show either."""
 
     def works(self, action: str) -> bool:
         return super().works(action) and self.session.state == "data" and not self._is_empty
 
     @property
     def _is_empty(self) -> bool:
-        return bool(self.NOTHING) and self.session.diagnosis.profile.fit.verdict == "no"
+        """Whether nothing is judged that this step could show."""
+        return bool(self._unjudged)
+
+    @property
+    def _unjudged(self) -> str:
+        """Why this step has nothing to show; empty where it has something."""
+        diagnosis = self.session.diagnosis
+        if self.NOTHING and diagnosis.profile.fit.verdict == "no":
+            return f"No profile fits this log, so {self.NOTHING}. 1 tells what happened, and what would make one fit."
+        if self.NEEDS_MISSION and diagnosis.run.checks:
+            return f"No mission was flown, so {self.NOTHING}. 1 tells what happened."
+        return ""
 
     def view(self) -> View:
         session = self.session
         if session.state == "data" and self._is_empty:
-            why = f"No profile fits this log, so {self.NOTHING}. 1 tells what happened, and what would make one fit."
+            why = self._unjudged
             return View(Content.styled(self.name, "bold"), lambda _: sentence(why))
         if session.state == "data":
             return self.view_of_diagnosis()

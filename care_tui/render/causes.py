@@ -45,7 +45,7 @@ def cause_item(cause: Cause, share: float | None, dismissed: str | None, glyphs:
         f"{cause.rank:>2} " if share is None else f"{percent(share):>5} ",
         text(option.name, "bold"),
         "  ",
-        change_text(option, cause.current, cause.suggested, glyphs),
+        change_text(option, cause.current, cause.is_assumed, cause.suggested, glyphs),
     )
     below = " " * (3 if share is None else 6)
     if dismissed is not None:
@@ -94,7 +94,7 @@ def node_value(node: PathNode, option: Variable | None) -> str:
 
 
 def edge_line(node: PathNode, glyphs: Glyphs) -> Content:
-    effect = "effect unknown" if node.effect is None else f"effect {node.effect:+.2f}"
+    effect = "effect unknown" if node.effect is None else f"effect {node.effect:+.2f} spreads"
     if node.support is None:
         return Content.styled(f"{glyphs.line} {effect}", "dim")
     line = Content.styled(f"{glyphs.line} {effect}, in {percent(node.support)} of resamples", "dim")
@@ -131,7 +131,7 @@ def cause_detail(
         )
         rows += _runner_up(cause, rivals)
     if cause.predicted is not None and cause.suggested is not None:
-        change = change_text(option, cause.current, cause.suggested, glyphs)
+        change = change_text(option, cause.current, cause.is_assumed, cause.suggested, glyphs)
         rows.append(labelled("With", change + Content(": ") + prediction(objective.variable, cause.predicted, glyphs)))
     rows.append(labelled("Usual effect", _effect(cause, effect)))
     if option.parameters and option.parameters != (option.name,):

@@ -18,7 +18,6 @@ from care_tui.render.rows import (
     measure,
     padded,
     percent,
-    setting,
     status,
     text,
     warning,
@@ -26,11 +25,18 @@ from care_tui.render.rows import (
 
 
 def option_item(
-    option: Variable, current: float | None, value: float | None, ticked: bool, alone: str, width: int, glyphs: Glyphs
+    option: Variable,
+    current: float | None,
+    is_assumed: bool,
+    value: float | None,
+    ticked: bool,
+    alone: str,
+    width: int,
+    glyphs: Glyphs,
 ) -> Content:
     """One option of the basket on one line: its box, its name padded to `width`, its change, its probability alone."""
     box = ("[x]" if ticked else "[ ]") if value is not None else "   "
-    change = text(setting(option, current)) if value is None else change_text(option, current or 0.0, value, glyphs)
+    change = change_text(option, current, is_assumed, value, glyphs)
     line = Content.assemble(f"{box} ", padded(option.name, width + 2, "bold" if ticked else ""), change)
     if ticked and option.reboot_required:
         line += Content.styled("  ! reboot", "$text-warning")
@@ -46,7 +52,7 @@ def outcome_rows(fix: Fix, objectives: Sequence[ObjectiveResult], glyphs: Glyphs
         outcome = (
             status("not_evaluated", glyphs) + Content("  no prediction")
             if predicted is None
-            else prediction(result.variable, predicted, glyphs)
+            else prediction(result.variable, predicted, glyphs, is_guess=fix.is_guess)
         )
         rows.append(Row(Content.assemble("  ", padded(result.variable.name, width + 2), outcome), width + 4))
         if result.value is not None and result.variable.kind != "functional":
@@ -64,9 +70,10 @@ def option_rows(option: Variable, notes: Sequence[str], glyphs: Glyphs) -> list[
     return rows + [warning("Caveat", note) for note in notes]
 
 
-def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs) -> Content:
+def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs, *, is_guess: bool = False) -> Content:
     """`✓ OK  139, 131 to 150 s, probability 91 %`."""
-    probability = "" if predicted.p_ok is None else f", probability {percent(predicted.p_ok)}"
+    guess = " (a guess)" if is_guess else ""
+    probability = "" if predicted.p_ok is None else f", probability {percent(predicted.p_ok)}{guess}"
     if variable.kind == "functional":  # a yes-or-no objective has a probability, not a value
         return status(predicted.status(), glyphs) + text(probability.replace(",", " ", 1))
     span = f"  {predicted.value:.4g}, {predicted.low:.4g} to {measure(predicted.high, variable.unit)}"

@@ -51,11 +51,14 @@ def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
 def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Content:
     """One objective on one line: status, name padded to `width`, value, threshold."""
     variable, bound = result.variable, result.threshold
+    wanted = "no threshold" if bound is None else f"{bound} {variable.unit}".rstrip()
+    if result.value is None and result.need is not None:
+        wanted = ""  # made for a mission that was not flown, or not to its end
     return Content.assemble(
         status(result.status, glyphs).pad_right(STATUS_WIDTH - len(WORDS[result.status]) - 2),
         padded(variable.name, width + 2, "bold"),
         padded("" if result.value is None else measure(result.value, variable.unit), VALUE_WIDTH),
-        padded("no threshold" if bound is None else f"{bound} {variable.unit}".rstrip(), BOUND_WIDTH),
+        padded(wanted, BOUND_WIDTH),
         text(result.reason, "dim"),
     )
 
@@ -104,15 +107,17 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
     """Where the run came from, which profile judged it, and everything that limits the answer."""
     log, mission, profile = diagnosis.run.log, diagnosis.run.mission, diagnosis.profile
     start = log.start or "no wall clock"
-    which = f"{mission.index} of {mission.count}, from {mission.start_s:.1f} s to {mission.end_s:.1f} s of the log"
     rows = [
         heading("This run"),
         labelled("Log", log.path),
         labelled("", f"{log.format}, {start}, {log.duration_s:.0f} s"),
-        labelled("Mission", which),
-        labelled("Profile", f"{profile.name} {profile.version} ({profile.platform})"),
-        labelled("", profile.reason),
     ]
+    if mission.count:
+        span = f"from {mission.start_s:.1f} s to {mission.end_s:.1f} s of the log"
+        rows.append(labelled(diagnosis.run.noun.capitalize(), f"{mission.index} of {mission.count}, {span}"))
+    if profile.name:
+        rows.append(labelled("Profile", f"{profile.name} {profile.version} ({profile.platform})"))
+        rows.append(labelled("", profile.reason))
     if diagnosis.abstained:
         rows.append(warning("No answer", diagnosis.abstained))
     if not mission.ended:

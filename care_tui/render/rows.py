@@ -24,7 +24,7 @@ from care_core.diagnose.records import (
 )
 from care_core.errors import CareError
 from care_core.text import clean
-from care_core.variables import Threshold, Variable
+from care_core.variables import ASSUMED, Threshold, Variable
 
 LABEL_WIDTH = 14
 PROGRESS_WIDTH = 40
@@ -201,11 +201,13 @@ def status(value: Status, glyphs: Glyphs) -> Content:
     return Content.styled(f"{sign} {WORDS[value]}", _COLOURS[value])
 
 
-def change_text(option: Variable, current: float, suggested: float | None, glyphs: Glyphs) -> Content:
+def change_text(
+    option: Variable, current: float | None, is_assumed: bool, suggested: float | None, glyphs: Glyphs
+) -> Content:
     """`16 → 50 cm/s`, or the current value alone where nothing is suggested."""
     if suggested is None:
-        return text(setting(option, current))
-    return text(f"{option.show(current)} {glyphs.to} {setting(option, suggested)}")
+        return text(f"{setting(option, current)}{ASSUMED if is_assumed else ''}")
+    return text(f"{option.driven(current, is_assumed)} {glyphs.to} {setting(option, suggested)}")
 
 
 _DIFF_STYLES = {"+": "$text-success", "-": "$text-error", "@": "$text-accent"}

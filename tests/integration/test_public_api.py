@@ -37,10 +37,8 @@ def test_the_notebook_of_the_readme_runs(
 
 
 def test_the_missions_of_a_log_are_judged_as_the_one_of_the_case(case: care_core.Case) -> None:
-    from care_core.application.viewing import missions_of
-
-    (mission,) = missions_of(case)
-    assert (mission.index, mission.ended) == (1, True)
+    (mission,) = case.diagnosis.missions
+    assert (mission.mission.index, mission.mission.ended) == (1, True)
     assert [(one.variable.name, one.value, one.status) for one in mission.results] == [
         (one.variable.name, one.value, one.status) for one in case.diagnosis.objectives
     ]

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from care_core.application.case import Case, Progress, Request
-from care_core.application.viewing import MissionVerdict
-from care_core.diagnose.records import Diagnosis, Hypothesis
+from care_core.diagnose.records import Diagnosis, Hypothesis, MissionVerdict
 from care_core.health.records import Health
+from care_core.run import MissionInfo
 from care_tui.app import CareApp
 from care_tui.settings import Settings
 from care_tui.widgets.pinned import Pinned
@@ -133,25 +133,27 @@ async def test_parts_parameters_and_chance_compete_in_one_ranking(make_app: Make
         assert walk(app).step == 4
 
 
-async def test_the_picker_shows_every_mission_with_its_verdict_and_diagnoses_another(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    first = MissionVerdict(1, 12.4, 199.65, True, (sample.OK_SUCCESS, sample.SLOW))
-    second = MissionVerdict(2, 210.0, 300.0, False, (sample.OK_SUCCESS, sample.NO_PATH))
-    monkeypatch.setattr("care_tui.pages.missions.missions_of", lambda _case: [first, second])
+async def test_the_picker_shows_every_mission_with_its_verdict_and_diagnoses_another() -> None:
+    first = MissionInfo(1, 2, 12.4, 199.65, ended=True, fits=True)
+    second = MissionInfo(2, 2, 210.0, 300.0, ended=False, fits=True)
+    missions = (
+        MissionVerdict(first, "fault", "mission_time", (sample.OK_SUCCESS, sample.SLOW)),
+        MissionVerdict(second, "not_evaluated", "cut", (sample.OK_SUCCESS, sample.NO_PATH)),
+    )
     asked: list[int | None] = []
 
     def diagnose(request: Request, progress: Progress) -> Case:
         asked.append(request.mission)
         mission = replace(sample.RUN.mission, index=request.mission or 1)
-        return Case(replace(sample.faulty(), run=replace(sample.RUN, mission=mission)), sample.OPTIONS)
+        found = replace(sample.faulty(), run=replace(sample.RUN, mission=mission), missions=missions)
+        return Case(found, sample.OPTIONS)
 
     app = CareApp(Request(LOG), engine=fake_engine(diagnose), settings=Settings(places=()))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "t")
         lines = items(app).splitlines()
         assert lines[0].split() == ["▸", "1", "12.4", "s", "to", "199.7", "s", "✗", "FAULT", "mission_time"]
-        assert lines[1].split() == ["2", "210.0", "s", "to", "300.0", "s", "?", "NOT", "EVALUATED"]
+        assert lines[1].split() == ["2", "210.0", "s", "to", "300.0", "s", "?", "NOT", "EVALUATED", "cut"]
         assert "mission_time" in text(app)
         await settle(pilot, "j")
         assert "the log stops before the mission does" in text(app)

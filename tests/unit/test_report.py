@@ -45,14 +45,21 @@ def test_the_document_has_exactly_the_published_keys() -> None:
     (fault,) = document["faults"]
     (cause,) = fault["causes"]
     assert list(cause) == [
-        "rank", "option", "path", "path_ace", "contribution", "current", "suggested", "predicted", "p_fixed",
+        "rank", "option", "path", "path_ace", "contribution", "current", "assumed", "suggested", "predicted", "p_fixed",
         "confidence", "edge_support", "in_support", "notes",
     ]  # fmt: skip
     assert cause["path"] == ["land_speed", "land_time", "mission_time"]
     assert cause["predicted"] == {"value": 140.0, "low": 130.0, "high": 149.0}
-    assert list(document["fix"]) == ["changes", "p_fixed", "predicted", "alternatives"]
+    assert list(document["fix"]) == ["changes", "p_fixed", "guess", "predicted", "alternatives"]
     assert document["fix"]["changes"] == [
-        {"option": "land_speed", "parameter": "LAND_SPEED", "from": 16, "to": 50, "reboot_required": False}
+        {
+            "option": "land_speed",
+            "parameter": "LAND_SPEED",
+            "from": 16,
+            "to": 50,
+            "assumed": False,
+            "reboot_required": False,
+        }
     ]
     assert document["fix"]["predicted"]["mission_time"]["status"] == "ok"
 
