@@ -93,6 +93,7 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
     data["name"] = name
     data["platform"] = f"{name}, carried over from: {data.get('platform', source)}"
     data["doc"] = f"Carried over from profile '{source}' with {runs}. Of the source: {data.get('doc', '')}".strip()
+    data.pop("carried_over", None)  # it is learned from this robot's own missions now
     for option in outside:
         entry = data["variables"][option.option]
         low, high = option.target

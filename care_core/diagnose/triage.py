@@ -403,7 +403,7 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
         for name, rate in case.world.base_rates().items()
     ]
     notes.append(_promise(case.world, [result.variable.name for result in broken]))
-    if not case.run.mission.fits:
+    if not case.run.mission.fits and case.run.mission.mismatch not in notes:
         notes.append(case.run.mission.mismatch)
     unread = [name for name in unread_options(case.profile.schema, case.run) if name in _off(case)]
     if unread:

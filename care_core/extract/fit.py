@@ -51,6 +51,8 @@ def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:
     for key, text in schema.match.items():
         if key != "vehicle" and log.facts.get(key) and text.casefold() not in log.facts[key].casefold():
             yield f"the log's {key} is '{log.facts[key]}', the profile is for '{text}'"
+    if schema.learned_elsewhere:
+        yield schema.learned_elsewhere
     if schema.match.get("vehicle") and vehicle.kind == "unknown":
         yield f"the log does not say what vehicle it is of, the profile is for {_a(schema.match['vehicle'])}"
     if schema.firmware_window is None:

@@ -14,6 +14,7 @@ import care_core.extract.actionlib
 import care_core.extract.ardupilot
 import care_core.extract.asked
 import care_core.extract.battery
+import care_core.extract.laser
 import care_core.extract.nav2
 import care_core.extract.navigation
 import care_core.extract.px4
@@ -159,7 +160,7 @@ class _Source:
         mission = replace(
             found, facts=self.log.facts, settings={name: setting.value for name, setting in driven.items()}
         )
-        mismatch = self.kind.mismatch(mission)
+        mismatch = self.schema.learned_elsewhere or self.kind.mismatch(mission)
         return Run(
             config=config,
             sources=sources,

@@ -101,6 +101,8 @@ def outcome(mission: Mission, args: Args) -> Value:
         "channel": "the topic or message",
         "field": "the field of it, dotted in ROS messages, such as twist.twist.linear.x",
         "stat": one_of(f"{', '.join(STATISTICS)} (last minus first); mean unless given", *STATISTICS),
+        "scale": numeric("what the statistic is multiplied by, 1 unless given"),
+        "offset": numeric("what is added then, 0 unless given"),
     },
 )
 def signal(mission: Mission, args: Args) -> Value:
@@ -115,7 +117,8 @@ def signal(mission: Mission, args: Args) -> Value:
     known = values[np.isfinite(values)]
     if not len(known):
         return Unavailable(f"{field} of {channel} is never a number", "check the sensor and its driver", channel)
-    return _statistic(known, str(args.get("stat", "mean")))
+    value = _statistic(known, str(args.get("stat", "mean")))
+    return value * float(args.get("scale", 1.0)) + float(args.get("offset", 0.0))
 
 
 def _statistic(values: NDArray[np.float64], stat: str) -> float:

@@ -58,7 +58,8 @@ def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P | None, Profile
     if not usable:
         return None, _none_fits(log, covered, fits, order)
     best = usable[0]
-    others = [covered[i].schema.name for i in usable[1:] if covered[i].found >= NEARLY_AS_WELL * covered[best].found]
+    rivals = [covered[i] for i in usable[1:] if not covered[i].schema.carried_over]
+    others = [rival.schema.name for rival in rivals if rival.found >= NEARLY_AS_WELL * covered[best].found]
     return candidates[best], _choice(covered[best], fits[best], others)
 
 
@@ -77,8 +78,9 @@ def fitting_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice
     return profile, choice
 
 
-def _by_content(coverage: Coverage) -> tuple[int, int, str]:
-    return -coverage.found, -coverage.names, coverage.schema.name
+def _by_content(coverage: Coverage) -> tuple[bool, int, int, str]:
+    """What was learned from such logs comes before what was carried over to them."""
+    return bool(coverage.schema.carried_over), -coverage.found, -coverage.names, coverage.schema.name
 
 
 def _choice(coverage: Coverage, fit: Fit, others: Sequence[str] = ()) -> ProfileChoice:

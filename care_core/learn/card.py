@@ -8,6 +8,7 @@ from care_core.causal.model import EffectRecord, Model, SkillRecord
 from care_core.learn.identification import identify
 from care_core.profile.schema import Schema
 from care_core.profile.store import CARD_FILE, Profile
+from care_core.variables import Role
 
 TOP = 10
 BAR = 20
@@ -158,6 +159,14 @@ def _limits(schema: Schema, model: Model) -> str:
         "Holds for this platform, this mission and the ranges above; outside them a diagnosis says so.",
         "An effect says what changing an option does on average, not that it caused every fault.",
     ]
+    if schema.learned_elsewhere:
+        lines.append(
+            f"For any log {schema.learned_elsewhere}: no confidence is above low and no limit is judged unless it is "
+            "given, until `care update` has carried it over to runs of the robot itself."
+        )
+    unread = [v.name for v in schema.variables.values() if v.role is not Role.OPTION and v.extract is None]
+    if schema.logs and unread:
+        lines.append(f"No log can tell: {', '.join(unread)}.")
     unpredicted = [o.name for o in schema.objectives if o.name not in model.outcomes]
     if unpredicted:
         lines.append(f"No option was found to move: {', '.join(unpredicted)}. Their faults are never explained.")

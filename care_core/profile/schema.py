@@ -160,6 +160,7 @@ class _Profile(Strict):
     match: _Match = _Match()
     logs: list[str] = Field(default_factory=list)
     observational: bool = False
+    carried_over: str = ""
     mission: dict[str, Any] = Field(default_factory=dict)
     evidence: list[_EvidenceRule] = Field(default_factory=list)
     circumstances: dict[str, dict[str, Side]] = Field(default_factory=dict)
@@ -254,6 +255,8 @@ class Schema:
     """What no parameter sets (wind, battery) -> the contexts and metrics that show it, and their bad side."""
     known: frozenset[tuple[str, str]] = frozenset()
     """(cause, effect): direct effects that people know to be possible. Data say how large they are."""
+    carried_over: str = ""
+    """What the profile was learned from, where that is not what its logs are of; empty where it is."""
     firmware_window: tuple[tuple[int, ...], tuple[int, ...]] | None = None
     """First and last version of the firmware that the profile is good for, as far as each is written."""
     digest: str = field(default="", compare=False)
@@ -282,6 +285,11 @@ class Schema:
     def asked(self) -> tuple[Variable, ...]:
         """The contexts that tell of the mission."""
         return tuple(v for v in self.contexts if v.about == "mission")
+
+    @property
+    def learned_elsewhere(self) -> str:
+        """Why no log is of what a carried-over profile was learned from; empty for any other."""
+        return f"the profile was learned from {self.carried_over}" if self.carried_over else ""
 
     def nominal_of(self, name: str) -> Nominal | None:
         """What physics says a variable is, None where the profile names no formula for it."""
@@ -342,6 +350,7 @@ def _to_schema(data: _Profile) -> Schema:
         match={key: text for key, text in data.match.model_dump(exclude={"versions"}).items() if text},
         logs=tuple(data.logs),
         observational=data.observational,
+        carried_over=data.carried_over,
         mission=data.mission,
         evidence=tuple(map(_to_rule, data.evidence)),
         variables=variables,
