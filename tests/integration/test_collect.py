@@ -240,7 +240,6 @@ def test_a_journal_that_was_cut_off_goes_on(care: Care, tmp_path: Path) -> None:
         ({"limits": ["max_speed = 0.5"]}, "'max_speed = 0.5' is no limit."),
         ({"parameters": "missing.yaml"}, "Cannot read the configuration"),
         ({"profile": "corier"}, "There is no profile 'corier'."),
-        ({"profile": "husky"}, "Profile 'husky' reads no logs."),
         ({"sampling": "sobel"}, "'sampling': Input should be"),
         ({"tell_apart": ["max_speed", "patience"]}, "belong to 'sampling: adaptive'"),
         ({"sampling": "adaptive", "tell_apart": ["max_speed", "patience"]}, "'patience' does not vary"),
@@ -252,6 +251,17 @@ def test_what_is_wrong_with_a_campaign_is_said(care: Care, tmp_path: Path, chang
     assert said in outcome.stderr
     assert outcome.stderr.count("\n") == 1
     assert not (tmp_path / "campaign").exists()
+
+
+def test_a_profile_of_a_table_has_no_logs_to_collect(care: Care, tmp_path: Path) -> None:
+    (tmp_path / "table").mkdir()
+    option = "{role: option, range: [0, 1], default: 0.5, parameter: /n/a}"
+    (tmp_path / "table" / "profile.yaml").write_text(
+        f'schema_version: 1\nname: table\nversion: "1"\nplatform: a table\nvariables: {{a: {option}}}\n'
+    )
+    outcome = care("collect", campaign_in(tmp_path, profile=str(tmp_path / "table")))
+    assert outcome.code == ExitCode.USAGE
+    assert "Profile 'table' reads no logs." in outcome.stderr
 
 
 def test_a_safety_option_varies_only_where_it_is_named(care: Care, tmp_path: Path) -> None:
