@@ -29,11 +29,11 @@ def figures(value: float, digits: int = 3) -> str:
     return f"{float(f'{value:.{digits}g}'):.15g}"
 
 
-def wrapped(text: str, first: str = "", rest: str | None = None) -> list[str]:
-    """The text, made safe, in lines of at most `WIDTH` columns; `rest` indents the later ones, as wide as `first` if
+def wrapped(text: str, first: str = "", rest: str | None = None, width: int = WIDTH) -> list[str]:
+    """The text, made safe, in lines of at most `width` columns; `rest` indents the later ones, as wide as `first` if
     not given."""
     indent = " " * len(first) if rest is None else rest
-    lines = textwrap.wrap(clean(text), WIDTH, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
+    lines = textwrap.wrap(clean(text), width, initial_indent=first, subsequent_indent=indent, break_on_hyphens=False)
     return [line.replace("\u00a0", " ") for line in lines]  # what must stand on one line was held together by them
 
 

@@ -87,6 +87,30 @@ def _worded(channel: str, values: list[object], kind: Kind) -> tuple[str, str]:
     return "message", str(values[0]) if values else ""
 
 
+def what_would_fit(case: Case) -> list[str]:
+    """What would make a profile fit the log of a case that none fits: by the one for this kind of log and vehicle that
+    misses least, else a profile of its own."""
+    from care_core.extract.coverage import to_have, try_on, wrong_kind
+    from care_core.extract.fit import is_other_vehicle
+    from care_core.extract.select import sound_profiles
+    from care_core.vehicles import vehicle_of
+
+    log = log_of(case)
+    vehicle = vehicle_of(log.facts, log.settings())
+    schemas = [profile.schema for profile in sound_profiles()[0]]
+    tried = [
+        try_on(log, schema)
+        for schema in schemas
+        if not wrong_kind(log, schema) and not is_other_vehicle(schema, vehicle)
+    ]
+    nearest = max(tried, key=lambda trial: trial.coverage.found, default=None)
+    own = f"a profile of its own: 'care profiles new {log.path.name}' writes a first one"
+    if nearest is None or not nearest.coverage.found:
+        return [own]
+    name = nearest.coverage.schema.name
+    return [f"for {name}: {advice}" for advice in to_have(nearest.missed)] + [own]
+
+
 @dataclass(frozen=True, slots=True)
 class Installed:
     """A profile that came with the program, and its model card."""

@@ -60,6 +60,20 @@ class Trial:
         return not self.obstacle
 
 
+def to_have(missed: Sequence[Missed]) -> list[str]:
+    """What to do so that nothing is missed, each thing once with what it gives, what gives most first."""
+    gives: dict[str, list[str]] = {}
+    for one in missed:
+        if one.hint:
+            gives.setdefault(one.hint, []).append(one.variable.name)
+    ranked = sorted(gives.items(), key=lambda item: -len(item[1]))
+    return [f"{hint} (gives {_named(names)})" for hint, names in ranked]
+
+
+def _named(names: Sequence[str]) -> str:
+    return ", ".join(names[:2]) + (f" and {len(names) - 2} more" if len(names) > 2 else "")
+
+
 def cover(log: Log, schema: Schema) -> Coverage:
     """Count what a log holds of a profile. A profile of another format, or of a published table, has nothing."""
     if wrong_kind(log, schema):
@@ -129,7 +143,7 @@ def _how_to_have(option: Variable) -> str:
         return "the profile names no parameter for it"
     namespace = names[0].rpartition("/")[0]
     recorded = f"record {namespace}/parameter_updates, or " if namespace else ""
-    return f"{recorded}give the file that sets {names[0]} with --config"
+    return f"{recorded}give the file that sets it with --config"
 
 
 def _missed_values(schema: Schema, absent: Collection[str], run: Run | None) -> Iterator[Missed]:

@@ -31,15 +31,19 @@ def fit_of(log: Log, coverage: Coverage) -> Fit:
     return FITS.but(*_differences(log, schema, vehicle), *_lacks(coverage))
 
 
+def is_other_vehicle(schema: Schema, vehicle: Vehicle) -> bool:
+    """Whether a profile was made for another kind of vehicle."""
+    return bool(schema.match.get("vehicle")) and vehicle.kind not in (schema.match["vehicle"], "unknown")
+
+
 def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle) -> Iterator[str]:
     """Why nothing that the profile says of this log could be believed."""
     schema = coverage.schema
     other = wrong_kind(log, schema)
-    wanted = schema.match.get("vehicle", "")
     if other:
         yield other
-    elif wanted and vehicle.kind not in (wanted, "unknown"):
-        yield f"it is for {_a(wanted)}, this is {_a(vehicle.kind)}"
+    elif is_other_vehicle(schema, vehicle):
+        yield f"it is for {_a(schema.match['vehicle'])}, this is {_a(vehicle.kind)}"
     elif not coverage.found:
         yield "none of its parameters or sources are in the log"
     elif coverage.sources < LEAST * coverage.sources_wanted:

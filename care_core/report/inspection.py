@@ -26,7 +26,7 @@ from care_core.report.happened import (
 )
 from care_core.report.wording import fit_text
 from care_core.run import Damage, MissionInfo, ProfileChoice
-from care_core.text import clean, clock, wrapped
+from care_core.text import WIDTH, clean, clock, wrapped
 
 INSPECT_ID: Final = "care.inspect/1"
 
@@ -259,7 +259,6 @@ def _missed(missed: Missed) -> MissedEntry:
 
 def inspection_text(document: InspectDocument) -> str:
     """Lines for a terminal."""
-    log = document.log
     fitting = next((profile.name for profile in document.profiles if profile.usable), "")
     lines = [
         *wrapped(fit_text("" if document.fit.verdict == "no" else fitting, document.fit)),
@@ -267,7 +266,14 @@ def inspection_text(document: InspectDocument) -> str:
         *finding_lines(document.findings),
         "",
         *account_lines(document.account, most=len(document.account)),
-        "",
+    ]
+    return "\n".join(lines) + "\n\n" + holdings_text(document)
+
+
+def holdings_text(document: InspectDocument, width: int = WIDTH) -> str:
+    """What the log holds, and what each profile would find in it: lines of at most this width where they are prose."""
+    log = document.log
+    lines = [
         f"Log         {log.path}",
         f"Format      {log.format}",
         f"Start       {log.start or 'not known (no wall clock)'}",
@@ -275,7 +281,7 @@ def inspection_text(document: InspectDocument) -> str:
         *(f"{name.capitalize():<11} {text}" for name, text in log.facts.items()),
         *_damage_lines(log.damage),
         *_parameter_lines(document.parameters),
-        *_profile_lines(document.profiles),
+        *_profile_lines(document.profiles, width),
         *_channel_lines(document),
     ]
     return "\n".join(lines) + "\n"
@@ -320,7 +326,7 @@ def _value(value: float | str) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 
-def _profile_lines(profiles: Iterable[ProfileEntry]) -> Iterator[str]:
+def _profile_lines(profiles: Iterable[ProfileEntry], width: int) -> Iterator[str]:
     for profile in profiles:
         held = ""
         if profile.sources_wanted:
@@ -329,10 +335,10 @@ def _profile_lines(profiles: Iterable[ProfileEntry]) -> Iterator[str]:
                 f" {profile.sources_wanted} sources are in the log"
             )
         verdict = held if profile.usable else "; ".join(part for part in (f"no: {profile.reason}", held) if part)
-        yield f"Profile     {profile.name}: {verdict}"
+        yield from wrapped(f"{profile.name}: {verdict}", "Profile     ", width=width)
         yield from (f"  mission {mission.index} {_mission_text(mission)}" for mission in profile.missions)
         if profile.options or profile.sources:
-            yield from _missed_lines(profile.missed)
+            yield from _missed_lines(profile.missed, width)
 
 
 def _mission_text(mission: MissionEntry) -> str:
@@ -341,13 +347,15 @@ def _mission_text(mission: MissionEntry) -> str:
     return f"{clock(mission.start_s)} to {clock(mission.end_s)}{end}{mismatch}"
 
 
-def _missed_lines(missed: Sequence[MissedEntry]) -> Iterator[str]:
+def _missed_lines(missed: Sequence[MissedEntry], width: int) -> Iterator[str]:
     """What a profile would miss, variables with the same hint on one line."""
     together: dict[tuple[str, str], list[str]] = {}
     for entry in missed:
         together.setdefault((entry.role, entry.hint), []).append(entry.name)
     for (role, hint), names in together.items():
-        yield f"  misses    {role}{'' if len(names) == 1 else 's'} {', '.join(names)}: {hint}"
+        yield from wrapped(
+            f"{role}{'' if len(names) == 1 else 's'} {', '.join(names)}: {hint}", "  misses    ", width=width
+        )
 
 
 def _channel_lines(document: InspectDocument) -> Iterator[str]:

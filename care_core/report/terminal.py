@@ -100,6 +100,8 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     yield from wrapped(f"{Path(run.log.path).name}{which}, {duration}{facts}", "Log      ")
     if profile.name:
         yield from wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
+    elif diagnosis.profile.fit.verdict == "no":
+        yield from wrapped("none fits; 'care inspect' tells what each would need", "Profile  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
         at = "" if damage.time_s is None else f" at {damage.time_s:.1f} s"
         yield from wrapped(f"{damage.what}{at}", "Damage   ")

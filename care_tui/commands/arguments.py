@@ -60,7 +60,7 @@ Site = Annotated[
     Path | None,
     typer.Option("--site", metavar="FILE", help="Judge by the limits of this file; your own site.yaml if absent."),
 ]
-Mission = Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last.")]
+Mission = Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last if absent.")]
 
 
 def bounds(texts: Iterable[str]) -> dict[str, float]:

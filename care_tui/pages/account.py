@@ -6,12 +6,15 @@ from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.application.case import Case
+from care_core.application.viewing import what_would_fit
 from care_core.health.records import Health
-from care_tui.pages.page import View
+from care_tui.pages.page import Fetch, View
 from care_tui.pages.step import StepPage
 from care_tui.render.happened import Told, fit_rows, told, told_item, told_rows, verdict_line
 from care_tui.render.objectives import run_rows
 from care_tui.render.rows import Row, Rows
+from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
 
 
@@ -28,6 +31,20 @@ class AccountPage(StepPage):
 
     _told: tuple[Health, list[Told]] | None = None
 
+    def __init__(self, screen: PanesScreen) -> None:
+        super().__init__(screen)
+        self._advice: Fetch[list[str]] = Fetch(self, "fit")
+        self._asked_for: Case | None = None
+
+    def enter(self) -> None:
+        case = self.session.case
+        if case is None or case.diagnosis.profile.fit.verdict != "no":
+            return
+        if self._asked_for is not case:
+            self._asked_for = case
+            self._advice.forget()
+        self._advice.start(lambda: what_would_fit(case))
+
     @property
     def _lines(self) -> list[Told]:
         """The lines of the pane, made once for a log."""
@@ -43,7 +60,8 @@ class AccountPage(StepPage):
 
     def _detail(self, index: int | None) -> Rows:
         diagnosis = self.session.diagnosis
-        fit = fit_rows(diagnosis)
+        found = self._advice.answer
+        fit = fit_rows(diagnosis, found if isinstance(found, list) else [])
         rows = [] if index is None else told_rows(self._lines[index])
         parts = [part for part in (rows, fit, run_rows(diagnosis).rows) if part]
         return Rows(row for place, part in enumerate(parts) for row in ([Row(Content())] if place else []) + [*part])

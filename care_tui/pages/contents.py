@@ -28,9 +28,9 @@ class ContentsPage(Page):
 
     def _inspect(self) -> Rows:
         import care_core
-        from care_core.report.inspection import inspection_text
+        from care_core.report.inspection import holdings_text
 
-        return plain_rows(inspection_text(care_core.inspect(self._log)))
+        return plain_rows(holdings_text(care_core.inspect(self._log), self.screen.text.text_width))
 
     def view(self) -> View:
         title = f"Contents of {clean(self._log.name)}"

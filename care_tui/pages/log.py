@@ -14,11 +14,12 @@ from care_tui.pages.page import Fetch, View
 from care_tui.pages.step import StepPage, failure_rows
 from care_tui.places import LogFile, found_logs
 from care_tui.render.objectives import run_rows
-from care_tui.render.rows import Row, Rows, error_rows, labelled, padded, progress_bar
+from care_tui.render.rows import Row, Rows, error_rows, labelled, progress_bar, text
 from care_tui.screens.open_log import OpenLogDialog
 from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
 
+NAME_WIDTH = 30
 SHORTEST_FOLDER = 10
 """Cells below which the end of a path tells nothing."""
 
@@ -71,7 +72,10 @@ class LogPage(StepPage):
         mark = self.glyphs.here if log.path == self.session.path else " "
         opened = "opened" if log.is_recent else ""
         about = f" {age(now - log.modified_s):>10}  {size(log.size):>8}  {opened:<6}  "
-        line = Content.assemble(f"{mark} ", padded(log.path.name, 24, "bold"), about)
+        named = text(log.path.name, "bold")
+        if named.cell_length > NAME_WIDTH:
+            named = named.truncate(NAME_WIDTH - 1) + self.glyphs.more
+        line = Content.assemble(f"{mark} ", named.pad_right(NAME_WIDTH - named.cell_length), about)
         # Of a long path the end tells more than the beginning.
         folder, room = clean(short(log.path.parent)), width - line.cell_length
         if len(folder) > room:

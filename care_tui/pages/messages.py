@@ -107,3 +107,5 @@ class MessagesPage(Page):
             marked = [i for i, m in enumerate(messages) if m.kind in LOUD or self._is_evidence(m)]
             if marked:
                 self.screen.draw(index=next((i for i in marked if i > here), marked[0]))
+            else:
+                self.screen.say("No message is a warning, an error or evidence.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from textual.content import Content
@@ -153,13 +154,15 @@ def marks_of(diagnosis: Diagnosis, glyphs: Glyphs) -> list[Mark]:
     return sorted((mark for mark in found if math.isfinite(mark.time_s)), key=lambda mark: mark.time_s)
 
 
-def fit_rows(diagnosis: Diagnosis) -> list[Row]:
-    """What would make a profile fit, where none does."""
+def fit_rows(diagnosis: Diagnosis, advice: Sequence[str]) -> list[Row]:
+    """What keeps every profile from fitting, and what would make one fit; nothing where one does."""
     fit = diagnosis.profile.fit
     if fit.verdict != "no":
         return []
-    head = heading("No profile fits this log. What keeps the nearest from fitting:")
-    return [head, *(Row(text(f"- {reason}"), 2) for reason in fit.reasons)]
+    rows = [heading("No profile fits this log"), *(Row(text(f"- {reason}"), 2) for reason in fit.reasons)]
+    return rows + (
+        [heading("What would make one fit"), *(Row(text(f"- {one}"), 2) for one in advice)] if advice else []
+    )
 
 
 def hypothesis_item(one: Hypothesis, finding: Finding | None) -> tuple[Content, Content]:

@@ -124,7 +124,8 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
         rows.append(warning("Mission", "the log stops before the mission does"))
     if mission.mismatch:
         rows.append(warning("Mission", mission.mismatch))
-    rows += [warning("Profile", line) for line in profile.fit.reasons]
+    if profile.fit.verdict != "no":  # then it stands above, on the pane of what happened
+        rows += [warning("Profile", line) for line in profile.fit.reasons]
     rows += [warning("Damage", damage(part)) for part in log.damage]
     rows += [warning("Note", line) for line in diagnosis.notes]
     rows += [labelled("ROS" if key == "ros" else key.capitalize(), value) for key, value in log.facts.items()]

@@ -1,0 +1,135 @@
+"""What holds of every output, whatever its format: the fit comes first, and no number stands without its caveat."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import care_core
+from care_core.application.case import Reading
+from care_core.diagnose.records import Diagnosis, Fix
+from care_core.diagnose.whatif import question
+from care_core.history.store import Triaged
+from care_core.report.document import build_document
+from care_core.report.history import history_document, history_json, history_text
+from care_core.report.html import to_html
+from care_core.report.terminal import to_text
+from care_core.report.whatif import whatif_json, whatif_text
+from care_core.report.writers import published, to_json, to_markdown, to_yaml
+from care_core.run import Fit, FitVerdict
+from care_tui.render.causes import cause_item
+from care_tui.render.fix import option_item, outcome_rows
+from care_tui.render.happened import standing
+from care_tui.render.rows import UNICODE
+from tests.made import LAND_SPEED, made_diagnosis
+
+SAMPLE = Path(__file__).parents[2] / "samples" / "arducopter_failed.BIN"
+OPTION = "LAND_SPEED"
+
+
+@pytest.fixture(scope="module")
+def reading() -> Reading:
+    found = care_core.triage(SAMPLE).reading
+    assert found is not None
+    return found
+
+
+def outputs(diagnosis: Diagnosis) -> Mapping[str, str]:
+    """Every format of a diagnosis."""
+    report = build_document(diagnosis)
+    history = history_document([Triaged("2026-01-01T00:00:00", "/a.BIN", 1, published(report))], [])
+    return {
+        "text": to_text(diagnosis),
+        "json": to_json(report),
+        "yaml": to_yaml(report),
+        "markdown": to_markdown(report),
+        "html": to_html(report),
+        "history": history_text(history),
+        "history json": history_json(history),
+    }
+
+
+@pytest.mark.parametrize(
+    ("verdict", "said"), [("fits", "fits"), ("partly", "fits in part: old firmware"), ("no", "does not fit: a rover")]
+)
+def test_every_output_begins_with_how_well_the_profile_fits(reading: Reading, verdict: FitVerdict, said: str) -> None:
+    made = made_diagnosis()
+    reasons = (said.partition(": ")[2],) if ": " in said else ()
+    choice = replace(made.profile, fit=Fit(verdict, reasons))
+    shown = outputs(replace(made, profile=choice))
+    expected = f"Profile arducopter {said}"
+    assert shown["text"].startswith(expected)
+    assert shown["yaml"].startswith(f"# {expected}")
+    assert shown["markdown"].split("\n\n")[1].startswith(expected)
+    assert shown["html"].partition("<h1>")[2].partition("<p>")[2].startswith(expected)
+    assert list(json.loads(shown["json"]))[:2] == ["schema", "fit"]
+    assert expected.partition(":")[0].removeprefix("Profile ") in shown["history"].splitlines()[0]
+    assert json.loads(shown["history json"])["triages"][0]["fit"] == verdict
+    assert standing(replace(made, profile=choice), UNICODE)[0].plain.removeprefix("! ").startswith(expected)
+    asked = replace(reading.question, profile=replace(reading.choice, fit=choice.fit))
+    answer = asked.ask({OPTION: 40.0})
+    assert whatif_text(asked, answer).startswith(expected)
+    assert list(json.loads(whatif_json(asked, answer)))[:2] == ["schema", "fit"]
+
+
+def test_a_value_that_no_source_holds_is_shown_as_assumed_in_every_output(reading: Reading) -> None:
+    made = made_diagnosis()
+    assert made.fix is not None
+    (fault,), (change,) = made.faults, made.fix.changes
+    fix = replace(made.fix, changes=(replace(change, is_assumed=True),))
+    cause = replace(fault.causes[0], is_assumed=True)
+    diagnosis = replace(
+        made,
+        run=replace(made.run, config={}, settings={}),
+        faults=(replace(fault, causes=(cause,)),),
+        fix=fix,
+        alternatives=(fix,),
+    )
+    shown = outputs(diagnosis)
+    for name in ("text", "markdown", "html"):
+        changes = [line for line in shown[name].splitlines() if "land_speed" in line and "16" in line]
+        assert len(changes) >= 3, f"{name}: headline, cause and alternative"
+        assert [line for line in changes if "16 (assumed)" not in line] == [], name
+    document = json.loads(shown["json"])
+    assert document["faults"][0]["causes"][0]["assumed"] is document["fix"]["changes"][0]["assumed"] is True
+    assert shown["yaml"].count("assumed: true") == 3, "the cause, the change and that of the alternative"
+    assert "-LAND_SPEED" not in shown["yaml"], "what no source holds is no line of the configuration as driven"
+    assert "16 (assumed) → 50" in cause_item(cause, None, None, UNICODE)[0].plain
+    assert "16 (assumed) → 50" in option_item(LAND_SPEED, 16.0, True, 50.0, True, "", 12, UNICODE).plain
+    assert "16 cm/s (assumed)" in option_item(LAND_SPEED, 16.0, True, None, False, "", 12, UNICODE).plain
+
+    judged = reading.judged
+    config = {name: value for name, value in judged.run.config.items() if name != OPTION}
+    asked = question(replace(judged, run=replace(judged.run, config=config)), reading.profile, reading.choice)
+    answer = asked.ask({OPTION: 40.0})
+    assert f"{OPTION}  50 (assumed) -> 40 cm/s" in whatif_text(asked, answer)
+    assert json.loads(whatif_json(asked, answer))["changes"][0]["assumed"] is True
+
+
+def test_no_probability_outside_the_training_runs_stands_without_its_warning(reading: Reading) -> None:
+    made = made_diagnosis()
+    assert made.fix is not None
+    fix = replace(made.fix, changes=tuple(replace(change, in_support=False) for change in made.fix.changes))
+    shown = outputs(replace(made, fix=fix, alternatives=(fix,), faults=(), hypotheses=()))
+    for name in ("text", "markdown", "html"):
+        assert "90% probability" in shown[name].replace("\u00a0", " "), name
+        assert unwarned(shown[name], fix) == [], name
+    assert json.loads(shown["json"])["fix"]["guess"] is True
+    rows = [row.content.plain for row in outcome_rows(fix, made.objectives, UNICODE)]
+    assert [row for row in rows if "92 %" in row and "(a guess)" not in row] == []
+
+    answer = reading.question.ask({OPTION: 400.0})
+    asked = Fix(answer.changes, answer.p_ok, {str(i): one.predicted for i, one in enumerate(answer.outlooks)})
+    assert asked.is_guess
+    assert json.loads(whatif_json(reading.question, answer))["guess"] is True
+    assert unwarned(whatif_text(reading.question, answer), asked) == []
+
+
+def unwarned(text: str, fix: Fix) -> list[str]:
+    """Lines with a probability of this fix that do not say that it is a guess."""
+    promised = {f"{fix.p_fixed:.0%}", *(f"{one.p_ok:.0%}" for one in fix.predicted.values() if one.p_ok is not None)}
+    return [line for line in text.splitlines() if any(one in line for one in promised) and "guess" not in line]
