@@ -9,7 +9,7 @@ import pytest
 from care_core.application.case import Case, Progress, Request
 from care_core.diagnose.records import Diagnosis, Hypothesis, MissionVerdict
 from care_core.health.records import Health
-from care_core.run import MissionInfo
+from care_core.run import Check, MissionInfo
 from care_tui.app import CareApp
 from care_tui.settings import Settings
 from care_tui.widgets.pinned import Pinned
@@ -63,16 +63,17 @@ async def test_that_nothing_was_found_is_said_plainly(make_app: MakeApp) -> None
 
 
 async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_say_why_they_are_empty(
-    make_app: MakeApp,
+    make_app: MakeApp, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("care_tui.pages.account.what_would_fit", lambda _case: ["for arducopter: record CMD"])
     app = make_app(sample.unfitting())
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         assert walk(app).step == 1
         assert pinned(app)[0].startswith("! Profile arducopter does not fit: it is a rover")
         assert "motor 2 lost thrust" in items(app)
-        assert "What keeps the nearest from fitting" in text(app)
-        assert "- it is a rover, the profile is of a copter" in text(app)
+        assert "- it is a rover, the profile is of a copter\n" in text(app)
+        assert "What would make one fit\n- for arducopter: record CMD\n" in text(app)
         for step in "2345":
             await settle(pilot, step)
             assert text(app).startswith("No profile fits this log, so ")
@@ -82,6 +83,27 @@ async def test_where_no_profile_fits_the_app_opens_on_the_account_and_the_steps_
             await settle(pilot, "enter")
         await settle(pilot, "6")
         assert text(app) == "report: yaml", "the account is exported all the same"
+
+
+async def test_what_a_run_without_a_profile_did_is_judged_and_one_without_a_mission_promises_nothing(
+    make_app: MakeApp,
+) -> None:
+    done = replace(sample.unfitting(), objectives=(sample.OK_SUCCESS,))
+    app = make_app(done)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "1")
+        assert "enter Objectives" in hints(app)
+        await settle(pilot, "enter")
+        assert items(app).startswith("✓ OK")
+        await settle(pilot, "v", "escape", "4")
+        assert text(app).startswith("No profile fits this log, so no change")
+    plain = replace(sample.all_ok(), run=replace(sample.RUN, checks=(Check("no_crash", 1.0, ""),)))
+    app = make_app(plain)
+    async with app.run_test(size=(80, 24)) as pilot:
+        for step in "45":
+            await settle(pilot, step)
+            assert text(app).startswith("No mission was flown, so ")
+            assert items(app) == ""
 
 
 async def test_where_no_profile_fits_what_explains_a_failure_is_ranked_all_the_same(make_app: MakeApp) -> None:
