@@ -45,6 +45,8 @@ FASTEST_HZ: Mapping[str, float] = {
 runs at 400 Hz, its gyros at 8 kHz."""
 ANY_FASTEST_HZ = 2_000.0
 """Of a message without an entry: robots publish odometry and lasers at up to some 100 Hz, joints at 1 kHz."""
+AT_ONCE = frozenset(("PARM", "CMD", "MSG", "RALY", "FNCE", "ORGN"))
+"""What a vehicle writes in a burst: parameters and items as fast as they come."""
 SLOWEST_S: Mapping[str, float] = {"BAT": 60.0, "POS": 30.0, "ATT": 30.0}
 """Longest usual time between two messages of a sensor, also in thinned logs."""
 
@@ -84,7 +86,7 @@ def clock_doubt(tables: Mapping[str, Table], start_s: float, end_s: float) -> st
         return "the log's clock does not advance during the mission"
     for name, table in tables.items():
         inside = table.t[(table.t >= start_s) & (table.t <= end_s)]
-        if len(inside) < _ENOUGH:
+        if len(inside) < _ENOUGH or name in AT_ONCE:
             continue
         sensors = len(_instances(table)) if name in FASTEST_HZ else 1
         rate_hz = (len(inside) - 1) / max(float(inside[-1] - inside[0]), 1e-9) / sensors

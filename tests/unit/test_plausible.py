@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from care_core.logs.base import Table
-from care_core.logs.plausible import plausible
+from care_core.logs.plausible import clock_doubt, plausible
 
 
 def battery(volts: list[float], **more: list[float]) -> dict[str, Table]:
@@ -44,3 +44,9 @@ def test_other_messages_pass() -> None:
 def test_a_dilution_of_precision_that_no_receiver_can_send_is_left_out() -> None:
     satellites = {"GPS": Table(np.arange(4.0), {"HDop": np.array([0.8, 655.35, 655.36, -0.1])})}
     np.testing.assert_array_equal(plausible(satellites)["GPS"]["HDop"], [0.8, 655.35])
+
+
+def test_what_a_vehicle_writes_at_once_says_nothing_of_its_clock() -> None:
+    burst = Table(np.full(900, 0.5), {"Value": np.arange(900.0)})
+    assert clock_doubt({"PARM": burst}, 0.0, 60.0) == ""
+    assert "too slow or stands still" in clock_doubt({"ATT": burst}, 0.0, 60.0)
