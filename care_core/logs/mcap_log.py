@@ -21,6 +21,9 @@ from care_core.logs.ros_log import (
     RosLog,
     Source,
     check_room,
+    first_ns,
+    joined,
+    last_ns,
     piece_of,
     timed,
 )
@@ -53,11 +56,11 @@ class McapPart:
             contents = read_contents(log)
         self._chunks = contents.chunks
         self._checked: set[int] = set()
-        self.flaws = timed(contents.flaws, [(chunk.pos, _last_ns(chunk)) for chunk in contents.chunks if chunk.index])
+        self.flaws = timed(contents.flaws, [(chunk.pos, last_ns(_times_ns(chunk))) for chunk in contents.chunks])
         if self._file.is_cut:
             self.flaws["zstd"] = Flaw("the zstd file is cut short or broken")
         self.connections: Mapping[int, Connection] = contents.connections()
-        self.times_ns = _times_by_channel(contents)
+        self.times_ns = joined(map(_times_ns, contents.chunks), contents.channels)
         self.metadata = _metadata(contents)
 
     def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
@@ -74,13 +77,13 @@ class McapPart:
         try:
             found = chunk.open(log, unpack)
         except BrokenRecordError as err:
-            self.flaws.setdefault(key, Flaw(str(err), chunk.pos, _first_ns(chunk)))
+            self.flaws.setdefault(key, Flaw(str(err), chunk.pos, first_ns(_times_ns(chunk))))
             return None
         if chunk.pos not in self._checked:
             self._checked.add(chunk.pos)
             why = chunk.flaw(*found)
             if why:
-                self.flaws.setdefault(key, Flaw(why, chunk.pos, _first_ns(chunk)))
+                self.flaws.setdefault(key, Flaw(why, chunk.pos, first_ns(_times_ns(chunk))))
         return found
 
     def _of_chunk(
@@ -119,23 +122,6 @@ def _metadata(contents: McapContents) -> Metadata:
     return Metadata.merged(found)
 
 
-def _times_by_channel(contents: McapContents) -> dict[int, NDArray[np.int64]]:
-    parts: dict[int, list[NDArray[np.int64]]] = {}
-    for chunk in contents.chunks:
-        for number, entries in chunk.index.items():
-            if len(entries) and number in contents.channels:
-                parts.setdefault(number, []).append(_times_ns(entries))
-    return {number: np.concatenate(times) for number, times in parts.items()}
-
-
-def _first_ns(chunk: McapChunk) -> int | None:
-    return min((int(_times_ns(entries).min()) for entries in chunk.index.values() if len(entries)), default=None)
-
-
-def _last_ns(chunk: McapChunk) -> int:
-    return max(int(_times_ns(entries).max()) for entries in chunk.index.values())
-
-
-def _times_ns(entries: NDArray[np.void]) -> NDArray[np.int64]:
-    """Log times; one beyond the year 2262 wraps and is no believable time either way."""
-    return entries["time"].astype(np.int64)
+def _times_ns(chunk: McapChunk) -> dict[int, NDArray[np.int64]]:
+    """Log times per channel; one beyond the year 2262 wraps and is no believable time either way."""
+    return {number: entries["time"].astype(np.int64) for number, entries in chunk.index.items() if len(entries)}

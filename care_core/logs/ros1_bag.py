@@ -24,6 +24,9 @@ from care_core.logs.ros_log import (
     RosLog,
     Source,
     check_room,
+    first_ns,
+    joined,
+    last_ns,
     piece_of,
     timed,
 )
@@ -57,9 +60,9 @@ class Ros1Part:
         if self._contents.is_encrypted:
             raise LogError("The bag is encrypted.", hint="Decrypt it with 'rosbag decrypt' first.", where=str(path))
         self.connections: Mapping[int, Connection] = self._contents.connections
-        lasts = [(chunk.pos, last) for chunk in self._contents.chunks if (last := _last_ns(chunk)) is not None]
+        lasts = [(chunk.pos, last_ns(_times_ns(chunk))) for chunk in self._contents.chunks]
         self.flaws = timed(self._contents.flaws, lasts)
-        self.times_ns = _times_by_connection(self._contents)
+        self.times_ns = joined(map(_times_ns, self._contents.chunks), self._contents.connections)
 
     def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
         """The messages of some connections, chunk by chunk."""
@@ -72,7 +75,7 @@ class Ros1Part:
                 try:
                     plain = chunk.open(bag, unpack)
                 except BrokenRecordError as err:
-                    self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, _first_ns(chunk)))
+                    self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, first_ns(_times_ns(chunk))))
                 else:
                     yield from self._of_chunk(chunk, wanted, *plain)
 
@@ -107,22 +110,8 @@ def _check_one_run(path: Path, parts: Sequence[Ros1Part]) -> None:
         )
 
 
-def _times_by_connection(contents: BagContents) -> Mapping[int, NDArray[np.int64]]:
-    parts: dict[int, list[NDArray[np.int64]]] = {}
-    for chunk in contents.chunks:
-        for number, entries in chunk.index.items():
-            if len(entries) and number in contents.connections:
-                parts.setdefault(number, []).append(_entry_times_ns(entries))
-    return {number: np.concatenate(times) for number, times in parts.items()}
-
-
-def _first_ns(chunk: BagChunk) -> int | None:
-    times = [int(_entry_times_ns(entries).min()) for entries in chunk.index.values() if len(entries)]
-    return min(times, default=None)
-
-
-def _last_ns(chunk: BagChunk) -> int | None:
-    return max((int(_entry_times_ns(entries).max()) for entries in chunk.index.values() if len(entries)), default=None)
+def _times_ns(chunk: BagChunk) -> dict[int, NDArray[np.int64]]:
+    return {number: _entry_times_ns(entries) for number, entries in chunk.index.items() if len(entries)}
 
 
 def _entry_times_ns(entries: NDArray[Any]) -> NDArray[np.int64]:

@@ -5,7 +5,7 @@ The files (`Part`) know where messages lie; this module knows what they mean.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from functools import cached_property
@@ -47,6 +47,9 @@ _STACKS = (
 
 Message = tuple[int, int, Buffer, int, int]
 """Connection number, record time in ns, and where the message lies: buffer, begin, end."""
+
+TimesNs = Mapping[int, NDArray[np.int64]]
+"""Record times by connection number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -426,18 +429,38 @@ class _Gathered:
         return self.done
 
 
-def timed(flaws: Mapping[str, Flaw], lasts: Sequence[tuple[int, int]]) -> dict[str, Flaw]:
+def timed(flaws: Mapping[str, Flaw], lasts: Sequence[tuple[int, int | None]]) -> dict[str, Flaw]:
     """The flaws of a file with times: a place that has none is as late as the messages that lie before it.
 
     Args:
-        lasts: byte and record time of the last message, of each stretch of the file.
+        lasts: byte and record time of the last message, None where it holds none, of each stretch of the file.
     """
     found = {}
     for key, flaw in flaws.items():
-        before = [time_ns for byte, time_ns in lasts if flaw.byte is not None and byte < flaw.byte]
+        before = [ns for byte, ns in lasts if ns is not None and flaw.byte is not None and byte < flaw.byte]
         known = flaw.time_ns is not None or not before
         found[key] = flaw if known else replace(flaw, time_ns=max(before))
     return found
+
+
+def joined(indexes: Iterable[TimesNs], known: Container[int]) -> dict[int, NDArray[np.int64]]:
+    """The record times of each known connection out of the indexes of a file's chunks."""
+    parts: dict[int, list[NDArray[np.int64]]] = {}
+    for index in indexes:
+        for number, times in index.items():
+            if number in known:
+                parts.setdefault(number, []).append(times)
+    return {number: np.concatenate(times) for number, times in parts.items()}
+
+
+def first_ns(index: TimesNs) -> int | None:
+    """The earliest record time of a chunk, None where it holds no message."""
+    return min((int(times.min()) for times in index.values()), default=None)
+
+
+def last_ns(index: TimesNs) -> int | None:
+    """The latest record time of a chunk, None where it holds no message."""
+    return max((int(times.max()) for times in index.values()), default=None)
 
 
 def _first(part: Part, number: int) -> bytes:
