@@ -279,8 +279,8 @@ def _plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Ch
 
 
 def _mission_done(mission: Mission) -> Value:
-    """1 where the vehicle says that its mission is complete or reached every waypoint of it, 0 where it was still at it
-    when it was disarmed; what somebody broke off is no failure of the mission."""
+    """1 where the vehicle says that its mission is complete or reached every waypoint of it, 0 where a crash or a
+    failsafe ended it or it was disarmed on its way; what somebody broke off is no failure of the mission."""
     said = messages(mission.tables.get("MSG"), mission.start_s, mission.end_s + _SAID_AFTER_S)
     if any(text.startswith(_COMPLETE) for _, text in said):
         return 1.0
@@ -290,6 +290,8 @@ def _mission_done(mission: Mission) -> Value:
         return unknown
     if flight.reached >= len(flight.waypoints):
         return 1.0
+    if _failed(mission):
+        return 0.0
     if not mission.ended:
         return _CUT
     last = mission.shared(modes_in_force)[-1]

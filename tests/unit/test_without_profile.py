@@ -71,6 +71,13 @@ def test_a_mission_that_the_pilot_broke_off_is_no_failure_of_the_vehicle() -> No
     assert value.reason == "0 of the mission's 1 waypoints were reached, and the last mode was Hold"
 
 
+def test_a_mission_that_a_failsafe_ended_failed() -> None:
+    errors = table([(40.0, 17, 1)], "Subsys", "ECode")
+    modes = table([(0.0, 10), (40.0, 4)], "ModeNum")
+    (mission,) = KIND.missions(flight(MODE=modes, ERR=errors, MSG=said((20.0, "Mission: 2 WP"))), 75.0, {})
+    assert checks(KIND.outcome(replace(mission, facts=ROVER)))["mission_success"] == 0.0
+
+
 def test_a_rover_whose_log_stops_when_all_is_done_is_fine_and_one_on_its_way_is_not_known() -> None:
     armed = table([(10.0, 1, 0)], "ArmState", "Forced")
     assert "disarmed" not in judged(ROVER, 10, ARM=armed, MSG=said((69.0, "Mission Complete")))
