@@ -6,14 +6,14 @@ those of the profile. A vehicle that was tuned for its frame is judged by its ow
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from care_core.causal.counterfactual import Config, World
 from care_core.causal.model import Model
-from care_core.configs.driven import option_setting, option_value
+from care_core.configs.driven import option_setting, option_value, same_value
 from care_core.diagnose.records import Need
 from care_core.profile.schema import Schema
 from care_core.run import Run, Setting, is_known
@@ -56,25 +56,49 @@ def profile_config(schema: Schema, model: Model) -> dict[str, float]:
 def reference_of(run: Run, schema: Schema, model: Model, good: Good | None = None) -> Reference:
     """The reference configuration for a run: a context is met, not set."""
     config = profile_config(schema, model)
-    given, source = _given(run, schema, good)
-    config.update({name: value for name, value in given.items() if schema.variables[name].accepts(value)})
+    named, recorded = _named(schema, good), _recorded(run, schema)
+    for name, value in {**recorded, **named}.items():
+        # A value that may not be suggested is no reference, but where it is driven it is none to be off either.
+        if schema.variables[name].accepts(value) or (name in named and _is_same(value, run.config.get(name))):
+            config[name] = value
     config.update({name: value for name, value in run.context.items() if is_known(value)})
-    return Reference(config, source)
+    return Reference(config, _whose(named, recorded, good))
 
 
-def _given(run: Run, schema: Schema, good: Good | None) -> tuple[dict[str, float], str]:
-    """Options by the operator's reference, or by the defaults that the log records, and whose they are."""
+def _is_same(value: float, other: float | None) -> bool:
+    """Whether a parameter has this value."""
+    return other is not None and same_value(value, other)
+
+
+def _named(schema: Schema, good: Good | None) -> dict[str, float]:
+    """Options by the configuration that the operator vouches for."""
+    return {} if good is None else _options(schema, good.settings)
+
+
+def _recorded(run: Run, schema: Schema) -> dict[str, float]:
+    """Options by the defaults that the log records."""
+    defaults = {name: at for name, setting in run.settings.items() if (at := _by_default(setting)) is not None}
+    return _options(schema, defaults)
+
+
+def _options(schema: Schema, settings: Mapping[str, Setting]) -> dict[str, float]:
     values: dict[str, float] = {}
     for option in schema.options:
-        setting = option_setting(option, run.settings if good is None else good.settings)
-        if setting is not None and good is None:
-            setting = _by_default(setting)
+        setting = option_setting(option, settings)
         value = None if setting is None else option_value(option, setting)
         if value is not None:
             values[option.name] = value
-    if good is not None:
-        return values, good.source
-    return values, "the defaults that the log records" if values else "the profile's reference"
+    return values
+
+
+def _whose(named: Collection[str], recorded: Collection[str], good: Good | None) -> str:
+    """Whose the reference is, in one phrase."""
+    if good is None:
+        return "the defaults that the log records" if recorded else "the profile's reference"
+    if not named:
+        return f"{_whose((), recorded, None)}, as {good.source} holds no option"
+    lacking = len(set(recorded) - set(named))
+    return f"{good.source}" + (f" and, for what it lacks ({lacking}), the defaults of the log" if lacking else "")
 
 
 def _by_default(setting: Setting) -> Setting | None:

@@ -63,7 +63,7 @@ class _Case:
     choice: ProfileChoice
     run: Run
     world: World
-    source: str
+    reference: str
     """Whose the reference is."""
     unranked: Mapping[str, tuple[Suspect, ...]]
     """Per objective the options off their reference whose effect the training runs cannot tell, the likeliest first."""
@@ -121,7 +121,15 @@ def diagnose(
         missed = any(result.status == "fault" for result in judged.checks)
         explained = without_parameters(health.findings, failed=missed)
         return Diagnosis(
-            choice, run, objectives, (), None, missions=judged.missions, health=health, hypotheses=explained
+            choice,
+            run,
+            objectives,
+            (),
+            None,
+            notes=() if run.checks else (_reference(judged),),
+            missions=judged.missions,
+            health=health,
+            hypotheses=explained,
         )
     report("ranking the causes", 0.7)
     world = world_of(judged, profile, keep)
@@ -130,7 +138,7 @@ def diagnose(
     }
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
-    case = _Case(profile, choice, run, world, judged.reference.source, unranked)
+    case = _Case(profile, choice, run, world, _reference(judged), unranked)
     unheard = {result.variable.name: _out_of_reach(case, result) for result in broken}
     faults = tuple(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
@@ -390,10 +398,16 @@ def _promise(world: World, broken: Sequence[str]) -> str:
     return f"probabilities are for the next run under the same conditions{seen}; how alike such runs are was {measured}"
 
 
+def _reference(judged: Judged) -> str:
+    """Whose configuration the run was judged against, and how far from it it was driven."""
+    off = len(deviating(judged.run.config, judged.reference.config))
+    count = f"{off} option{' of this run is' if off == 1 else 's of this run are'} off it"
+    return f"judged against {judged.reference.source}: {count}"
+
+
 def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
     notes = list(case.choice.fit.reasons)
-    off = len(deviating(case.world.config, case.world.reference))
-    notes.append(f"judged against {case.source}: {off} options of this run are off it")
+    notes.append(case.reference)
     for name in (result.variable.name for result in broken):
         unknown = ", ".join(suspect.option for suspect in case.unranked[name])
         if unknown:

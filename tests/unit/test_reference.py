@@ -79,3 +79,29 @@ def test_the_default_of_a_ros_node_is_no_reference(planted: Profile) -> None:
     described = Setting("/a/radius", 0.9, "/a/parameter_updates", default=0.6)
     reference = judge(replace(run, settings={"/a/radius": described}), SCHEMA, planted.model).reference
     assert (reference.config["radius"], reference.source) == (DEFAULTS["radius"], "the profile's reference")
+
+
+def test_what_a_reference_file_lacks_is_at_the_defaults_of_the_log(planted: Profile) -> None:
+    schema = with_variable(SCHEMA, replace(SCHEMA.variables["speed"], parameters=("SPEED",)))
+    schema = with_variable(schema, replace(schema.variables["accel"], parameters=("ACCEL",)))
+    run = planted_run(speed=1.5, accel=2.0)
+    settings = {
+        "SPEED": Setting("SPEED", 1.5, "PARM", default=1.2),
+        "ACCEL": Setting("ACCEL", 2.0, "PARM", default=1.1),
+    }
+    good = Good({"SPEED": Setting("SPEED", 1.4, "good.param")}, "the configuration of good.param")
+    found = judge(replace(run, settings=settings), schema, planted.model, good=good).reference
+    assert (found.config["speed"], found.config["accel"]) == (1.4, 1.1)
+    assert found.source == "the configuration of good.param and, for what it lacks (1), the defaults of the log"
+    empty = judge(replace(run, settings=settings), schema, planted.model, good=Good({}, "x.param")).reference
+    assert empty.config["speed"] == 1.2
+    assert empty.source == "the defaults that the log records, as x.param holds no option"
+
+
+def test_a_tuned_value_beyond_the_range_is_not_off_a_reference_that_has_it(planted: Profile) -> None:
+    schema = with_variable(SCHEMA, replace(SCHEMA.variables["speed"], parameters=("SPEED",)))
+    good = Good({"SPEED": Setting("SPEED", 99.0, "good.param")}, "the configuration of good.param")
+    run = planted_run(speed=99.0)
+    assert judge(run, schema, planted.model, good=good).reference.config["speed"] == 99.0
+    other = judge(planted_run(speed=1.5), schema, planted.model, good=good).reference
+    assert other.config["speed"] == DEFAULTS["speed"]
