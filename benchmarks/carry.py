@@ -23,15 +23,17 @@ import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
 
-from benchmarks.travel import EFFORT, MEASURED
+from benchmarks.travel import MEASURED
 from care_core.causal.counterfactual import World
 from care_core.causal.model import Model, Training
 from care_core.diagnose.judging import read_and_judge, world_of
+from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
 from care_core.learn.relative import relative
 from care_core.learn.skill import all_met, calibration_error
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
+from care_core.learn.train import summaries
 from care_core.learn.transfer import carry_over
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
@@ -40,6 +42,7 @@ from care_core.variables import Threshold
 
 KINDS = ("hexa", "payload", "draggy", "old_battery", "light")
 RUNS = (0, 10, 30)
+EFFORT = Effort(points=350, iterations=25, folds=5)
 DRAWS = 3
 
 
@@ -70,7 +73,7 @@ def learn(frame: pd.DataFrame, schema: Schema) -> Model:
     training = Training(origin="", runs=len(frame), seed=0, alpha=0.01, resamples=0, moves_together=together)
     return Model(
         schema_digest=schema.digest, graph=graph, edges={}, bidirected=(), effects={}, paths={}, outcomes=outcomes,
-        summaries={}, skill={}, training=training, mechanisms=mechanisms,
+        summaries=summaries(relative(frame, schema), schema), skill={}, training=training, mechanisms=mechanisms,
     )  # fmt: skip
 
 
@@ -81,7 +84,7 @@ def carried(source: Model, schema: Schema, rows: pd.DataFrame) -> Model:
     outcomes, mechanisms = carry_over(source, schema, rows, source.graph, np.random.default_rng(0))
     return Model(
         schema_digest=source.schema_digest, graph=source.graph, edges={}, bidirected=(), effects={}, paths={},
-        outcomes=outcomes, summaries={}, skill={}, training=source.training, mechanisms=mechanisms,
+        outcomes=outcomes, summaries=source.summaries, skill={}, training=source.training, mechanisms=mechanisms,
     )  # fmt: skip
 
 

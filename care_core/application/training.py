@@ -71,8 +71,8 @@ def update_profile(source: str, runs: Path, out: Path, *, seed: int, progress: P
     with _learning():
         from care_core.learn.table import read_table
         from care_core.learn.train import TrainSettings
-        from care_core.learn.transfer import out_of_support, update
-    frame = read_table(runs, profile.schema)
+        from care_core.learn.transfer import FEWEST, out_of_support, update
+    frame = read_table(runs, profile.schema, at_least=FEWEST)
     outside = out_of_support(profile.model, profile.schema, frame)
     text = _retargeted((profile.path / PROFILE_FILE).read_text(encoding="utf-8"), out.name, runs.name, outside)
     schema = parse_schema(text, runs)

@@ -155,7 +155,11 @@ class Mechanism:
 
     def latent_sd(self, x: FloatArray) -> FloatArray:
         """Posterior standard deviation of the noise-free value, shape (m,)."""
-        return self._known_sd(np.full(len(x), self.kernel.variance), self.kernel(self.scaled(x), self.points))
+        own = self._known_sd(np.full(len(x), self.kernel.variance), self.kernel(self.scaled(x), self.points))
+        if self.prior is None:
+            return own
+        source, share = self.prior
+        return np.hypot(own, share * source.latent_sd(self._columns(x, source.inputs)))
 
     def change(self, x: FloatArray, here: FloatArray) -> tuple[FloatArray, FloatArray]:
         """f(x) - f(here) on the transformed scale: posterior mean and standard deviation, both of shape (m,).
@@ -169,7 +173,12 @@ class Mechanism:
         cross = self.kernel(z, self.points) - self.kernel(origin, self.points)
         prior = 2 * (self.kernel.variance - self.kernel(z, origin)[:, 0])
         mean: FloatArray = self.scale * (cross @ self.weights)
-        return mean + self.known(x) - self.known(here), self._known_sd(prior, cross)
+        sd = self._known_sd(prior, cross)
+        if self.prior is not None:
+            source, share = self.prior
+            places = source.inputs
+            sd = np.hypot(sd, share * source.change(self._columns(x, places), self._columns(here, places))[1])
+        return mean + self.known(x) - self.known(here), sd
 
     def around(self, x: FloatArray, here: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """What is not known of the noise-free values at x (m, p) and at here (1, p): their posterior variances, shape
@@ -182,7 +191,15 @@ class Mechanism:
         half = cross @ self._inverse
         variance = self.scale**2 * np.maximum(self.kernel.variance - (half * cross).sum(axis=1), 1e-12)
         covariance: FloatArray = self.scale**2 * (self.kernel(z[:-1], z[-1:])[:, 0] - half[:-1] @ cross[-1])
-        return variance[:-1], covariance, float(variance[-1])
+        if self.prior is None:
+            return variance[:-1], covariance, float(variance[-1])
+        source, share = self.prior
+        there, between, at_here = source.around(self._columns(x, source.inputs), self._columns(here, source.inputs))
+        return (
+            variance[:-1] + share**2 * there,
+            covariance + share**2 * between,
+            float(variance[-1]) + share**2 * at_here,
+        )
 
     def _known_sd(self, prior: FloatArray, cross: FloatArray) -> FloatArray:
         explained = ((cross @ self._inverse) * cross).sum(axis=1)
@@ -191,8 +208,14 @@ class Mechanism:
 
     def ignorance(self, x: FloatArray) -> FloatArray:
         """How little the training data say there: posterior over prior variance, 0 (known) to 1 (nothing known)."""
-        share: FloatArray = (self.latent_sd(x) / self.scale) ** 2 / max(self.kernel.variance, 1e-12)
+        share: FloatArray = self.latent_sd(x) ** 2 / max(self._prior_variance, 1e-12)
         return np.clip(share, 0.0, 1.0)
+
+    @property
+    def _prior_variance(self) -> float:
+        """Of a noise-free value before any run, on the transformed scale."""
+        own = self.scale**2 * self.kernel.variance
+        return own if self.prior is None else own + self.prior[1] ** 2 * self.prior[0]._prior_variance
 
     @property
     def noise_sd(self) -> float:

@@ -5,7 +5,7 @@ pydantic checks the shape of these records where a file is read; nothing else he
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -99,6 +99,12 @@ class Summary(Record):
         if bound.op == "==":
             levels = np.round(levels)
         return float(np.clip(np.mean([bound.met(float(level)) for level in levels]), TAIL, 1 - TAIL))
+
+    def with_values(self, values: Iterable[float]) -> Summary:
+        """The same with its ends drawn out to a few more values."""
+        known = [value for value in values if np.isfinite(value)]
+        low, high = min((self.low, *known)), max((self.high, *known))
+        return self.model_copy(update={"quantiles": (low, *self.quantiles[1:-1], high)})
 
     def times(self, factor: float) -> Summary:
         """The same in another unit."""

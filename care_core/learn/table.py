@@ -21,30 +21,30 @@ CONDITIONS, STARTED = "conditions", "log_start"
 """What runs of one site and day share (any value); when the log of a run began."""
 
 
-def read_table(path: Path, schema: Schema) -> pd.DataFrame:
+def read_table(path: Path, schema: Schema, at_least: int = MIN_RUNS) -> pd.DataFrame:
     """Read a runs table (CSV or Parquet) and keep the schema's variables, in the schema's order, as floats.
 
     `CONDITIONS` is kept, made from the date of the log where the table has none; other columns (the log's name,
     provenance) are dropped. Metrics and objectives may be missing in a row: a mission
-    that was refused or failed does not have them. Options and contexts may not.
+    that was refused or failed does not have them. Options may not.
 
     Raises:
-        LearningError: the file cannot be read, a variable has no column, a value is not a number, an option or a
-            context is missing in a row, or there are fewer than `MIN_RUNS` rows.
+        LearningError: the file cannot be read, a variable has no column, a value is not a number, an option is missing
+            in a row, or there are fewer rows than `at_least`.
     """
-    return check_table(_read(path), schema, where=str(path))
+    return check_table(_read(path), schema, where=str(path), at_least=at_least)
 
 
-def check_table(frame: pd.DataFrame, schema: Schema, where: str = "") -> pd.DataFrame:
+def check_table(frame: pd.DataFrame, schema: Schema, where: str = "", at_least: int = MIN_RUNS) -> pd.DataFrame:
     """The checks of `read_table` on a table that is in memory; returns a new table."""
     unknown = [str(column) for column in frame.columns if column not in schema.variables]
     for name in schema.variables:
         if name not in frame.columns:
             hint = nearest(name, unknown) or "Add the column, or take the variable out of the profile."
             raise LearningError(f"The table has no column '{name}'.", hint=hint, where=where)
-    if len(frame) < MIN_RUNS:
+    if len(frame) < at_least:
         raise LearningError(
-            f"The table has {len(frame)} runs; a model needs at least {MIN_RUNS}.",
+            f"The table has {len(frame)} runs; a model needs at least {at_least}.",
             hint="Collect more runs (care collect).",
             where=where,
         )

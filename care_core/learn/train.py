@@ -119,7 +119,7 @@ def assemble(
         effects=_total_effects(frame, ratios, schema, graph, learned.outcomes, learned.mechanisms, resamples, support),
         paths=_paths(schema, graph, edges, support),
         outcomes=learned.outcomes,
-        summaries=_summaries(ratios, schema),
+        summaries=summaries(ratios, schema),
         witnesses=_witnesses(ratios, schema, learned.mechanisms),
         skill=skill,
         training=learned.training,
@@ -383,21 +383,22 @@ def _witnesses(frame: pd.DataFrame, schema: Schema, mechanisms: Mapping[str, Mec
     return found
 
 
-def _summaries(frame: pd.DataFrame, schema: Schema) -> dict[str, Summary]:
-    summaries: dict[str, Summary] = {}
+def summaries(frame: pd.DataFrame, schema: Schema) -> dict[str, Summary]:
+    """What the runs hold of each variable."""
+    held: dict[str, Summary] = {}
     for name in schema.variables:
         if name not in frame:
             continue
         values = frame[name].to_numpy(dtype=float)
         values = values[np.isfinite(values)]
         if len(values):
-            summaries[name] = Summary(
+            held[name] = Summary(
                 count=len(values),
                 mean=float(values.mean()),
                 sd=float(values.std()),
                 quantiles=tuple(float(q) for q in np.quantile(values, QUANTILES)),
             )
-    return summaries
+    return held
 
 
 def _training(frame: pd.DataFrame, schema: Schema, structure: Structure, settings: TrainSettings) -> Training:

@@ -1,8 +1,10 @@
 """A profile of one robot carried over to another with few runs of the latter (paper, RQ2).
 
-What the robots share is the structure: the source's graph is kept, completed by what the target's runs show. Each
-mechanism starts from the source's: the target's value is a share of what the source predicts plus a Gaussian process
-learned on what that leaves. Far from the target's runs the answer is the source's, shifted; near them it is theirs.
+What the robots share is the structure: the source's graph is kept, completed by what the target's runs show where they
+are many. Each mechanism starts from the source's, and what the source leaves of the target's runs is either one step
+that they have in common (shrunk towards none) or, where there are enough runs and it predicts runs left out better, a
+Gaussian process beside a share of the source. Far from the target's runs the answer is the source's, shifted; near them
+it is theirs.
 """
 
 from __future__ import annotations
@@ -17,21 +19,25 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import LEAST, FloatArray, Mechanism, transformed
+from care_core.causal.mechanisms import LEAST, FloatArray, Kernel, Mechanism, solve, transformed
 from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.errors import LearningError
 from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.completion import complete
-from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, Effort, Inputs, fit_mechanism, left_out, logistic
+from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, Effort, Fitted, Inputs, fit, left_out, logistic
 from care_core.learn.outcomes import causes_of, find_stages, groups_that_move_together, inputs_of
-from care_core.learn.relative import relative
+from care_core.learn.relative import missions_of, relative
 from care_core.learn.screening import screen_options
 from care_core.learn.train import Learned, TrainSettings, assemble
 from care_core.profile.schema import Schema
 from care_core.variables import Role
 
 TRUST = 10.0
-"""Target runs that the source's own scale (a share of 1) counts as."""
+"""Target runs that the source's own scale (a share of 1) and its own noise count as."""
+FEWEST = 3
+"""Fewer runs say nothing of what they have in common."""
+ENOUGH_FOR_EFFECTS = 100
+"""With fewer runs the graph and the effects stay the source's: a profile has some hundred variables."""
 
 Progress = Callable[[str, float], None]
 
@@ -60,17 +66,46 @@ def update(
         frame: a checked table of the target's runs (`table.read_table`).
 
     Raises:
-        LearningError: fewer runs than a mechanism needs.
+        LearningError: too few runs to have anything in common.
     """
-    if len(frame) < MIN_ROWS:
+    if len(frame) < FEWEST:
         raise LearningError(
-            f"The table has {len(frame)} runs, {MIN_ROWS} are needed.", hint="Record more missions of the target."
+            f"The table has {len(frame)} runs, {FEWEST} are needed.", hint="Record more missions of the target."
         )
     with threadpool_limits(1):
         return _update(source, schema, frame, settings, progress or (lambda _step, _share: None))
 
 
+def _shifted_only(source: Model, schema: Schema, frame: pd.DataFrame, settings: TrainSettings) -> Model:
+    """The source's model with its mechanisms moved to the target's runs."""
+    outcomes, mechanisms = carry_over(source, schema, frame, source.graph, np.random.default_rng(settings.seed))
+    ratios = relative(frame, schema)
+    notes = (
+        f"Carried over from a model of {source.training.runs} runs: graph, effects and skill are that model's.",
+        *(f"{option}." for option in out_of_support(source, schema, frame)),
+    )
+    training = source.training.model_copy(
+        update={"origin": _origin(source, settings), "runs": source.training.runs + len(frame), "notes": notes}
+    )
+    summaries = {name: summary.with_values(ratios[name]) for name, summary in source.summaries.items()}
+    return dataclasses.replace(
+        source,
+        schema_digest=schema.digest,
+        outcomes=outcomes,
+        mechanisms=mechanisms,
+        summaries=summaries,
+        training=training,
+    )
+
+
+def _origin(source: Model, settings: TrainSettings) -> str:
+    return f"{source.training.origin.rstrip('.')}; carried over with {settings.origin}."
+
+
 def _update(source: Model, schema: Schema, frame: pd.DataFrame, settings: TrainSettings, report: Progress) -> Model:
+    if len(frame) < ENOUGH_FOR_EFFECTS:
+        report("carrying the mechanisms over", 0.0)
+        return _shifted_only(source, schema, frame, settings)
     rng = np.random.default_rng(settings.seed)
     report("completing the graph", 0.0)
     ratios = relative(frame, schema)
@@ -79,7 +114,7 @@ def _update(source: Model, schema: Schema, frame: pd.DataFrame, settings: TrainS
     report("carrying the mechanisms over", 0.2)
     outcomes, mechanisms = carry_over(source, schema, frame, graph, rng)
     training = Training(
-        origin=f"{source.training.origin.rstrip('.')}; carried over with {settings.origin}.",
+        origin=_origin(source, settings),
         runs=len(frame),
         seed=settings.seed,
         alpha=source.training.alpha,
@@ -126,19 +161,26 @@ def carry_over(
     """The mechanisms of the source (`only` those keys, if given), refitted on the target's runs where they are enough,
     else as they were."""
     mechanisms: dict[str, Mechanism] = {}
+    missions = missions_of(frame, schema)
+    frame = frame.assign(**{v.name: _met(v.name, source, frame) for v in schema.contexts if v.name in source.summaries})
     for key in source.mechanisms if only is None else only:
         mechanism = source.mechanisms[key]
         name = key.removeprefix("stage:")
         rows, values = _observed(key, source, schema, frame)
         names = tuple(dict.fromkeys((*mechanism.inputs, *causes_of(name, graph, schema))))
         known = rows & frame[list(names)].notna().all(axis=1).to_numpy() & (values > LEAST[mechanism.transform])
-        enough = int(known.sum()) >= MIN_ROWS and np.ptp(values[known]) > 0
         effort = METRIC if schema.variables[name].role is Role.METRIC and key == name else OUTCOME
         read = {mechanism.inputs[place] for place in mechanism.reads} | set(causes_of(name, graph, schema))
         inputs = dataclasses.replace(inputs_of(names, schema), read=np.array([name in read for name in names]))
         x = frame.loc[known, list(inputs.names)].to_numpy(dtype=float)
-        mechanisms[key] = started_from(mechanism, x, values[known], inputs, rng, effort) if enough else mechanism
+        groups = np.arange(len(x)) if missions is None else missions[known]
+        mechanisms[key] = started_from(mechanism, x, values[known], inputs, groups, rng, effort)
     return dict(source.outcomes), mechanisms
+
+
+def _met(name: str, source: Model, frame: pd.DataFrame) -> pd.Series[float]:
+    """A context of the target's runs; where a run does not have it, the middle of what training held."""
+    return frame[name].fillna(source.summaries[name].quantile(0.5))
 
 
 def _observed(key: str, source: Model, schema: Schema, frame: pd.DataFrame) -> tuple[NDArray[np.bool_], FloatArray]:
@@ -157,27 +199,113 @@ def _observed(key: str, source: Model, schema: Schema, frame: pd.DataFrame) -> t
 
 
 def started_from(
-    source: Mechanism, x: FloatArray, y: FloatArray, inputs: Inputs, rng: np.random.Generator, effort: Effort
+    source: Mechanism,
+    x: FloatArray,
+    y: FloatArray,
+    inputs: Inputs,
+    groups: NDArray[np.int64],
+    rng: np.random.Generator,
+    effort: Effort,
 ) -> Mechanism:
-    """The target's mechanism: a share of the source's prediction, and a regression of what that leaves.
+    """The target's mechanism: the source's, moved or with a regression beside it, whichever predicts missions left out
+    better; the source's as it is where there are next to no runs.
 
     Args:
         x: shape (n, p), inputs in their own units, columns named by `inputs`. y: shape (n,).
+        groups: shape (n,), runs of one mission have one number: what a mission has in common is not the vehicle's.
     """
+    if len(y) < FEWEST:
+        return source
     if len(y) > effort.points:
         keep = np.sort(rng.choice(len(y), effort.points, replace=False))
-        x, y = x[keep], y[keep]
-    places = [inputs.names.index(name) for name in source.inputs]
-    before = source.latent(x[:, places])
-    coded = 2.0 * y - 1.0 if source.binary else transformed(y, source.transform)
-    share = _share(before, coded)
-    rest = fit_mechanism(x, coded - share * before, inputs, binary=False, rng=rng, effort=effort, transform="identity")
-    carried = dataclasses.replace(rest, transform=source.transform, binary=source.binary, prior=(source, share))
+        x, y, groups = x[keep], y[keep], groups[keep]
+    moved = _moved(source, x, y, inputs, groups)
+    if len(y) < MIN_ROWS or np.ptp(y) == 0:
+        return moved.mechanism
+    beside = _with_regression(source, x, y, inputs, groups, rng, effort)
+    return moved.mechanism if moved.loss <= beside.loss else beside.mechanism
+
+
+def _moved(source: Mechanism, x: FloatArray, y: FloatArray, inputs: Inputs, groups: NDArray[np.int64]) -> Fitted:
+    """The source moved by what the target's runs have in common: their mean error, shrunk towards none by as much as
+    chance alone explains of it, counted in missions (James and Stein 1961, positive part). It is as unsure as the
+    source, whose errors were seen on hundreds of runs, or more where these runs say so."""
+    columns = x[:, [inputs.names.index(name) for name in source.inputs]]
+    rest = _coded(source, y) - source.latent(columns)
+    unknown = float((source.latent_sd(columns) ** 2).mean())
+    # The levels of a mechanism's errors widen its noise, so the noise is what is left without them.
+    wider = 1.0 if source.binary else max(float(np.var(source.calibration)), 1.0)
+    expected = unknown + source.noise_sd**2
+    count, mean = len(rest), float(rest.mean())
+    pooled = (float(((rest - mean) ** 2).sum()) / wider + TRUST * expected) / (count - 1 + TRUST)
+    variance = max(pooled, expected)
+    step = float(np.sqrt(max(mean**2 - wider * variance / len(np.unique(groups)), 0.0)))
+    noise = float(np.sqrt(variance - unknown))
+    kernel = Kernel(np.zeros(0), additive=step, joint=0.0, noise=noise, idle=1)
+    points = np.zeros((count, 0))
+    errors, sd = left_out(kernel, points, rest, groups)
+    sd = np.sqrt(sd**2 + unknown)
+    mechanism = Mechanism(
+        inputs=inputs.names,
+        reads=np.zeros(0, dtype=np.int64),
+        log_inputs=np.zeros(0, dtype=bool),
+        centre=np.zeros(0),
+        sd=np.zeros(0),
+        kernel=kernel,
+        points=points,
+        targets=rest,
+        weights=solve(kernel, points, rest),
+        mean=0.0,
+        scale=1.0,
+        transform=source.transform,
+        binary=source.binary,
+        calibration=source.calibration,
+        prior=(source, 1.0),
+    )
     if not source.binary:
-        return carried
-    errors, _ = left_out(rest.kernel, rest.points, rest.targets)
-    held_out = coded - rest.scale * errors
-    return dataclasses.replace(carried, calibration=logistic(held_out, y))
+        return Fitted(mechanism, _loss_of(errors, sd))
+    held_out = _coded(source, y) - errors
+    return Fitted(mechanism, _loss_of_odds(source.calibration, held_out, y))
+
+
+def _with_regression(
+    source: Mechanism,
+    x: FloatArray,
+    y: FloatArray,
+    inputs: Inputs,
+    groups: NDArray[np.int64],
+    rng: np.random.Generator,
+    effort: Effort,
+) -> Fitted:
+    """A share of the source's prediction, and a regression of what that leaves."""
+    before = source.latent(x[:, [inputs.names.index(name) for name in source.inputs]])
+    coded = _coded(source, y)
+    share = _share(before, coded)
+    rest = fit(
+        x, coded - share * before, inputs, binary=False, rng=rng, effort=effort, transform="identity", groups=groups
+    )
+    mechanism = rest.mechanism
+    carried = dataclasses.replace(mechanism, transform=source.transform, binary=source.binary, prior=(source, share))
+    if not source.binary:
+        return Fitted(carried, rest.loss)
+    errors, _ = left_out(mechanism.kernel, mechanism.points, mechanism.targets, groups)
+    held_out = coded - mechanism.scale * errors
+    calibration = logistic(held_out, y)
+    return Fitted(dataclasses.replace(carried, calibration=calibration), _loss_of_odds(calibration, held_out, y))
+
+
+def _coded(source: Mechanism, y: FloatArray) -> FloatArray:
+    return 2.0 * y - 1.0 if source.binary else transformed(y, source.transform)
+
+
+def _loss_of(errors: FloatArray, sd: FloatArray) -> float:
+    return float((np.log(sd) + 0.5 * (errors / sd) ** 2).mean())
+
+
+def _loss_of_odds(calibration: FloatArray, latent: FloatArray, y: FloatArray) -> float:
+    slope, offset = calibration
+    logit = slope * latent + offset
+    return float(np.logaddexp(0, np.where(y > 0.5, -logit, logit)).mean())
 
 
 def _share(before: FloatArray, coded: FloatArray) -> float:

@@ -79,4 +79,53 @@ def test_options_that_left_the_source_are_named(planted: Profile) -> None:
 
 def test_too_few_runs_are_refused(planted: Profile) -> None:
     with pytest.raises(LearningError, match="are needed"):
-        update(planted.model, SCHEMA, fly_many(5), SETTINGS)
+        update(planted.model, SCHEMA, fly_many(2), SETTINGS)
+
+
+def slower(frame: pd.DataFrame) -> pd.DataFrame:
+    """The planted robot with worn wheels: everything takes a quarter longer."""
+    worn: pd.DataFrame = frame.assign(time=1.25 * frame["time"])
+    return worn
+
+
+def test_ten_runs_tell_what_they_have_in_common(planted: Profile) -> None:
+    test, few = slower(fly_many(150, seed=7)), slower(fly_many(10, seed=8))
+    _, mechanisms = carry_over(planted.model, SCHEMA, few, planted.model.graph, np.random.default_rng(0))
+    assert error(mechanisms, test, "time") < 0.6 * error(planted.model.mechanisms, test, "time")
+
+
+@pytest.mark.parametrize("runs", [4, 10, 30])
+def test_runs_of_the_same_robot_hardly_move_it(planted: Profile, runs: int) -> None:
+    test, few = fly_many(150, seed=7), fly_many(runs, seed=8)
+    _, mechanisms = carry_over(planted.model, SCHEMA, few, planted.model.graph, np.random.default_rng(0))
+    for name in ("time", "energy"):
+        assert error(mechanisms, test, name) < 1.1 * error(planted.model.mechanisms, test, name)
+
+
+def test_with_few_runs_the_source_keeps_its_graph_and_its_support(planted: Profile, tmp_path: Path) -> None:
+    few = slower(fly_many(10, seed=8))
+    model = update(planted.model, SCHEMA, few, replace(SETTINGS, origin="worn.csv"))
+    assert (model.graph, model.effects) == (planted.model.graph, planted.model.effects)
+    for option in SCHEMA.options:
+        summary = planted.model.summaries[option.name]
+        assert model.supports(option.name, summary.low)
+        assert model.supports(option.name, float(few[option.name].max()))
+    write_model(model, tmp_path)
+    again = read_model(tmp_path).mechanisms["time"]
+    x = np.array([[DEFAULTS[name] for name in again.inputs]])
+    np.testing.assert_allclose(again.expected(x), model.mechanisms["time"].expected(x), rtol=1e-5)
+
+
+def test_what_the_source_does_not_know_a_carried_mechanism_does_not_know_either(planted: Profile) -> None:
+    _, mechanisms = carry_over(
+        planted.model, SCHEMA, slower(fly_many(10, seed=8)), planted.model.graph, np.random.default_rng(0)
+    )
+    carried, source = mechanisms["time"], planted.model.mechanisms["time"]
+    near = np.array([[DEFAULTS[name] for name in carried.inputs]])
+    far = near * 4
+    places = [carried.inputs.index(name) for name in source.inputs]
+    for x in (near, far):
+        assert carried.latent_sd(x)[0] >= source.latent_sd(x[:, places])[0]
+        variance, covariance, here = carried.around(x, near)
+        assert np.all(np.abs(covariance) <= np.sqrt(variance * here) * (1 + 1e-6))
+    assert carried.ignorance(near)[0] < carried.ignorance(far)[0]
