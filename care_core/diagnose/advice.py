@@ -10,6 +10,9 @@ from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult
 ENOUGH = 0.5
 """A change less likely than this to repair the run is no advice."""
 
+ALIKE = 0.02
+"""Shares of a limit that are no difference to an operator."""
+
 
 def believed(fixes: Sequence[Fix], hypotheses: Sequence[Hypothesis]) -> tuple[Fix, ...]:
     """The fixes with the probability that something failed which no parameter repairs taken off their promise."""
@@ -24,6 +27,25 @@ def outweighed(hypotheses: Sequence[Hypothesis]) -> str | None:
     if rival is None or rival.probability <= parameters:
         return None
     return f"{rival.name}: that explains this failure better than any parameter, look at it first"
+
+
+def nearest(fixes: Sequence[Fix], broken: Sequence[ObjectiveResult]) -> Fix | None:
+    """The smallest fix whose predicted values exceed the limits about least, as shares of them; None without any."""
+
+    def excess(fix: Fix) -> float:
+        return sum(max(0.0, _beyond(fix, result)) for result in broken)
+
+    least = min(map(excess, fixes), default=0.0)
+    near = [fix for fix in fixes if excess(fix) <= least + ALIKE]
+    return min(near, key=lambda fix: len(fix.changes), default=None)
+
+
+def _beyond(fix: Fix, result: ObjectiveResult) -> float:
+    predicted, bound = fix.predicted.get(result.variable.name), result.threshold
+    if predicted is None or bound is None or result.variable.kind == "functional":
+        return 0.0
+    sign = 1.0 if bound.op in ("<=", "<") else -1.0
+    return sign * (predicted.value - bound.value) / (abs(bound.value) or 1.0)
 
 
 def falls_short(fix: Fix, broken: Sequence[ObjectiveResult]) -> str | None:

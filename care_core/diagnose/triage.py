@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import World
 from care_core.diagnose import provenance
-from care_core.diagnose.advice import believed, falls_short, outweighed
+from care_core.diagnose.advice import believed, falls_short, nearest, outweighed
 from care_core.diagnose.circumstances import circumstances, unusual
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
@@ -354,7 +354,21 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
             "(wind, battery, positioning, obstacles) or at parameters outside the profile"
         )
     pinned = f", with {', '.join(sorted(case.world.kept))} kept as it is" if case.world.kept else ""
-    return f"no change inside the acceptable ranges is likely enough to meet every threshold{pinned}"
+    broken = [fault.objective for fault in faults]
+    best = nearest(_resets(case, faults), broken)
+    short = falls_short(best, broken) if best else None
+    return f"{short or 'no change inside the acceptable ranges is likely enough to meet every limit'}{pinned}"
+
+
+def _resets(case: _Case, faults: tuple[Fault, ...]) -> list[Fix]:
+    """Each named cause back at its reference, and all of them: where every probability is about zero, what comes
+    nearest to the limits is told by its values."""
+    world = case.world
+    named = dict.fromkeys(cause.option.name for fault in faults for cause in fault.causes if not cause.is_lead)
+    free = [name for name in named if name not in world.kept and world.config[name] != world.reference[name]]
+    sets = [[name] for name in free] + ([free] if len(free) > 1 else [])
+    resets = [{name: world.reference[name] for name in names} for names in sets]
+    return [to_fix(world, one, float(world.probability([{**world.config, **one}])[0])) for one in resets]
 
 
 def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:

@@ -351,8 +351,8 @@ def profile_entry(choice: ProfileChoice) -> ProfileEntry:
 
 def wanted_text(entry: ObjectiveEntry) -> str:
     """The threshold of an objective with its unit and what it was made of, empty where it has none."""
-    if entry.threshold is None:
-        return ""
+    if entry.threshold is None or (entry.basis and entry.value is None):
+        return ""  # one made for this mission says nothing where it was not flown to its end
     bound = f"{entry.threshold.op} {entry.threshold.value:g} {entry.unit}".rstrip()
     return f"{bound} ({entry.basis})" if entry.basis else bound
 

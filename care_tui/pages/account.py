@@ -56,7 +56,7 @@ class AccountPage(StepPage):
     def view(self) -> View:
         diagnosis, glyphs, lines = self.session.diagnosis, self.glyphs, self._lines
         listing = Listing(len(lines), lambda i, _width: (told_item(lines[i], glyphs),), lambda i: lines[i].words)
-        return View(verdict_line(diagnosis.health, glyphs), self._detail, listing)
+        return View(verdict_line(diagnosis, glyphs), self._detail, listing)
 
     def _detail(self, index: int | None) -> Rows:
         diagnosis = self.session.diagnosis

@@ -83,14 +83,17 @@ def finding_rows(finding: Finding, cause: Finding | None = None) -> list[Row]:
     return rows
 
 
-def verdict_line(health: Health, glyphs: Glyphs) -> Content:
+def verdict_line(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
     """What robot this is, and the finding that comes first; that nothing was found is said plainly."""
+    health = diagnosis.health
     robot = Content(clean(f"{health.robot}: " if health.robot else ""))
     first = next(iter(health.findings), None)
     if health.too_little:
         return robot + Content(clean(unjudged(health.findings) if health.findings else health.too_little))
     if first is None:
-        return robot + Content("nothing out of the ordinary was found")
+        missed = ", ".join(clean(one.variable.name) for one in diagnosis.objectives if one.status == "fault")
+        nothing = Content("nothing out of the ordinary was found")
+        return robot + nothing + (Content(f", but {missed} missed") if missed else Content())
     sign = {"critical": f"{glyphs.fault} ", "warning": "! ", "info": ""}[first.severity]
     return Content.assemble(robot, (sign + clean(first.title), "bold"), f" at {seconds(first.onset_s)}")
 

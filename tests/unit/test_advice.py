@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from care_core.diagnose.advice import believed, falls_short, outweighed
+from care_core.diagnose.advice import believed, falls_short, nearest, outweighed
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
 from care_core.variables import Threshold
 from tests.made import LAND_SPEED, TIME, made_diagnosis
@@ -57,3 +57,12 @@ def test_a_part_that_left_no_trace_stops_no_advice() -> None:
 def test_what_no_parameter_repairs_comes_off_the_promise() -> None:
     (fix,) = believed([fix_with(0.9)], motor(0.2))
     assert fix.p_fixed == pytest.approx(0.9 * 0.8)
+
+
+def test_out_of_reach_is_told_by_the_smallest_change_that_comes_nearest() -> None:
+    far, near = fix_with(0.01), fix_with(0.01)
+    far = replace(far, predicted={"mission_time": Prediction(190.0, 180.0, 200.0, 0.0)})
+    near = replace(near, predicted={"mission_time": Prediction(160.0, 155.0, 166.0, 0.0)})
+    both = replace(near, changes=(*near.changes, *near.changes))
+    assert nearest([far, both, near], [LATE]) is near
+    assert nearest([], [LATE]) is None
