@@ -4,7 +4,8 @@ python -m benchmarks.documents [FILE...]
 
 A fenced block whose first line begins with `$ ` is a session: its commands run in order, all of one document in one
 empty folder that holds `samples/`, and what each prints follows it, data before talk. A block after the line
-`<!-- not run: REASON -->` is left as it is: it needs a robot, the network or hours.
+`<!-- not run: REASON -->` is left as it is: it needs a robot, the network or hours. One after `<!-- takes minutes -->`
+is renewed here, and its commands are tested with less work.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ DOCUMENTS = (
 
 _BLOCK = re.compile(r"(?P<before>[^\n]*)\n```[a-z]*\n(?P<session>\$ .*?)^```$", re.DOTALL | re.MULTILINE)
 _NOT_RUN = "<!-- not run"
-_LIMIT_S = 120
+_SLOW = "<!-- takes minutes"
+_LIMIT_S, _SLOW_LIMIT_S = 120.0, 3600.0
 
 
 @dataclass(frozen=True)
@@ -47,22 +49,22 @@ class Session:
         return [line[2:].replace("\0", "\n") for line in joined.splitlines() if line.startswith("$ ")]
 
 
-def sessions(text: str) -> Iterator[Session]:
-    """The sessions of a document that are run."""
+def sessions(text: str, *, slow: bool = False) -> Iterator[Session]:
+    """The sessions of a document that are run; `slow`: those too that take minutes."""
     for block in _BLOCK.finditer(text):
-        if not block["before"].startswith(_NOT_RUN):
+        if not block["before"].startswith(_NOT_RUN if slow else (_NOT_RUN, _SLOW)):
             yield Session(block.start("session"), block.end("session"), block["session"])
 
 
-def played(session: Session, folder: Path) -> str:
+def played(session: Session, folder: Path, limit_s: float = _LIMIT_S) -> str:
     """The session with what its commands print in a folder, both streams as a terminal shows them."""
     lines = []
     for command in session.commands:
-        lines += [f"$ {command}", printed(command, folder).rstrip("\n")]
+        lines += [f"$ {command}", printed(command, folder, limit_s).rstrip("\n")]
     return "".join(f"{line}\n" for line in lines if line)
 
 
-def printed(command: str, folder: Path) -> str:
+def printed(command: str, folder: Path, limit_s: float = _LIMIT_S) -> str:
     """What a command prints in a terminal of 80 columns, without its progress. Raises TimeoutExpired."""
     environment = {
         **os.environ,
@@ -74,7 +76,7 @@ def printed(command: str, folder: Path) -> str:
     }
     ended = subprocess.run(
         ("bash", "-c", command), cwd=folder, env=environment, capture_output=True, text=True, encoding="utf-8",
-        stdin=subprocess.DEVNULL, timeout=_LIMIT_S, check=False,
+        stdin=subprocess.DEVNULL, timeout=limit_s, check=False,
     )  # fmt: skip
     talk = [line for line in ended.stderr.splitlines(keepends=True) if not line.rstrip().endswith(" ...")]
     return ended.stdout + "".join(talk)
@@ -91,8 +93,8 @@ def renewed(text: str) -> str:
         folder = Path(name)
         prepare(folder)
         parts, done = [], 0
-        for session in sessions(text):
-            parts += [text[done : session.start], played(session, folder)]
+        for session in sessions(text, slow=True):
+            parts += [text[done : session.start], played(session, folder, _SLOW_LIMIT_S)]
             done = session.end
         return "".join((*parts, text[done:]))
 

@@ -191,7 +191,7 @@ class Robot:
         self.speed += max(-2 * rate, min(rate, self.wanted[0] - self.speed))
         self.turn += max(-4 * STEP_S, min(4 * STEP_S, self.wanted[1] - self.turn))
         grip = 1.0 - self.conditions.slip
-        real_turn = self.turn * grip + self.conditions.bias * self.speed + self.rng.gauss(0.0, 0.01)
+        real_turn = self.turn + self.conditions.bias * self.speed + self.rng.gauss(0.0, 0.01)
         self.yaw = _wrapped(self.yaw + real_turn * STEP_S)
         real = self.speed * grip
         x, y = self.x + real * math.cos(self.yaw) * STEP_S, self.y + real * math.sin(self.yaw) * STEP_S

@@ -36,7 +36,7 @@ class Conditions:
     clutter: Sequence[Disc]
     """Boxes and bins as (x, y, radius), which the map does not know."""
     slip: float
-    """Share of the commanded motion that the floor eats."""
+    """Share of the way that the floor eats."""
     bias: float
     """How much the robot pulls aside, rad/s at 1 m/s."""
     volts: float
@@ -55,7 +55,7 @@ class Conditions:
                 clutter.append(disc)
         return cls(
             tuple(clutter),
-            slip=rng.uniform(0.0, 0.12),
+            slip=rng.uniform(0.0, 0.05),
             bias=rng.gauss(0.0, 0.02),
             volts=rng.gauss(12.5, 0.08),
             ohms=rng.uniform(0.06, 0.1),
