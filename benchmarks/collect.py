@@ -26,7 +26,7 @@ from care_core.learn.skill import calibration_error, reliability
 from care_core.profile.schema import Schema, read_schema
 from care_samples.robot.mission import DEFAULTS, GOAL_LIMIT_S, Robot
 from care_samples.robot.recording import NODE, write_bag
-from care_samples.robot.starting import write_start
+from care_samples.robot.starting import write_robot
 from care_samples.robot.world import GOALS, Conditions
 
 OFF = 0.2
@@ -41,7 +41,7 @@ Config = Mapping[str, float]
 def collected(folder: Path, runs: int) -> Path:
     """The folder of a profile trained on a campaign of so many runs."""
     start = folder / "courier"
-    write_start(start, 1)
+    write_robot(start, 1)
     campaign = start / "campaign.yaml"
     yaml = YAML()
     data = yaml.load(campaign.read_text(encoding="utf-8"))

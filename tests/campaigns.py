@@ -15,7 +15,7 @@ from care_core.collect.space import Axis, Space
 from care_core.variables import Role, Variable
 from care_samples.robot.mission import DEFAULTS, Robot
 from care_samples.robot.recording import write_bag
-from care_samples.robot.starting import write_start
+from care_samples.robot.starting import write_robot
 from care_samples.robot.world import Conditions
 
 COPY = "cp drive.bag {logs}/drive.bag"
@@ -23,7 +23,7 @@ COPY = "cp drive.bag {logs}/drive.bag"
 
 def campaign_in(folder: Path, **changes: Any) -> Path:
     """A campaign of four runs in a folder with what it names; keys may be changed or, with None, left out."""
-    write_start(folder, 1)
+    write_robot(folder, 1)
     (folder / "drive.bag").write_bytes(drive(recorded=False))  # so every run drove what it was asked
     written: dict[str, Any] = {
         "schema_version": 1,

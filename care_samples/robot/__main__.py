@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
+from care_samples.parameters import read_parameters
 from care_samples.robot.mission import DEFAULTS, Robot
 from care_samples.robot.ranges import RANGES
 from care_samples.robot.recording import NODE, write_bag, write_mcap
-from care_samples.robot.starting import write_start
+from care_samples.robot.starting import write_robot
 from care_samples.robot.world import GOALS, Conditions
 
 
@@ -25,10 +24,10 @@ def main(words: list[str]) -> int:
     """Drive, or write the files to begin with; the exit code."""
     asked = _arguments(words)
     if asked.start is not None:
-        write_start(asked.start, asked.ros)
+        write_robot(asked.start, asked.ros)
         return 0
     try:
-        parameters = read_parameters(asked.params)
+        parameters = read_parameters(asked.params, NODE, DEFAULTS, RANGES)
     except (OSError, ValueError) as err:
         print(f"robot: {asked.params}: {err}", file=sys.stderr)
         return 2
@@ -54,34 +53,6 @@ def _arguments(words: list[str]) -> argparse.Namespace:
     if asked.log is not None and asked.log.suffix not in (".bag", ".mcap"):
         parser.error("a log ends in .bag or .mcap")
     return asked
-
-
-def read_parameters(path: Path) -> dict[str, float]:
-    """All parameters by name, the defaults where the file does not say.
-
-    Raises:
-        OSError: the file cannot be read.
-        ValueError: it is no parameter file, or a value is no number in the parameter's range.
-    """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
-
-    try:
-        found: Any = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-    except YAMLError as err:
-        raise ValueError("this is no YAML") from err
-    own = found.get(NODE) if isinstance(found, Mapping) else None
-    own = own.get("ros__parameters", own) if isinstance(own, Mapping) else None
-    if not isinstance(own, Mapping):
-        raise ValueError(f"there are no parameters of '{NODE}'")
-    given = {f"{space}/{name}": value for space, names in own.items() for name, value in dict(names).items()}
-    for name, value in given.items():
-        if name not in DEFAULTS:
-            raise ValueError(f"there is no parameter {name}")
-        low, high = RANGES[name]
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-            raise ValueError(f"{name} is {value}, not {low:g} to {high:g}")
-    return {**DEFAULTS, **given}
 
 
 if __name__ == "__main__":

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from care_samples.parameters import write_start
+
 _HERE = Path(__file__).parent / "start"
 _NAMES = ("courier.yaml", "profile.yaml", "campaign.yaml")
 
@@ -20,16 +22,11 @@ _ROS2 = {
 """What ROS 2 has otherwise: texts, and what they become."""
 
 
-def write_start(folder: Path, ros: int) -> None:
+def write_robot(folder: Path, ros: int) -> None:
     """Write the files; those that are there already stay."""
-    folder.mkdir(parents=True, exist_ok=True)
+    texts = {}
     for name in _NAMES:
-        text = (_HERE / name).read_text(encoding="utf-8")
+        texts[name] = (_HERE / name).read_text(encoding="utf-8")
         for pattern, other in _ROS2[name] if ros == 2 else ():
-            text = re.sub(pattern, other, text, flags=re.MULTILINE)
-        path = folder / name
-        if path.exists():
-            print(f"kept {path}")
-        else:
-            path.write_text(text, encoding="utf-8")
-            print(f"wrote {path}")
+            texts[name] = re.sub(pattern, other, texts[name], flags=re.MULTILINE)
+    write_start(texts, folder)

@@ -14,10 +14,12 @@ from care_core.collect.sampling import points
 from care_core.logs.opening import open_log
 from care_core.profile.schema import read_schema
 from care_core.tables.rows import TableRow, rows_of, write_table
-from care_samples.robot.__main__ import main, read_parameters
+from care_samples.parameters import read_parameters
+from care_samples.robot.__main__ import main
 from care_samples.robot.mission import DEFAULTS, Robot
+from care_samples.robot.ranges import RANGES
 from care_samples.robot.recording import NODE, write_bag, write_mcap
-from care_samples.robot.starting import write_start
+from care_samples.robot.starting import write_robot
 from care_samples.robot.world import Conditions
 
 DOCUMENT = ROOT / "docs" / "new-robot.md"
@@ -79,7 +81,7 @@ def test_both_kinds_of_log_say_the_same(tmp_path: Path) -> None:
     story = Robot(parameters, Conditions.of(4)).run()
     found = []
     for ros, name, write in ((1, "a.bag", write_bag), (2, "a.mcap", write_mcap)):
-        write_start(tmp_path / str(ros), ros)
+        write_robot(tmp_path / str(ros), ros)
         write(tmp_path / name, story, parameters)
         (row,) = rows_of(tmp_path / name, read_schema(tmp_path / str(ros) / "profile.yaml"))
         found.append({key: value for key, value in row.items() if not key.startswith("log")})
@@ -91,7 +93,7 @@ def test_both_kinds_of_log_say_the_same(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["a.bag", "a.mcap"])
 def test_a_mission_depends_on_its_parameters_and_seed_alone(tmp_path: Path, name: str) -> None:
-    write_start(tmp_path, 1)
+    write_robot(tmp_path, 1)
     made = []
     for seed in (3, 3, 4):
         log = tmp_path / name
@@ -135,8 +137,8 @@ def test_the_robot_refuses_what_it_cannot_drive(
 
 def test_the_files_to_begin_with_hold_the_defaults(tmp_path: Path) -> None:
     for ros in (1, 2):
-        write_start(tmp_path / str(ros), ros)
-        assert read_parameters(tmp_path / str(ros) / "courier.yaml") == DEFAULTS
+        write_robot(tmp_path / str(ros), ros)
+        assert read_parameters(tmp_path / str(ros) / "courier.yaml", NODE, DEFAULTS, RANGES) == DEFAULTS
         campaign = read_campaign(tmp_path / str(ros) / "campaign.yaml")
         assert len(campaign.space.axes) == len(DEFAULTS)
         options = campaign.schema.options
