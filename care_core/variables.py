@@ -129,6 +129,8 @@ class Variable:
     """The bound of an objective that has no fixed one."""
     own_limit: OwnLimit | None = None
     """Where the bound is from, where it is not the profile's."""
+    grows: bool = False
+    """Whether an objective only grows while the mission lasts: past its limit it is broken, however that ends."""
     about: About = "world"
     """What a context tells of."""
     nominal: Extract | None = None

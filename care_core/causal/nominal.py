@@ -18,7 +18,7 @@ Given = Mapping[str, FloatArray]
 """Arguments of a formula by their names, each of shape (n,)."""
 
 GRAVITY = 9.81
-SCALES = {"cm": 0.01, "cm/s": 0.01, "cm/s/s": 0.01, "cdeg": 0.01, "ms": 0.001}
+SCALES = {"cm": 0.01, "cm/s": 0.01, "cm/s/s": 0.01, "cdeg": 0.01, "ms": 0.001, "gravities": GRAVITY}
 """From a variable's unit to that of a formula's argument."""
 _TINY = 1e-6
 
@@ -129,16 +129,20 @@ def multicopter_cruise_time(given: Given) -> FloatArray:
     )
     time, ramps, top = np.zeros_like(length), np.zeros_like(length), np.zeros_like(length)
     for legs, rise, limit in groups:
-        for side in (-1, 1):  # two lengths with the mean and the variation of all
-            flat = np.maximum(length * (1 + side * given["leg_variation"]), 1.0)
+        for flat in _two_lengths(length, given["leg_variation"]):
             way = np.hypot(flat, rise)
             fastest = np.minimum(speed * way / flat, limit * way / np.maximum(rise, _TINY))
             peak, ramp = _ramps(way, fastest, acceleration, jerk, _lag(given))
             time += legs / 2 * (way / peak + ramp)
             ramps += legs / 2 * ramp
             top += legs / 2 * peak
-    overlap = 2 * _blend(given["radius"], given["corner_turn"], top / count, acceleration, jerk)
+    overlap = 2 * _blend(given["radius"], given["corner_turn"], top / count, acceleration, jerk, 2 * acceleration)
     return np.asarray(time - given["flown_corners"] * np.minimum(overlap, ramps / count))
+
+
+def _two_lengths(mean: FloatArray, variation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two lengths that stand for all legs: they have their mean and their variation."""
+    return np.maximum(mean * (1 - variation), 1.0), np.maximum(mean * (1 + variation), 1.0)
 
 
 @formula(*_CRUISE)
@@ -224,10 +228,11 @@ def _ramps(
 
 
 def _blend(
-    radius: FloatArray, turn_deg: FloatArray, top: FloatArray, acceleration: FloatArray, jerk: FloatArray
-) -> FloatArray:
+    radius: FloatArray, turn_deg: FloatArray, top: FloatArray, acceleration: FloatArray, jerk: FloatArray,
+    corner: FloatArray,
+) -> FloatArray:  # fmt: skip
     """How long before a corner the next leg may begin, halved: the corner stays within the radius, the vehicle within
-    its speed and twice its acceleration."""
+    its speed and the acceleration that it may have in a corner."""
     aside = np.maximum(2 * np.sin(np.radians(turn_deg) / 2), 0.05)
     along = np.maximum(2 * np.cos(np.radians(turn_deg) / 2), 0.05)
     bend = acceleration / jerk  # seconds from rest until the acceleration is at its largest
@@ -235,8 +240,87 @@ def _blend(
     beyond = off - acceleration**3 / (6 * jerk**2)
     later = bend + (-bend / 2 + np.sqrt(np.maximum(bend**2 / 4 + 2 * beyond / acceleration, 0.0)))
     by_radius = np.where(beyond <= 0, np.cbrt(6 * off / jerk), later)
-    by_turn = np.where(acceleration * aside < 2 * acceleration, np.inf, 2 * acceleration / (jerk * aside))
+    by_turn = np.where(acceleration * aside < corner, np.inf, corner / (jerk * aside))
     slowest = top / along
     knee = acceleration * bend / 2
     by_speed = np.where(slowest >= knee, bend + (slowest - knee) / acceleration, np.sqrt(2 * slowest / jerk))
     return np.asarray(np.minimum(np.minimum(by_radius, by_turn), by_speed))
+
+
+# --- rovers: the same legs on the ground, corners driven through or turned on the spot --------------------------
+
+_DRIVE = (
+    "path_length", "legs", "leg_variation", "flown_corners", "corner_turn", "sharp_corners", "sharp_turns",
+    "commanded_speed", "speed", "acceleration", "deceleration", "radius", "turn_limit", "turn_rate", "throttle_limit",
+    "full_throttle_speed", "steering_kind",
+)  # fmt: skip
+# ArduRover 4.5: acceleration where none is given (AR_WPNav.cpp: AR_WPNAV_ACCEL_MAX), percent below which the largest
+# throttle is not taken (AP_MotorsUGV.cpp: sanity_check_parameters), turn rate on the spot (AR_PivotTurn.cpp:
+# WP_PIVOT_RATE).
+_NO_LIMIT, _LEAST_THROTTLE, _PIVOT_RATE = 20.0, 30.0, 60.0
+# Fitted to the training drives: path error of a rover that stands nearly still, seconds in which its steering responds,
+# those more of one that steers by its wheels, and the part of a turn that leads it off.
+_POSITION_M, _RESPONSE_S, _WHEELS_S, _TURN_RAD = 0.55, 0.27, 0.18, 0.18
+
+
+@formula(*_DRIVE)
+def drive_cruise_time(given: Given) -> FloatArray:
+    """All legs of a rover without the waits at their ends.
+
+    Speeding up and slowing down share the smaller of both limits, and the jerk is as large as it (AR_WPNav::init). A
+    vehicle that steers by its wheels stops at sharp corners and turns on the spot; others begin the next leg early.
+    """
+    speed, limit, count = _drive_speed(given), _drive_acceleration(given), np.maximum(given["legs"], 1)
+    time, ramps, top = np.zeros_like(speed), np.zeros_like(speed), np.zeros_like(speed)
+    for way in _two_lengths(given["path_length"] / count, given["leg_variation"]):
+        peak, ramp = _ramps(way, speed, limit, limit, 0.0)
+        time += count / 2 * (way / peak + ramp)
+        ramps += count / 2 * ramp
+        top += count / 2 * peak
+    overlap = 2 * _blend(given["radius"], given["corner_turn"], top / count, limit, limit, given["turn_limit"])
+    through = given["flown_corners"] - given["steering_kind"] * given["sharp_corners"]
+    pivots = (
+        given["steering_kind"] * given["sharp_turns"] / np.minimum(_PIVOT_RATE, np.maximum(given["turn_rate"], 1.0))
+    )
+    return np.asarray(time + pivots - through * np.minimum(overlap, ramps / count))
+
+
+def _drive_speed(given: Given) -> FloatArray:
+    """The speed that is asked for, as far as the throttle gives it."""
+    wanted = np.where(given["commanded_speed"] > 0, given["commanded_speed"], given["speed"])
+    throttle = np.clip(given["throttle_limit"], _LEAST_THROTTLE, 100.0) / 100.0
+    most = np.where(given["full_throttle_speed"] > 0, given["full_throttle_speed"] * throttle, wanted)
+    return np.asarray(np.minimum(wanted, most))
+
+
+def _drive_acceleration(given: Given) -> FloatArray:
+    """The smaller of both limits, each of which may be none."""
+    faster = np.where(given["acceleration"] > 0, given["acceleration"], _NO_LIMIT)
+    return np.asarray(np.where(given["deceleration"] > 0, np.minimum(faster, given["deceleration"]), faster))
+
+
+@formula(*_DRIVE)
+def drive_cruise_speed(given: Given) -> FloatArray:
+    """Length of the legs over the time for them."""
+    return np.asarray(given["path_length"] / np.maximum(drive_cruise_time(given), _TINY))
+
+
+@formula(*_DRIVE, "hold_time")
+def drive_mission_time(given: Given) -> FloatArray:
+    """The legs and the waits at their ends."""
+    return np.asarray(given["hold_time"] + drive_cruise_time(given))
+
+
+@formula(*_DRIVE)
+def drive_path_error(given: Given) -> FloatArray:
+    """Largest distance from the legs: how far a rover gets while its steering responds and turns as fast as it may."""
+    leg = given["path_length"] / np.maximum(given["legs"], 1)
+    fastest = np.minimum(_drive_speed(given), np.sqrt(_drive_acceleration(given) * leg))
+    turn_s = _TURN_RAD / np.radians(np.maximum(given["turn_rate"], 1.0))
+    return np.asarray(_POSITION_M + fastest * (_RESPONSE_S + given["steering_kind"] * _WHEELS_S + turn_s))
+
+
+@formula("path_length", "energy_per_metre")
+def drive_energy(given: Given) -> FloatArray:
+    """Wh: what each metre takes, all the way."""
+    return np.asarray(given["energy_per_metre"] * given["path_length"] / 3600)

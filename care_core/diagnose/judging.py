@@ -152,6 +152,7 @@ def judge(
     own = dict(thresholds or {})
     schema = _without_limits_of(own, schema)
     bounds = thresholds_in_force(schema, own)
+    so_far = run.objectives
     run = replace(run, objectives=meaningful(run, schema, bounds, own))
     if model is None:
         results = (_judge_one(o, run.objectives.get(o.name), bounds.get(o.name)) for o in schema.objectives)
@@ -167,10 +168,13 @@ def judge(
     )
     needs: dict[str, Need] = {}
     for objective in schema.objectives:
-        need = need_of(objective.name, world) if objective.relative and objective.name not in own else None
+        asked = objective.relative and objective.name not in own and _has_inputs(objective, run, schema)
+        need = need_of(objective.name, world) if asked else None
         if need is not None and objective.relative is not None:
             needs[objective.name] = need
             bounds[objective.name] = objective.relative.for_need(need.value)
+    past = _past_their_limits(run, so_far, schema, bounds, needs)
+    run = replace(run, objectives={**run.objectives, **past})
     results = (
         _judge_one(
             objective,
@@ -178,6 +182,7 @@ def judge(
             bounds.get(objective.name),
             model.summary_at(objective.name, reference.config),
             needs.get(objective.name),
+            so_far=objective.name in past,
         )
         for objective in schema.objectives
     )
@@ -216,6 +221,32 @@ def unread_options(schema: Schema, run: Run) -> frozenset[str]:
         for option in schema.options
         if option.modes and not entered & {mode.casefold() for mode in option.modes}
     )
+
+
+def _has_inputs(objective: Variable, run: Run, schema: Schema) -> bool:
+    """Whether the run tells what physics needs to know of its mission and vehicle."""
+    nominal = schema.nominal_of(objective.name)
+    needed = () if nominal is None else nominal.inputs
+    return all(is_known(run.context.get(name)) for name in needed if schema.variables[name].role is Role.CONTEXT)
+
+
+def _past_their_limits(
+    run: Run, so_far: Mapping[str, Value], schema: Schema, bounds: Mapping[str, Threshold], needs: Mapping[str, Need]
+) -> dict[str, float]:
+    """Objectives of a mission whose end the log does not hold that are broken already, however much the reference
+    configuration needs: those only grow."""
+    if run.mission.ended:
+        return {}
+    past: dict[str, float] = {}
+    for objective in schema.objectives:
+        name, value = objective.name, so_far.get(objective.name)
+        if not objective.grows or name not in bounds or not is_known(value):
+            continue
+        need, relative = needs.get(name), objective.relative
+        limit = bounds[name] if need is None or relative is None else relative.for_need(need.high)
+        if not limit.met(value):
+            past[name] = value
+    return past
 
 
 def meaningful(
@@ -305,6 +336,8 @@ def _judge_one(
     bound: Threshold | None,
     summary: Summary | None = None,
     need: Need | None = None,
+    *,
+    so_far: bool = False,
 ) -> ObjectiveResult:
     if value is None:
         reason = "the profile does not say how to read it from a log"
@@ -317,7 +350,8 @@ def _judge_one(
     status: Status = "ok" if bound.met(value) else "fault"
     # A yes-or-no result has no place among others.
     percentile = summary.percentile(value) if summary and objective.kind == "non-functional" else None
-    return ObjectiveResult(objective, value, bound, status, percentile=percentile, need=need)
+    reason = "so far: the log ends before the mission does" if so_far else ""
+    return ObjectiveResult(objective, value, bound, status, reason, percentile=percentile, need=need)
 
 
 def _judge_check(check: Check) -> ObjectiveResult:

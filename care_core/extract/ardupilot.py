@@ -47,16 +47,15 @@ _TOOK_OFF, _LANDED = (16, 28), (18,)
 _DRIVES = frozenset(("rover",))
 _GLIDES = frozenset(("plane", "quadplane"))
 """What lands where it finds room: its last height says little."""
-_COMPLETE = ("Mission Complete", "Mission complete")
-"""What a rover (AR mode_auto.cpp) and a submarine say when no item is left."""
 _MOVED_M = 5.0
 """A receiver that stands still wanders by its accuracy, 2 to 3 m."""
-_PHASE_ARGS = {
+PHASE_ARGS = {
     "phase": one_of(
-        "only this part of the flight: takeoff, leg, return, return_climb, return_cruise, descent, touchdown",
-        *("takeoff", "leg", "return", "return_climb", "return_cruise", "descent", "touchdown"),
+        "only this part of the flight: takeoff, leg, return, return_climb, return_cruise, descent, touchdown; of a "
+        "drive: mission (from its start to where it is complete, or ends), leg, hold",
+        *("takeoff", "leg", "return", "return_climb", "return_cruise", "descent", "touchdown", "mission", "hold"),
     ),
-    "index": numeric("number of the leg, from 1"),
+    "index": numeric("number of the leg or wait, from 1"),
 }
 _STATISTIC = one_of("mean, max, min, std, rms or peak (95th percentile)", "mean", "max", "min", "std", "rms", "peak")
 
@@ -119,7 +118,7 @@ class ArduPilotFlight(MissionKind):
         return tuple(sorted(found, key=lambda one: one.time_s))
 
     def is_decided(self, mission: Mission) -> bool:
-        return mission.ended or (_is_armed(mission) and _failed(mission))
+        return _is_over(mission) or (_is_armed(mission) and _failed(mission))
 
     def checks(self, mission: Mission) -> tuple[Check, ...]:
         return () if not _is_armed(mission) or flew_automatically(mission) else tuple(_plain_checks(mission))
@@ -216,7 +215,7 @@ _NOT_FLOWN = Unavailable("the vehicle never armed", "see why arming was refused"
 _EVENTS: Wanted = {name: NEEDS[name] for name in ("MSG", "ARM", "EV", "ERR")}
 
 
-def _flight(mission: Mission) -> Flight | Unavailable:
+def flight_of(mission: Mission) -> Flight | Unavailable:
     return mission.shared(analyse) if _is_armed(mission) else _NOT_FLOWN
 
 
@@ -242,6 +241,14 @@ def _in_flight(mission: Mission, kind: str, about: str = "") -> Value:
 def _failed(mission: Mission) -> bool:
     """Whether something ended the flight for good: no landing after it makes the mission a success."""
     return _forced(mission) or bool(_has_event(mission, "crash")) or bool(_has_event(mission, "failsafe"))
+
+
+def _is_over(mission: Mission) -> bool:
+    """Whether the vehicle was disarmed, or drove its mission to the end: what stands on the ground stays there."""
+    if mission.ended or not _is_armed(mission):
+        return mission.ended
+    flight = mission.shared(analyse)
+    return flight.drive is not None and flight.completed
 
 
 def _nothing_to_judge(mission: Mission, flight: Flight) -> Unavailable | None:
@@ -281,10 +288,9 @@ def _plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Ch
 def _mission_done(mission: Mission) -> Value:
     """1 where the vehicle says that its mission is complete or reached every waypoint of it, 0 where a crash or a
     failsafe ended it or it was disarmed on its way; what somebody broke off is no failure of the mission."""
-    said = messages(mission.tables.get("MSG"), mission.start_s, mission.end_s + _SAID_AFTER_S)
-    if any(text.startswith(_COMPLETE) for _, text in said):
-        return 1.0
     flight = mission.shared(analyse)
+    if flight.completed:
+        return 1.0
     unknown = _nothing_to_judge(mission, flight)
     if unknown is not None:
         return unknown
@@ -355,25 +361,28 @@ def _detected(mission: Mission, events: tuple[int, ...]) -> bool:
 
 @extractor("mission_success", needs=NEEDS, unit="")
 def mission_success(mission: Mission, args: Args) -> Value:
-    """1 when every waypoint was reached, the vehicle landed where the mission ends (within `tolerance_m` of it) and
-    disarmed by itself, with no crash and no failsafe; else 0. A refused arming is 0."""
+    """1 when every waypoint was reached, the vehicle landed where the mission ends (within `tolerance_m` of it; a rover
+    says that its mission is complete) and disarmed by itself, with no crash and no failsafe; else 0. A refused arming
+    is 0."""
     if not _is_armed(mission):
         return 0.0
     if not flew_automatically(mission):
         return Unavailable("no mission was flown")
     if _failed(mission):
         return 0.0
-    return _mission_flown(mission) if mission.ended else _CUT
+    return _mission_flown(mission) if _is_over(mission) else _CUT
 
 
 def _mission_flown(mission: Mission) -> Value:
-    """1 when every waypoint was reached and the vehicle landed where the mission ends, else 0."""
+    """1 when every waypoint was reached and the vehicle landed where the mission ends, or said so, else 0."""
     flight = mission.shared(analyse)
     unknown = _nothing_to_judge(mission, flight)
     if unknown is not None:
         return unknown
     if flight.reached < len(flight.waypoints):
         return 0.0
+    if flight.drive is not None:
+        return float(flight.completed)
     if flight.end is None:
         return 1.0
     off_m = landing_error(mission, {})
@@ -438,7 +447,7 @@ def arming_time(mission: Mission, args: Args) -> Value:
 @extractor("waypoints_reached", needs=NEEDS, unit="")
 def waypoints_reached(mission: Mission, args: Args) -> Value:
     """How many of the mission's waypoints the autopilot reported as reached."""
-    flight = _flight(mission)
+    flight = flight_of(mission)
     if isinstance(flight, Unavailable):
         return flight
     return float(flight.reached) if flight.waypoints else Unavailable("the log names no waypoints", "record CMD")
@@ -447,7 +456,7 @@ def waypoints_reached(mission: Mission, args: Args) -> Value:
 @extractor("landing_error", needs=NEEDS, unit="m")
 def landing_error(mission: Mission, args: Args) -> Value:
     """Horizontal distance at the end of the flight from where the mission ends: home, or where it lands."""
-    flight = _flight(mission)
+    flight = flight_of(mission)
     if isinstance(flight, Unavailable):
         return flight
     if flight.track is None:
@@ -460,7 +469,7 @@ def landing_error(mission: Mission, args: Args) -> Value:
 @extractor("waypoint_miss", needs=NEEDS, unit="m")
 def waypoint_miss(mission: Mission, args: Args) -> Value:
     """The largest, over the waypoints, of the smallest horizontal distance from the waypoint: corners cut."""
-    flight = _flight(mission)
+    flight = flight_of(mission)
     if isinstance(flight, Unavailable):
         return flight
     if flight.track is None or not len(flight.route):
@@ -478,7 +487,7 @@ def mission_time(mission: Mission, args: Args) -> Value:
     return mission.end_s - mission.start_s if _is_armed(mission) else _NOT_FLOWN
 
 
-@extractor("phase_time", needs=NEEDS, unit="s", args=_PHASE_ARGS)
+@extractor("phase_time", needs=NEEDS, unit="s", args=PHASE_ARGS)
 def phase_time(mission: Mission, args: Args) -> Value:
     """Duration of one completed part of the flight."""
     span = _phase(mission, args)
@@ -488,7 +497,7 @@ def phase_time(mission: Mission, args: Args) -> Value:
 @extractor("cruise_speed", needs=NEEDS, unit="m/s")
 def cruise_speed(mission: Mission, args: Args) -> Value:
     """Length of the legs that were completed over the time for them, without the waits at their ends."""
-    flight = _flight(mission)
+    flight = flight_of(mission)
     if isinstance(flight, Unavailable):
         return flight
     given = mission.shared(asked)
@@ -497,7 +506,8 @@ def cruise_speed(mission: Mission, args: Args) -> Value:
     done = [i - 1 for name, i in flight.phases if name == "leg"]
     if not done or len(given.lengths) != len(flight.waypoints):
         return Unavailable("the flight completed no leg")
-    moving_s = sum(flight.phases["leg", i + 1].duration_s - float(given.holds_s[i]) for i in done)
+    waited_s = 0.0 if flight.drive is not None else float(given.holds_s[done].sum())
+    moving_s = sum(flight.phases["leg", i + 1].duration_s for i in done) - waited_s
     length_m = float(given.lengths[done].sum())
     return length_m / moving_s if moving_s > 0 and length_m > 0 else Unavailable("the legs have no length")
 
@@ -506,7 +516,7 @@ def cruise_speed(mission: Mission, args: Args) -> Value:
 def return_height(mission: Mission, args: Args) -> Value:
     """The greatest height above home on the way back."""
     span = _phase(mission, {"phase": "return_climb"})
-    flight = _flight(mission)
+    flight = flight_of(mission)
     if isinstance(span, Unavailable):
         return span
     if isinstance(flight, Unavailable) or flight.track is None:
@@ -516,39 +526,44 @@ def return_height(mission: Mission, args: Args) -> Value:
 
 @extractor("distance", needs=NEEDS, unit="m")
 def distance(mission: Mission, args: Args) -> Value:
-    """Length of the way over ground while airborne."""
-    flight = _flight(mission)
+    """Length of the way over ground while airborne; of a rover, in its mission."""
+    flight = flight_of(mission)
     if isinstance(flight, Unavailable):
         return flight
     if flight.track is None:
         return missing("POS")
     steps = np.hypot(np.diff(flight.track.north), np.diff(flight.track.east))
-    return float(steps[flight.track.airborne(flight.track.t)[1:]].sum())
+    return float(steps[flight.under_way(flight.track.t)[1:]].sum())
 
 
 @extractor("path_error", needs=NEEDS, unit="m", args={"stat": one_of("max or mean", "max", "mean")})
 def path_error(mission: Mission, args: Args) -> Value:
-    """Horizontal distance from the legs (home, waypoints, home if it returns) while airborne."""
-    flight = _flight(mission)
+    """Horizontal distance from the legs (home, waypoints, home if it returns) while airborne, or in a rover's
+    mission."""
+    flight = flight_of(mission)
     if isinstance(flight, Unavailable):
         return flight
     if flight.track is None or not len(flight.corners):
         return missing("POS" if flight.track is None else "CMD")
-    return _statistic(flight.path_errors(), str(args.get("stat", "max")))
+    return statistic(flight.path_errors(), str(args.get("stat", "max")))
 
 
 _BATTERY: Wanted = {"BAT": ("Inst", "Instance", "Volt", "Curr", "EnrgTot")}
 
 
-@extractor("energy_used", needs=merge_needs((NEEDS, _BATTERY)), unit="Wh")
+@extractor("energy_used", needs=merge_needs((NEEDS, _BATTERY)), unit="Wh", args=PHASE_ARGS)
 def energy_used(mission: Mission, args: Args) -> Value:
-    """Energy drawn between arming and disarming: the monitor's counter, else voltage times current over time."""
+    """Energy drawn between arming and disarming, or in a part of it: the monitor's counter, else voltage times current
+    over time."""
     if not _is_armed(mission):
         return _NOT_FLOWN
+    span = _phase(mission, args) if "phase" in args else (mission.start_s, mission.end_s)
+    if isinstance(span, Unavailable):
+        return span
     table = mission.tables.get("BAT")
     if table is None or not len(table):
         return missing("BAT")
-    used = [_energy(battery, mission) for battery in _instances(table)]
+    used = [_energy(battery, *span) for battery in _instances(table)]
     known = [value for value in used if value is not None]
     if known:
         return sum(known)
@@ -557,13 +572,13 @@ def energy_used(mission: Mission, args: Args) -> Value:
     return Unavailable("BAT says the same current throughout, or none", "is BATT_MONITOR one that measures current?")
 
 
-def _energy(battery: Table, mission: Mission) -> float | None:
-    """Wh of one battery, None where its monitor counts and measures nothing."""
-    inside = battery.between(mission.start_s, mission.end_s)
+def _energy(battery: Table, start_s: float, end_s: float) -> float | None:
+    """Wh of one battery between two times, None where its monitor counts and measures nothing."""
+    inside = battery.between(start_s, end_s)
     counted = _known(inside, "EnrgTot")
     if len(counted) and np.ptp(counted["EnrgTot"]) > 0 and (np.diff(counted["EnrgTot"]) >= 0).all():
         whole = _known(battery, "EnrgTot")
-        start, end = np.interp((mission.start_s, mission.end_s), whole.t, whole["EnrgTot"])
+        start, end = np.interp((start_s, end_s), whole.t, whole["EnrgTot"])
         return float(end - start)
     measured = _known(inside, "Volt", "Curr")
     if len(measured) < _MIN_ROWS or not is_alive(measured["Curr"]) or not measured["Curr"].any():
@@ -584,8 +599,8 @@ def min_voltage(mission: Mission, args: Args) -> Value:
     """The lowest battery voltage between arming and disarming."""
     if not _is_armed(mission):
         return _NOT_FLOWN
-    volts = _series(mission, "BAT", ("Volt",), {}, airborne=False)
-    return volts if isinstance(volts, Unavailable) else _statistic(volts["Volt"], "min")
+    volts = series(mission, "BAT", ("Volt",), {}, under_way=False)
+    return volts if isinstance(volts, Unavailable) else statistic(volts["Volt"], "min")
 
 
 @extractor("start_voltage", needs=merge_needs((NEEDS, _BATTERY)), unit="V")
@@ -616,7 +631,7 @@ def voltage_margin(mission: Mission, args: Args) -> Value:
 
 def _phase(mission: Mission, args: Args) -> tuple[float, float] | Unavailable:
     """Start and end in the log of the part of the flight that `args` name."""
-    flight = _flight(mission)
+    flight = flight_of(mission)
     if isinstance(flight, Unavailable):
         return flight
     name, index = str(args.get("phase", "")), int(args.get("index", 0))
@@ -626,11 +641,11 @@ def _phase(mission: Mission, args: Args) -> tuple[float, float] | Unavailable:
     return phase.start_s, phase.end_s
 
 
-def _series(
-    mission: Mission, channel: str, fields: Sequence[str], args: Args, *, airborne: bool = True
+def series(
+    mission: Mission, channel: str, fields: Sequence[str], args: Args, *, under_way: bool = True
 ) -> Table | Unavailable:
-    """Rows of a channel while airborne (or in a phase), first instance only, with all of `fields` finite."""
-    flight = _flight(mission)
+    """Rows of a channel while under way (or in a phase), first instance only, with all of `fields` finite."""
+    flight = flight_of(mission)
     if isinstance(flight, Unavailable):
         return flight
     table = mission.table(channel)
@@ -642,16 +657,16 @@ def _series(
         if isinstance(span, Unavailable):
             return span
         table = table.between(*span)
-    elif airborne:
-        if flight.track is None:
+    elif under_way:
+        if flight.track is None and flight.drive is None:
             return missing("POS")
-        table = table.where(flight.track.airborne(table.t))
+        table = table.where(flight.under_way(table.t))
     finite = np.ones(len(table), dtype=bool)
     for field in fields:
         finite &= np.isfinite(table[field])
     table = table.where(finite)
     if len(table) < _MIN_ROWS:
-        return Unavailable(f"too little {channel} in this part of the flight", "was the vehicle airborne?")
+        return Unavailable(f"too little {channel} in this part of the flight", "was the vehicle under way?")
     return table
 
 
@@ -663,7 +678,7 @@ def _instances(table: Table) -> list[Table]:
     return [table.where(table[name] == number) for number in np.unique(table[name])]
 
 
-def _statistic(values: Floats, stat: str) -> Value:
+def statistic(values: Floats, stat: str) -> Value:
     """One number from many. `peak` is the 95th percentile, which one bad sample cannot move."""
     measures: dict[str, Callable[[Floats], object]] = {
         "mean": np.mean,
@@ -674,7 +689,7 @@ def _statistic(values: Floats, stat: str) -> Value:
         "peak": lambda x: np.percentile(x, 95),
     }
     if not len(values):
-        return Unavailable("the vehicle was never airborne")
+        return Unavailable("the vehicle was never under way")
     if stat not in measures:
         return Unavailable(f"there is no statistic '{stat}'", f"use one of {', '.join(measures)}")
     return float(measures[stat](values))  # type: ignore[arg-type]
@@ -684,7 +699,7 @@ def _wrapped(degrees: Floats) -> Floats:
     return np.asarray((degrees + 180.0) % 360.0 - 180.0)
 
 
-def _register(
+def register(
     name: str, wanted: Wanted, unit: str, doc: str, measure: Callable[[Table, Mission, Args], Floats],
     *, stat: str, args: Mapping[str, str] | None = None,
     columns: Callable[[Mission], Sequence[str]] | None = None,
@@ -698,13 +713,13 @@ def _register(
     required = [field for field in fields if field not in ("I", "IMU", "C")]
 
     def compute(mission: Mission, given: Args) -> Value:
-        table = _series(mission, channel, required if columns is None else columns(mission), given)
+        table = series(mission, channel, required if columns is None else columns(mission), given)
         if isinstance(table, Unavailable):
             return table
-        return _statistic(measure(table, mission, given), str(given.get("stat", stat)))
+        return statistic(measure(table, mission, given), str(given.get("stat", stat)))
 
     compute.__doc__ = f"{doc} Statistic: {stat} unless `stat` says otherwise."
-    described = {"stat": _STATISTIC, **_PHASE_ARGS, **(args or {})}
+    described = {"stat": _STATISTIC, **PHASE_ARGS, **(args or {})}
     extractor(name, needs=merge_needs((NEEDS, wanted)), unit=unit, args=described)(compute)
 
 
@@ -754,39 +769,39 @@ _LEAN = {"ATT": ("Roll", "Pitch")}
 _SINK = {"PSCD": ("VD",)}
 _OUTPUTS = {"RCOU": tuple(f"C{output}" for output in range(1, 15))}
 
-_register("attitude_error", _ATTITUDE, "deg", "Wanted minus flown attitude.", _attitude_error, stat="rms", args=_TILT)
-_register("rate_error", _RATE, "deg/s", "Wanted minus flown rotation rate: slack or oscillation of one axis.",
+register("attitude_error", _ATTITUDE, "deg", "Wanted minus flown attitude.", _attitude_error, stat="rms", args=_TILT)
+register("rate_error", _RATE, "deg/s", "Wanted minus flown rotation rate: slack or oscillation of one axis.",
           _of_axis(lambda t, c: t[c[0]] - t[c[1]]), stat="rms", args=_AXIS)  # fmt: skip
-_register("rate_activity", _RATE, "deg/s", "Rotation rate of one axis.",
+register("rate_activity", _RATE, "deg/s", "Rotation rate of one axis.",
           _of_axis(lambda t, c: t[c[0]]), stat="rms", args=_AXIS)  # fmt: skip
-_register("rate_output", _RATE, "", "Output of one axis' rate controller: how hard it works.",
+register("rate_output", _RATE, "", "Output of one axis' rate controller: how hard it works.",
           _of_axis(lambda t, c: t[c[2]]), stat="rms", args=_AXIS)  # fmt: skip
-_register("lean_angle", _LEAN, "deg", "Angle between the vehicle's mast and the vertical.",
+register("lean_angle", _LEAN, "deg", "Angle between the vehicle's mast and the vertical.",
           lambda t, _m, _a: _lean(t), stat="peak")  # fmt: skip
-_register("altitude_error", {"PSCD": ("TPD", "PD")}, "m", "Wanted minus flown height.",
+register("altitude_error", {"PSCD": ("TPD", "PD")}, "m", "Wanted minus flown height.",
           lambda t, _m, _a: np.abs(t["TPD"] - t["PD"]), stat="rms")  # fmt: skip
-_register("climb_rate_error", {"PSCD": ("TVD", "VD")}, "m/s", "Wanted minus flown vertical speed.",
+register("climb_rate_error", {"PSCD": ("TVD", "VD")}, "m/s", "Wanted minus flown vertical speed.",
           lambda t, _m, _a: np.abs(t["TVD"] - t["VD"]), stat="rms")  # fmt: skip
-_register("vertical_acceleration_error", {"PSCD": ("TAD", "AD")}, "m/s/s", "Wanted minus flown vertical acceleration.",
+register("vertical_acceleration_error", {"PSCD": ("TAD", "AD")}, "m/s/s", "Wanted minus flown vertical acceleration.",
           lambda t, _m, _a: np.abs(t["TAD"] - t["AD"]), stat="rms")  # fmt: skip
-_register("climb_rate", _SINK, "m/s", "Speed upwards.", lambda t, _m, _a: -t["VD"], stat="peak")
-_register("descent_rate", _SINK, "m/s", "Speed downwards.", lambda t, _m, _a: t["VD"], stat="peak")
-_register("motor_saturation", _OUTPUTS, "", "Share of the time in which a motor is at MOT_SPIN_MAX.",
+register("climb_rate", _SINK, "m/s", "Speed upwards.", lambda t, _m, _a: -t["VD"], stat="peak")
+register("descent_rate", _SINK, "m/s", "Speed downwards.", lambda t, _m, _a: t["VD"], stat="peak")
+register("motor_saturation", _OUTPUTS, "", "Share of the time in which a motor is at MOT_SPIN_MAX.",
           _at_limit, stat="mean", columns=_motor_columns)  # fmt: skip
-_register("motor_output", _OUTPUTS, "", "Mean output of the motors, as a share of their range.",
+register("motor_output", _OUTPUTS, "", "Mean output of the motors, as a share of their range.",
           lambda t, m, _a: _motors(t, m).mean(axis=1), stat="mean", columns=_motor_columns)  # fmt: skip
-_register("motor_spread", _OUTPUTS, "", "How far the motors differ from each other, as a share of their range.",
+register("motor_spread", _OUTPUTS, "", "How far the motors differ from each other, as a share of their range.",
           lambda t, m, _a: np.ptp(_motors(t, m), axis=1), stat="mean", columns=_motor_columns)  # fmt: skip
-_register("throttle", {"CTUN": ("ThO",)}, "", "Throttle out of the attitude controller, 0 to 1.",
+register("throttle", {"CTUN": ("ThO",)}, "", "Throttle out of the attitude controller, 0 to 1.",
           lambda t, _m, _a: t["ThO"], stat="mean")  # fmt: skip
-_register("vibration", {"VIBE": ("IMU", "VibeX", "VibeY", "VibeZ")}, "m/s/s", "Vibration of the first IMU, all axes.",
+register("vibration", {"VIBE": ("IMU", "VibeX", "VibeY", "VibeZ")}, "m/s/s", "Vibration of the first IMU, all axes.",
           lambda t, _m, _a: np.sqrt(t["VibeX"] ** 2 + t["VibeY"] ** 2 + t["VibeZ"] ** 2), stat="mean")  # fmt: skip
-_register("gps_quality", {"GPS": ("I", "HDop")}, "", "Horizontal dilution of precision of the first GPS.",
+register("gps_quality", {"GPS": ("I", "HDop")}, "", "Horizontal dilution of precision of the first GPS.",
           lambda t, _m, _a: t["HDop"], stat="mean")  # fmt: skip
-_register("ekf_velocity_innovation", {"XKF3": ("C", "IVN", "IVE")}, "m/s",
+register("ekf_velocity_innovation", {"XKF3": ("C", "IVN", "IVE")}, "m/s",
           "Horizontal velocity measured minus estimated, first core.",
           lambda t, _m, _a: np.hypot(t["IVN"], t["IVE"]), stat="rms")  # fmt: skip
-_register("ekf_position_innovation", {"XKF3": ("C", "IPN", "IPE")}, "m",
+register("ekf_position_innovation", {"XKF3": ("C", "IPN", "IPE")}, "m",
           "Horizontal position measured minus estimated, first core.",
           lambda t, _m, _a: np.hypot(t["IPN"], t["IPE"]), stat="rms")  # fmt: skip
 
@@ -798,20 +813,20 @@ _register("ekf_position_innovation", {"XKF3": ("C", "IPN", "IPE")}, "m",
     args={
         "field": one_of("SV velocity, SP position, SH height, SM compass", "SV", "SP", "SH", "SM"),
         "stat": one_of("mean, max, rms or peak", "mean", "max", "rms", "peak"),
-        **_PHASE_ARGS,
+        **PHASE_ARGS,
     },
 )
 def ekf_innovation(mission: Mission, args: Args) -> Value:
     """Innovation test ratio of the first estimator core (above 1 it rejects the sensor). Mean unless `stat`."""
     field = str(args.get("field", "SV"))
-    table = _series(mission, "XKF4", (field,), args)
-    return table if isinstance(table, Unavailable) else _statistic(table[field], str(args.get("stat", "mean")))
+    table = series(mission, "XKF4", (field,), args)
+    return table if isinstance(table, Unavailable) else statistic(table[field], str(args.get("stat", "mean")))
 
 
-@extractor("mean_lean_angle", needs=merge_needs((NEEDS, _ATTITUDE)), unit="deg", args=_PHASE_ARGS)
+@extractor("mean_lean_angle", needs=merge_needs((NEEDS, _ATTITUDE)), unit="deg", args=PHASE_ARGS)
 def mean_lean_angle(mission: Mission, args: Args) -> Value:
     """Angle of the lean averaged over the earth's directions while airborne: what steady wind asks for."""
-    table = _series(mission, "ATT", ("Roll", "Pitch", "Yaw"), args)
+    table = series(mission, "ATT", ("Roll", "Pitch", "Yaw"), args)
     if isinstance(table, Unavailable):
         return table
     roll, pitch, yaw = (np.radians(table[name]) for name in ("Roll", "Pitch", "Yaw"))
@@ -837,18 +852,18 @@ def _both_axes(mission: Mission, args: Args, of_axis: Callable[[Callable[[str], 
     parts = []
     for axis in "NE":
         names = [f"{field}{axis}" for field in fields]
-        table = _series(mission, f"PSC{axis}", names, args)
+        table = series(mission, f"PSC{axis}", names, args)
         if isinstance(table, Unavailable):
             return table
         columns = dict(zip(fields, (table[name] for name in names), strict=True))
         parts.append(of_axis(columns.__getitem__))
     count = min(len(part) for part in parts)
-    return _statistic(np.hypot(parts[0][:count], parts[1][:count]), str(args.get("stat", stat)))
+    return statistic(np.hypot(parts[0][:count], parts[1][:count]), str(args.get("stat", stat)))
 
 
 _HORIZONTAL_ARGS = {
     "stat": one_of("mean, max, rms or peak (95th percentile)", "mean", "max", "rms", "peak"),
-    **_PHASE_ARGS,
+    **PHASE_ARGS,
 }
 
 

@@ -40,6 +40,8 @@ _MOST_ITEMS = 2000
 """Items that are followed: a jump without end would never stop."""
 _HOME = 1
 """Type of an ORGN record: home; 0 is the origin of the estimator."""
+_SHARP_DEG = 60.0
+"""Corners from which a vehicle that turns on the spot stops and does so (AR_PivotTurn.cpp: WP_PIVOT_ANGLE)."""
 _LEVEL_M = 0.5
 """Height difference below which a leg is level."""
 _METRES_PER_DEGREE = 111_319.49
@@ -83,12 +85,16 @@ class Asked:
         return np.asarray(np.diff(self.points[:, 2]))
 
     @property
-    def corners_deg(self) -> Floats:
-        """Change of course, 0 to 180 degrees, at each corner that is flown through without a wait."""
+    def turns_deg(self) -> Floats:
+        """Change of course, 0 to 180 degrees, at each corner."""
         step = np.diff(self.points[:, :2], axis=0)
         course = np.degrees(np.arctan2(step[:, 1], step[:, 0]))
-        turns = np.abs((np.diff(course) + 180.0) % 360.0 - 180.0)
-        return np.asarray(turns[self.holds_s[:-1] == 0])
+        return np.asarray(np.abs((np.diff(course) + 180.0) % 360.0 - 180.0))
+
+    @property
+    def corners_deg(self) -> Floats:
+        """Change of course at each corner that is flown through without a wait."""
+        return np.asarray(self.turns_deg[self.holds_s[:-1] == 0])
 
     @property
     def commanded_speed(self) -> float:
@@ -205,6 +211,8 @@ _MISSION: Mapping[str, Callable[[Asked], float]] = {
     "descending_legs": lambda a: float((a.rises < -_LEVEL_M).sum()),
     "flown_corners": lambda a: float(len(a.corners_deg)),
     "corner_turn": lambda a: float(a.corners_deg.mean()) if len(a.corners_deg) else 0.0,
+    "sharp_corners": lambda a: float((a.corners_deg > _SHARP_DEG).sum()),
+    "sharp_turns": lambda a: float(a.turns_deg[a.turns_deg > _SHARP_DEG].sum()),
     "hold_time": lambda a: float(a.holds_s.sum()),
     "stops": lambda a: float((a.holds_s > 0).sum()),
     "commanded_speed": lambda a: a.commanded_speed,
@@ -218,7 +226,8 @@ _MISSION: Mapping[str, Callable[[Asked], float]] = {
 @extractor("mission_asked", needs=ITEMS, unit="", args={"what": one_of(", ".join(_MISSION), *_MISSION)})
 def mission_asked(mission: Mission, args: Args) -> Value:
     """One number of the mission that the vehicle was given: lengths and heights in m, times in s, turns in degrees,
-    `commanded_speed` in m/s (0: none), `returns` 1 or 0."""
+    `commanded_speed` in m/s (0: none), `returns` 1 or 0; corners are `sharp` from 60 degrees, `sharp_turns` adds up
+    theirs, those with a wait too."""
     measure = _MISSION.get(str(args.get("what")))
     if measure is None:
         return Unavailable(f"there is no '{args.get('what')}' of a mission", f"use one of {', '.join(_MISSION)}")

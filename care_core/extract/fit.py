@@ -11,7 +11,7 @@ from care_core.extract.coverage import Coverage, wrong_kind
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
 from care_core.run import FITS, Fit
-from care_core.vehicles import Vehicle, vehicle_of
+from care_core.vehicles import UNLIKE_ROVERS, Vehicle, vehicle_of
 
 MOST = 0.7
 """Share of a profile's options, and of its sources, that a log holds when it fits: some sources stand in for others,
@@ -57,6 +57,8 @@ def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:
             yield f"the log's {key} is '{log.facts[key]}', the profile is for '{text}'"
     if schema.learned_elsewhere:
         yield schema.learned_elsewhere
+    if schema.match.get("vehicle") == "rover" and vehicle.name in UNLIKE_ROVERS:
+        yield f"this is a {vehicle.name}, the profile was learned on wheels"
     if schema.match.get("vehicle") and vehicle.kind == "unknown":
         yield f"the log does not say what vehicle it is of, the profile is for {_a(schema.match['vehicle'])}"
     if schema.firmware_window is None:

@@ -1,4 +1,4 @@
-"""What one ArduPilot flight did: its mission items, its track around home, and its phases.
+"""What one ArduPilot flight or drive did: its mission items, its track around home, and its phases.
 
 Everything is worked out once per mission (`Mission.shared(analyse)`) and read by the extractors of `ardupilot`.
 Positions are metres north and east of home on a plane, which is exact to centimetres over a few kilometres.
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.extract.asked import ITEMS, Asked, Item, asked, home_of, items_of
-from care_core.extract.modes import MODES, modes_in_force
+from care_core.extract.modes import MODES, kind_flown, modes_in_force
 from care_core.extract.registry import Mission, has, merge_needs
 from care_core.logs.base import Table, Wanted
 from care_core.run import Unavailable
@@ -50,7 +50,12 @@ _HOMEWARD = (20, 21)  # MAV_CMD_NAV_RETURN_TO_LAUNCH, MAV_CMD_NAV_LAND
 _AT_HEIGHT_M = 0.5
 _STARTED = re.compile(r"Mission: (\d+) ")
 _REACHED = re.compile(r"Reached (?:command|waypoint) #(\d+)")
-"""A copter reaches commands, a plane and a rover waypoints."""
+"""A copter says it when the wait is over (ArduCopter/mode_auto.cpp), rovers and planes when they arrive
+(Rover/mode_auto.cpp)."""
+_COMPLETE = ("Mission Complete", "Mission complete")
+"""What a rover (Rover/mode_auto.cpp) and a submarine say when no item is left."""
+_SAID_AFTER_S = 0.6
+"""What ends a mission may be said a moment after it has ended."""
 
 Floats = NDArray[np.float64]
 
@@ -83,10 +88,6 @@ class Track:
     east: Floats
     height: Floats
 
-    def airborne(self, t: Floats) -> NDArray[np.bool_]:
-        """Whether the vehicle was higher than `AIRBORNE_M` at times `t`."""
-        return np.asarray(np.interp(t, self.t, self.height) > AIRBORNE_M)
-
     def filled_in(self) -> Track:
         """The same track at `FILL_S` or closer: cubic Hermite between positions, velocities by central differences."""
         steps = np.diff(self.t)
@@ -100,7 +101,8 @@ class Track:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Flight:
-    """One flight. `phases` holds only what was completed, by name and index (legs count from 1, the rest is 0)."""
+    """One flight. `phases` holds only what was completed, by name and index (legs count from 1, the rest is 0);
+    of a drive, the mission as far as it went."""
 
     waypoints: tuple[Waypoint, ...]
     """The waypoints of the mission that the vehicle was given."""
@@ -115,17 +117,30 @@ class Flight:
     track: Track | None
     """None when the log holds no position."""
     phases: Mapping[tuple[str, int], Phase]
+    drive: Phase | None = None
+    """Of a vehicle that stays on the ground: from the start of its mission to where it was complete, or broken off.
+    None of one that flies."""
+    completed: bool = False
+    """Whether the vehicle said that its mission is complete, as rovers and submarines do."""
+
+    def under_way(self, t: Floats) -> NDArray[np.bool_]:
+        """Whether the vehicle was on its way at times `t`: in its mission, or, where it flies, above `AIRBORNE_M`."""
+        if self.drive is not None:
+            return np.asarray((t >= self.drive.start_s) & (t <= self.drive.end_s))
+        if self.track is None:
+            return np.zeros(len(t), dtype=bool)
+        return np.asarray(np.interp(t, self.track.t, self.track.height) > AIRBORNE_M)
 
     def path_errors(self) -> Floats:
-        """Horizontal distance in metres from the way that was asked for while airborne, along the track as flown.
+        """Horizontal distance in metres from the way that was asked for while under way, along the track as flown.
 
         A vehicle turns between two positions of a thinned log, so the corners are filled in first.
         """
         if self.track is None:
             return np.empty(0)
         track = self.track.filled_in()
-        up = track.height > AIRBORNE_M
-        points = np.column_stack((track.north[up], track.east[up]))
+        going = self.under_way(track.t)
+        points = np.column_stack((track.north[going], track.east[going]))
         return distance_to_legs(points, self.corners)
 
 
@@ -137,6 +152,11 @@ def analyse(mission: Mission) -> Flight:
     home = home_of(mission)
     track = _track(mission, home)
     started, reached = _milestones(mission)
+    said = messages(mission.tables.get("MSG"), mission.start_s, mission.end_s + _SAID_AFTER_S)
+    complete_s = next((t for t, text in reversed(said) if text.startswith(_COMPLETE)), None)
+    drive = _drive(mission, complete_s) if kind_flown(mission) == "rover" else None
+    if drive is not None and numbers:
+        started.setdefault(numbers[0], drive.start_s)  # named once, before the vehicle may move
     route = np.array([_offset(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
     corners, end = _way(mission.shared(asked))
     return Flight(
@@ -146,8 +166,11 @@ def analyse(mission: Mission) -> Flight:
         end=end,
         reached=sum(number in reached for number in numbers),
         track=track,
-        phases=_phases(mission, track, numbers, started, reached),
-    )
+        phases=_phases(mission, track, numbers, started, reached) if drive is None
+        else _drive_phases(mission, drive, numbers, started, reached, complete_s),
+        drive=drive,
+        completed=complete_s is not None,
+    )  # fmt: skip
 
 
 def _hermite(t: Floats, known_t: Floats, known: Floats) -> Floats:
@@ -257,6 +280,32 @@ def _phases(
         phases.update(
             {(name, 0): phase for name, phase in _return_phases(mission, track, homeward, returns=returns).items()}
         )
+    return phases
+
+
+def _drive(mission: Mission, complete_s: float | None) -> Phase:
+    """A ground vehicle's mission in the time that it was armed: to where it said that it is complete."""
+    automatic = [mode.t for mode in mission.shared(modes_in_force) if mode.way == "mission"]
+    start_s = max(mission.start_s, min(automatic, default=mission.start_s))
+    return Phase(start_s, mission.end_s if complete_s is None else max(start_s, min(complete_s, mission.end_s)))
+
+
+def _drive_phases(
+    mission: Mission, drive: Phase, numbers: Sequence[int], started: Mapping[int, float], reached: Mapping[int, float],
+    complete_s: float | None,
+) -> dict[tuple[str, int], Phase]:  # fmt: skip
+    """The legs of a ground vehicle, each to its arrival, and its waits: to the next item, or the mission's end."""
+    phases = {("mission", 0): drive}
+    way = mission.shared(asked)
+    waits = () if isinstance(way, Unavailable) else way.holds_s
+    ends = sorted((*started.values(), *(() if complete_s is None else (complete_s,))))
+    for index, number in enumerate(numbers, start=1):
+        if number not in started or number not in reached:
+            continue
+        phases["leg", index] = Phase(started[number], reached[number])
+        after = next((t for t in ends if t > reached[number]), None)
+        if after is not None and index <= len(waits) and waits[index - 1] > 0:
+            phases["hold", index] = Phase(reached[number], after)
     return phases
 
 

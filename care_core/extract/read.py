@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 # Importing them registers their extractors and mission kinds.
 import care_core.extract.actionlib
 import care_core.extract.ardupilot
+import care_core.extract.ardurover
 import care_core.extract.asked
 import care_core.extract.battery
 import care_core.extract.laser

@@ -74,6 +74,7 @@ class _Variable(Strict):
     safety: bool = False
     kind: Kind | None = None
     threshold: Bound | None = None
+    grows: bool = False
     about: About = "world"
     nominal: dict[str, str] | None = None
     extract: dict[str, Any] | None = None
@@ -85,6 +86,8 @@ class _Variable(Strict):
             raise ValueError("an objective needs 'kind': functional or non-functional")
         if self.role is not Role.OBJECTIVE and self.threshold is not None:
             raise ValueError("only objectives have a 'threshold'")
+        if self.grows and (self.kind != "non-functional" or (self.threshold and self.threshold.op not in ("<", "<="))):
+            raise ValueError("'grows' belongs to a non-functional objective with an upper threshold")
         if self.role is not Role.CONTEXT and self.about != "world":
             raise ValueError("only contexts are 'about' something")
         if self.role not in (Role.METRIC, Role.OBJECTIVE) and self.nominal is not None:
@@ -398,6 +401,7 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         kind=v.kind,
         threshold=absolute,
         relative=relative,
+        grows=v.grows,
         about=v.about,
         nominal=None if v.nominal is None else Extract(v.nominal["kind"], _arguments(v.nominal)),
         extract=extract,

@@ -23,6 +23,8 @@ _KINDS: Mapping[str, Kind] = {
 _VERSION = re.compile(r"[Vv](\d+)\.(\d+)(?:\.(\d+))?")
 _HELI_CLASSES = frozenset((6, 11, 13))
 _ROVER_CLASSES = {2: "boat", 3: "balance bot"}
+UNLIKE_ROVERS = frozenset(_ROVER_CLASSES.values())
+"""What Rover's firmware drives as well."""
 _MAV_TYPES = {
     1: "fixed wing", 2: "quad", 3: "coaxial copter", 4: "helicopter", 7: "airship", 10: "rover", 11: "boat",
     12: "submarine", 13: "hexa", 14: "octa", 15: "tricopter", **dict.fromkeys(range(19, 26), "VTOL"),

@@ -219,7 +219,7 @@ def test_a_log_without_arming_or_refusal_holds_no_mission() -> None:
 def test_statistics_of_a_hundred_and_one_values() -> None:
     """Each of its own, so that none stands for another."""
     ramp = np.arange(101.0) - 20.0
-    found = {name: ardupilot._statistic(ramp, name) for name in ("mean", "max", "min", "std", "rms", "peak")}
+    found = {name: ardupilot.statistic(ramp, name) for name in ("mean", "max", "min", "std", "rms", "peak")}
     assert found == pytest.approx(
         {"mean": 30, "max": 80, "min": -20, "std": 29.155, "rms": 41.833, "peak": 75}, rel=1e-4
     )

@@ -104,3 +104,61 @@ def test_units_of_variables_become_those_of_arguments() -> None:
 def test_what_is_wrong_is_named(kind: str, given: dict[str, str], says: str) -> None:
     with pytest.raises(ValueError, match=says):
         nominal(kind, given, {"takeoff_height": "m", "climb_speed": "m/s"})
+
+
+# --- rovers -----------------------------------------------------------------------------------------------------
+
+ROVER = {
+    "path_length": 200.0, "legs": 2.0, "leg_variation": 0.0, "flown_corners": 0.0, "corner_turn": 0.0,
+    "sharp_corners": 0.0, "sharp_turns": 0.0, "commanded_speed": 0.0, "hold_time": 0.0, "speed": 5.0,
+    "acceleration": 1.0, "deceleration": 0.0, "radius": 3.0, "turn_limit": 5.9, "turn_rate": 120.0,
+    "throttle_limit": 100.0, "full_throttle_speed": 20.0, "steering_kind": 0.0, "energy_per_metre": 36.0,
+}  # fmt: skip
+
+
+def of_rover(kind: str, **changed: float) -> float:
+    given = {**ROVER, **changed}
+    row = np.array([[given[name] for name in FORMULAS[kind].arguments]])
+    return float(nominal(kind, {}, dict.fromkeys(given, "")).of(row)[0])
+
+
+def test_a_rovers_legs_from_rest_to_rest() -> None:
+    # Each leg: 100 m at 5 m/s, 5 s for speeding up and slowing down at 1 m/s/s, 1 s for its rise and fall.
+    assert of_rover("drive_cruise_time") == pytest.approx(2 * (20 + 5 + 1))
+    assert of_rover("drive_mission_time", hold_time=7.0) == pytest.approx(of_rover("drive_cruise_time") + 7)
+    assert of_rover("drive_cruise_speed") == pytest.approx(200 / 52)
+    assert of_rover("drive_energy") == pytest.approx(2.0)
+
+
+def test_the_smaller_of_both_accelerations_plans_a_rovers_mission() -> None:
+    slow = of_rover("drive_cruise_time", deceleration=0.25)
+    assert slow == of_rover("drive_cruise_time", acceleration=0.25)
+    assert of_rover("drive_cruise_time", deceleration=4.0) == of_rover("drive_cruise_time")
+
+
+def test_a_rover_is_no_faster_than_its_throttle_allows() -> None:
+    slow = of_rover("drive_cruise_time", full_throttle_speed=4.0, throttle_limit=50.0)
+    assert slow == pytest.approx(of_rover("drive_cruise_time", speed=2.0))
+    # A limit below 30 % counts as 30 %.
+    low = {"full_throttle_speed": 4.0, "throttle_limit": 10.0}
+    assert of_rover("drive_cruise_time", **low) == pytest.approx(of_rover("drive_cruise_time", speed=1.2))
+
+
+def test_a_commanded_speed_beats_a_rovers_parameter() -> None:
+    assert of_rover("drive_cruise_time", commanded_speed=2.0) == of_rover("drive_cruise_time", speed=2.0)
+
+
+def test_only_a_rover_that_steers_by_its_wheels_turns_on_the_spot() -> None:
+    sharp = {"flown_corners": 1.0, "corner_turn": 90.0, "sharp_corners": 1.0, "sharp_turns": 90.0}
+    stopping = of_rover("drive_cruise_time")
+    assert of_rover("drive_cruise_time", steering_kind=1.0, **sharp) == pytest.approx(stopping + 90 / 60)
+    assert of_rover("drive_cruise_time", steering_kind=1.0, turn_rate=30.0, **sharp) == pytest.approx(stopping + 3)
+    assert of_rover("drive_cruise_time", **sharp) < stopping
+
+
+@given(st.floats(12, 360), st.floats(1, 9))
+def test_a_faster_rover_that_turns_more_slowly_strays_farther(rate: float, speed: float) -> None:
+    here = of_rover("drive_path_error", turn_rate=rate, speed=speed)
+    assert here <= of_rover("drive_path_error", turn_rate=rate / 2, speed=speed)
+    assert here <= of_rover("drive_path_error", turn_rate=rate, speed=speed * 1.5)
+    assert here <= of_rover("drive_path_error", turn_rate=rate, speed=speed, steering_kind=1.0)

@@ -130,3 +130,11 @@ def test_nothing_fits() -> None:
     other = replace(candidate("bag", "Z").schema, logs=("ros1-bag",))
     assert choose_profile(log, [Candidate(other)])[1].fit.reasons == ("it reads ros1-bag, this is dataflash-bin",)
     assert choose_profile(log, [])[1].fit.reasons == ("no profile is installed",)
+
+
+def test_a_boat_fits_a_rovers_profile_in_part() -> None:
+    rover = candidate("wheels", "A", match={"vehicle": "rover"})
+    log = NamedLog(("A",), SOURCES, {"firmware": "ArduRover V4.5.4", "vehicle": "rover"})
+    assert choose_profile(log, [rover])[1].fit == FITS
+    boat = replace(log, facts={"firmware": "ArduRover V4.5.4", "vehicle": "boat"})
+    assert choose_profile(boat, [rover])[1].fit == Fit("partly", ("this is a boat, the profile was learned on wheels",))
