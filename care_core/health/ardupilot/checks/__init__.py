@@ -9,6 +9,7 @@ from care_core.health.ardupilot.checks import (
     attitude,
     barometer,
     battery,
+    blocked,
     changes,
     compass,
     cpu,
@@ -39,6 +40,6 @@ class Check(Protocol):
 
 
 CHECKS: tuple[Check, ...] = (
-    attitude, barometer, battery, changes, compass, cpu, crash, estimator, gps, imu, log, motor, prearm, radio, thrust,
-    vibration,
+    attitude, barometer, battery, blocked, changes, compass, cpu, crash, estimator, gps, imu, log, motor, prearm, radio,
+    thrust, vibration,
 )  # fmt: skip

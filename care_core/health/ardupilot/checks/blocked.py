@@ -1,0 +1,57 @@
+"""A rover that is driven and does not move: blocked, stuck, or its motors do not turn.
+
+Limits are those by which the firmware itself calls a rover crashed or blocked (Rover/crash_check.cpp): in a mode that
+drives by itself, for 2 s, a throttle of 5 % or more with less than 0.08 m/s and less than 0.08 rad/s of turn. The check
+of the firmware acts only where FS_CRASH_CHECK is set, which it is not as shipped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.health.ardupilot.flight import Flight, Mask
+from care_core.health.ardupilot.measure import lasting
+from care_core.health.ardupilot.signals import Floats
+from care_core.health.records import Finding
+from care_core.logs.base import Wanted
+from care_core.vehicles import way_of
+
+READS: Wanted = {"THR": ("ThrOut", "Speed"), "STER": ("TurnRate",)}
+
+THROTTLE_PERCENT, STANDING_MS, TURNING_DPS = 5.0, 0.08, float(np.degrees(0.08))
+_LASTS_S = 2.0
+_BY_ITSELF = frozenset(("mission", "return", "guided"))
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """The first time that it stood still although it was driven."""
+    driven = flight.one("THR", "ThrOut", "Speed")
+    if flight.vehicle.kind != "rover" or driven is None:
+        return
+    turned = flight.one("STER", "TurnRate")
+    still = np.abs(driven["Speed"]) < STANDING_MS
+    if turned is not None and len(turned):
+        still &= np.abs(np.interp(driven.t, turned.t, turned["TurnRate"])) < TURNING_DPS
+    pushed = np.abs(driven["ThrOut"]) >= THROTTLE_PERCENT
+    spans = lasting(driven.t, still & pushed & _drives_itself(flight, driven.t), _LASTS_S)
+    if spans:
+        start, end = spans[0]
+        most = float(np.abs(driven["ThrOut"])[(driven.t >= start) & (driven.t <= end)].max())
+        yield Finding(
+            "blocked", "the vehicle is driven and does not move", start, end, "critical",
+            f"for {end - start:.0f} s below {STANDING_MS:g} m/s at up to {most:.0f} % throttle "
+            f"(limit {THROTTLE_PERCENT:g} % for {_LASTS_S:g} s)",
+            "THR, STER; Rover/crash_check.cpp", suspect="world",
+        )  # fmt: skip
+
+
+def _drives_itself(flight: Flight, t: Floats) -> Mask:
+    """Which of these times lie in an armed span and a mode that drives without a pilot."""
+    entered = np.array([at for at, _ in flight.modes])
+    automatic = np.array([way_of("rover", mode) in _BY_ITSELF for _, mode in flight.modes], dtype=bool)
+    if not len(entered):
+        return np.zeros(len(t), dtype=bool)
+    place = np.searchsorted(entered, t, side="right") - 1
+    return np.asarray(flight.during(flight.armed, t) & (place >= 0) & automatic[np.maximum(place, 0)])
