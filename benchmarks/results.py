@@ -63,6 +63,12 @@ BENCHMARKS = (
         "cause first in 80 %",
         "plain classifier with the same contexts",
     ),
+    Benchmark(
+        "travel_rover",
+        "benchmarks.travel --platform ardurover --shared {shared} --table {tables}/ardurover.parquet",
+        "cause first in 80 %",
+        "plain classifier with the same contexts",
+    ),
     Benchmark("ros_health", "benchmarks.ros_health {shared}/data/ros_hardware", "kind in three in 70 %", "none known"),
     Benchmark("wild_logs", "benchmarks.wild_logs --shared {shared}", "no crash, each refusal a sentence", "none known"),
     Benchmark("few_runs", "benchmarks.few_runs --shared {shared} --tables {tables}", "above the peers", "CBI, plain"),

@@ -1,6 +1,6 @@
 """Does the profile travel? Missions, vehicles and sites that training never saw, beside a plain classifier.
 
-    python -m benchmarks.travel --shared DIR --table arducopter.parquet [--profiles DIR] [--folds N]
+    python -m benchmarks.travel --shared DIR --table arducopter.parquet [--platform NAME] [--profiles DIR] [--folds N]
 
 Two parts. *Missions left out whole*: the table (made by `benchmarks.train_profiles --tables`) is split by mission; each
 part is predicted by a model of the others: time and energy with their intervals, what the reference configuration needs
@@ -48,8 +48,15 @@ from care_core.profile.store import Profile, load_profile
 
 EFFORT = Effort(points=500, iterations=40, folds=5)
 MEASURED = ("mission_time", "energy")
-APART = ("path_length", "legs", "hold_time", "commanded_speed", "takeoff_height", "return_distance", "hover_power")
+APART = {
+    "arducopter": (
+        "path_length", "legs", "hold_time", "commanded_speed", "takeoff_height", "return_distance", "hover_power",
+    ),
+    "ardurover": ("path_length", "legs", "hold_time", "commanded_speed", "sharp_turns", "steering_kind"),
+}  # fmt: skip
 """Contexts by which the distance of a mission from those of training is told, each in standard deviations."""
+FAULTS = {"arducopter": "varied", "ardurover": "rover"}
+"""Folder of each platform's failed runs of settings that training never saw."""
 FAR = (0.5, 1.0)
 """Distances that part near, farther and far missions."""
 
@@ -107,7 +114,9 @@ def _predict(frame: pd.DataFrame, schema: Schema, test: NDArray[np.bool_]) -> Le
         inputs = [v.name for v in (*schema.options, *schema.contexts)]
         peer = PlainClassifier(train.fillna(medians), all_met(train, schema) == 1.0, inputs)
         flown = {name: needs(schema.variables[name], frame, schema)[test] for name in MEASURED}
-        return _asked(model, schema, rows, rows.fillna(medians), flown, peer, _distance(train, rows))
+        return _asked(
+            model, schema, rows, rows.fillna(medians), flown, peer, _distance(train, rows, APART[schema.name])
+        )
 
 
 def _asked(
@@ -142,11 +151,11 @@ def _asked(
     return found
 
 
-def _distance(train: pd.DataFrame, rows: pd.DataFrame) -> FloatArray:
+def _distance(train: pd.DataFrame, rows: pd.DataFrame, contexts: Sequence[str]) -> FloatArray:
     """Of each run's mission from the nearest of training, in standard deviations a context; shape (n,)."""
-    scale = train[list(APART)].std()
-    known = (train[list(APART)] / scale).fillna(0.0).drop_duplicates().to_numpy()
-    asked = (rows[list(APART)] / scale).fillna(0.0).to_numpy()
+    scale = train[list(contexts)].std()
+    known = (train[list(contexts)] / scale).fillna(0.0).drop_duplicates().to_numpy()
+    asked = (rows[list(contexts)] / scale).fillna(0.0).to_numpy()
     apart: FloatArray = np.sqrt(((asked[:, None, :] - known[None, :, :]) ** 2).mean(axis=2)).min(axis=1)
     return apart
 
@@ -270,17 +279,18 @@ def show_faults(found: Faults) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--shared", type=Path, required=True, help="folder that holds data/")
-    parser.add_argument("--table", type=Path, required=True, help="runs of the arducopter profile's training")
+    parser.add_argument("--table", type=Path, required=True, help="runs of the profile's training")
+    parser.add_argument("--platform", choices=sorted(FAULTS), default="arducopter", help="default: arducopter")
     parser.add_argument("--profiles", type=Path, help="folder of profiles to judge; default: the bundled ones")
     parser.add_argument("--folds", type=int, default=5, help="parts of the missions; 0 leaves this out")
     args = parser.parse_args()
-    profile = load_profile("arducopter" if args.profiles is None else args.profiles / "arducopter")
+    profile = load_profile(args.platform if args.profiles is None else args.profiles / args.platform)
     schema = profile.schema
     frame = read_table(args.table, schema)[list(schema.variables)]
     inputs = [v.name for v in (*schema.options, *schema.contexts)]
     filled = frame.fillna({v.name: frame[v.name].median() for v in schema.contexts})
     peer = PlainClassifier(filled, all_met(frame, schema) == 1.0, inputs)
-    show_faults(judge_faults(profile, args.shared / "data" / "varied" / "faults", peer))
+    show_faults(judge_faults(profile, args.shared / "data" / FAULTS[args.platform] / "faults", peer))
     if args.folds:
         show_left_out(left_out(frame, schema, args.folds), frame, schema)
 
