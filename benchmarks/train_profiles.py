@@ -16,6 +16,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks.nav2_names import on_move_base
 from care_core.files import bundled
 from care_core.learn.card import model_card
 from care_core.learn.table import read_table
@@ -37,6 +38,8 @@ class Source:
     origin: str
     hardware: str = ""
     """A table with the columns `tag` and `hardware`: logs in which hardware failed teach nothing about parameters."""
+    from_move_base: bool = False
+    """The logs are of move_base, whatever the profile reads."""
 
 
 SOURCES = {
@@ -68,6 +71,12 @@ SOURCES = {
         ("data/care/cure_turtlebot3_1000.csv",),
         "1000 TurtleBot 3 missions in Gazebo from the CURE artifact (Hossen et al. 2025, MIT license).",
     ),
+    "nav2": Source(
+        ("data/move_base/train.tar.xz",),
+        "The 301 missions of move_base on ROS 1 that its own profile was learned from, read under the names and units "
+        "of Nav2; no mission of Nav2 was seen.",
+        from_move_base=True,
+    ),
     "husky-care": Source(
         ("data/care/care_husky_sim_399.csv",),
         "399 Husky missions in Gazebo from the CaRE artifact (Hossen et al. 2023, MIT license).",
@@ -85,6 +94,7 @@ def runs_table(source: Source, schema: Schema, shared: Path, folder: Path) -> Pa
             archive.extractall(folder / schema.name, filter="data")
     table = folder / f"{schema.name}.parquet"
     broken = with_failing_hardware(shared / source.hardware) if source.hardware else frozenset()
+    schema = on_move_base(schema) if source.from_move_base else schema
     logs = [log for log in find_logs([folder / schema.name]) if log.stem not in broken]
     found = ingest(logs, schema, table, progress=lambda _step, _share: None)
     for failure in found.failures:

@@ -48,6 +48,14 @@ def _beyond(fix: Fix, result: ObjectiveResult) -> float:
     return sign * (predicted.value - bound.value) / (abs(bound.value) or 1.0)
 
 
+def untried(fix: Fix, learned_elsewhere: str) -> str | None:
+    """Why a fix is not advised that rests on other robots alone, with what it suspects, else None."""
+    if not learned_elsewhere:
+        return None
+    suspected = ", ".join(change.option.name for change in fix.changes)
+    return f"{learned_elsewhere}, so no change is advised; look at {suspected}, and carry it over with 'care update'"
+
+
 def falls_short(fix: Fix, broken: Sequence[ObjectiveResult]) -> str | None:
     """Why a fix is not advised that is less likely than not to repair the run, with what it reaches, else None."""
     if fix.p_fixed >= ENOUGH:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import World
 from care_core.diagnose import provenance
-from care_core.diagnose.advice import believed, falls_short, nearest, outweighed
+from care_core.diagnose.advice import believed, falls_short, nearest, outweighed, untried
 from care_core.diagnose.circumstances import circumstances, unusual
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
@@ -150,7 +150,7 @@ def diagnose(
     out_of_reach = next(filter(None, unheard.values()), None)
     abstained = out_of_reach or outweighed(hypotheses) or _abstains(case, faults, fixes)
     if abstained is None:
-        abstained = falls_short(fixes[0], broken)
+        abstained = falls_short(fixes[0], broken) or untried(fixes[0], schema.learned_elsewhere)
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     if abstained is None:
         faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)

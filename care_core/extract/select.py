@@ -53,7 +53,7 @@ def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P | None, Profile
     _refuse_unreadable(log)
     covered = [cover(log, candidate.schema) for candidate in candidates]
     fits = [fit_of(log, coverage) for coverage in covered]
-    order = sorted(range(len(fits)), key=lambda i: (_ORDER[fits[i].verdict], *_by_content(covered[i])))
+    order = sorted(range(len(fits)), key=lambda i: (_ORDER[fits[i].verdict], *_nearness(log, covered[i])))
     usable = [i for i in order if fits[i].verdict != "no"]
     if not usable:
         return None, _none_fits(log, covered, fits, order)
@@ -78,9 +78,12 @@ def fitting_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice
     return profile, choice
 
 
-def _by_content(coverage: Coverage) -> tuple[bool, int, int, str]:
-    """What was learned from such logs comes before what was carried over to them."""
-    return bool(coverage.schema.carried_over), -coverage.found, -coverage.names, coverage.schema.name
+def _nearness(log: Log, coverage: Coverage) -> tuple[int, int, int, str]:
+    """What was learned from such logs comes before what was carried over to them, and that before another stack's."""
+    stack, own = coverage.schema.match.get("stack", ""), log.facts.get("stack", "")
+    is_of_another = bool(own) and stack.casefold() not in own.casefold()
+    strange = 2 if is_of_another else 1 if coverage.schema.carried_over else 0
+    return strange, -coverage.found, -coverage.names, coverage.schema.name
 
 
 def _choice(coverage: Coverage, fit: Fit, others: Sequence[str] = ()) -> ProfileChoice:

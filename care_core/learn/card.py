@@ -161,8 +161,8 @@ def _limits(schema: Schema, model: Model) -> str:
     ]
     if schema.learned_elsewhere:
         lines.append(
-            f"For any log {schema.learned_elsewhere}: no confidence is above low and no limit is judged unless it is "
-            "given, until `care update` has carried it over to runs of the robot itself."
+            f"For any log {schema.learned_elsewhere}: no confidence is above low, no change is advised and no limit "
+            "is judged unless it is given, until `care update` has carried it over to runs of the robot itself."
         )
     unread = [v.name for v in schema.variables.values() if v.role is not Role.OPTION and v.extract is None]
     if schema.logs and unread:

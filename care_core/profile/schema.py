@@ -259,7 +259,8 @@ class Schema:
     known: frozenset[tuple[str, str]] = frozenset()
     """(cause, effect): direct effects that people know to be possible. Data say how large they are."""
     carried_over: str = ""
-    """What the profile was learned from, where that is not what its logs are of; empty where it is."""
+    """What the profile was learned from, where that is not what its logs are of: then it names suspects and advises no
+    change. Empty where it is."""
     firmware_window: tuple[tuple[int, ...], tuple[int, ...]] | None = None
     """First and last version of the firmware that the profile is good for, as far as each is written."""
     digest: str = field(default="", compare=False)

@@ -138,8 +138,10 @@ def _short_names(parameters: Sequence[str], known: Mapping[str, Variable], taken
     """A name each: the one that a bundled profile has for it, else as many of its last parts as tell it apart."""
     names: dict[str, str] = {}
     for parameter in parameters:
-        if parameter in known and known[parameter].name not in {*taken, *names.values()}:
-            names[parameter] = known[parameter].name
+        option = known.get(parameter)
+        is_own = option is not None and option.parameters[0] == parameter  # not a second key that the option sets too
+        if option is not None and is_own and option.name not in {*taken, *names.values()}:
+            names[parameter] = option.name
     for parameter in parameters:
         parts = [re.sub(r"\W", "_", part) for part in re.split(r"[/.]", parameter) if part] or ["parameter"]
         used = {*taken, *names.values()}

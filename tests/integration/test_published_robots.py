@@ -61,6 +61,7 @@ def test_a_bag_is_triaged_and_never_with_more_than_low_confidence(care: Care, re
     causes = [cause for fault in report["faults"] for cause in fault["causes"]]
     assert causes
     assert {cause["confidence"] for cause in causes} == {"low"}
+    assert report["fix"] is None
     judged = {one["name"]: one["status"] for one in report["objectives"]}
     assert [name for name, status in judged.items() if status == "fault"] == [
         "Mission_success" if name == "husky-care" else "Task_success_rate"
