@@ -91,9 +91,9 @@ def verdict_line(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
     if health.too_little:
         return robot + Content(clean(unjudged(health.findings) if health.findings else health.too_little))
     if first is None:
-        missed = ", ".join(clean(one.variable.name) for one in diagnosis.objectives if one.status == "fault")
-        nothing = Content("nothing out of the ordinary was found")
-        return robot + nothing + (Content(f", but {missed} missed") if missed else Content())
+        missed = sum(one.status == "fault" for one in diagnosis.objectives)
+        found = f"{missed} of {len(diagnosis.objectives)} objectives missed, no failed part found"
+        return robot + Content(found if missed else "nothing out of the ordinary was found")
     sign = {"critical": f"{glyphs.fault} ", "warning": "! ", "info": ""}[first.severity]
     return Content.assemble(robot, (sign + clean(first.title), "bold"), f" at {seconds(first.onset_s)}")
 
