@@ -317,11 +317,14 @@ def changes_of(fix: Fix) -> dict[str, float]:
 
 
 def predict(case: Case, changes: Mapping[str, float]) -> Fix:
-    """These changes with what they would bring; without any, what the same configuration would bring again."""
+    """These changes with what they would bring; without any, what the same configuration would bring again. What a
+    failed part or what the run met explains is taken off, as for the suggestion."""
+    from care_core.diagnose.advice import believed
     from care_core.diagnose.records import Fix
 
     if case.reading is None:
         raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
     answer = case.reading.question.ask(changes)
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
-    return Fix(answer.changes, answer.p_ok, predicted)
+    (fix,) = believed([Fix(answer.changes, answer.p_ok, predicted)], case.diagnosis.hypotheses)
+    return fix

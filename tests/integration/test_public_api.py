@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import care_core
+from care_core.diagnose.records import Hypothesis
 from care_core.errors import UsageError
 
 ROOT = Path(__file__).parents[2]
@@ -69,3 +71,12 @@ def test_a_case_keeps_its_log_open_and_reads_the_same_from_it(case: care_core.Ca
     trace = trace_of(case, signals_of(case)[0], whole_of(case), 40)
     assert trace.count > 0
     assert len(trace.columns) == 40
+
+
+def test_what_a_failed_part_explains_is_taken_off_every_prediction_as_off_the_suggestion(case: care_core.Case) -> None:
+    from care_core.application.case import predict
+
+    plain = predict(case, {"LAND_SPEED": 40.0})
+    half = (Hypothesis("hardware", "motor 2 lost thrust", 0.5), Hypothesis("parameter", "LAND_SPEED", 0.5))
+    doubted = predict(replace(case, diagnosis=replace(case.diagnosis, hypotheses=half)), {"LAND_SPEED": 40.0})
+    assert doubted.p_fixed == pytest.approx(plain.p_fixed / 2)
