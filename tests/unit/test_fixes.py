@@ -10,6 +10,7 @@ from care_core.causal.counterfactual import World
 from care_core.diagnose.fixes import (
     MAX_CHANGES,
     NEARLY,
+    _ranked,
     best_alone,
     candidate_values,
     change_notes,
@@ -97,6 +98,14 @@ def test_sets_grow_by_one_and_stay_inside(planted: Profile, driven: dict[str, fl
         assert 0 <= probability <= 1
         assert all(BY_NAME[name].accepts(value) for name, value in assignment.items())
         assert all(planted.model.supports(name, value) for name, value in assignment.items())
+
+
+def test_of_changes_that_do_the_same_the_smallest_is_first_and_what_does_more_is_before_both(planted: Profile) -> None:
+    here = planted_world(planted, inert=0.5, reserve=58)
+    ranked = _ranked(here, [{"inert": 0.0}, {"inert": 0.4}, {"reserve": 20.0}])
+    assert [next(iter(assignment.items())) for assignment, _ in ranked] == [
+        ("reserve", 20.0), ("inert", 0.4), ("inert", 0.0),
+    ]  # fmt: skip
 
 
 def test_nothing_free_nothing_found(planted: Profile) -> None:

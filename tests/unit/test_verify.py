@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 
 from care_core.configs.driven import same_value
 from care_core.diagnose.judging import judge
-from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, verify
+from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, _notes, verify
 from care_core.errors import ConfigError
 from care_core.report.document import build_document
 from care_core.report.reading import read_report
@@ -55,6 +55,15 @@ def test_a_change_that_was_made_and_did_what_it_promised() -> None:
     assert {check.variable.name: check.outcome for check in found.objectives} == {
         "success": "kept", "time": "recovered", "energy": "kept",
     }  # fmt: skip
+
+
+def test_another_version_of_the_profile_and_an_older_log_are_told() -> None:
+    run = replace(planted_run(), log=replace(planted_run().log, start="2024-05-01T10:00:00+00:00"))
+    assert list(_notes(promise(), run, SCHEMA)) == []
+    (told,) = _notes(replace(promise(), version="0"), run, SCHEMA)
+    assert told == "the report was written with version 0 of the profile, not 1"
+    (told,) = _notes(replace(promise(), start="2024-05-02T10:00:00+00:00"), run, SCHEMA)
+    assert told == "this log is older than the one of the report"
 
 
 def test_a_change_that_was_not_made() -> None:
