@@ -88,3 +88,10 @@ def test_without_a_model_only_a_failure_is_explained() -> None:
 
 def test_what_the_operator_did_counts_as_met() -> None:
     assert lead(weigh({}, 0.0, [finding(0.9, suspect="operation")], "no"))[0] == "world"
+
+
+def test_what_left_no_signal_weighs_as_much_as_chance_and_thrice_where_the_profile_fits_in_part() -> None:
+    for verdict, times in (("fits", 1.0), ("partly", 3.0)):
+        found = {one.what: one.probability for one in weigh({}, 0.0, (), verdict)}  # type: ignore[arg-type]
+        assert found["hardware"] / found["chance"] == pytest.approx(times)
+        assert found["world"] / found["chance"] == pytest.approx(times)
