@@ -259,8 +259,8 @@ _DRIVE = (
 # WP_PIVOT_RATE).
 _NO_LIMIT, _LEAST_THROTTLE, _PIVOT_RATE = 20.0, 30.0, 60.0
 # Fitted to the training drives: path error of a rover that stands nearly still, seconds in which its steering responds,
-# those more of one that steers by its wheels, and the part of a turn that leads it off.
-_POSITION_M, _RESPONSE_S, _WHEELS_S, _TURN_RAD = 0.55, 0.27, 0.18, 0.18
+# those more of a skid-steered one, and the part of a turn that leads it off.
+_POSITION_M, _RESPONSE_S, _SKID_S, _TURN_RAD = 0.55, 0.27, 0.18, 0.18
 
 
 @formula(*_DRIVE)
@@ -268,7 +268,7 @@ def drive_cruise_time(given: Given) -> FloatArray:
     """All legs of a rover without the waits at their ends.
 
     Speeding up and slowing down share the smaller of both limits, and the jerk is as large as it (AR_WPNav::init). A
-    vehicle that steers by its wheels stops at sharp corners and turns on the spot; others begin the next leg early.
+    skid-steered one stops at sharp corners and turns on the spot; others begin the next leg early.
     """
     speed, limit, count = _drive_speed(given), _drive_acceleration(given), np.maximum(given["legs"], 1)
     time, ramps, top = np.zeros_like(speed), np.zeros_like(speed), np.zeros_like(speed)
@@ -317,7 +317,7 @@ def drive_path_error(given: Given) -> FloatArray:
     leg = given["path_length"] / np.maximum(given["legs"], 1)
     fastest = np.minimum(_drive_speed(given), np.sqrt(_drive_acceleration(given) * leg))
     turn_s = _TURN_RAD / np.radians(np.maximum(given["turn_rate"], 1.0))
-    return np.asarray(_POSITION_M + fastest * (_RESPONSE_S + given["steering_kind"] * _WHEELS_S + turn_s))
+    return np.asarray(_POSITION_M + fastest * (_RESPONSE_S + given["steering_kind"] * _SKID_S + turn_s))
 
 
 @formula("path_length", "energy_per_metre")

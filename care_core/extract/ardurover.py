@@ -13,7 +13,7 @@ from care_core.extract.flight import NEEDS
 from care_core.extract.registry import Args, Mission, extractor, merge_needs, one_of
 from care_core.logs.base import Table, Wanted
 from care_core.run import Unavailable, Value
-from care_core.vehicles import steers_by_wheels
+from care_core.vehicles import is_skid_steered
 
 Floats = NDArray[np.float64]
 
@@ -95,8 +95,8 @@ def _usual_speed(driven: Table) -> float:
 
 @extractor("steering_kind", needs=NEEDS, unit="")
 def steering_kind(mission: Mission, args: Args) -> Value:
-    """1 of a rover that steers by the difference of its wheels, 0 of one that steers them."""
-    found = steers_by_wheels(mission.settings)
+    """1 of a skid-steered rover, which drives its sides apart, 0 of one with steered wheels."""
+    found = is_skid_steered(mission.settings)
     return Unavailable("no SERVOn_FUNCTION says how it steers") if found is None else float(found)
 
 

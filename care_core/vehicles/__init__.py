@@ -7,7 +7,7 @@ from care_core.vehicles.arming import method_words
 from care_core.vehicles.errors import error_kind, error_words, is_over
 from care_core.vehicles.events import event_words
 from care_core.vehicles.modes import Way, mode_name, mode_number, reason_words, way_of
-from care_core.vehicles.motors import Motor, motor_outputs, motors_of, steers_by_wheels
+from care_core.vehicles.motors import Motor, is_skid_steered, motor_outputs, motors_of
 from care_core.vehicles.parameters import Spelling, renamed, spelled_in, spellings
 from care_core.vehicles.self_written import is_self_written
 from care_core.vehicles.vehicle import UNLIKE_ROVERS, Kind, Vehicle, flies, vehicle_of
@@ -25,6 +25,7 @@ __all__ = [
     "flies",
     "is_over",
     "is_self_written",
+    "is_skid_steered",
     "method_words",
     "mode_name",
     "mode_number",
@@ -34,7 +35,6 @@ __all__ = [
     "renamed",
     "spelled_in",
     "spellings",
-    "steers_by_wheels",
     "vehicle_of",
     "way_of",
 ]

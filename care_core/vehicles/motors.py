@@ -42,7 +42,7 @@ def motor_outputs(settings: Driven) -> dict[int, int]:
     return outputs
 
 
-def steers_by_wheels(settings: Driven) -> bool | None:
+def is_skid_steered(settings: Driven) -> bool | None:
     """Whether a ground vehicle steers by driving its sides apart (SRV_Channel.h: k_throttleLeft 73, k_throttleRight
     74), rather than by a steered wheel or rudder (k_steering 26); None where no parameter says."""
     functions = {code(settings, f"SERVO{output}_FUNCTION") for output in range(1, _OUTPUTS + 1)}

@@ -15,7 +15,7 @@ from care_core.extract.flight import analyse
 from care_core.extract.registry import MISSION_KINDS, Mission, find_extractor
 from care_core.logs.base import Table
 from care_core.run import Unavailable, Value
-from care_core.vehicles import steers_by_wheels
+from care_core.vehicles import is_skid_steered
 
 KIND = MISSION_KINDS["ardupilot_flight"]
 HOME = (47.0, 8.0)
@@ -121,8 +121,8 @@ def test_what_the_vehicle_is_like() -> None:
     assert value(mission, "steering_kind") == 1.0
     assert value(mission, "full_throttle_speed") == pytest.approx(10.0)
     assert value(mission, "energy_per_metre") == pytest.approx(30.0)
-    assert steers_by_wheels({"SERVO1_FUNCTION": 26.0, "SERVO3_FUNCTION": 70.0}) is False
-    assert steers_by_wheels({"SERVO1_FUNCTION": 0.0}) is None
+    assert is_skid_steered({"SERVO1_FUNCTION": 26.0, "SERVO3_FUNCTION": 70.0}) is False
+    assert is_skid_steered({"SERVO1_FUNCTION": 0.0}) is None
 
 
 def test_of_a_vehicle_that_hardly_moved_nothing_is_known() -> None:
