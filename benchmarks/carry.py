@@ -1,12 +1,13 @@
 """A profile carried to a vehicle that training never saw, with none, 10 and 30 of its runs.
 
-    python -m benchmarks.carry --shared DIR --table arducopter.parquet [--kinds NAME...]
+    python -m benchmarks.carry --shared DIR --table arducopter.parquet [--kinds NAME...] [--quick]
 
 Each kind of vehicle (`settings.jsonl`) is left out of training with all its runs. The profile of the others is carried
 to it as `care update` does, with runs of some of its settings, and asked about the flights of its other settings: their
 time and energy with intervals, the verdict of each flight that was accomplished, and the probability that a
 configuration meets all objectives. Flights with failing hardware are left out throughout. Last, the failed flights of
-that kind (`faults/`) and the resets that were flown.
+that kind (`faults/`) and the resets that were flown. `--quick` is about time, energy and path alone, with the graph of
+the bundled profile and smaller mechanisms.
 """
 
 from __future__ import annotations
@@ -25,10 +26,12 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.travel import MEASURED
 from care_core.causal.counterfactual import World
-from care_core.causal.model import Model, Training
+from care_core.causal.graph import CausalGraph
+from care_core.causal.mechanisms import Mechanism
+from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.diagnose.judging import read_and_judge, world_of
 from care_core.learn.fitting import Effort
-from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
+from care_core.learn.outcomes import fit_outcomes, fit_total, groups_that_move_together, met
 from care_core.learn.relative import relative
 from care_core.learn.skill import all_met, calibration_error
 from care_core.learn.structure import learn_structure
@@ -43,6 +46,7 @@ from care_core.variables import Threshold
 KINDS = ("hexa", "payload", "draggy", "old_battery", "light")
 RUNS = (0, 10, 30)
 EFFORT = Effort(points=350, iterations=25, folds=5)
+QUICK = Effort(points=250, iterations=15, folds=5)
 DRAWS = 3
 
 
@@ -64,17 +68,29 @@ class Carried:
     reset_kept: list[float] = field(default_factory=list)
 
 
-def learn(frame: pd.DataFrame, schema: Schema) -> Model:
-    """A model of these runs, as far as predictions need one."""
+def learn(frame: pd.DataFrame, schema: Schema, known: CausalGraph | None) -> Model:
+    """A model of these runs, as far as predictions need one; with a known graph without the functional objectives."""
     rng = np.random.default_rng(0)
-    graph = learn_structure(frame, schema, rng=rng).graph
-    outcomes, mechanisms = fit_outcomes(frame, schema, graph, rng, effort=EFFORT)
+    graph = learn_structure(frame, schema, rng=rng).graph if known is None else known
+    outcomes, mechanisms = _outcomes(frame, schema, graph, rng, quick=known is not None)
     together = groups_that_move_together(schema, relative(frame, schema))
     training = Training(origin="", runs=len(frame), seed=0, alpha=0.01, resamples=0, moves_together=together)
     return Model(
         schema_digest=schema.digest, graph=graph, edges={}, bidirected=(), effects={}, paths={}, outcomes=outcomes,
         summaries=summaries(relative(frame, schema), schema), skill={}, training=training, mechanisms=mechanisms,
     )  # fmt: skip
+
+
+def _outcomes(
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, quick: bool
+) -> tuple[dict[str, OutcomeRecord], dict[str, Mechanism]]:
+    if not quick:
+        return fit_outcomes(frame, schema, graph, rng, effort=EFFORT)
+    fitted = {
+        v.name: fit_total(v.name, frame, schema, graph, rng, effort=QUICK) for v in schema.objectives if v.relative
+    }
+    found = {name: mechanism for name, mechanism in fitted.items() if mechanism is not None}
+    return {name: OutcomeRecord(objective=name, mechanism=name) for name in found}, found
 
 
 def carried(source: Model, schema: Schema, rows: pd.DataFrame) -> Model:
@@ -118,8 +134,9 @@ def ask(model: Model, schema: Schema, rows: pd.DataFrame, medians: Mapping[str, 
             if np.isfinite(kept[objective.name][i]):
                 own: Threshold = objective.relative.for_need(float(after.predict(objective.name, [there]).value[0]))
                 flagged |= not own.met(float(row[objective.name]))
-        found.odds.append(float(World(model, config, {}, limits).probability([config])[0]))
-        found.kept.append(float(everything[i]))
+        if "mission_success" in model.outcomes:
+            found.odds.append(float(World(model, config, {}, limits).probability([config])[0]))
+            found.kept.append(float(everything[i]))
         verdicts = [values[i] for values in kept.values()]
         if np.isfinite(verdicts).all() and row["mission_success"] == 1:
             fine = all(verdict == 1 for verdict in verdicts)
@@ -147,16 +164,20 @@ def ask_resets(profile: Profile, folder: Path, kind: str, found: Carried) -> Non
         found.reset_kept.extend(float(row["ok"]) for row in truth["tried"])
 
 
-def kind_left_out(frame: pd.DataFrame, schema: Schema, kind: str, profile: Profile, faults: Path) -> dict[int, Carried]:
+def kind_left_out(
+    frame: pd.DataFrame, schema: Schema, kind: str, profile: Profile, faults: Path, *, quick: bool
+) -> dict[int, Carried]:
     """One kind of vehicle, by the number of its runs."""
     others = frame[frame["vehicle"] != kind].reset_index(drop=True)
-    source = learn(others[list(schema.variables)], schema)
+    source = learn(others[list(schema.variables)], schema, profile.model.graph if quick else None)
     medians = {v.name: float(others[v.name].median()) for v in schema.contexts}
     found = {count: Carried() for count in RUNS}
     for own, rest in draws(frame[frame["vehicle"] == kind]):
         for count in RUNS:
             model = carried(source, schema, own[:count].reset_index(drop=True))
             ask(model, schema, rest, medians, found[count])
+            if quick:
+                continue
             there = Profile(profile.path, schema)
             there.__dict__["model"] = model
             ask_resets(there, faults, kind, found[count])
@@ -167,7 +188,8 @@ def show(kind: str, found: Mapping[int, Carried]) -> None:
     for count, one in found.items():
         cells = [f"{np.sqrt(np.mean(np.square(one.error[n]))):6.1%} {np.mean(one.inside[n]):5.0%}" for n in MEASURED]
         odds, kept = np.array(one.odds), np.array(one.kept)
-        cells += [f"{calibration_error(odds, kept):.3f} {np.mean((odds - kept) ** 2):.3f}"]
+        if len(odds):
+            cells += [f"{calibration_error(odds, kept):.3f} {np.mean((odds - kept) ** 2):.3f}"]
         resets, fixed = np.array(one.reset_odds), np.array(one.reset_kept)
         if len(resets):
             cells += [
@@ -210,6 +232,7 @@ def main() -> None:
     parser.add_argument("--shared", type=Path, required=True, help="folder that holds data/")
     parser.add_argument("--table", type=Path, required=True, help="runs of the arducopter profile's training")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--quick", action="store_true", help="time, energy and path alone, in a minute")
     args = parser.parse_args()
     profile = load_profile("arducopter")
     schema = profile.schema
@@ -220,7 +243,7 @@ def main() -> None:
     parts = []
     with threadpool_limits(1):
         for kind in args.kinds:
-            parts.append(kind_left_out(frame, schema, kind, profile, varied / "faults"))
+            parts.append(kind_left_out(frame, schema, kind, profile, varied / "faults", quick=args.quick))
             show(kind, parts[-1])
     show("all", together(parts))
 

@@ -2,9 +2,9 @@
 
 What the robots share is the structure: the source's graph is kept, completed by what the target's runs show where they
 are many. Each mechanism starts from the source's, and what the source leaves of the target's runs is either one step
-that they have in common (shrunk towards none) or, where there are enough runs and it predicts runs left out better, a
-Gaussian process beside a share of the source. Far from the target's runs the answer is the source's, shifted; near them
-it is theirs.
+that they have in common (shrunk towards none) or, where there are enough missions and it predicts those left out
+better, a Gaussian process beside a share of the source. Far from the target's runs the answer is the source's, shifted;
+near them it is theirs.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ TRUST = 10.0
 """Target runs that the source's own scale (a share of 1) and its own noise count as."""
 FEWEST = 3
 """Fewer runs say nothing of what they have in common."""
+ENOUGH_MISSIONS = 10
+"""Thirty runs of three missions let a regression learn the missions by heart: energies were off by 20 %, not by 5 %."""
 ENOUGH_FOR_EFFECTS = 100
 """With fewer runs the graph and the effects stay the source's: a profile has some hundred variables."""
 
@@ -220,7 +222,7 @@ def started_from(
         keep = np.sort(rng.choice(len(y), effort.points, replace=False))
         x, y, groups = x[keep], y[keep], groups[keep]
     moved = _moved(source, x, y, inputs, groups)
-    if len(y) < MIN_ROWS or np.ptp(y) == 0:
+    if len(y) < MIN_ROWS or len(np.unique(groups)) < ENOUGH_MISSIONS or np.ptp(y) == 0:
         return moved.mechanism
     beside = _with_regression(source, x, y, inputs, groups, rng, effort)
     return moved.mechanism if moved.loss <= beside.loss else beside.mechanism

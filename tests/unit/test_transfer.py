@@ -10,7 +10,9 @@ import pytest
 
 from care_core.causal.mechanisms import Mechanism
 from care_core.errors import LearningError
-from care_core.learn.transfer import carry_over, out_of_support, update
+from care_core.learn.fitting import Effort
+from care_core.learn.outcomes import inputs_of
+from care_core.learn.transfer import carry_over, out_of_support, started_from, update
 from care_core.profile.model import read_model, write_model
 from care_core.profile.store import Profile
 from tests.planted import DEFAULTS, SCHEMA, SETTINGS, fly_many
@@ -129,3 +131,13 @@ def test_what_the_source_does_not_know_a_carried_mechanism_does_not_know_either(
         variance, covariance, here = carried.around(x, near)
         assert np.all(np.abs(covariance) <= np.sqrt(variance * here) * (1 + 1e-6))
     assert carried.ignorance(near)[0] < carried.ignorance(far)[0]
+
+
+def test_many_runs_of_few_missions_are_no_regression(planted: Profile) -> None:
+    source, runs = planted.model.mechanisms["energy"], heavier(fly_many(40, seed=8)).dropna(subset=["energy"])
+    inputs = inputs_of(source.inputs, SCHEMA)
+    x, y = runs[list(source.inputs)].to_numpy(float), runs["energy"].to_numpy(float)
+    quick = Effort(points=120, iterations=15)
+    of_three = started_from(source, x, y, inputs, np.arange(len(y)) % 3, np.random.default_rng(0), quick)
+    assert len(of_three.reads) == 0
+    assert of_three.prior == (source, 1.0)
