@@ -22,6 +22,8 @@ _PATIENCE_S = 1e9
 """How long a goal may take where nobody gave it a time."""
 _GOAL = "ActionGoal"
 """How the types of a ROS 1 action's goals end."""
+_STATUS = "/_action/status"
+"""How the topics end on which ROS 2 actions tell of their goals."""
 _DRIVES = "move_base", "navigate", "nav", "goto"
 """Part of the name of an action that drives: of a robot with an arm as well, its drive is judged."""
 
@@ -45,7 +47,8 @@ def _missions(log: Log) -> Iterator[Mapping[str, Any]]:
     else:
         for action in _actions(log.channels()):
             yield {"kind": actionlib.KIND, "action": action, "goal_timeout_s": _PATIENCE_S}
-        yield {"kind": nav2.KIND, "goal_timeout_s": _PATIENCE_S}
+        if any(one.count and one.name.endswith(_STATUS) for one in log.channels()):
+            yield {"kind": nav2.KIND, "goal_timeout_s": _PATIENCE_S}
 
 
 def _actions(channels: tuple[Channel, ...]) -> list[str]:
