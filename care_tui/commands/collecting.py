@@ -26,7 +26,9 @@ def collect(
     ] = False,
     json: AsJson = False,
 ) -> None:
-    """Vary options, run your command for each configuration, and read its logs into a table of runs for 'care train'.
+    """Vary options and run your command for each configuration.
+
+    Its logs are read into a table of runs for 'care train'.
 
     What is interrupted goes on where it was when the command is given again. Ends with 0 every run gave a mission, 3
     some did not, 4 none did.
