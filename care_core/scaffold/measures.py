@@ -14,6 +14,7 @@ from care_core.profile.schema import Schema
 from care_core.run import Run, Unavailable, is_known
 from care_core.scaffold.seen import Seen
 from care_core.variables import Extract, Role, Threshold, Variable
+from care_core.vehicles import vehicle_of
 
 _NUMBERS = ("Float32", "Float64", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64")
 _SIGNALS: Mapping[str, tuple[tuple[str, str, Role, str], ...]] = {
@@ -78,7 +79,8 @@ class Measures:
 
 def find_measures(logs: Sequence[Seen], spec: Mapping[str, Any], bundled: Sequence[Schema]) -> Measures:
     """Try on the logs what the bundled profiles of the same kind of mission measure, and signals of their channels."""
-    candidates = [*_bundled_measures(str(spec["kind"]), bundled), *_objectives_of(str(spec["kind"]))]
+    vehicle = vehicle_of(logs[0].log.facts, logs[0].settings).kind
+    candidates = [*_bundled_measures(str(spec["kind"]), vehicle, bundled), *_objectives_of(str(spec["kind"]))]
     types = {name: kind for log in logs for name, kind in log.channels.items()}
     named = set(MISSION_KINDS[str(spec["kind"])].needs(spec)) if spec["kind"] != "recording" else set()
     candidates += _signals(types, named, {one.name for one in candidates})
@@ -111,11 +113,14 @@ def _sort_in(found: Measures, variable: Variable) -> None:
     found.left[variable.name] = why[:_WHY_SHORT]
 
 
-def _bundled_measures(kind: str, bundled: Sequence[Schema]) -> list[Variable]:
-    """Contexts, metrics and objectives of profiles of this kind of mission, each once; the largest profile first."""
+def _bundled_measures(kind: str, vehicle: str, bundled: Sequence[Schema]) -> list[Variable]:
+    """Contexts, metrics and objectives of profiles of this kind of mission, each once: first of the same vehicle, then
+    of the largest profile."""
     family = type(MISSION_KINDS[kind])
     schemas = [one for one in bundled if type(MISSION_KINDS.get(str(one.mission.get("kind")))) is family]
-    schemas.sort(key=lambda one: (one.mission.get("kind") != kind, -len(one.variables)))
+    schemas.sort(
+        key=lambda one: (one.mission.get("kind") != kind, one.match.get("vehicle") != vehicle, -len(one.variables))
+    )
     found: dict[str, Variable] = {}
     for schema in schemas:
         for variable in schema.variables.values():
