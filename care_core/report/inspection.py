@@ -137,7 +137,15 @@ class InspectDocument(_Model):
 
 def build_inspection(log: Log, trials: Sequence[Trial], choice: ProfileChoice, health: Health) -> InspectDocument:
     """The document of a log and the installed profiles. Text of the log is made safe to show."""
-    ranked = sorted(trials, key=lambda t: (not t.is_usable, -t.coverage.found, t.coverage.schema.name))
+    ranked = sorted(
+        trials,
+        key=lambda t: (
+            not t.is_usable,
+            bool(t.coverage.schema.carried_over),
+            -t.coverage.found,
+            t.coverage.schema.name,
+        ),
+    )
     profiles = [_profile(trial) for trial in ranked]
     channels = [
         ChannelEntry(name=clean(c.name), type=clean(c.type), count=c.count, rate_hz=_finite(c.rate_hz))

@@ -58,7 +58,9 @@ def _limit(objective: Measure, good: Sequence[int], *, alike: bool) -> Limit:
     if variable.kind == "functional" and variable.threshold is not None:
         return Limit(variable.threshold, "met or not met")
     seen = [value for place in good if (value := objective.values[place]) is not None]
-    if alike and seen and min(seen) > 0:
+    bound = variable.threshold or variable.relative
+    is_ceiling = bound is None or bound.op in ("<=", "<")
+    if alike and seen and min(seen) > 0 and is_ceiling:
         found = upper_quantile([math.log(value) for value in seen])
         if found is not None:
             said = f"what 95 % of runs like the {len(seen)} good ones keep ({min(seen):.4g} to {max(seen):.4g})"
@@ -66,6 +68,8 @@ def _limit(objective: Measure, good: Sequence[int], *, alike: bool) -> Limit:
         worst = max(seen)
         said = f"{RATIO:g} x the largest of {len(seen)} good runs ({min(seen):.4g} to {worst:.4g})"
         return Limit(Threshold("<=", float(f"{RATIO * worst:.3g}")), said)
+    if not is_ceiling and variable.threshold is not None:
+        return Limit(variable.threshold, "that of the profile it is from: correct it")
     why = "nothing says that the logs hold the same mission" if seen else "no run was good"
     return Limit(_ratio(variable), f"a ratio: {why}")
 

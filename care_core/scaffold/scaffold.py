@@ -49,7 +49,7 @@ def scaffold(logs: Sequence[Seen], name: str, bundled: Sequence[Schema]) -> Scaf
         LogError: the logs hold neither parameters nor anything that can be measured.
     """
     _refuse_mixed(logs)
-    readers = [one for one in bundled if logs[0].log.format.value in one.logs]
+    readers = [one for one in bundled if logs[0].log.format.value in one.logs and not one.carried_over]
     missions = find_missions(logs, readers)
     measures = find_measures(logs, missions.spec, readers)
     taken = {one.variable.name for one in measures.kept}
