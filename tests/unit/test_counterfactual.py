@@ -13,7 +13,7 @@ from care_core.causal.mechanisms import TAIL
 from care_core.profile.store import Profile
 from care_core.run import Unavailable
 from care_core.variables import Threshold
-from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run, world_of
+from tests.planted import DEFAULTS, OPTIONS, SCHEMA, fly_many, planted_run, world_of
 
 BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
 CONFIGS = st.fixed_dictionaries(
@@ -169,3 +169,13 @@ def test_a_bound_above_and_a_bound_below_are_complements(planted: Profile) -> No
 def test_a_bound_outside_what_the_target_can_be(planted: Profile, op: str, probability: float) -> None:
     bound = Threshold(op, -5.0)  # type: ignore[arg-type]
     assert world(planted, bounds={"time": bound}).predict("time", [DEFAULTS]).p_ok[0] == pytest.approx(probability)
+
+
+def test_the_interval_of_a_new_mission_holds_four_in_five(planted: Profile) -> None:
+    flown = fly_many(150, seed=7)
+    flown = flown[flown["time"].notna()]
+    configs = flown[list(DEFAULTS)].to_dict("records")
+    for name in ("time", "energy"):
+        p = world(planted, {}).predict(name, [{str(key): value for key, value in one.items()} for one in configs])
+        seen = flown[name].to_numpy()
+        assert 0.65 < np.mean((p.low <= seen) & (seen <= p.high)) < 0.93
