@@ -217,7 +217,7 @@ async def test_a_log_that_is_cut_off_before_its_mission_tells_what_is_there(tmp_
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         assert walk(app).step == 1
-        assert "What keeps the nearest from fitting" in text(app)
+        assert "What would make one fit" in text(app)
         assert "breaks off inside a record" in text(app)
         for key, name in (("m", "Messages"), ("p", "Signals"), ("t", "Missions")):
             await settle(pilot, key)
