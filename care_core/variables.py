@@ -100,6 +100,15 @@ class Extract:
 
 
 @dataclass(frozen=True, slots=True)
+class Events:
+    """The like parts of a mission, each with noise of its own: the context that counts them, and the metric that holds
+    the standard deviation of the logarithm of what each took."""
+
+    count: str
+    variation: str
+
+
+@dataclass(frozen=True, slots=True)
 class Variable:
     """One declared variable of a profile.
 
@@ -126,15 +135,19 @@ class Variable:
     kind: Kind | None = None
     threshold: Threshold | None = None
     relative: RelativeThreshold | None = None
-    """The bound of an objective that has no fixed one."""
+    """The bound of an objective that has no fixed one, or has one for the profile's own mission alone."""
     own_limit: OwnLimit | None = None
     """Where the bound is from, where it is not the profile's."""
     grows: bool = False
     """Whether an objective only grows while the mission lasts: past its limit it is broken, however that ends."""
+    accuracy: float = 0.0
+    """Share of an objective's value within which a log tells it."""
     about: About = "world"
     """What a context tells of."""
     nominal: Extract | None = None
     """What physics says the value is: the name of a formula, and the variables that are its arguments."""
+    events: Events | None = None
+    """The like parts that the value is a sum over, where there are any."""
     extract: Extract | None = None
     order: int | None = None
     """Place in the mission, or in the making of a number out of others: a variable never causes one of a lower

@@ -50,13 +50,13 @@ def kinship(mechanism: Mechanism, x: FloatArray, here: FloatArray, persistence: 
     Args:
         x: shape (m, p). here: shape (1, p). persistence: share of the noise variance, 0 to 1.
     """
-    noise = mechanism.noise_sd**2
+    noise, own = mechanism.noise_at(x) ** 2, float(mechanism.noise_at(here)[0]) ** 2
     variance, covariance, unsure = mechanism.around(x, here)
     return Kinship(
         variance=variance + noise,
-        covariance=covariance + persistence * noise,
-        here=unsure + noise,
-        repeated=unsure + persistence * noise,
+        covariance=covariance + persistence * np.sqrt(noise * own),
+        here=unsure + own,
+        repeated=unsure + persistence * own,
     )
 
 

@@ -163,7 +163,7 @@ class World:
             kin = kinship(mechanism, x, here, self._persistence(outcome.objective))
             centre, sd = next_value(kin, latent, float(mechanism.latent(here)[0]), seen)
         else:
-            centre, sd = latent, np.sqrt(mechanism.latent_sd(x) ** 2 + mechanism.noise_sd**2)
+            centre, sd = latent, np.sqrt(mechanism.latent_sd(x) ** 2 + mechanism.noise_at(x) ** 2)
         bound = self.thresholds.get(outcome.objective)
         low, high = (restored(centre + mechanism.error_quantile(q) * sd, mechanism.transform) for q in INTERVAL)
         p_ok = np.full(len(configs), np.nan) if bound is None else _probability_of(mechanism, bound, centre, sd)

@@ -85,6 +85,16 @@ class Kernel:
         return self.additive**2 + self.joint**2
 
 
+@dataclass(frozen=True, slots=True)
+class Averaging:
+    """Noise that averages out over the like parts of a mission (its goals): `share` of the noise variance belongs to
+    each part alone in missions of `usual` parts; `count` is the input that counts them. One part alone has more."""
+
+    count: str
+    usual: float
+    share: float
+
+
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     """One mechanism: a regression of the (transformed) target on its inputs.
@@ -104,6 +114,7 @@ class Mechanism:
         prior: of a mechanism carried over from another platform: that platform's mechanism and the share of its
             prediction that is kept. The regression is then of what that leaves.
         nominal: what physics says of the target. The regression is then of the logarithm of the ratio to it.
+        averaging: what of the noise depends on how many like parts a mission has.
     """
 
     inputs: tuple[str, ...]
@@ -122,6 +133,7 @@ class Mechanism:
     calibration: FloatArray
     prior: tuple[Mechanism, float] | None = None
     nominal: Nominal | None = None
+    averaging: Averaging | None = None
 
     def scaled(self, x: FloatArray) -> FloatArray:
         """Inputs in their own units, shape (m, p), to the scale and the columns that the kernel sees, shape (m, q)."""
@@ -219,8 +231,16 @@ class Mechanism:
 
     @property
     def noise_sd(self) -> float:
-        """Standard deviation of a run around the mechanism, on the transformed scale."""
+        """Standard deviation of a training run around the mechanism, on the transformed scale."""
         return self.scale * self.kernel.noise
+
+    def noise_at(self, x: FloatArray) -> FloatArray:
+        """The same for missions of any number of parts, shape (m,)."""
+        if self.averaging is None:
+            return np.full(len(x), self.noise_sd)
+        parts = np.maximum(self._columns(x, (self.averaging.count,))[:, 0], 1.0)
+        share = self.averaging.share
+        return np.asarray(self.noise_sd * np.sqrt(1 - share + share * self.averaging.usual / parts))
 
     def probability(self, x: FloatArray) -> FloatArray:
         """Binary targets: probability of 1, shape (m,)."""
@@ -246,7 +266,7 @@ class Mechanism:
         was expected there. x: (1, p). An error that no training run had is 0 or 1."""
         if value <= LEAST[self.transform]:
             return 0.0, float(self.expected(x)[0])
-        sd = np.sqrt(self.latent_sd(x) ** 2 + self.noise_sd**2)
+        sd = np.sqrt(self.latent_sd(x) ** 2 + self.noise_at(x) ** 2)
         z = (transformed(np.array([value]), self.transform) - self.latent(x)) / sd
         share = np.searchsorted(self.calibration, z)[0] / len(self.calibration)
         return float(share), float(self.expected(x)[0])

@@ -38,22 +38,23 @@ def circumstances(run: Run, world: World, schema: Schema) -> tuple[Circumstance,
 
 def unusual(run: Run, profile: Profile) -> tuple[str, ...]:
     """What of this mission the profile does not know: another mission, conditions beyond its training."""
-    found = [run.mission.mismatch] if run.mission.mismatch else []
+    found = [run.mission.mismatch] if run.mission.mismatch and not profile.schema.travels else []
     for variable in profile.schema.contexts:
         value, summary = run.context.get(variable.name), profile.model.summaries.get(variable.name)
         is_asked = run.checks and variable.about == "mission"  # of a flight that followed no mission
         if summary is None or not is_known(value) or is_asked:
             continue
-        margin = max(BEYOND * (summary.high - summary.low), NEAR * abs(summary.high))
-        if not summary.low - margin <= value <= summary.high + margin:
+        low, high = _range_seen(variable, summary)
+        margin = max(BEYOND * (high - low), NEAR * abs(high))
+        if not low - margin <= value <= high + margin:
             what = f"{variable.doc or variable.name} of {figures(value)} {variable.unit}".rstrip()
-            found.append(f"{what} is outside the training runs ({_seen(summary)})")
+            found.append(f"{what} is outside the training runs ({_seen(low, high)})")
     return tuple(found)
 
 
-def _seen(summary: Summary) -> str:
-    low, high = figures(summary.low), figures(summary.high)
-    return f"always {low}" if low == high else f"{low} to {high}"
+def _seen(low: float, high: float) -> str:
+    least, most = figures(low), figures(high)
+    return f"always {least}" if least == most else f"{least} to {most}"
 
 
 def _shown(run: Run, world: World, schema: Schema) -> Iterator[Circumstance]:
@@ -111,14 +112,21 @@ def _unsupported(run: Run, world: World, schema: Schema) -> Iterator[Circumstanc
     """Contexts outside everything that training saw, on either side."""
     for variable in schema.contexts:
         value, summary = run.context.get(variable.name), world.model.summaries.get(variable.name)
-        if summary is None or not is_known(value) or summary.low <= value <= summary.high:
+        if summary is None or not is_known(value):
             continue
-        if _same(value, summary.low) or _same(value, summary.high):
+        least, most = _range_seen(variable, summary)
+        if least <= value <= most or _same(value, least) or _same(value, most):
             continue
         low, high = _span(summary)
         text = f"{variable.doc or variable.name}: {figures(value)} {variable.unit}".rstrip()
-        text += f" is outside the training runs ({_seen(summary)})"
+        text += f" is outside the training runs ({_seen(least, most)})"
         yield Circumstance("outside support", variable.name, value, variable.unit, low, high, 0.0, text)
+
+
+def _range_seen(variable: Variable, summary: Summary) -> tuple[float, float]:
+    """What training saw of a context: its runs, and what the profile says of their parts."""
+    low, high = variable.range or (summary.low, summary.high)
+    return min(low, summary.low), max(high, summary.high)
 
 
 def _span(summary: Summary) -> tuple[float, float]:

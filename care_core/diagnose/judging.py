@@ -151,11 +151,14 @@ def judge(
     """
     own = dict(thresholds or {})
     schema = _without_limits_of(own, schema)
-    bounds = thresholds_in_force(schema, own)
+    bounds = thresholds_in_force(schema, own, elsewhere=bool(run.mission.mismatch))
     so_far = run.objectives
     run = replace(run, objectives=meaningful(run, schema, bounds, own))
     if model is None:
-        results = (_judge_one(o, run.objectives.get(o.name), bounds.get(o.name)) for o in schema.objectives)
+        results = (
+            _judge_one(o, run.objectives.get(o.name), bounds.get(o.name), literal=_is_literal(o, own))
+            for o in schema.objectives
+        )
         return Judged(run, bounds, own, tuple(results), tuple(map(_judge_check, run.checks)))
     reference = reference_of(run, schema, model, good)
     world = World(
@@ -168,9 +171,10 @@ def judge(
     )
     needs: dict[str, Need] = {}
     for objective in schema.objectives:
-        asked = objective.relative and objective.name not in own and _has_inputs(objective, run, schema)
-        need = need_of(objective.name, world) if asked else None
-        if need is not None and objective.relative is not None:
+        if objective.relative is None or objective.name in bounds or not _has_inputs(objective, run, schema):
+            continue
+        need = need_of(objective.name, world)
+        if need is not None:
             needs[objective.name] = need
             bounds[objective.name] = objective.relative.for_need(need.value)
     past = _past_their_limits(run, so_far, schema, bounds, needs)
@@ -183,6 +187,7 @@ def judge(
             model.summary_at(objective.name, reference.config),
             needs.get(objective.name),
             so_far=objective.name in past,
+            literal=_is_literal(objective, own),
         )
         for objective in schema.objectives
     )
@@ -277,7 +282,7 @@ def meaningful(
 def _of_another_mission(objective: Variable, run: Run) -> str:
     """Why the threshold in force is not one of this run's mission, empty where it is."""
     if objective.own_limit is None:
-        return run.mission.mismatch
+        return "" if objective.relative is not None else run.mission.mismatch
     return objective.own_limit.mismatch(run.context)
 
 
@@ -297,11 +302,17 @@ def _without_limits_of(named: Container[str], schema: Schema) -> Schema:
     return replace(schema, variables={**schema.variables, **freed}) if freed else schema
 
 
-def thresholds_in_force(schema: Schema, overrides: Mapping[str, float]) -> dict[str, Threshold]:
-    """The profile's thresholds with the operator's values put in."""
+def thresholds_in_force(
+    schema: Schema, overrides: Mapping[str, float], *, elsewhere: bool = False
+) -> dict[str, Threshold]:
+    """The profile's fixed thresholds with the operator's values put in.
+
+    Args:
+        elsewhere: the mission is not the profile's own, so what has a ratio too is bounded by that.
+    """
     bounds: dict[str, Threshold] = {}
     for objective in schema.objectives:
-        bound = objective.threshold
+        bound = None if elsewhere and objective.relative is not None else objective.threshold
         if objective.name in overrides:
             declared = bound or objective.relative
             bound = Threshold(declared.op if declared else "<=", overrides[objective.name])
@@ -338,7 +349,9 @@ def _judge_one(
     need: Need | None = None,
     *,
     so_far: bool = False,
+    literal: bool = False,
 ) -> ObjectiveResult:
+    """`literal`: the bound is the operator's, who knows how well it can be told."""
     if value is None:
         reason = "the profile does not say how to read it from a log"
         return ObjectiveResult(objective, None, bound, "not_evaluated", reason, need=need)
@@ -348,10 +361,24 @@ def _judge_one(
     if bound is None:
         return ObjectiveResult(objective, value, None, "not_evaluated", "no threshold: give one with --threshold")
     status: Status = "ok" if bound.met(value) else "fault"
+    reason = ""
+    if status == "fault" and not literal and _is_too_close(objective, value, bound):
+        status, reason = "ok", f"beyond its limit by less than the {objective.accuracy:.1%} to which a log tells it"
     # A yes-or-no result has no place among others.
     percentile = summary.percentile(value) if summary and objective.kind == "non-functional" else None
-    reason = "so far: the log ends before the mission does" if so_far else ""
+    if so_far:
+        reason = "so far: the log ends before the mission does"
     return ObjectiveResult(objective, value, bound, status, reason, percentile=percentile, need=need)
+
+
+def _is_literal(objective: Variable, own: Container[str]) -> bool:
+    """Whether the bound is the operator's, for this run or for the site."""
+    return objective.name in own or objective.own_limit is not None
+
+
+def _is_too_close(objective: Variable, value: float, bound: Threshold) -> bool:
+    """Whether a value off its bound may be within it, for all that a log can tell."""
+    return any(bound.met(value * (1 + side * objective.accuracy)) for side in (-1, 1))
 
 
 def _judge_check(check: Check) -> ObjectiveResult:

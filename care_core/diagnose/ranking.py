@@ -14,12 +14,14 @@ from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.configs.driven import same_value
 from care_core.diagnose.records import PathNode
-from care_core.diagnose.symptoms import pointers
+from care_core.diagnose.symptoms import NOTHING, pointers
 from care_core.run import Evidence, Run, is_known
 from care_core.variables import Role
 
 FELT = 0.05
 """Effect times support, in standard deviations, from which an edge is taken to carry something of this run."""
+HARDLY = 0.01
+"""Share of its acceptable range by which an option may be off its reference and be as good as at it."""
 PERMUTATIONS = 12
 """Orders of reset per Shapley estimate, each also taken backwards."""
 
@@ -79,19 +81,35 @@ def suspects(
     shares = _shapley(learned, lambda sets: world.predict(objective, [_reset(world, s) for s in sets]).p_ok)
     contribution = {**dict.fromkeys(names, 0.0), **dict(zip(learned, map(float, shares), strict=True))}
     unexplained = max(0.0, 1.0 - sum(max(0.0, share) for share in contribution.values()))
-    pointer = pointers(world, objective, names, known, said)
+    pointer = pointers(world, objective, _acting_where_it_failed(world, objective, names, said), known, said)
     found = [
         Suspect(
             option=name,
             contribution=contribution[name],
             path=paths[name],
             effect=effects[name],
-            weight=contribution[name] + unexplained * pointer[name].share,
-            symptom=pointer[name].metric,
+            weight=contribution[name] + unexplained * pointer.get(name, NOTHING).share,
+            symptom=pointer.get(name, NOTHING).metric,
         )
         for name in names
     ]
     return tuple(sorted(found, key=lambda s: (-s.weight, -s.total_effect, s.option)))
+
+
+def _acting_where_it_failed(world: World, objective: str, names: Sequence[str], said: Sequence[Evidence]) -> list[str]:
+    """The options that the graph lets act on the stage at which the run failed, and those that a message names; all
+    where it tells of none.
+
+    One that is hardly off its reference shows in no symptom.
+    """
+    outcome = world.model.outcomes.get(objective)
+    names = [n for n in names if world.variables[n].distance(world.config[n], world.reference[n]) > HARDLY]
+    for stage in outcome.stages if outcome is not None else ():
+        seen = world.known(stage.variable)
+        if stage.variable != objective and seen is not None and seen != stage.passes:
+            acting = world.model.graph.ancestors(stage.variable).union(*(message.options for message in said))
+            return [name for name in names if name in acting] or names
+    return names
 
 
 def not_ruled_out(world: World, objective: str, found: Sequence[Suspect]) -> tuple[Suspect, ...]:

@@ -32,6 +32,9 @@ class Pointer:
     metric: str | None
 
 
+NOTHING = Pointer(0.0, None)
+
+
 def pointers(
     world: World, objective: str, names: Sequence[str], known: Container[Edge], said: Sequence[Evidence]
 ) -> dict[str, Pointer]:

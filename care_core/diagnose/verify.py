@@ -125,14 +125,14 @@ def verify_log(
     wanted = {name: before.threshold for name, before in promise.objectives.items() if before.threshold is not None}
     own = {name: bound.value for name, bound in wanted.items() if name not in usual or usual[name].value != bound.value}
     judged = read_and_judge(log, profile, thresholds=own, mission=mission, sha256=sha256)
-    found = verify(promise, judged, schema, _doubt(promise, judged.run))
+    found = verify(promise, judged, schema, _doubt(promise, judged.run, schema))
     return judged.run, replace(found, notes=tuple(_notes(promise, judged.run, schema)))
 
 
-def _doubt(promise: Promise, run: Run) -> str:
+def _doubt(promise: Promise, run: Run, schema: Schema) -> str:
     if run.log.sha256 == promise.sha256:
         return "this is the log that the report is about, not one of a later run"
-    return run.mission.mismatch
+    return "" if schema.travels else run.mission.mismatch
 
 
 def _notes(promise: Promise, run: Run, schema: Schema) -> Iterator[str]:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,8 +110,43 @@ def timeout_s(spec: Args) -> float:
 
 
 def listed_goals(spec: Args) -> tuple[tuple[float, float], ...]:
-    """The goals (x, y) that a mission consists of; empty when the profile does not say."""
+    """The goals (x, y) of the profile's own mission; empty when it does not say."""
     return tuple((float(goal[0]), float(goal[1])) for goal in spec.get("goals", ()))
+
+
+def listed_headings(spec: Args) -> tuple[float, ...]:
+    """The headings asked for at them, rad; nan where the profile does not say."""
+    return tuple(float(goal[2]) if len(goal) > 2 else math.nan for goal in spec.get("goals", ()))
+
+
+def difference(legs: Sequence[Leg], spec: Args) -> str:
+    """What tells a mission from the profile's own, empty where nothing does. One that was given up is still its own."""
+    goals = listed_goals(spec)
+    tolerance_m = float(spec.get("tolerance_m", TOLERANCE_M))
+    for number, leg in enumerate(legs if goals else (), start=1):
+        if number > len(goals):
+            return f"{len(legs)} goals were sent, the profile's mission has {len(goals)}"
+        off_m = leg.offset(*goals[number - 1])
+        if math.isnan(off_m):
+            return f"the log does not say where goal {number} lies"
+        if off_m > tolerance_m:
+            return f"goal {number} lies {off_m:.1f} m from the profile's"
+    return ""
+
+
+def own_goals(legs: Sequence[Leg], spec: Args) -> tuple[tuple[float, float], ...]:
+    """The goals of the profile's own mission where this is it; empty where the goals are others."""
+    return () if difference(legs, spec) else listed_goals(spec)
+
+
+def time_limit_s(legs: Sequence[Leg], spec: Args) -> float:
+    """How long each goal may take. The profile says it of its own goals; where others lie farther apart, longer."""
+    goals = listed_goals(spec)
+    if len(goals) < 2 or not difference(legs, spec):
+        return timeout_s(spec)
+    listed_m = max(math.dist(a, b) for a, b in pairwise(goals))
+    apart_m = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(legs)]
+    return timeout_s(spec) * max([1.0, *(one / listed_m for one in apart_m if math.isfinite(one))])
 
 
 Recoveries = Sequence[tuple[float, str]]
@@ -206,8 +242,8 @@ def analyse(mission: Mission) -> Drive:
     names = topics(mission.spec)
     return Drive(
         legs=legs,
-        timeout_s=timeout_s(mission.spec),
-        goals=listed_goals(mission.spec),
+        timeout_s=time_limit_s(legs, mission.spec),
+        goals=own_goals(legs, mission.spec),
         odometry=_odometry(mission.table(names.odometry), legs),
         commands=_commands(mission.table(names.commands), legs),
         topics=names,

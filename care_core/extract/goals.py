@@ -7,7 +7,6 @@ is the goal server's own, see `drive.GoalServer`.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -25,11 +24,13 @@ from care_core.extract.drive import (
     Leg,
     Status,
     analyse,
+    difference,
     goal_server,
     listed_goals,
     longest,
+    own_goals,
     share,
-    timeout_s,
+    time_limit_s,
     topics,
 )
 from care_core.extract.registry import Args, Mission, MissionKind, numeric, points
@@ -62,8 +63,15 @@ _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
 """What a message of the log speaks about, first match counts."""
 
 GOAL_ARGS: Mapping[str, str] = {
-    "goals": points("list of [x, y] in m, in the frame of the goals, that the thresholds belong to", 2),
-    "goal_timeout_s": numeric("time within which each goal must be reached, 60 unless given"),
+    "goals": points(
+        "list of [x, y] or [x, y, heading] in m and rad, in the frame of the goals: the mission that fixed thresholds "
+        "and the time of a goal belong to",
+        *(2, 3),
+    ),
+    "goal_timeout_s": numeric(
+        "time within which each goal must be reached, 60 unless given; longer where goals lie farther apart than those "
+        "of the list"
+    ),
     "tolerance_m": numeric("how far a goal may be from the listed one, 0.3 unless given"),
     "passages": points("list of [x, y] of narrow passages, in the frame of the odometry", 2),
     "odometry": "topic of nav_msgs/Odometry, /odom unless given",
@@ -100,20 +108,7 @@ class GoalMissions(MissionKind):
         return tuple(missions)
 
     def mismatch(self, mission: Mission) -> str:
-        goals = listed_goals(mission.spec)
-        if not goals:
-            return ""
-        tolerance_m = float(mission.spec.get("tolerance_m", TOLERANCE_M))
-        legs = mission.shared(analyse).legs
-        for number, leg in enumerate(legs, start=1):
-            if number > len(goals):
-                return f"{len(legs)} goals were sent, the profile's mission has {len(goals)}"
-            off_m = leg.offset(*goals[number - 1])
-            if math.isnan(off_m):
-                return f"the log does not say where goal {number} lies"
-            if off_m > tolerance_m:
-                return f"goal {number} lies {off_m:.1f} m from the profile's"
-        return ""
+        return difference(mission.shared(analyse).legs, mission.spec)
 
     def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
         """Failed goals, recoveries, standstill, and warnings of the log: each kind of message once, with its count."""
@@ -151,8 +146,8 @@ def _starts_again(leg: Leg, group: Sequence[Leg], goals: Sequence[tuple[float, f
         return True
     # A goal that replaces one still under way belongs to the same mission, wherever it lies.
     replaces = group[-1].status is None or group[-1].end_s >= leg.sent_s
-    first = goals[0] if goals else (group[0].x, group[0].y)
-    return not replaces and leg.offset(*first) <= tolerance_m
+    firsts = {(group[0].x, group[0].y), *goals[:1]}
+    return not replaces and any(leg.offset(*first) <= tolerance_m for first in firsts)
 
 
 def _has_ended(legs: Sequence[Leg], spec: Args, until_s: float) -> bool:
@@ -161,11 +156,11 @@ def _has_ended(legs: Sequence[Leg], spec: Args, until_s: float) -> bool:
     A client may give up after failed goals, so a list that was not finished has ended too once a goal failed; while
     every goal so far was reached, the log must go on for a goal's time without the next.
     """
-    limit_s = timeout_s(spec)
+    limit_s = time_limit_s(legs, spec)
     last = legs[-1]
     if last.status is None:
         return until_s - last.sent_s > limit_s
-    if len(legs) < len(listed_goals(spec)) and all(leg.reached(limit_s) for leg in legs):
+    if len(legs) < len(own_goals(legs, spec)) and all(leg.reached(limit_s) for leg in legs):
         return until_s - last.end_s > limit_s
     return True
 

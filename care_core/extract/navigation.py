@@ -31,6 +31,7 @@ from care_core.extract.drive import (
     share,
 )
 from care_core.extract.goals import ROSOUT, rosout
+from care_core.extract.goals_asked import goals_asked, way_asked_m
 from care_core.extract.registry import Args, Mission, extractor, missing, numeric, one_of
 from care_core.run import Unavailable, Value
 
@@ -133,6 +134,25 @@ def of_drive(
     return wrap
 
 
+_PER_GOAL = {"per": one_of("goal: for each goal that the mission asks for; in all unless given", "goal")}
+_PER_METRE = {"per": one_of("metre: for each metre of way that the goals ask for; in all unless given", "metre")}
+
+
+def divided(compute: Callable[[Mission, Args], Value]) -> Callable[[Mission, Args], Value]:
+    """A sum over the mission, for each metre or goal that it asks for where the argument `per` says so."""
+
+    @wraps(compute)
+    def answer(mission: Mission, args: Args) -> Value:
+        value, per = compute(mission, args), args.get("per")
+        if isinstance(value, Unavailable) or per is None:
+            return value
+        drive = mission.shared(analyse)
+        amount = way_asked_m(mission) if per == "metre" else float(len(drive.goals) or len(drive.legs))
+        return amount if isinstance(amount, Unavailable) else value / amount
+
+    return answer
+
+
 # Goals and time
 
 
@@ -142,7 +162,8 @@ def goals_sent(mission: Mission, args: Args) -> Value:
     return float(len(mission.shared(analyse).legs))
 
 
-@extractor("goals_reached", needs={}, parts=("goals",), unit="")
+@extractor("goals_reached", needs={}, parts=("goals",), unit="", args=_PER_GOAL)
+@divided
 def goals_reached(mission: Mission, args: Args) -> Value:
     """Number of goals that ended in success, late ones included."""
     return float(sum(leg.status == Status.SUCCEEDED for leg in mission.shared(analyse).legs))
@@ -168,9 +189,11 @@ def goals_success(mission: Mission, args: Args) -> Value:
         "status": one_of(
             "preempted, succeeded, aborted, rejected, recalled or lost; aborted unless given",
             *("preempted", "succeeded", "aborted", "rejected", "recalled", "lost"),
-        )
+        ),
+        **_PER_GOAL,
     },
 )
+@divided
 def goals_ended(mission: Mission, args: Args) -> Value:
     """Number of goals that the goal server answered with a status: aborted means that it gave up by itself."""
     status = str(args.get("status", "aborted")).upper()
@@ -192,18 +215,30 @@ def goals_time(mission: Mission, args: Args) -> Value:
     unit="s",
     args={
         "index": numeric("number of the goal, from 1; all unless given"),
-        "of": one_of("mean or longest of all goals, mean unless given", "mean", "longest"),
+        "of": one_of(
+            "mean or longest of all goals, or variation, the standard deviation of their logarithms; mean unless given",
+            *("mean", "longest", "variation"),
+        ),
+        "per": one_of("metre: over the way to each goal; in all unless given", "metre"),
     },
 )
 def goal_time(mission: Mission, args: Args) -> Value:
     """Time that a goal took, reached or not."""
     legs = mission.shared(analyse).legs
+    times = [leg.time_s for leg in legs]
+    if args.get("per") == "metre":
+        found = mission.shared(goals_asked)
+        if isinstance(found, Unavailable):
+            return found
+        times = [time / max(way_m, TOLERANCE_M) for time, way_m in zip(times, found[0].lengths.tolist(), strict=False)]
     if "index" in args:
         number = int(args["index"])
         if not 1 <= number <= len(legs):
             return Unavailable(f"goal {number} was not sent", f"{len(legs)} goals were")
-        return legs[number - 1].time_s
-    times = [leg.time_s for leg in legs]
+        return times[number - 1]
+    if args.get("of") == "variation":
+        positive = np.log([time for time in times if time > 0])
+        return float(np.std(positive, ddof=1)) if len(positive) > 1 else Unavailable("one goal varies from no other")
     return max(times) if args.get("of") == "longest" else sum(times) / len(times)
 
 
@@ -283,14 +318,16 @@ def passages_passed(mission: Mission, args: Args) -> Value:
 # Path
 
 
-@extractor("path_length", needs={}, parts=("goals", "odometry"), unit="m")
+@extractor("path_length", needs={}, parts=("goals", "odometry"), unit="m", args=_PER_METRE)
+@divided
 @of_drive(_odometry)
 def path_length(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Length of the odometry's path."""
     return float(odometry.step_m.sum())
 
 
-@extractor("detour", needs={}, parts=("goals", "odometry"), unit="m")
+@extractor("detour", needs={}, parts=("goals", "odometry"), unit="m", args=_PER_METRE)
+@divided
 @of_drive(_placed)
 def detour(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Path driven beyond the way made towards the goals."""
@@ -399,7 +436,8 @@ def no_way_time(drive: Drive, odometry: Odometry, args: Args) -> Value:
     return longest(np.abs(odometry.speed) < MOVING_MPS, odometry.dt)
 
 
-@extractor("total_turn", needs={}, parts=("goals", "odometry"), unit="rad")
+@extractor("total_turn", needs={}, parts=("goals", "odometry"), unit="rad", args=_PER_METRE)
+@divided
 @of_drive(_odometry)
 def total_turn(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Sum of all turning, left and right alike."""
@@ -496,8 +534,10 @@ def command_interval(drive: Drive, commands: Commands, args: Args) -> Value:
         "absent": numeric(
             "value where the log lacks the topic, which is only published on a recovery; not known unless given"
         ),
+        **_PER_GOAL,
     },
 )
+@divided
 def recoveries(mission: Mission, args: Args) -> Value:
     """Number of recovery behaviors that ran."""
     ran = goal_server(mission.spec).recoveries(mission)

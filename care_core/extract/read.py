@@ -15,6 +15,7 @@ import care_core.extract.ardupilot
 import care_core.extract.ardurover
 import care_core.extract.asked
 import care_core.extract.battery
+import care_core.extract.goals_asked
 import care_core.extract.laser
 import care_core.extract.nav2
 import care_core.extract.navigation

@@ -42,12 +42,12 @@ def numeric(meaning: str) -> Argument:
     return Argument(meaning, _is_number)
 
 
-def points(meaning: str, size: int) -> Argument:
-    """An argument that lists points of so many numbers each."""
+def points(meaning: str, *sizes: int) -> Argument:
+    """An argument that lists points, each of one of these counts of numbers."""
 
     def accepts(value: object) -> bool:
         return isinstance(value, list) and all(
-            isinstance(point, list) and len(point) == size and all(map(_is_number, point)) for point in value
+            isinstance(point, list) and len(point) in sizes and all(map(_is_number, point)) for point in value
         )
 
     return Argument(meaning, accepts)

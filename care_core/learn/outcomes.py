@@ -9,21 +9,21 @@ which it exists.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import FloatArray, Mechanism, transformed
+from care_core.causal.mechanisms import Averaging, FloatArray, Mechanism, transformed
 from care_core.causal.model import OutcomeRecord, StageRecord
 from care_core.causal.nominal import Nominal
 from care_core.learn.fitting import MIN_ROWS, Effort, Fitted, Inputs, best_transform, fit, tested_on_missions_left_out
 from care_core.learn.knowledge import with_known
 from care_core.learn.relative import missions_of, needs
 from care_core.profile.schema import Schema
-from care_core.variables import Role, Variable
+from care_core.variables import Events, Role, Variable
 
 MIN_CLASS = 5
 """Missions each way that a stage needs: with fewer there is nothing to learn about who fails it."""
@@ -82,7 +82,7 @@ def inputs_of(names: Sequence[str], schema: Schema, nominal: Nominal | None = No
 def met(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArray:
     """1 where the objective keeps its threshold, 0 where not, NaN where it has no value; shape (n,)."""
     values = frame[objective.name].to_numpy(dtype=float)
-    if objective.relative is not None:
+    if objective.threshold is None and objective.relative is not None:
         need = needs(objective, frame, schema)
         bounds = [None if np.isnan(n) else objective.relative.for_need(n) for n in need]
     else:
@@ -226,6 +226,7 @@ def fit_on(
     met = {v.name: frame[v.name].fillna(frame[v.name].median()) for v in schema.contexts if v.name in frame}
     frame = frame.assign(**met)
     best: Fitted | None = None
+    events = schema.variables[target].events if target in schema.variables else None
     for names in sets:
         inputs = inputs_of(names, schema, nominal)
         known = frame[[*inputs.names, target]].notna().all(axis=1).to_numpy()
@@ -243,9 +244,22 @@ def fit_on(
     if best is None:
         return None
     x, y, inputs, groups = asked
-    if groups is None:
-        return best.mechanism
-    return tested_on_missions_left_out(best.mechanism, x, y, inputs, rng=rng, effort=effort, groups=groups)
+    mechanism = best.mechanism
+    if groups is not None:
+        mechanism = tested_on_missions_left_out(mechanism, x, y, inputs, rng=rng, effort=effort, groups=groups)
+    return mechanism if events is None else replace(mechanism, averaging=averaging(mechanism, events, target, frame))
+
+
+def averaging(mechanism: Mechanism, events: Events, target: str, frame: pd.DataFrame) -> Averaging | None:
+    """How much of the noise belongs to each part of a mission alone: what its parts differ by, averaged over them."""
+    if events.count not in mechanism.inputs:
+        return None
+    runs = frame.loc[frame[target].notna(), [events.count, events.variation]].dropna()
+    usual = float(runs[events.count].median())
+    if not len(runs) or not usual > 0:
+        return None
+    own = float((runs[events.variation] ** 2 / runs[events.count]).mean())
+    return Averaging(events.count, usual, min(1.0, own / max(mechanism.noise_sd**2, 1e-12)))
 
 
 def groups_that_move_together(schema: Schema, frame: pd.DataFrame) -> tuple[tuple[str, ...], ...]:

@@ -48,12 +48,14 @@ def needs(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArra
 
 
 def missions_of(frame: pd.DataFrame, schema: Schema) -> NDArray[np.int64] | None:
-    """A number for each run, the same for runs of which the same was asked, shape (n,); None where nothing tells."""
+    """A number for each run, the same for runs of which the same was asked, shape (n,); None where nothing tells, or
+    where all were asked the same: then each is a witness for the others."""
     names = [context.name for context in schema.asked]
     if not names:
         return None
     rounded = frame[names].to_numpy(dtype=float).round(1)
-    return np.asarray(np.unique(rounded, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
+    numbers = np.asarray(np.unique(rounded, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
+    return numbers if numbers.any() else None
 
 
 def _is_reference(frame: pd.DataFrame, schema: Schema) -> NDArray[np.bool_]:

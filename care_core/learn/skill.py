@@ -104,7 +104,11 @@ def _probabilities(
     names = [name for name in schema.variables if name in filled]
     configs = [{str(k): float(v) for k, v in row.items()} for row in filled[names].to_dict("records")]
     fixed = {v.name: v.threshold for v in schema.objectives if v.threshold is not None and v.name in outcomes}
-    relative_ones = [(v.name, v.relative) for v in schema.objectives if v.relative is not None and v.name in outcomes]
+    relative_ones = [
+        (v.name, v.relative)
+        for v in schema.objectives
+        if v.threshold is None and v.relative is not None and v.name in outcomes
+    ]
     if not relative_ones:
         return _asked(World(model, configs[0], {}, fixed), configs)
     reference = {v.name: v.default for v in schema.options if v.default is not None}

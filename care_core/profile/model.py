@@ -9,7 +9,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,7 +18,7 @@ from pydantic import Field, ValidationError
 
 from care_core import limits
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import FloatArray, Kernel, Mechanism, Transform
+from care_core.causal.mechanisms import Averaging, FloatArray, Kernel, Mechanism, Transform
 from care_core.causal.model import (
     EdgeRecord,
     EffectRecord,
@@ -48,12 +48,19 @@ class _NominalRecord(Record):
     scales: tuple[float, ...]
 
 
+class _AveragingRecord(Record):
+    count: str
+    usual: float = Field(gt=0)
+    share: float = Field(ge=0, le=1)
+
+
 class _MechanismRecord(Record):
     target: str
     inputs: tuple[str, ...]
     reads: tuple[str, ...] | None = None
     """The inputs that the kernel sees; all when None."""
     nominal: _NominalRecord | None = None
+    averaging: _AveragingRecord | None = None
     transform: Transform
     binary: bool
     prior: str = ""
@@ -133,6 +140,7 @@ def _mechanism_record(key: str, m: Mechanism) -> _MechanismRecord:
         inputs=m.inputs,
         reads=None if reads == m.inputs else reads,
         nominal=physics,
+        averaging=None if m.averaging is None else _AveragingRecord(**asdict(m.averaging)),
         transform=m.transform,
         binary=m.binary,
         prior=prior,
@@ -293,6 +301,14 @@ def _nominal(key: str, record: _MechanismRecord) -> Nominal | None:
     return Nominal(physics.kind, physics.inputs, physics.scales)
 
 
+def _averaging(key: str, record: _MechanismRecord) -> Averaging | None:
+    if record.averaging is None:
+        return None
+    if record.averaging.count not in record.inputs:
+        raise ValueError(f"{key} counts '{record.averaging.count}', which is none of its inputs")
+    return Averaging(record.averaging.count, record.averaging.usual, record.averaging.share)
+
+
 def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArray]) -> Mechanism:
     def floats(name: str) -> FloatArray:
         array = arrays[f"{key}/{name}"]
@@ -318,6 +334,7 @@ def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArr
         inputs=record.inputs,
         reads=np.array([record.inputs.index(name) for name in reads], dtype=np.int64),
         nominal=_nominal(key, record),
+        averaging=_averaging(key, record),
         log_inputs=logs.astype(bool),
         centre=centre,
         sd=sd,

@@ -19,7 +19,18 @@ from care_core.causal.nominal import Nominal, nominal
 from care_core.configs.driven import same_value
 from care_core.errors import ProfileError, nearest
 from care_core.logs.base import LogFormat
-from care_core.variables import About, Extract, Kind, Op, RelativeThreshold, Role, Threshold, ValueType, Variable
+from care_core.variables import (
+    About,
+    Events,
+    Extract,
+    Kind,
+    Op,
+    RelativeThreshold,
+    Role,
+    Threshold,
+    ValueType,
+    Variable,
+)
 from care_core.vehicles import Kind as VehicleKind
 
 Side = Literal["low", "high"]
@@ -38,7 +49,8 @@ class _Threshold(Strict):
 
 
 class Bound(Strict):
-    """An objective's threshold: a value, or a ratio to what the reference configuration needs."""
+    """An objective's threshold: a value, a ratio to what the reference configuration needs, or a value for the
+    profile's own mission and a ratio for any other."""
 
     op: Op
     value: float | None = None
@@ -46,18 +58,17 @@ class Bound(Strict):
     at_least: float | None = None
 
     @model_validator(mode="after")
-    def _is_one_of_both(self) -> Bound:
-        if (self.value is None) == (self.ratio is None):
+    def _says_how(self) -> Bound:
+        if self.value is None and self.ratio is None:
             raise ValueError("a threshold has a 'value' or a 'ratio'")
         if self.at_least is not None and self.ratio is None:
             raise ValueError("'at_least' belongs to a 'ratio'")
         return self
 
     def thresholds(self) -> tuple[Threshold | None, RelativeThreshold | None]:
-        """The fixed threshold and the relative one, of which there is one."""
-        if self.value is not None:
-            return Threshold(self.op, self.value), None
-        return None, None if self.ratio is None else RelativeThreshold(self.op, self.ratio, self.at_least)
+        """The fixed threshold and the relative one, of which there is one at least."""
+        fixed = None if self.value is None else Threshold(self.op, self.value)
+        return fixed, None if self.ratio is None else RelativeThreshold(self.op, self.ratio, self.at_least)
 
 
 class _Variable(Strict):
@@ -77,6 +88,8 @@ class _Variable(Strict):
     grows: bool = False
     about: About = "world"
     nominal: dict[str, str] | None = None
+    accuracy: float = Field(default=0.0, ge=0, lt=1)
+    events: dict[str, str] | None = None
     extract: dict[str, Any] | None = None
     order: int | None = None
 
@@ -94,6 +107,10 @@ class _Variable(Strict):
             raise ValueError("only metrics and objectives have a 'nominal'")
         if self.nominal is not None and "kind" not in self.nominal:
             raise ValueError("'nominal' needs 'kind', the name of a formula")
+        if self.role is not Role.OBJECTIVE and self.accuracy:
+            raise ValueError("only objectives have an 'accuracy'")
+        if self.events is not None and (self.nominal is None or set(self.events) != {"count", "variation"}):
+            raise ValueError("'events' has a 'count' and a 'variation', and belongs to a 'nominal'")
         if self.role is not Role.OPTION and self.parameter:
             raise ValueError("only options have a 'parameter'")
         if self.role is not Role.OPTION and self.modes:
@@ -195,6 +212,8 @@ class _Profile(Strict):
         for variable in self.variables.values():
             if variable.nominal is not None:
                 nominal(variable.nominal["kind"], _arguments(variable.nominal), units)
+            if variable.events is not None:
+                _declared(variable.events.values(), met, "'events' names the context or metric")
         return self
 
 
@@ -284,6 +303,11 @@ class Schema:
     @property
     def objectives(self) -> tuple[Variable, ...]:
         return self.of(Role.OBJECTIVE)
+
+    @property
+    def travels(self) -> bool:
+        """Whether any mission is judged, and not the profile's own alone."""
+        return any(objective.relative is not None for objective in self.objectives)
 
     @property
     def asked(self) -> tuple[Variable, ...]:
@@ -404,6 +428,8 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         relative=relative,
         grows=v.grows,
         about=v.about,
+        accuracy=v.accuracy,
+        events=None if v.events is None else Events(**v.events),
         nominal=None if v.nominal is None else Extract(v.nominal["kind"], _arguments(v.nominal)),
         extract=extract,
         order=v.order,

@@ -134,7 +134,7 @@ def test_errors_of_left_out_groups_are_those_of_refitting_without_them() -> None
     [
         ("climb_speed: speed_up}", "kind: none_such}"),
         ("climb_speed: speed_up}", "climb_speed: vz}"),
-        ("ratio: 1.3", "value: 3, ratio: 1.3"),
+        ("ratio: 1.3", "at_least: 3"),
         ("about: mission", "about: weather"),
     ],
     ids=["formula", "argument", "bound", "about"],
