@@ -31,6 +31,12 @@ class _Limit(Bound):
     mission: dict[str, float] = Field(default_factory=dict)
 
     @model_validator(mode="after")
+    def _is_one_of_both(self) -> _Limit:
+        if self.value is not None and self.ratio is not None:
+            raise ValueError("a limit has a 'value' or a 'ratio', not both")
+        return self
+
+    @model_validator(mode="after")
     def _mission_is_that_of_a_value(self) -> _Limit:
         if self.mission and self.value is None:
             raise ValueError("'mission' belongs to a 'value': a ratio holds for any mission")
