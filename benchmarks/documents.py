@@ -72,7 +72,7 @@ def printed(command: str, folder: Path, limit_s: float = _LIMIT_S) -> str:
         "COLUMNS": "80",
         "NO_COLOR": "1",
         "XDG_DATA_HOME": str(folder / ".data"),
-        "PYTHONPATH": str(ROOT),
+        "PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "samples"))),
     }
     ended = subprocess.run(
         ("bash", "-c", command), cwd=folder, env=environment, capture_output=True, text=True, encoding="utf-8",
