@@ -78,11 +78,10 @@ class ObjectiveResult:
 
 
 def overall(objectives: Collection[Status], severities: Collection[Severity], fit: FitVerdict) -> Status:
-    """What a whole run came to. Not evaluated is not OK; nor is a warning where no profile gives it a limit."""
+    """What a whole run came to. Not evaluated is not OK; without a profile nobody knows a limit of time or energy."""
     if "fault" in objectives or "critical" in severities:
         return "fault"
-    doubted = "not_evaluated" in objectives or not objectives or (fit == "no" and "warning" in severities)
-    return "not_evaluated" if doubted else "ok"
+    return "not_evaluated" if "not_evaluated" in objectives or not objectives or fit == "no" else "ok"
 
 
 @dataclass(frozen=True, slots=True)

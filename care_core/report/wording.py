@@ -71,14 +71,12 @@ def said_without_profile(
     if status == "fault":
         broken = [one.reason or one.name for one in objectives if one.status == "fault"]
         return "; ".join((*worst[:WORST_NAMED], *broken))
-    if status == "ok":
-        return f"nothing that could be judged failed ({NO_LIMITS})"
     unknown = [one.name for one in objectives if one.status == "not_evaluated"]
     if not objectives or len(unknown) == len(objectives):
         return unjudged(findings)
     if unknown:
         return f"nothing failed, but {', '.join(unknown)} could not be evaluated ({NO_LIMITS})"
-    return f"nothing failed in the run itself, but its findings have no limits to be held against ({NO_LIMITS})"
+    return f"nothing that could be judged failed ({NO_LIMITS})"
 
 
 def hypothesis_text(one: Hypothesis | HypothesisEntry) -> str:
