@@ -72,6 +72,7 @@ def printed(command: str, folder: Path, limit_s: float = _LIMIT_S) -> str:
         "COLUMNS": "80",
         "NO_COLOR": "1",
         "XDG_DATA_HOME": str(folder / ".data"),
+        "XDG_CONFIG_HOME": str(folder / ".config"),
         "PYTHONPATH": os.pathsep.join((str(ROOT), str(ROOT / "samples"))),
     }
     ended = subprocess.run(

@@ -26,7 +26,7 @@ def outweighed(hypotheses: Sequence[Hypothesis]) -> str | None:
     parameters = sum(one.probability for one in hypotheses if one.what == "parameter")
     if rival is None or rival.probability <= parameters:
         return None
-    return f"{rival.name}: that explains this failure better than any parameter, look at it first"
+    return f"{rival.name}, which explains this failure better than any parameter: look at it first"
 
 
 def nearest(fixes: Sequence[Fix], broken: Sequence[ObjectiveResult]) -> Fix | None:

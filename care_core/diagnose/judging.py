@@ -273,16 +273,17 @@ def meaningful(
             continue
         elif not accomplished:
             found[name] = Unavailable("the mission was not accomplished, so its value means nothing")
-        elif name not in judged_anyway and (mismatch := _of_another_mission(objective, run)):
+        elif name not in judged_anyway and (mismatch := _of_another_mission(objective, run, schema)):
             hint = f"give this mission's bound with --threshold {name}=VALUE"
             found[name] = Unavailable(mismatch, hint)
     return found
 
 
-def _of_another_mission(objective: Variable, run: Run) -> str:
+def _of_another_mission(objective: Variable, run: Run, schema: Schema) -> str:
     """Why the threshold in force is not one of this run's mission, empty where it is."""
     if objective.own_limit is None:
-        return "" if objective.relative is not None else run.mission.mismatch
+        travels = objective.relative is not None and not schema.learned_elsewhere
+        return "" if travels else run.mission.mismatch
     return objective.own_limit.mismatch(run.context)
 
 

@@ -123,7 +123,7 @@ def _verdict(report: Report) -> str:
     if not broken and any(objective.status == "not_evaluated" for objective in report.objectives):
         found += " Not everything could be evaluated."
     if report.abstained:
-        return f"{found} <strong>No answer</strong>: {escape(report.abstained)}"
+        return f"{found} <strong>No change advised</strong>: {escape(report.abstained)}"
     if report.fix is None:
         return found
     likely = f"{chance(report.fix.p_fixed, report.fix.guess)} that all objectives are met"

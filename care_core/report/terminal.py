@@ -64,7 +64,7 @@ def _headline(diagnosis: Diagnosis) -> Iterator[str]:
     if not broken and diagnosis.profile.fit.verdict != "no":
         yield from (line for one in critical(diagnosis.health) for line in wrapped(finding_text(one), "BUT: "))
     if diagnosis.abstained:
-        yield from wrapped(diagnosis.abstained, "No answer: ")
+        yield from wrapped(diagnosis.abstained, "No change advised: ")
     if diagnosis.fix is not None:
         yield from wrapped(_summary(diagnosis, diagnosis.fix))
 

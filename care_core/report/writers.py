@@ -128,7 +128,7 @@ def _verdict(report: Report) -> str:
     names = ", ".join(f"`{name}`" for name in broken)
     if report.abstained:
         found = f"**Fault**: {names}. " if broken else ""
-        return f"{found}**No answer**: {_escape(report.abstained)}"
+        return f"{found}**No change advised**: {_escape(report.abstained)}"
     worst = [_escape(one.title) for one in report.findings if one.severity == "critical" and not one.after_impact]
     if not broken and worst:
         return f"**Fault**: {'; '.join(worst)}."

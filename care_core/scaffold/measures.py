@@ -115,7 +115,9 @@ def _sort_in(found: Measures, variable: Variable) -> None:
 
 def _bundled_measures(kind: str, vehicle: str, bundled: Sequence[Schema]) -> list[Variable]:
     """Contexts, metrics and objectives of profiles of this kind of mission, each once: first of the same vehicle, then
-    of the largest profile."""
+    of the largest profile. That a whole recording is the mission says nothing of the robot: then none."""
+    if kind == "recording":
+        return []
     family = type(MISSION_KINDS[kind])
     schemas = [one for one in bundled if type(MISSION_KINDS.get(str(one.mission.get("kind")))) is family]
     schemas.sort(

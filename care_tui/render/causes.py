@@ -178,7 +178,7 @@ def no_cause_rows(diagnosis: Diagnosis, objective: ObjectiveResult | None) -> Ro
 
 def doubt_rows(diagnosis: Diagnosis) -> list[Row]:
     """Why there is no answer, what the run met that may be the cause instead, and what would tell more."""
-    rows = [] if diagnosis.abstained is None else [warning("No answer", diagnosis.abstained)]
+    rows = [] if diagnosis.abstained is None else [warning("No change advised", diagnosis.abstained)]
     for title, lines in (
         ("It may be no parameter", [f"{rival.name}: {rival.text}" for rival in diagnosis.rivals]),
         ("What would tell more", diagnosis.tell_more),

@@ -119,7 +119,7 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
         rows.append(labelled("Profile", f"{profile.name} {profile.version} ({profile.platform})"))
         rows.append(labelled("", profile.reason))
     if diagnosis.abstained:
-        rows.append(warning("No answer", diagnosis.abstained))
+        rows.append(warning("No change advised", diagnosis.abstained))
     if not mission.ended:
         rows.append(warning("Mission", "the log stops before the mission does"))
     if mission.mismatch:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from ruamel.yaml import YAML
 
-from benchmarks.documents import ROOT, printed, sessions
+from benchmarks.documents import ROOT, prepare, printed, sessions
 from care_core.collect.campaign import Campaign, read_campaign
 from care_core.collect.sampling import points
 from care_core.logs.opening import open_log
@@ -55,6 +55,7 @@ def _driven(campaign: Campaign, config: Mapping[str, float], seed: int, folder: 
 def test_every_command_of_the_tutorial_runs(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     for name in ("scipy", "sklearn", "causallearn", "ananke"):
         pytest.importorskip(name)
+    prepare(tmp_path)
     said: dict[str, str] = {}
     for session in sessions(DOCUMENT.read_text(encoding="utf-8"), slow=True):
         for command in session.commands:

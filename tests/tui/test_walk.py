@@ -278,7 +278,7 @@ async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app
         assert "not ruled out, 2 % probability alone" in items(app)
         assert "costs" not in text(app)
         lines = text(app).splitlines()
-        assert "No answer" in lines[0]
+        assert "No change advised" in lines[0]
         assert lines[1:5] == [
             "It may be no parameter",
             "- wind: stronger than in 99 % of the training runs",

@@ -40,7 +40,7 @@ def test_a_change_less_likely_than_not_is_named_and_not_advised() -> None:
 
 
 def test_no_parameter_is_advised_where_a_part_explains_more() -> None:
-    said = "motor 2 lost thrust: that explains this failure better than any parameter, look at it first"
+    said = "motor 2 lost thrust, which explains this failure better than any parameter: look at it first"
     assert outweighed(motor(0.7)) == said
     assert outweighed(motor(0.3)) is None
 

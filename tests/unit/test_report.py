@@ -157,10 +157,10 @@ def test_the_other_headlines() -> None:
     lost = replace(made_diagnosis(), fix=None, abstained="nothing in the profile explains this run")
     assert "\nOK: " in to_text(fine)
     assert "\nNOT EVALUATED: " in to_text(unknown)
-    assert "No answer: nothing in the profile" in to_text(lost)
+    assert "No change advised: nothing in the profile" in to_text(lost)
     assert "**No fault found.**" in to_markdown(build_document(fine))
     assert "not everything" in to_markdown(build_document(unknown))
-    assert "**Fault**: `mission_time`. **No answer**: nothing" in to_markdown(build_document(lost))
+    assert "**Fault**: `mission_time`. **No change advised**: nothing" in to_markdown(build_document(lost))
 
 
 def test_a_crash_is_never_called_fine() -> None:
