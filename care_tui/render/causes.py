@@ -94,7 +94,7 @@ def node_value(node: PathNode, option: Variable | None) -> str:
 
 
 def edge_line(node: PathNode, glyphs: Glyphs) -> Content:
-    effect = "effect unknown" if node.effect is None else f"effect {node.effect:+.2f} spreads"
+    effect = "effect unknown" if node.effect is None else f"effect {node.effect:+.2f} sd"
     if node.support is None:
         return Content.styled(f"{glyphs.line} {effect}", "dim")
     line = Content.styled(f"{glyphs.line} {effect}, in {percent(node.support)} of resamples", "dim")

@@ -95,7 +95,7 @@ async def test_the_path_follows_the_highlighted_cause(make_app: MakeApp) -> None
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
         assert "LAND_SPEED    16 cm/s  (expected 50)" in text(app)
-        assert "effect -0.81 spreads, in 97 % of resamples" in text(app)
+        assert "effect -0.81 sd, in 97 % of resamples" in text(app)
         assert "outside the training support" in text(app)
         assert "Runner-up     WPNAV_SPEED, costs 6 %" in text(app)
         await settle(pilot, "j")

@@ -95,3 +95,10 @@ def test_what_left_no_signal_weighs_as_much_as_chance_and_thrice_where_the_profi
         found = {one.what: one.probability for one in weigh({}, 0.0, (), verdict)}  # type: ignore[arg-type]
         assert found["hardware"] / found["chance"] == pytest.approx(times)
         assert found["world"] / found["chance"] == pytest.approx(times)
+
+
+def test_what_left_no_trace_weighs_alike_and_more_where_the_profile_fits_in_part() -> None:
+    fits = {one.what: one.probability for one in weigh({}, 0.0, (), "fits")}
+    assert fits == pytest.approx({"chance": 1 / 3, "hardware": 1 / 3, "world": 1 / 3})
+    partly = {one.what: one.probability for one in weigh({}, 0.0, (), "partly")}
+    assert partly == pytest.approx({"chance": 1 / 7, "hardware": 3 / 7, "world": 3 / 7})

@@ -162,3 +162,11 @@ def test_a_faster_rover_that_turns_more_slowly_strays_farther(rate: float, speed
     assert here <= of_rover("drive_path_error", turn_rate=rate / 2, speed=speed)
     assert here <= of_rover("drive_path_error", turn_rate=rate, speed=speed * 1.5)
     assert here <= of_rover("drive_path_error", turn_rate=rate, speed=speed, steering_kind=1.0)
+
+
+@pytest.mark.parametrize("short", [10.0, 40.0, 90.0])
+def test_legs_of_two_lengths_take_what_each_takes_alone(short: float) -> None:
+    long = 200.0 - short
+    together = value("multicopter_cruise_time", path_length=200.0, legs=2.0, leg_variation=(long - short) / 200.0)
+    alone = [value("multicopter_cruise_time", path_length=length, legs=1.0) for length in (short, long)]
+    assert together == pytest.approx(sum(alone), rel=1e-9)

@@ -9,6 +9,7 @@ import pytest
 
 from care_core.errors import ProfileError
 from care_core.extract.read import reading_plan
+from care_core.extract.registry import points
 from care_core.profile.schema import parse_schema
 from care_core.profile.store import available_profiles, load_profile, own_profiles
 from tests.conftest import Care
@@ -92,3 +93,9 @@ def test_an_unsound_profile_keeps_no_other_from_use(care: Care) -> None:
     assert "arducopter" in listed.stdout
     assert "Did you mean 'roll'?" in listed.stderr
     assert care("profiles", "check", "aa_broken").code == 2
+
+
+@pytest.mark.parametrize("wrong", [[[1.0]], [["a", 1.0]], [1.0, 2.0], [[1.0, 2.0], "ab"], "ab"])
+def test_goals_are_points_of_numbers(wrong: object) -> None:
+    assert not points("goals", 2, 3).accepts(wrong)
+    assert points("goals", 2, 3).accepts([[1.0, 2.0], [1, 2, 3]])
