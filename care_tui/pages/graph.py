@@ -54,7 +54,7 @@ class GraphPage(Page):
             why = "The profile has no model of this." if fits else "No profile fits this log: there is no model of it."
             return View(Content("Causal model"), lambda _: sentence(why))
         node, links = self._trail[-1], self._links(self._trail[-1])
-        title = Content.assemble("Around ", (node, "bold"), f"  {self._counts(links)}", ("  effects in standard deviations", "dim"))
+        title = Content.assemble("Around ", (node, "bold"), f"  {self._counts(links)}", ("  effects in sd", "dim"))
         listing = Listing(len(links), lambda i, width: (self._item(links[i], width),), lambda i: links[i].name)
         return View(title, lambda i: self._detail(node, None if i is None else links[i]), listing)
 
