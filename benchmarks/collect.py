@@ -18,9 +18,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from ruamel.yaml import YAML
 
 import care_core
+from care_core import plain_yaml
 from care_core.application.case import Request
 from care_core.learn.skill import calibration_error, reliability
 from care_core.profile.schema import Schema, read_schema
@@ -43,11 +43,9 @@ def collected(folder: Path, runs: int) -> Path:
     start = folder / "courier"
     write_robot(start, 1)
     campaign = start / "campaign.yaml"
-    yaml = YAML()
-    data = yaml.load(campaign.read_text(encoding="utf-8"))
+    data = plain_yaml.editable(campaign.read_text(encoding="utf-8"))
     data["runs"] = runs
-    with campaign.open("w", encoding="utf-8") as stream:
-        yaml.dump(data, stream)
+    campaign.write_text(plain_yaml.written(data), encoding="utf-8")
     model = folder / "model"
     table, schema = start / "campaign" / "runs.csv", start / "profile.yaml"
     for words in (("collect", campaign), ("train", table, "--schema", schema, "-o", model)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import StringIO
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -20,6 +21,8 @@ _SHALLOW = 400
 
 _LONG_TEXT = 1000
 """Characters that count as one value more."""
+_WIDTH = 120
+"""Columns of a text that is written."""
 
 
 class PlainYamlError(ValueError):
@@ -47,6 +50,26 @@ def load(text: str) -> Any:
     with _explained():
         _check(text)
         return safe.load(text)
+
+
+def editable(text: str) -> Any:
+    """The data of a text with its comments, for `written`; like `load` it builds no object. Raises PlainYamlError."""
+    with _explained():
+        _check(text)
+        return _round_trip().load(text)
+
+
+def written(data: Any) -> str:
+    """The text of data, those of `editable` with the comments they came with."""
+    stream = StringIO()
+    _round_trip().dump(data, stream)
+    return stream.getvalue()
+
+
+def _round_trip() -> YAML:
+    yaml = YAML(typ="rt")
+    yaml.width = _WIDTH
+    return yaml
 
 
 def compose(text: str) -> Node | None:

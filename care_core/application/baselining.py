@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from care_core import plain_yaml
 from care_core.application.case import fitting, opened
 from care_core.errors import CareError, ConfigError, LogError
 from care_core.profile.site import SITE_SCHEMA, load_site
@@ -91,30 +91,27 @@ def _none_read(errors: Sequence[CareError]) -> CareError:
     return LogError(f"None of the {len(errors)} logs could be read.", hint="Look at one with 'care inspect'.")
 
 
+_NEW_SITE = "# Limits of this site, read by 'care triage' and the app. Change what you know better.\n"
+
+
 def site_text(found: Baseline, file: Path) -> str:
     """The site file with the limits of this profile put in; those of other profiles, and remarks, stay as they are.
 
     Raises:
         ConfigError: the file that is there is no site file.
     """
-    from ruamel.yaml import YAML
-
-    yaml = YAML(typ="rt")  # keeps comments; like `safe` it builds no object that a tag names
-    yaml.width = 120
     if file.is_file() and file.stat().st_size:
         load_site(file)
-        data: Any = yaml.load(file.read_text(encoding="utf-8"))
+        text = file.read_text(encoding="utf-8")
     else:
-        data = yaml.load(f"# Limits of this site, read by 'care triage' and the app. Change what you know better.\n"
-                         f"schema: {SITE_SCHEMA}\nlimits: {{}}\n")  # fmt: skip
-        data["limits"] = {}
+        text = f"{_NEW_SITE}schema: {SITE_SCHEMA}\nlimits:\n"
+    data = plain_yaml.editable(text)
+    data["limits"] = data["limits"] or {}
     proposed = {p.objective.name: _entry(p) for p in found.proposals if p.limit is not None}
     if not proposed:
         raise ConfigError("There is no limit to write.", hint="See why above.", where=str(file))
     data["limits"][found.choice.name] = proposed
-    stream = StringIO()
-    yaml.dump(data, stream)
-    return stream.getvalue()
+    return plain_yaml.written(data)
 
 
 def _entry(proposal: Proposal) -> dict[str, Any]:

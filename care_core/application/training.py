@@ -6,11 +6,11 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
-from io import StringIO
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from care_core import plain_yaml
 from care_core.errors import UsageError
 from care_core.profile.model import write_model
 from care_core.profile.schema import parse_schema, read_schema
@@ -83,12 +83,7 @@ def update_profile(source: str, runs: Path, out: Path, *, seed: int, progress: P
 
 def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]) -> str:
     """The source's `profile.yaml` for the other robot, its comments kept."""
-    from ruamel.yaml import YAML
-
-    # Keeps comments; like `safe` it builds no object that a tag names. The text was read within limits before.
-    round_trip = YAML(typ="rt")
-    round_trip.width = 120
-    data: Any = round_trip.load(text)
+    data = plain_yaml.editable(text)
     source = data["name"]
     data["name"] = name
     data["platform"] = f"{name}, carried over from: {data.get('platform', source)}"
@@ -101,9 +96,7 @@ def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]
         entry["range"] = [math.floor(low), math.ceil(high)] if whole else [low, high]
         if "default" in entry and not low <= entry["default"] <= high:
             del entry["default"]
-    stream = StringIO()
-    round_trip.dump(data, stream)
-    return stream.getvalue()
+    return plain_yaml.written(data)
 
 
 def _write(out: Path, schema: Schema, model: Model, schema_text: str) -> None:

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from ruamel.yaml import YAML
 
 from benchmarks.documents import ROOT, prepare, printed, sessions
+from care_core import plain_yaml
 from care_core.collect.campaign import Campaign, read_campaign
 from care_core.collect.sampling import points
 from care_core.logs.opening import open_log
@@ -29,11 +29,9 @@ VARIED = ("slow_distance", "max_speed", "patience", "controller_frequency")
 
 def reduced(campaign: Path) -> None:
     """Four runs of four options."""
-    yaml = YAML()
-    data = yaml.load(campaign.read_text(encoding="utf-8"))
+    data = plain_yaml.editable(campaign.read_text(encoding="utf-8"))
     data.update(runs=4, options=list(VARIED))
-    with campaign.open("w", encoding="utf-8") as stream:
-        yaml.dump(data, stream)
+    campaign.write_text(plain_yaml.written(data), encoding="utf-8")
 
 
 def enlarge(table: Path, campaign: Campaign, folder: Path) -> None:
