@@ -87,8 +87,10 @@ class Px4Log:
 
     @cached_property
     def facts(self) -> Mapping[str, str]:
-        """`stack`, `firmware` ("PX4 v1.15.0 (cb09dde6)"), `hardware` and `vehicle`, where the log names them."""
+        """`stack`, `firmware` ("PX4 v1.15.0 (cb09dde6)"), `uuid` of the board, `hardware` and `vehicle`, where told."""
         facts = {"stack": "PX4", "firmware": f"PX4 {self._version}".strip()}
+        if isinstance(self._info.get("sys_uuid"), str):
+            facts["uuid"] = str(self._info["sys_uuid"])
         if isinstance(self._info.get("ver_hw"), str):
             facts["hardware"] = str(self._info["ver_hw"])
         status = self.read({"vehicle_status": ("vehicle_type",)}).get("vehicle_status")
