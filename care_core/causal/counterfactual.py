@@ -8,7 +8,7 @@ and for another day apart (`Model.training.persistence`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -36,6 +36,10 @@ class Predicted:
     p_ok: FloatArray
 
 
+_Answers = dict[bytes, tuple[float, ...]]
+"""The inputs of a mechanism, as the bytes of their values -> what it says of the next run there."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class World:
     """This run, ready to be asked "what if": its configuration, its outcome, and the thresholds in force."""
@@ -58,6 +62,8 @@ class World:
     """Options that stay as they are."""
     assumed: frozenset[str] = frozenset()
     """Options that no source of the run holds: taken to be at their reference."""
+    _told: dict[str, _Answers] = field(default_factory=dict, init=False, repr=False)
+    """What was worked out already: the search asks for most configurations many times over."""
 
     def predict(self, objective: str, configs: Sequence[Config]) -> Predicted:
         """The objective under each configuration, given what this run met."""
@@ -93,9 +99,13 @@ class World:
             if name in self.thresholds
             for key in ([stage.mechanism for stage in outcome.stages] or [outcome.mechanism])
         ]
-        used = [self.model.mechanisms[key] for key in keys]
-        least: FloatArray = np.max([m.ignorance(columns(configs, m.inputs)) for m in used], axis=0)
+        least: FloatArray = np.max([self._ignorance(key, configs) for key in keys], axis=0)
         return least
+
+    def _ignorance(self, key: str, configs: Sequence[Config]) -> FloatArray:
+        mechanism = self.model.mechanisms[key]
+        x = columns(configs, mechanism.inputs)
+        return self._once(f"ignorance/{key}", x, lambda rows: (mechanism.ignorance(rows),))[0]
 
     def _groups(self, names: Mapping[str, FloatArray]) -> list[list[str]]:
         together = [[name for name in group if name in names] for group in self.model.training.moves_together]
@@ -130,13 +140,34 @@ class World:
     ) -> FloatArray:
         """Probability of passing one stage, given which runs of this configuration passed it."""
         mechanism = self.model.mechanisms[stage.mechanism]
-        chance = self._chance(mechanism, stage.passes, configs)
-        if not passed:
-            return chance
-        here = columns([self.config], mechanism.inputs)
-        kin = kinship(mechanism, columns(configs, mechanism.inputs), here, self._persistence(objective))
-        expected = float(self._chance(mechanism, stage.passes, [self.config])[0])
-        return np.clip(next_passes(kin, chance, expected, passed), TAIL, 1 - TAIL)
+
+        def ask(x: FloatArray) -> tuple[FloatArray]:
+            chance = _chance(mechanism, stage.passes, x)
+            if not passed:
+                return (chance,)
+            here = columns([self.config], mechanism.inputs)
+            kin = kinship(mechanism, x, here, self._persistence(objective))
+            expected = float(_chance(mechanism, stage.passes, here)[0])
+            return (np.clip(next_passes(kin, chance, expected, passed), TAIL, 1 - TAIL),)
+
+        (probability,) = self._once(f"{objective}/{stage.mechanism}", columns(configs, mechanism.inputs), ask)
+        return probability
+
+    def _once(self, key: str, x: FloatArray, ask: Callable[[FloatArray], tuple[FloatArray, ...]]) -> FloatArray:
+        """What `ask` answers for each row of x, asked once for each that is new: an array of each of its answers.
+
+        Args:
+            x: shape (m, p). ask: k arrays of shape (n,) for n of the rows.
+
+        Returns:
+            Shape (k, m).
+        """
+        told = self._told.setdefault(key, {})
+        rows = [row.tobytes() for row in x]
+        new = {row: i for i, row in enumerate(rows) if row not in told}
+        if new:
+            told.update(zip(new, zip(*ask(x[list(new.values())]), strict=True), strict=True))
+        return np.array([told[row] for row in rows]).T
 
     def _passed(self, objective: str, stage: StageRecord, observed: Mapping[str, object]) -> bool | None:
         """Whether a run passed the stage, None where it never came to it."""
@@ -146,24 +177,21 @@ class World:
         bound = self.thresholds.get(objective) if stage.variable == objective else None
         return bound.met(seen) if bound is not None else seen == stage.passes
 
-    @staticmethod
-    def _chance(mechanism: Mechanism, passes: float, configs: Sequence[Config]) -> FloatArray:
-        one = mechanism.probability(columns(configs, mechanism.inputs))
-        return one if passes == 1.0 else 1.0 - one
-
     def _continuous(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
         mechanism = self.model.mechanisms[outcome.mechanism]
-        x = columns(configs, mechanism.inputs)
         least = LEAST[mechanism.transform]
         values = [known_value(seen, outcome.objective) for seen in (self.observed, *self.repeats)]
         seen = transformed(np.array([v for v in values if v is not None and v > least]), mechanism.transform)
-        latent = mechanism.latent(x)
-        if len(seen):
+
+        def ask(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+            if not len(seen):
+                return mechanism.latent(x), np.sqrt(mechanism.latent_sd(x) ** 2 + mechanism.noise_at(x) ** 2)
             here = columns([self.config], mechanism.inputs)
             kin = kinship(mechanism, x, here, self._persistence(outcome.objective))
-            centre, sd = next_value(kin, latent, float(mechanism.latent(here)[0]), seen)
-        else:
-            centre, sd = latent, np.sqrt(mechanism.latent_sd(x) ** 2 + mechanism.noise_at(x) ** 2)
+            latent = mechanism.latent(np.vstack([x, here]))
+            return next_value(kin, latent[:-1], float(latent[-1]), seen)
+
+        centre, sd = self._once(outcome.objective, columns(configs, mechanism.inputs), ask)
         bound = self.thresholds.get(outcome.objective)
         low, high = (restored(centre + mechanism.error_quantile(q) * sd, mechanism.transform) for q in INTERVAL)
         p_ok = np.full(len(configs), np.nan) if bound is None else _probability_of(mechanism, bound, centre, sd)
@@ -174,6 +202,11 @@ def known_value(observed: Mapping[str, object], name: str) -> float | None:
     """A run's value of a metric or an objective, None where it has none."""
     value = observed.get(name)
     return float(value) if is_known(value) else None  # type: ignore[arg-type]
+
+
+def _chance(mechanism: Mechanism, passes: float, x: FloatArray) -> FloatArray:
+    one = mechanism.probability(x)
+    return one if passes == 1.0 else 1.0 - one
 
 
 def _probability_of(mechanism: Mechanism, bound: Threshold, centre: FloatArray, sd: FloatArray) -> FloatArray:

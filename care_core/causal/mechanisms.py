@@ -24,8 +24,9 @@ FloatArray = NDArray[np.float64]
 Transform = Literal["identity", "log", "log1p"]
 LEAST: Mapping[Transform, float] = {"identity": -np.inf, "log": 0.0, "log1p": -1.0}
 """Every value that a transform can take lies above this."""
-BLOCK = 4_000_000
-"""Largest number of floats in one block of pairwise distances: bounds memory, not accuracy."""
+BLOCK = 300_000
+"""Largest number of floats in one block of pairwise distances, which then stays in the processor's cache: changes no
+number."""
 SLICE = 64
 JITTER = 1e-6
 TAIL = 0.01
@@ -60,7 +61,10 @@ class Kernel:
     def __call__(self, a: FloatArray, b: FloatArray) -> FloatArray:
         """Covariance of the noise-free values. a: (m, p), b: (n, p) -> (m, n)."""
         rows = max(1, BLOCK // max(1, b.size))
-        return np.vstack([self._block(a[i : i + rows], b) for i in range(0, len(a), rows)])
+        covariance = np.empty((len(a), len(b)))
+        for i in range(0, len(a), rows):
+            covariance[i : i + rows] = self._block(a[i : i + rows], b)
+        return covariance
 
     def among(self, points: FloatArray) -> FloatArray:
         """Covariance of points with each other, shape (n, n): half the work of calling it, and the same numbers."""
@@ -73,16 +77,47 @@ class Kernel:
         return covariance
 
     def _block(self, a: FloatArray, b: FloatArray) -> FloatArray:
-        exponent = -0.5 * ((a[:, None, :] - b[None, :, :]) * self.relevance) ** 2
-        each = np.exp(exponent).sum(axis=-1) + self.idle
-        covariance: FloatArray = self.additive**2 * each / max(1, len(self.relevance) + self.idle)
-        covariance += self.joint**2 * np.exp(exponent.sum(axis=-1))
-        return covariance
+        scale = self.relevance * np.sqrt(0.5)
+        exponents = (a * scale).T[:, :, None] - (b * scale).T[:, None, :]  # (p, m, n): sums over p run along rows
+        np.multiply(exponents, exponents, out=exponents)
+        np.negative(exponents, out=exponents)
+        joint: FloatArray = exponents.sum(axis=0)
+        each = np.exp(exponents, out=exponents).sum(axis=0) + self.idle
+        np.exp(joint, out=joint)
+        joint *= self.joint**2
+        joint += each * (self.additive**2 / max(1, len(self.relevance) + self.idle))
+        return joint
 
     @property
     def variance(self) -> float:
         """Prior variance of a noise-free value."""
         return self.additive**2 + self.joint**2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Factor:
+    """The Cholesky factor of a covariance, to be asked for L^-1 b: what is explained is the square of that.
+
+    numpy solves no triangular system, so the inverses of its blocks on the diagonal are kept beside it.
+    """
+
+    lower: FloatArray
+    diagonal: tuple[FloatArray, ...]
+
+    @classmethod
+    def of(cls, covariance: FloatArray) -> Factor:
+        """Of a positive definite matrix, shape (n, n)."""
+        lower = np.linalg.cholesky(covariance)
+        starts = range(0, len(lower), SLICE)
+        return cls(lower, tuple(np.linalg.inv(lower[i : i + SLICE, i : i + SLICE]) for i in starts))
+
+    def whitened(self, rows: FloatArray) -> FloatArray:
+        """L^-1 of each row. rows: (m, n) -> (m, n)."""
+        solved = np.empty_like(rows)
+        for i, inverse in zip(range(0, len(self.lower), SLICE), self.diagonal, strict=True):
+            block = slice(i, i + SLICE)
+            solved[:, block] = (rows[:, block] - solved[:, :i] @ self.lower[block, :i].T) @ inverse.T
+        return solved
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,9 +178,10 @@ class Mechanism:
         return scaled
 
     @cached_property
-    def _inverse(self) -> FloatArray:
+    def _training(self) -> Factor:
         covariance = self.kernel.among(self.points)
-        return np.asarray(np.linalg.inv(covariance + np.eye(len(self.points)) * (self.kernel.noise**2 + JITTER)))
+        covariance[np.diag_indices_from(covariance)] += self.kernel.noise**2 + JITTER
+        return Factor.of(covariance)
 
     def latent(self, x: FloatArray) -> FloatArray:
         """Posterior mean on the transformed scale. x: (m, p) -> (m,)."""
@@ -199,10 +235,9 @@ class Mechanism:
         What is not known of the mechanism at one place is partly what is not known at the other.
         """
         z = self.scaled(np.vstack([x, here]))
-        cross = self.kernel(z, self.points)
-        half = cross @ self._inverse
-        variance = self.scale**2 * np.maximum(self.kernel.variance - (half * cross).sum(axis=1), 1e-12)
-        covariance: FloatArray = self.scale**2 * (self.kernel(z[:-1], z[-1:])[:, 0] - half[:-1] @ cross[-1])
+        half = self._training.whitened(self.kernel(z, self.points))
+        variance = self.scale**2 * np.maximum(self.kernel.variance - (half**2).sum(axis=1), 1e-12)
+        covariance: FloatArray = self.scale**2 * (self.kernel(z[:-1], z[-1:])[:, 0] - half[:-1] @ half[-1])
         if self.prior is None:
             return variance[:-1], covariance, float(variance[-1])
         source, share = self.prior
@@ -214,7 +249,7 @@ class Mechanism:
         )
 
     def _known_sd(self, prior: FloatArray, cross: FloatArray) -> FloatArray:
-        explained = ((cross @ self._inverse) * cross).sum(axis=1)
+        explained = (self._training.whitened(cross) ** 2).sum(axis=1)
         sd: FloatArray = self.scale * np.sqrt(np.maximum(prior - explained, 1e-12))
         return sd
 
@@ -259,7 +294,13 @@ class Mechanism:
 
     def error_quantile(self, share: float) -> float:
         """Continuous targets: that quantile of the standardised error."""
-        return float(np.quantile(self.calibration, share))
+        if share not in self._quantiles:
+            self._quantiles[share] = float(np.quantile(self.calibration, share))
+        return self._quantiles[share]
+
+    @cached_property
+    def _quantiles(self) -> dict[float, float]:
+        return {}
 
     def residual_share(self, x: FloatArray, value: float) -> tuple[float, float]:
         """Continuous targets: the share of training runs whose error lies below that of `value` at one place, and what
