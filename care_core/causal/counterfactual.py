@@ -105,7 +105,8 @@ class World:
     def _ignorance(self, key: str, configs: Sequence[Config]) -> FloatArray:
         mechanism = self.model.mechanisms[key]
         x = columns(configs, mechanism.inputs)
-        return self._once(f"ignorance/{key}", x, lambda rows: (mechanism.ignorance(rows),))[0]
+        ignorance: FloatArray = self._once(f"ignorance/{key}", x, lambda rows: (mechanism.ignorance(rows),))[0]
+        return ignorance
 
     def _groups(self, names: Mapping[str, FloatArray]) -> list[list[str]]:
         together = [[name for name in group if name in names] for group in self.model.training.moves_together]
@@ -150,7 +151,9 @@ class World:
             expected = float(_chance(mechanism, stage.passes, here)[0])
             return (np.clip(next_passes(kin, chance, expected, passed), TAIL, 1 - TAIL),)
 
-        (probability,) = self._once(f"{objective}/{stage.mechanism}", columns(configs, mechanism.inputs), ask)
+        probability: FloatArray = self._once(f"{objective}/{stage.mechanism}", columns(configs, mechanism.inputs), ask)[
+            0
+        ]
         return probability
 
     def _once(self, key: str, x: FloatArray, ask: Callable[[FloatArray], tuple[FloatArray, ...]]) -> FloatArray:
@@ -167,7 +170,8 @@ class World:
         new = {row: i for i, row in enumerate(rows) if row not in told}
         if new:
             told.update(zip(new, zip(*ask(x[list(new.values())]), strict=True), strict=True))
-        return np.array([told[row] for row in rows]).T
+        answers: FloatArray = np.array([told[row] for row in rows]).T
+        return answers
 
     def _passed(self, objective: str, stage: StageRecord, observed: Mapping[str, object]) -> bool | None:
         """Whether a run passed the stage, None where it never came to it."""

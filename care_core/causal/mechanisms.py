@@ -107,7 +107,7 @@ class Factor:
     @classmethod
     def of(cls, covariance: FloatArray) -> Factor:
         """Of a positive definite matrix, shape (n, n)."""
-        lower = np.linalg.cholesky(covariance)
+        lower = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         starts = range(0, len(lower), SLICE)
         return cls(lower, tuple(np.linalg.inv(lower[i : i + SLICE, i : i + SLICE]) for i in starts))
 
