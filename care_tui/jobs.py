@@ -19,18 +19,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-SUFFIXES: dict[str, ReportFormat] = {
-    ".yaml": "yaml",
-    ".yml": "yaml",
-    ".md": "markdown",
-    ".html": "html",
-    ".htm": "html",
-    ".json": "json",
-    ".patch": "patch",
-    ".diff": "patch",
-}
-"""File suffix to report format; the first suffix of a format is its default."""
-
 
 class CancelledError(BaseException):
     """The operator took the work back. Not an Exception: no reader may mistake it for damage and go on."""
@@ -93,7 +81,7 @@ class Engine:
     diagnose: Callable[[Request, Progress], Case] = open_and_warm
     predict: Callable[[Case, Mapping[str, float]], Fix] = predict
     diff: Callable[[Case, Fix, DiffSide], str] = diff_of
-    report: Callable[[Diagnosis, ReportFormat], str] = report_of
+    report: Callable[[Case, ReportFormat], str] = report_of
     commands: Callable[[Diagnosis], list[str]] = commands_of
     save: Callable[[Path, str], None] = save_text
     remember: Callable[[Diagnosis], CareError | None] = remember_triage

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -159,3 +159,8 @@ class Session:
     def decided(self) -> Diagnosis:
         """The diagnosis with the ticked changes as its fix, and the causes set aside."""
         return decided(self.diagnosis, self.fix, self.dismissed)
+
+    def decided_case(self) -> Case:
+        """The case with that diagnosis; only asked for in the state `data`."""
+        assert self.case is not None
+        return replace(self.case, diagnosis=self.decided())

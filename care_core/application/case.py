@@ -34,6 +34,18 @@ Progress = Callable[[str, float], None]
 
 ReportFormat = Literal["text", "yaml", "markdown", "html", "json", "patch"]
 
+SUFFIXES: Mapping[str, ReportFormat] = {
+    ".yaml": "yaml",
+    ".yml": "yaml",
+    ".md": "markdown",
+    ".html": "html",
+    ".htm": "html",
+    ".json": "json",
+    ".patch": "patch",
+    ".diff": "patch",
+}
+"""Suffix of a file to the format of the report in it; the first suffix of a format is its usual one."""
+
 
 @dataclass(frozen=True, slots=True)
 class Request:
@@ -102,7 +114,7 @@ class Case:
 
     def report(self, format: ReportFormat = "text") -> str:
         """The fix report in one of its formats."""
-        return report_of(self.diagnosis, format)
+        return report_of(self, format)
 
 
 def open_case(request: Request, progress: Progress) -> Case:
@@ -272,19 +284,23 @@ def _diagnose(reading: Reading, health: Health, request: Request, progress: Prog
     )
 
 
-def report_of(diagnosis: Diagnosis, format: ReportFormat) -> str:
-    """The fix report in one of its formats."""
+def report_of(case: Case, format: ReportFormat) -> str:
+    """The fix report in one of its formats; a page draws the signals of the case's log."""
     from care_core.report.document import build_document
-    from care_core.report.html import to_html
     from care_core.report.terminal import to_text
     from care_core.report.writers import to_json, to_markdown, to_yaml
 
     if format == "text":
-        return to_text(diagnosis)
-    document = build_document(diagnosis)
+        return to_text(case.diagnosis)
+    document = build_document(case.diagnosis)
     if format == "patch":
         return document.diff
-    write = {"yaml": to_yaml, "markdown": to_markdown, "html": to_html, "json": to_json}[format]
+    if format == "html":
+        from care_core.application.plotting import drawn_of
+        from care_core.report.html import to_html
+
+        return to_html(document, drawn_of(case))
+    write = {"yaml": to_yaml, "markdown": to_markdown, "json": to_json}[format]
     return write(document)
 
 

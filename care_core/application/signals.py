@@ -170,11 +170,11 @@ def _held(log: Log, present: Mapping[str, Channel], read: Iterable[Source]) -> s
 
 def _known(present: Mapping[str, Channel], held: Collection[Source]) -> Iterator[Signal]:
     """The signals that every log of its kind has, as far as this one has them."""
-    commands = sorted((name for name, one in present.items() if _of_type(one.type) == "Twist"), key=len)
+    commands = sorted((name for name, one in present.items() if type_name(one.type) == "Twist"), key=len)
     command = next((name for name in commands if name.endswith("cmd_vel")), "")
     for name, channel in present.items():
         if name.startswith("/"):
-            for field, wanted in KNOWN_TYPES.get(_of_type(channel.type), {}).items():
+            for field, wanted in KNOWN_TYPES.get(type_name(channel.type), {}).items():
                 yield Signal(name, field, (command, wanted[0]) if command and wanted else None)
             continue
         for field, wanted in KNOWN.get(name, {}).items():
@@ -183,7 +183,7 @@ def _known(present: Mapping[str, Channel], held: Collection[Source]) -> Iterator
                 yield Signal(name, field, next((demand for demand in demands if demand in held), None))
 
 
-def _of_type(type: str) -> str:
+def type_name(type: str) -> str:
     """The bare name of a ROS type: geometry_msgs/Twist, geometry_msgs/msg/TwistStamped."""
     return type.rsplit("/", 1)[-1]
 
@@ -203,11 +203,8 @@ def trace_of(case: Case, signal: Signal, span: tuple[float, float], columns: int
         CareError: the log holds no number there.
     """
     sources = [(signal.channel, signal.field), *([signal.wanted] if signal.wanted else [])]
-    asked: dict[str, list[str]] = {}
-    for channel, field in sources:
-        asked.setdefault(channel, [] if channel.startswith("/") else list(SELECTORS)).append(field)
-    tables = log_of(case).read(asked)
-    lines = [_line(tables.get(channel), field, span) for channel, field in sources]
+    found = lines_of(case, sources, span)
+    lines = [found[source] for source in sources]
     if lines[0] is None:
         raise CareError(f"The log holds no numbers in {signal.name}.", hint="Choose another signal.")
     count = len(lines[0][1])
@@ -221,6 +218,18 @@ def trace_of(case: Case, signal: Signal, span: tuple[float, float], columns: int
 
 
 Line = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
+"""Times in seconds of the log and values, both of shape (n,)."""
+
+
+def lines_of(case: Case, sources: Iterable[Source], span: tuple[float, float]) -> dict[Source, Line | None]:
+    """Signals over a span of the log, read in one pass, of the first sensor where there are several; None where the
+    log holds no numbers of that name."""
+    asked: dict[str, list[str]] = {}
+    wanted = list(dict.fromkeys(sources))
+    for channel, field in wanted:
+        asked.setdefault(channel, [] if channel.startswith("/") else list(SELECTORS)).append(field)
+    tables = log_of(case).read(asked)
+    return {(channel, field): _line(tables.get(channel), field, span) for channel, field in wanted}
 
 
 def _line(table: Table | None, field: str, span: tuple[float, float]) -> Line | None:

@@ -1,16 +1,17 @@
 """The report as one HTML file that needs nothing else: no script, no font, no picture from elsewhere.
 
-Every text goes through `escape`, whoever wrote it.
+Every text goes through `escape`, whoever wrote it; what is no text of the document, through `clean` before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from pathlib import Path
 
 from care_core.report.document import (
     CauseEntry,
+    FaultEntry,
     FixEntry,
     FixSet,
     ObjectiveEntry,
@@ -19,7 +20,9 @@ from care_core.report.document import (
     SinceEntry,
     wanted_text,
 )
-from care_core.report.happened import finding_sentence
+from care_core.report.happened import FindingEntry
+from care_core.report.path_drawing import MOST, paths_svg
+from care_core.report.plots import NOTHING_DRAWN, Drawn, mark_list, plot_figure
 from care_core.report.together import listed, together
 from care_core.report.wording import SEVERITY_WORDS, chance, fit_text, hypothesis_text, noted
 from care_core.report.writers import STATUS_WORDS, plain_verdict
@@ -27,111 +30,159 @@ from care_core.run import shown
 from care_core.text import seconds
 from care_core.variables import ASSUMED
 
-_STYLE = """
-:root { color-scheme: light dark; --line: #8886; --ok: #16803c; --fault: #c0261c; --unknown: #9a6a00; }
-@media (prefers-color-scheme: dark) { :root { --ok: #5fd38d; --fault: #ff8a80; --unknown: #ffc14d; } }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
-table { border-collapse: collapse; width: 100%; margin: .5rem 0 1rem; }
-th, td { text-align: left; vertical-align: top; padding: .3rem .8rem .3rem 0; border-bottom: 1px solid var(--line); }
-td.number { font-variant-numeric: tabular-nums; white-space: nowrap; }
-code, pre { font: 14px/1.45 ui-monospace, monospace; }
-pre { overflow-x: auto; padding: .8rem; border: 1px solid var(--line); border-radius: 4px; }
-.status { font-weight: 600; white-space: nowrap; }
-.ok { color: var(--ok); } .fault { color: var(--fault); } .not_evaluated { color: var(--unknown); }
-ins { color: var(--ok); text-decoration: none; } del { color: var(--fault); text-decoration: none; }
-footer { border-top: 1px solid var(--line); margin-top: 2rem; font-size: 14px; overflow-wrap: anywhere; }
-"""
 _SIGNS = {"ok": "✓", "fault": "✗", "not_evaluated": "?"}
 _SEVERITY_CLASSES = {"critical": "fault", "warning": "not_evaluated", "info": "ok"}
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'"
 
 
-def to_html(report: Report) -> str:
+def to_html(report: Report, drawn: Drawn = NOTHING_DRAWN) -> str:
     """A page to mail or to keep beside the log."""
-    return "\n".join(_page(report)) + "\n"
+    return "\n".join(_page(report, drawn)) + "\n"
 
 
-def _page(report: Report) -> Iterator[str]:
+def _page(report: Report, drawn: Drawn) -> Iterator[str]:
     title = f"Triage of {escape(Path(report.log.path).name)}"
     yield '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">'
     yield f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
     yield '<meta name="viewport" content="width=device-width, initial-scale=1">'
-    yield f"<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>"
+    style = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+    yield f"<title>{title}</title>\n<style>{style}</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>"
     yield f"<p>{escape(fit_text(report.profile.name if report.profile else '', report.fit))}.</p>"
-    yield f"<p>{_verdict(report)}</p>"
-    yield from _happened(report)
-    if report.objectives:
-        yield "<h2>Objectives</h2>"
-        yield from _table(("Objective", "Value", "Wanted", "Status", "Why"), map(_objective_row, report.objectives))
-    for faults in together(report.faults, lambda fault: [cause.path for cause in fault.causes]):
-        fault = faults[-1]
-        yield f"<h2>Causes of {listed([f'<code>{escape(one.objective)}</code>' for one in faults])}</h2>"
-        if fault.causes:
-            heads = ("", "Option", "Path", "Driven", "Suggested", "Probability", "Confidence", "Notes")
-            yield from _table(heads, map(_cause_row, fault.causes))
-        else:
-            yield "<p>None was found among the options of the profile.</p>"
-    if report.fix is not None:
-        yield from _fix(report, report.fix)
-    if report.since is not None:
-        yield from _since(report.since)
-    if report.rivals:
-        yield "<h2>It may be no parameter</h2>"
-        yield from _list(f"{escape(rival.circumstance)}: {escape(rival.text)}" for rival in report.rivals)
-    if report.tell_more:
-        yield "<h2>What would tell more</h2>"
-        yield from _list(escape(advice) for advice in report.tell_more)
-    if report.dismissed:
-        yield "<h2>Set aside by the operator</h2>"
-        yield from _list(f"<code>{escape(entry.option)}</code>: {escape(entry.reason)}" for entry in report.dismissed)
-    if report.notes:
-        yield "<h2>Notes</h2>"
-        yield from _list(escape(note) for note in report.notes)
+    yield from _verdict(report)
+    yield from _facts(report)
+    sections = [(name, head, lines) for name, head, made in _sections(report, drawn) if (lines := list(made))]
+    links = [f'<a href="#{name}">{_plain(head)}</a>' for name, head, _ in sections]
+    yield f'<nav aria-label="Contents">{" ".join(links)}</nav>'
+    yield "</header>\n<main>"
+    for name, head, lines in sections:
+        yield f'<section id="{name}">\n<h2>{head}</h2>'
+        yield from lines
+        yield "</section>"
+    yield "</main>"
     yield from _footer(report)
     yield "</body>\n</html>"
 
 
-def _happened(report: Report) -> Iterator[str]:
-    if report.hypotheses:
-        yield "<h2>What explains it</h2>"
-        yield from _list(f"{h.probability:.0%}: {escape(hypothesis_text(h))}" for h in report.hypotheses)
-    findings = noted(report.findings)
-    if findings:
-        yield "<h2>Findings, the first cause first</h2>"
-        yield from _list(
-            f'<span class="status {_SEVERITY_CLASSES[f.severity]}">{SEVERITY_WORDS[f.severity]}</span> '
-            f"{escape(finding_sentence(f))}"
-            for f in findings
-        )
-    if report.account:
-        yield "<h2>What happened</h2>"
-        rows = ((seconds(one.time_s), escape(one.text), escape(one.source)) for one in report.account)
-        yield from _table(("Time", "What", "Source"), rows)
+def _plain(head: str) -> str:
+    """A heading without its tags, for the list of contents."""
+    return head.replace("<code>", "").replace("</code>", "")
 
 
-def _verdict(report: Report) -> str:
+def _sections(report: Report, drawn: Drawn) -> Iterator[tuple[str, str, Iterable[str]]]:
+    """Name, heading and lines of each part; one without lines is left out."""
+    yield "explains", "What explains it", _explanations(report)
+    yield "findings", "Findings, the first cause first", _findings(report)
+    yield "objectives", "Objectives", _objectives(report)
+    groups = together(report.faults, lambda fault: [cause.path for cause in fault.causes])
+    for number, faults in enumerate(groups, start=1):
+        names = listed([f"<code>{escape(one.objective)}</code>" for one in faults])
+        yield f"causes{number}", f"Causes of {names}", _causes(faults[-1], drawn, number)
+    if report.fix is not None:
+        yield "fix", "Fix", _fix(report, report.fix)
+    yield "signals", "Signals", _signals(drawn)
+    yield "account", "What happened", _account(report, drawn)
+    if report.since is not None:
+        yield "since", f"Changed since <code>{escape(Path(report.since.log).name)}</code>", _since(report.since)
+    yield (
+        "rivals",
+        "It may be no parameter",
+        _list(f"{escape(r.circumstance)}: {escape(r.text)}" for r in report.rivals),
+    )
+    yield "more", "What would tell more", _list(map(escape, report.tell_more))
+    aside = (f"<code>{escape(entry.option)}</code>: {escape(entry.reason)}" for entry in report.dismissed)
+    yield "aside", "Set aside by the operator", _list(aside)
+    yield "notes", "Notes", _list(map(escape, report.notes))
+
+
+def _verdict(report: Report) -> Iterator[str]:
+    status, text = _said(report)
+    yield f'<p class="verdict {status}">{text}</p>'
+
+
+def _said(report: Report) -> tuple[str, str]:
+    """The verdict as status and sentence."""
     if report.fit.verdict == "no":
         status, said = plain_verdict(report)
-        return f"<strong>{STATUS_WORDS[status].capitalize()}</strong>: {escape(said)}."
+        return status, f"<strong>{STATUS_WORDS[status].capitalize()}</strong>: {escape(said)}."
     worst = [escape(one.title) for one in report.findings if one.severity == "critical" and not one.after_impact]
     broken = ", ".join(
         f"<code>{escape(objective.name)}</code>" for objective in report.objectives if objective.status == "fault"
     )
     if not broken and worst:
-        return f"<strong>Fault</strong>: {'; '.join(worst)}."
+        return "fault", f"<strong>Fault</strong>: {'; '.join(worst)}."
+    status = "fault" if broken else "ok"
     found = f"<strong>Fault</strong>: {broken}." if broken else "<strong>No fault found.</strong>"
     if not broken and any(objective.status == "not_evaluated" for objective in report.objectives):
-        found += " Not everything could be evaluated."
+        status, found = "not_evaluated", f"{found} Not everything could be evaluated."
     if report.abstained:
-        return f"{found} <strong>No change advised</strong>: {escape(report.abstained)}"
+        return status, f"{found} <strong>No change advised</strong>: {escape(report.abstained)}"
     if report.fix is None:
-        return found
+        return status, found
     likely = f"{chance(report.fix.p_fixed, report.fix.guess)} that all objectives are met"
-    return f"{found} Change {_changes(report.fix)}: {likely}."
+    return status, f"{found} Change {_changes(report.fix)}: {likely}."
 
 
-def _changes(fix: FixSet) -> str:
-    return ", ".join(f"<code>{escape(change.option)}</code> {change.values}" for change in fix.changes)
+def _facts(report: Report) -> Iterator[str]:
+    """What run this is, in a few words each."""
+    log = report.log
+    robot = next((one.text for one in report.account if one.kind == "vehicle"), "")
+    judged = next((one for one in report.missions if one.judged), None)
+    mission = f"{judged.index} of {len(report.missions)}" if judged and len(report.missions) > 1 else ""
+    facts = (
+        ("Robot", robot),
+        ("Recorded", (log.start or "").replace("T", " ").partition(".")[0]),
+        ("Length of the log", seconds(log.duration_s)),
+        ("Mission", mission),
+        ("Profile", f"{report.profile.name} {report.profile.version}" if report.profile else ""),
+        ("Damage", f"{len(log.damage)} place{'s' if len(log.damage) > 1 else ''}" if log.damage else ""),
+    )
+    yield '<dl class="facts">'
+    yield from (f"<div><dt>{name}</dt><dd>{escape(value)}</dd></div>" for name, value in facts if value)
+    yield "</dl>"
+
+
+def _explanations(report: Report) -> Iterator[str]:
+    if not report.hypotheses:
+        return
+    yield '<ol class="chances">'
+    for one in report.hypotheses:
+        bar = f'<span class="bar" aria-hidden="true"><i style="width:{one.probability:.0%}"></i></span>'
+        share = f'<span class="number">{one.probability:.0%}</span>'
+        yield f"<li>{share}{bar}<span>{escape(hypothesis_text(one))}</span></li>"
+    yield "</ol>"
+
+
+def _findings(report: Report) -> Iterator[str]:
+    findings = noted(report.findings)
+    if findings:
+        yield '<ul class="findings">'
+        for one in findings:
+            yield from _finding(one)
+        yield "</ul>"
+
+
+def _finding(one: FindingEntry) -> Iterator[str]:
+    style = _SEVERITY_CLASSES[one.severity]
+    late = ", after the impact" if one.after_impact else ""
+    yield f'<li class="{style}"><p><span class="status {style}">{SEVERITY_WORDS[one.severity]}</span> '
+    yield f"<strong>{escape(one.title)}</strong>, at {seconds(one.onset_s)}{late}</p>"
+    if one.evidence:
+        yield f"<p>{escape(one.evidence)}</p>"
+    if one.consequences:
+        led = "; ".join(f"{escape(below.title)} ({seconds(below.onset_s)})" for below in one.consequences)
+        yield f"<p>Led to: {led}</p>"
+    if one.source:
+        yield f'<p class="quiet">Seen in {escape(one.source)}</p>'
+    yield "</li>"
+
+
+def _objectives(report: Report) -> Iterator[str]:
+    if report.objectives:
+        heads = ("Objective", "Value", "Wanted", "Status", "Why")
+        has_reason = any(one.reason for one in report.objectives)
+        rows = (_objective_row(one)[: 5 if has_reason else 4] for one in report.objectives)
+        styles = ("", "value", "", "status-cell", "why")
+        yield from _table("Objectives", heads[: 5 if has_reason else 4], rows, styles, "objectives")
 
 
 def _objective_row(objective: ObjectiveEntry) -> tuple[str, ...]:
@@ -149,46 +200,57 @@ def _status(status: str) -> str:
     return f'<span class="status {status}">{_SIGNS[status]} {STATUS_WORDS[status]}</span>'
 
 
-def _cause_row(cause: CauseEntry) -> tuple[str, ...]:
-    return (
-        str(cause.rank),
-        f"<code>{escape(cause.option)}</code>",
-        " → ".join(escape(node) for node in cause.path),
-        f"{cause.current:g}{ASSUMED if cause.assumed else ''}",
-        "" if cause.suggested is None else f"{cause.suggested:g}",
-        "" if cause.p_fixed is None else f"{cause.p_fixed:.0%}",
-        cause.confidence + ("" if cause.in_support else ", outside the training runs"),
-        "<br>".join(escape(note) for note in cause.notes),
+def _causes(fault: FaultEntry, drawn: Drawn, number: int) -> Iterator[str]:
+    if not fault.causes:
+        yield "<p>None was found among the options of the profile.</p>"
+        return
+    judged = next((one for one in drawn.faults if one.objective.variable.name == fault.objective), None)
+    if judged is not None:
+        drawing = list(paths_svg(judged, f"paths{number}"))
+        if drawing:
+            yield '<figure><div class="scroll" tabindex="0" role="group" aria-label="Causal paths, may be scrolled">'
+            yield from drawing
+            yield '</div><figcaption><span class="quiet">From the option to the objective, the best cause first'
+            yield f" ({min(MOST, len(fault.causes))} of {len(fault.causes)} drawn). On each step: its effect in "
+            yield "standard deviations, and in how many resamples of the training runs it was found; broken where in "
+            yield "less than half. Expected is what the reference configuration would give.</span></figcaption>"
+            yield "</figure>"
+    for cause in fault.causes:
+        yield from _cause(cause)
+
+
+def _cause(cause: CauseEntry) -> Iterator[str]:
+    driven = f"{cause.current:g}{ASSUMED if cause.assumed else ''}"
+    to = "" if cause.suggested is None else f" → {cause.suggested:g}"
+    fixed = "" if cause.p_fixed is None else f"{cause.p_fixed:.0%} fixed by it alone, "
+    outside = "" if cause.in_support else ", outside the training runs"
+    yield (
+        f'<div class="cause"><p>{cause.rank}. <strong><code>{escape(cause.option)}</code></strong> '
+        f'<span class="number">{driven}{to}</span> ({fixed}{cause.confidence} confidence{outside})</p>'
     )
+    yield f'<p class="quiet">{" → ".join(escape(node) for node in cause.path)}</p>'
+    yield from _list(map(escape, cause.notes))
+    yield "</div>"
+
+
+def _changes(fix: FixSet) -> str:
+    return ", ".join(f"<code>{escape(change.option)}</code> {change.values}" for change in fix.changes)
 
 
 def _fix(report: Report, fix: FixEntry) -> Iterator[str]:
-    yield "<h2>Fix</h2>"
     objectives = {objective.name: objective for objective in report.objectives}
     rows = (
         (f"<code>{escape(name)}</code>", escape(_prediction(objectives[name], one, fix.guess)), _status(one.status))
         for name, one in fix.predicted.items()
     )
-    yield from _table(("Objective", "Predicted (80 %)", "Status"), rows)
+    yield from _table("What the change is predicted to bring", ("Objective", "Predicted (80 %)", "Status"), rows)
+    yield "<h3>Difference to the configuration as driven</h3>"
     yield f"<pre>{chr(10).join(_diff_line(line) for line in report.diff.splitlines())}</pre>"
+    yield "<h3>Commands</h3>"
     yield f"<pre>{escape(chr(10).join(report.apply))}</pre>"
     if fix.alternatives:
         yield "<h3>Alternatives</h3>"
         yield from _list(_alternative(alternative) for alternative in fix.alternatives)
-
-
-def _since(since: SinceEntry) -> Iterator[str]:
-    yield f"<h2>Changed since <code>{escape(Path(since.log).name)}</code></h2>"
-    if since.warnings:
-        yield from _list(escape(warning) for warning in since.warnings)
-    if not since.changes:
-        yield "<p>No parameter that anybody sets.</p>"
-        return
-    rows = (
-        (f"<code>{escape(c.parameter)}</code>", escape(c.option or ""), escape(shown(c.from_)), escape(shown(c.to)))
-        for c in since.changes
-    )
-    yield from _table(("Parameter", "Option", "Then", "Now"), rows)
 
 
 def _prediction(objective: ObjectiveEntry, predicted: PredictedObjective, is_guess: bool) -> str:
@@ -207,28 +269,84 @@ def _diff_line(line: str) -> str:
     return f"<{tag}>{escape(line)}</{tag}>" if tag else escape(line)
 
 
+def _signals(drawn: Drawn) -> Iterator[str]:
+    """The plots that matter, then the others folded away."""
+    if not drawn.plots:
+        return
+    yield f'<p class="quiet">Over {drawn.end_s - drawn.start_s:.0f} s from {drawn.since}; the axis counts seconds'
+    yield f" from it ({drawn.start_s:.1f} s into the log). Spikes are kept. Numbers mark what happened:</p>"
+    yield from mark_list(drawn)
+    for limit in drawn.deadlines:
+        if drawn.start_s < limit.value < drawn.end_s:
+            yield f'<p class="quiet">The broken upright line at {limit.value - drawn.start_s:.1f} s: '
+            yield f"{escape(limit.words)}.</p>"
+    numbered = list(enumerate(drawn.plots, start=1))
+    for number, plot in numbered:
+        if plot.matters:
+            yield from plot_figure(plot, drawn, f"plot{number}")
+    others = [(number, plot) for number, plot in numbered if not plot.matters]
+    if others:
+        yield f"<details><summary>{len(others)} other signals</summary>"
+        for number, plot in others:
+            yield from plot_figure(plot, drawn, f"plot{number}")
+        yield "</details>"
+
+
+def _account(report: Report, drawn: Drawn) -> Iterator[str]:
+    if not report.account:
+        return
+    start_s = drawn.start_s if drawn.is_mission else 0.0
+    heads = ("In the log", *(("In the mission",) if start_s else ()), "What", "Source")
+    rows = []
+    for one in report.account:
+        times = [seconds(one.time_s)]
+        if start_s:
+            times.append("" if one.time_s is None else f"{one.time_s - start_s:+.1f} s".replace("-", "\u2212"))
+        rows.append((*times, escape(one.text), escape(one.source)))
+    styles = ("time", *(("time",) if start_s else ()), "", "source")
+    yield from _table("What happened, in order of time", heads, rows, styles, "account")
+
+
+def _since(since: SinceEntry) -> Iterator[str]:
+    yield from _list(escape(warning) for warning in since.warnings)
+    if not since.changes:
+        yield "<p>No parameter that anybody sets.</p>"
+        return
+    rows = (
+        (f"<code>{escape(c.parameter)}</code>", escape(c.option or ""), escape(shown(c.from_)), escape(shown(c.to)))
+        for c in since.changes
+    )
+    yield from _table("Parameters that changed", ("Parameter", "Option", "Then", "Now"), rows)
+
+
 def _footer(report: Report) -> Iterator[str]:
     log, profile = report.log, report.profile
     yield "<footer>"
-    yield f"<p>Log <code>{escape(log.path)}</code>, {escape(log.format)}, {log.duration_s:.0f} s,"
-    yield f"SHA-256 <code>{escape(log.sha256)}</code>.<br>"
+    yield f"<p>Log <code>{escape(log.path)}</code>, {escape(log.format)}, {log.duration_s:.0f} s"
+    yield f", SHA-256 <code>{escape(log.sha256)}</code>.<br>" if log.sha256 else ".<br>"
     if profile is not None:
         yield f"Profile {escape(profile.name)} {escape(profile.version)} ({escape(profile.platform)})."
     yield "</p>"
-    if log.damage:
-        yield from _list(f"Damage: {escape(damage.what)}" for damage in log.damage)
+    yield from _list(f"Damage: {escape(damage.what)}" for damage in log.damage)
     yield "</footer>"
 
 
-def _table(heads: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
-    yield "<table>"
-    yield f"<tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>"
+def _table(
+    caption: str, heads: Sequence[str], rows: Iterable[Sequence[str]], styles: Sequence[str] = (), name: str = ""
+) -> Iterator[str]:
+    """A table that may be scrolled where the page is narrow; `styles` are classes of its columns."""
+    classes = [f' class="{style}"' if style else "" for style in (*styles, *[""] * (len(heads) - len(styles)))]
+    yield f'<div class="scroll" tabindex="0" role="group" aria-label="{escape(caption)}"><table'
+    yield f' role="table" class="{name}">' if name else ">"
+    heading = "".join(f'<th scope="col"{style}>{head}</th>' for head, style in zip(heads, classes, strict=False))
+    yield f"<thead><tr>{heading}</tr></thead><tbody>"
     for row in rows:
-        yield f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>"
-    yield "</table>"
+        cells = "".join(f'<td role="cell"{style}>{cell}</td>' for cell, style in zip(row, classes, strict=False))
+        yield f'<tr role="row">{cells}</tr>'
+    yield "</tbody></table></div>"
 
 
 def _list(items: Iterable[str]) -> Iterator[str]:
-    yield "<ul>"
-    yield from (f"<li>{item}</li>" for item in items)
-    yield "</ul>"
+    lines = [f"<li>{item}</li>" for item in items]
+    if lines:
+        yield from ("<ul>", *lines, "</ul>")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import care_core
-from care_core.application.case import Case, ReportFormat, Request, exit_code
+from care_core.application.case import SUFFIXES, Case, ReportFormat, Request, exit_code
 from care_core.application.remembering import remember_triage
 from care_core.errors import LogError, UsageError
 from care_tui.commands.arguments import (
@@ -99,8 +99,7 @@ def demo() -> None:
 
 
 def _format_of(out: Path | None) -> ReportFormat | None:
-    suffixes: dict[str, ReportFormat] = {".json": "json", ".yaml": "yaml", ".yml": "yaml", ".md": "markdown"}
-    return None if out is None else suffixes.get(out.suffix.lower())
+    return None if out is None else SUFFIXES.get(out.suffix.lower())
 
 
 def _written(case: Case, format: ReportFormat | None, *, to_file: bool) -> str:

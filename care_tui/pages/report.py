@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.application.case import SUFFIXES
 from care_core.errors import CareError
 from care_core.text import clean
-from care_tui.jobs import SUFFIXES
 from care_tui.pages.page import View, sentence
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.rows import error_rows, plain_rows
@@ -30,9 +30,9 @@ class ReportPage(DiagnosisPage):
     def enter(self) -> None:
         if self.session.state == "data":
             self._text = None
-            diagnosis = self.session.decided()
+            case = self.session.decided_case()
             format = "markdown" if self.session.format == "html" else self.session.format
-            self.screen.fetch("report", lambda _job: self.walk.engine.report(diagnosis, format), self._received)
+            self.screen.fetch("report", lambda _job: self.walk.engine.report(case, format), self._received)
 
     def _received(self, text: str | CareError) -> None:
         self._text = text
@@ -65,7 +65,9 @@ class ReportPage(DiagnosisPage):
             return
         suffix = next(suffix for suffix, format in SUFFIXES.items() if format == self.session.format)
         name = f"{clean(Path(self.session.diagnosis.run.log.path).stem)}.care{suffix}"
-        self.screen.app.push_screen(ExportDialog(self.session.decided(), Path(name), self.walk.engine), self._exported)
+        self.screen.app.push_screen(
+            ExportDialog(self.session.decided_case(), Path(name), self.walk.engine), self._exported
+        )
 
     def _exported(self, path: str | None) -> None:
         if path is not None:

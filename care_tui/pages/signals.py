@@ -11,9 +11,10 @@ from textual.content import Content
 from care_core.application.case import Case
 from care_core.application.signals import Signal, Trace, signals_of, trace_of, whole_of
 from care_core.errors import CareError
+from care_core.report.marks import Mark, marks_of
 from care_core.text import clean, seconds
 from care_tui.pages.page import Fetch, Page, View, sentence
-from care_tui.render.happened import Mark, marks_of
+from care_tui.render.happened import sign_of
 from care_tui.render.plot import WANTED, dots_across, plot
 from care_tui.render.rows import ASCII, Row, Rows, error_rows, padded, text
 from care_tui.screens.panes import PanesScreen
@@ -49,7 +50,7 @@ class SignalsPage(Page):
         self._whole = whole_of(case)
         self._span = self._whole
         self._moment: float | None = None
-        self._marks = marks_of(case.diagnosis, self.glyphs)
+        self._marks = marks_of(case.diagnosis)
 
     def enter(self) -> None:
         self._found.start(lambda: signals_of(self._case))
@@ -105,12 +106,14 @@ class SignalsPage(Page):
         rows += [Row(Content(f"{labels.get(i, ''):>{AXIS}} ") + line) for i, line in enumerate(lines)]
         signs = [" "] * width
         for mark in reversed(told):
-            signs[self._place(mark.time_s, trace, width)] = mark.sign
+            signs[self._place(mark.time_s, trace, width)] = sign_of(mark, self.glyphs)
         rows.append(Row(Content(f"{'':>{AXIS}} {''.join(signs)}")))
         start, end = seconds(trace.start_s), seconds(trace.end_s)
         rows.append(Row(Content(f"{'':>{AXIS}} {start:<{max(width - len(end), 0)}}{end}")))
         near = sorted(sorted(told, key=self._weight)[:below], key=lambda mark: mark.time_s)
-        return rows + [Row(text(f"{mark.sign} {seconds(mark.time_s):>8}  {mark.words}"), 12) for mark in near]
+        return rows + [
+            Row(text(f"{sign_of(mark, self.glyphs)} {seconds(mark.time_s):>8}  {mark.words}"), 12) for mark in near
+        ]
 
     def _head(self, signal: Signal, trace: Trace) -> Content:
         head = Content.assemble((clean(signal.name), "bold"), f"  {trace.count} values")

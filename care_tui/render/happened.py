@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,6 +9,7 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.health.records import Finding, Health, Moment, Severity
+from care_core.report.marks import Mark
 from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
 from care_core.text import clean, seconds
 from care_tui.render.objectives import damage
@@ -119,42 +119,23 @@ def warnings_of(diagnosis: Diagnosis) -> list[str]:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """Something that happened, as a sign on the axis of time; the gravest have the least `rank`."""
-
-    time_s: float
-    sign: str
-    words: str
-    rank: int
-
-
-MARKED: dict[str, tuple[str, int]] = {
-    "crash": ("C", 0),
-    "failsafe": ("F", 1),
-    "error": ("E", 1),
-    "arming": ("A", 3),
-    "mode": ("M", 3),
-    "goal": ("G", 3),
-    "recovery": ("R", 2),
-    "parameter": ("P", 3),
+_SIGNS = {
+    "crash": "C",
+    "failsafe": "F",
+    "error": "E",
+    "arming": "A",
+    "mode": "M",
+    "goal": "G",
+    "recovery": "R",
+    "parameter": "P",
+    "flight": "T",
+    "info": "i",
 }
-"""Kinds of moments that are marked on plots; the others are too many."""
 
 
-def marks_of(diagnosis: Diagnosis, glyphs: Glyphs) -> list[Mark]:
-    """What happened, in order of time: findings, the moments that matter, and what the diagnosis rests on."""
-    signs: dict[Severity, tuple[str, int]] = {"critical": (glyphs.fault, 0), "warning": ("!", 1), "info": ("i", 4)}
-    findings = [one.what for one in told(diagnosis.health) if isinstance(one.what, Finding)]
-    found = [Mark(f.onset_s, signs[f.severity][0], f.title, signs[f.severity][1]) for f in findings]
-    found += [
-        Mark(one.time_s, MARKED[one.kind][0], one.text, MARKED[one.kind][1])
-        for one in diagnosis.health.account
-        if one.kind in MARKED
-    ]
-    said = {mark.words for mark in found}
-    found += [Mark(part.time_s, "!", part.text, 1) for part in diagnosis.run.evidence if part.text not in said]
-    return sorted((mark for mark in found if math.isfinite(mark.time_s)), key=lambda mark: mark.time_s)
+def sign_of(mark: Mark, glyphs: Glyphs) -> str:
+    """What happened as a sign on the axis of time."""
+    return glyphs.fault if mark.kind == "critical" else _SIGNS.get(mark.kind, "!")
 
 
 def fit_rows(diagnosis: Diagnosis, advice: Sequence[str]) -> list[Row]:

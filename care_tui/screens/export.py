@@ -13,10 +13,10 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
-from care_core.diagnose.records import Diagnosis
+from care_core.application.case import SUFFIXES, Case
 from care_core.errors import CareError, UsageError
 from care_core.text import clean
-from care_tui.jobs import SUFFIXES, Engine, as_care_error
+from care_tui.jobs import Engine, as_care_error
 from care_tui.widgets.line_input import LineInput
 
 NAMES = ".yaml, .md, .html, .json or .patch"
@@ -45,9 +45,9 @@ class ExportDialog(ModalScreen[str | None]):
 
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape", "dismiss(None)", "Cancel", id="export.cancel")]
 
-    def __init__(self, diagnosis: Diagnosis, default: Path, engine: Engine) -> None:
+    def __init__(self, case: Case, default: Path, engine: Engine) -> None:
         super().__init__()
-        self._diagnosis = diagnosis
+        self._case = case
         self._default = default
         self._engine = engine
 
@@ -81,7 +81,7 @@ class ExportDialog(ModalScreen[str | None]):
     @work(thread=True, exclusive=True, group="write", exit_on_error=False)
     def _write(self, path: Path) -> CareError | None:
         try:
-            self._engine.save(path, self._engine.report(self._diagnosis, SUFFIXES[path.suffix.lower()]))
+            self._engine.save(path, self._engine.report(self._case, SUFFIXES[path.suffix.lower()]))
         except Exception as err:
             return as_care_error(err)
         return None

@@ -48,7 +48,8 @@ def fake_diff(case: Case, fix: Fix, side: DiffSide) -> str:
     return "\n".join(lines)
 
 
-def fake_report(diagnosis: Diagnosis, format: ReportFormat) -> str:
+def fake_report(case: Case, format: ReportFormat) -> str:
+    diagnosis = case.diagnosis
     assert diagnosis.fix is None or diagnosis.fix.changes
     changes = () if diagnosis.fix is None else diagnosis.fix.changes
     aside = [f"  aside: {entry.option}: {entry.reason}" for entry in diagnosis.dismissed]

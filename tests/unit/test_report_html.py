@@ -29,6 +29,9 @@ class Seen(HTMLParser):
         if tag not in ("meta", "br"):
             self.open.append(tag)
 
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+
     def handle_endtag(self, tag: str) -> None:
         assert self.open.pop() == tag
 
@@ -39,7 +42,7 @@ def test_it_holds_the_answer_and_needs_nothing_else() -> None:
     seen.feed(page)
     assert not seen.open
     assert "script" not in seen.tags
-    assert not seen.links
+    assert all(link.startswith("#") for link in seen.links)
     for part in ("land_speed", "mission_time", "✗ FAULT", "? NOT EVALUATED", "<ins>+LAND_SPEED,50</ins>", "param set"):
         assert part in page
 

@@ -1,0 +1,250 @@
+"""What a page draws of a case: the signals behind the metrics and findings of a run, thinned so that spikes stay."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from care_core.application.case import Case
+from care_core.application.signal_words import is_position, words_of
+from care_core.application.signals import Line as Values
+from care_core.application.signals import Signal, Source, lines_of, signals_of, type_name, whole_of
+from care_core.application.viewing import log_of
+from care_core.report.marks import Mark, marks_of
+from care_core.report.plots import Band, Drawn, Limit, Line, Plot, Point
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from care_core.health.records import Finding
+
+MOST_PLOTS, FEWEST, MOST_OTHERS = 8, 6, 10
+"""Plots that matter at most and, with others, at least; and how many more."""
+MOST_POINTS = 400
+"""Points of a line."""
+MOST_MARKS = 16
+_SAME = 12
+"""Letters that two marks of one second share where they say the same."""
+_LONGEST_GAP, _LEAST_GAP = 5.0, 0.01
+"""A line is broken where it has no value for so many of its usual intervals, and for this share of the span."""
+
+_TOGETHER = {
+    "RCOU": "",
+    "MOT": "",
+    "SERVO_OUTPUT_RAW": "",
+    "VIBE": "",
+    "VIBRATION": "",
+    "MAG": "magnetic field",
+    "XKF4": "test ratios of the estimator",
+    "NKF4": "test ratios of the estimator",
+}
+"""Records whose fields are drawn in one plot, with words for them all where those of the first are not."""
+MOST_TOGETHER = 8
+
+_PARAMETER_LIMITS: Mapping[Source, tuple[tuple[str, float], ...]] = {
+    ("BAT", "Volt"): (("BATT_LOW_VOLT", 1.0), ("BATT_CRT_VOLT", 1.0)),
+    ("ATT", "Roll"): (("ANGLE_MAX", 0.01),),
+    ("ATT", "Pitch"): (("ANGLE_MAX", 0.01),),
+    ("GPS", "HDop"): (("GPS_HDOP_GOOD", 0.01),),
+    ("RCOU", "C1"): (("MOT_PWM_MAX", 1.0), ("MOT_PWM_MIN", 1.0)),
+}
+"""Parameters that are a limit of a signal, and the factor to its unit; 0 switches such a limit off."""
+_KNOWN_LIMITS: Mapping[Source, tuple[Limit, ...]] = {
+    ("VIBE", "VibeX"): (Limit(30.0, "acceptable below"), Limit(60.0, "trouble nearly always above")),
+    ("VIBRATION", "vibration_x"): (Limit(30.0, "acceptable below"), Limit(60.0, "trouble nearly always above")),
+    ("XKF4", "SV"): (Limit(1.0, "rejected above"),),
+    ("NKF4", "SV"): (Limit(1.0, "rejected above"),),
+}
+"""Limits of ArduPilot's documentation: "Measuring Vibration", "Log messages" (XKF4)."""
+_COUNTERS: Mapping[Source, str] = {("BAT", "EnrgTot"): "energy"}
+"""Counters that an objective is the growth of."""
+
+
+def drawn_of(case: Case, *, positions: bool = True) -> Drawn:
+    """What there is to draw of a case; `positions`: signals too that say where the robot was."""
+    diagnosis = case.diagnosis
+    if case.log is None:
+        return Drawn(faults=diagnosis.faults)
+    span = whole_of(case)
+    groups = [
+        group
+        for group in _groups(signals_of(case))
+        if positions or not any(is_position(one.channel, one.field) for one in group)
+    ]
+    chosen = _chosen(case, groups)
+    sources = [
+        source for group, _ in chosen for one in group for source in ((one.channel, one.field), one.wanted) if source
+    ]
+    values = lines_of(case, sources, span)
+    plots = [_plot(case, group, values, span, matters=matters) for group, matters in chosen]
+    return Drawn(
+        faults=diagnosis.faults,
+        plots=tuple(plot for plot in plots if plot is not None),
+        marks=_marks(case, span),
+        deadlines=tuple(_deadlines(case, span)),
+        start_s=span[0],
+        end_s=span[1],
+        is_mission=diagnosis.run.mission.end_s > diagnosis.run.mission.start_s,
+    )
+
+
+def _groups(signals: Sequence[Signal]) -> list[list[Signal]]:
+    """Signals that share a plot, in the order of their first."""
+    groups: dict[Source, list[Signal]] = {}
+    for one in signals:
+        key = one.channel, "" if one.channel in _TOGETHER and one.wanted is None else one.field
+        groups.setdefault(key, []).append(one)
+    return [group[:MOST_TOGETHER] for group in groups.values()]
+
+
+def _chosen(case: Case, groups: Sequence[list[Signal]]) -> list[tuple[list[Signal], bool]]:
+    """The groups to be drawn, and whether a finding, a fault or a causal path speaks of them."""
+    diagnosis = case.diagnosis
+    matters = {result.variable.name for result in diagnosis.objectives if result.status == "fault"}
+    matters |= {node.name for fault in diagnosis.faults for cause in fault.causes[:1] for node in cause.path}
+    findings = [one for one in diagnosis.health.findings if one.severity != "info"]
+    named = [_channels(one) for one in (*findings, *(below for one in findings for below in one.consequences))]
+
+    def rank(group: Sequence[Signal]) -> tuple[float, float]:
+        found = next((place for place, names in enumerate(named) if group[0].channel in names), None)
+        if found is not None:
+            return 0.0, found
+        used = {name for one in group for name in one.used_by}
+        if used & matters:
+            return 1.0, -len(used & matters) / len(used)
+        return (2.0, 0.0) if group[0].wanted else (3.0, 0.0)
+
+    ordered = sorted(groups, key=rank)
+    telling = [group for group in ordered if rank(group)[0] < 2][:MOST_PLOTS]
+    first = ordered[: max(len(telling), FEWEST)]
+    rest = ordered[len(first) : len(first) + MOST_OTHERS]
+    return [*((group, True) for group in first), *((group, False) for group in rest)]
+
+
+def _channels(finding: Finding) -> list[str]:
+    """The words of a finding's source, channels among them."""
+    return re.findall(r"/[\w/]+|\w+", finding.source)
+
+
+def _plot(
+    case: Case,
+    group: Sequence[Signal],
+    values: Mapping[Source, Values | None],
+    span: tuple[float, float],
+    *,
+    matters: bool,
+) -> Plot | None:
+    """The plot of a group, None where the log has no number for it in the span."""
+    channel = group[0].channel
+    types = {one.name: type_name(one.type) for one in log_of(case).channels()}
+    unit, words = words_of(channel, types.get(channel, ""), group[0].field)
+    lines, drawn = [], []
+    for one in group:
+        found = values.get((one.channel, one.field))
+        if found is None or not len(found[1]) or (len(group) > 1 and not found[1].any()):
+            continue
+        drawn.append(one.field)
+        wrap = {"deg": 360.0, "rad": 6.2832}.get(unit) if words == "heading" else None
+        lines.append(Line(one.field, _segments(*found, span, wrap)))
+        wanted = values.get(one.wanted) if one.wanted else None
+        if wanted is not None and len(wanted[1]):
+            lines.append(Line(one.wanted_name, _segments(*wanted, span, wrap), is_wanted=True))
+    if not lines:
+        return None
+    findings = [one for found in case.diagnosis.health.findings for one in (found, *found.consequences)]
+    return Plot(
+        words=_TOGETHER.get(channel, "") or words,
+        source=f"{channel} {', '.join(drawn)}",
+        unit=unit,
+        read_for=tuple(dict.fromkeys(name for one in group for name in one.used_by))[:6],
+        lines=tuple(lines),
+        limits=tuple(_limits(case, group, values)),
+        bands=tuple(_bands(findings, channel, span)),
+        matters=matters,
+    )
+
+
+def _segments(
+    t: NDArray[np.float64], values: NDArray[np.float64], span: tuple[float, float], wrap: float | None
+) -> tuple[tuple[Point, ...], ...]:
+    """A line as few points in pieces; angles that turn over at `wrap` are broken there."""
+    import numpy as np
+
+    if np.any(np.diff(t) < 0):
+        order = np.argsort(t, kind="stable")
+        t, values = t[order], values[order]
+    steps = np.diff(t)
+    longest = max(_LONGEST_GAP * float(np.median(steps)) if len(steps) else 0.0, _LEAST_GAP * (span[1] - span[0]))
+    is_end = steps > longest
+    if wrap is not None:
+        is_end |= np.abs(np.diff(values)) > wrap / 2
+    piece = np.concatenate(([0], np.cumsum(is_end)))
+    kept = thinned(t, values, span, MOST_POINTS)
+    pieces = np.split(kept, np.flatnonzero(np.diff(piece[kept])) + 1)
+    return tuple(tuple((float(t[i]), float(values[i])) for i in one) for one in pieces if len(one))
+
+
+def thinned(
+    t: NDArray[np.float64], values: NDArray[np.float64], span: tuple[float, float], most: int
+) -> NDArray[np.intp]:
+    """Places of at most so many values that show what all would: the least and the greatest of each part of the span,
+    the first and the last. Shape (k,), in order of time."""
+    import numpy as np
+
+    if len(t) <= most:
+        return np.arange(len(t))
+    edges = np.linspace(*span, most // 2)
+    starts = np.unique(np.clip(np.searchsorted(t, edges), 0, len(t) - 1))
+    ends = np.append(starts[1:], len(t))
+    least = [start + int(np.argmin(values[start:end])) for start, end in zip(starts, ends, strict=True)]
+    greatest = [start + int(np.argmax(values[start:end])) for start, end in zip(starts, ends, strict=True)]
+    return np.unique(np.array([0, *least, *greatest, len(t) - 1]))
+
+
+def _limits(case: Case, group: Sequence[Signal], values: Mapping[Source, Values | None]) -> Iterator[Limit]:
+    """What the signals of a plot were to keep: documented limits, parameters as driven, limits of objectives."""
+    settings = case.diagnosis.run.settings
+    for one in group:
+        source = one.channel, one.field
+        yield from _KNOWN_LIMITS.get(source, ())
+        for name, factor in _PARAMETER_LIMITS.get(source, ()):
+            setting = settings.get(name)
+            if setting is not None and isinstance(setting.value, float) and setting.value > 0:
+                yield Limit(setting.value * factor, name)
+        found = values.get(source)
+        for result in case.diagnosis.objectives:
+            if result.name == _COUNTERS.get(source) and result.threshold is not None and found is not None:
+                yield Limit(float(found[1][0]) + result.threshold.value, f"limit of {result.name}")
+
+
+def _bands(findings: Collection[Finding], channel: str, span: tuple[float, float]) -> Iterator[Band]:
+    """The times of findings that this channel shows."""
+    for one in findings:
+        named = one.severity != "info" and channel in _channels(one)
+        if named and one.end_s > one.onset_s and one.onset_s < span[1] and one.end_s > span[0]:
+            yield Band(one.onset_s, one.end_s, one.severity, one.title)
+
+
+def _marks(case: Case, span: tuple[float, float]) -> tuple[Mark, ...]:
+    """The gravest of what happened in the span, in order of time; what two sources say at one time once."""
+    inside = {
+        (round(mark.time_s), mark.words.casefold()[:_SAME]): mark
+        for mark in sorted(marks_of(case.diagnosis), key=lambda mark: -mark.rank)
+        if span[0] <= mark.time_s <= span[1]
+    }
+    gravest = sorted(inside.values(), key=lambda mark: (mark.rank, mark.time_s))[:MOST_MARKS]
+    return tuple(sorted(gravest, key=lambda mark: mark.time_s))
+
+
+def _deadlines(case: Case, span: tuple[float, float]) -> Iterator[Limit]:
+    """Limits of objectives that are the time of the mission itself, as times of the log."""
+    for result in case.diagnosis.objectives:
+        is_time = result.variable.unit == "s" and result.threshold is not None and result.value is not None
+        if (
+            is_time
+            and result.threshold
+            and abs((result.value or 0.0) - (span[1] - span[0])) < 0.02 * (span[1] - span[0])
+        ):
+            yield Limit(span[0] + result.threshold.value, f"limit of {result.name}")

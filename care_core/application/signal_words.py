@@ -1,0 +1,166 @@
+"""Units of the signals that logs hold, and what they are in words, where that is documented.
+
+ArduPilot: docs "Log messages" and the FMTU records of its logs; MAVLink: common.xml; PX4: msg/; ROS: REP 103 and the
+comments of the message definitions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+Words = tuple[str, str]
+"""Unit and words."""
+
+_ATTITUDE = {"Roll": ("deg", "roll"), "Pitch": ("deg", "pitch"), "Yaw": ("deg", "heading")}
+_ESTIMATOR = {
+    "SV": ("", "velocity test ratio of the estimator"),
+    "SP": ("", "position test ratio of the estimator"),
+    "SH": ("", "height test ratio of the estimator"),
+    "SM": ("", "compass test ratio of the estimator"),
+}
+_BATTERY = {
+    "Volt": ("V", "battery voltage"),
+    "Curr": ("A", "battery current"),
+    "EnrgTot": ("Wh", "energy drawn"),
+    "CurrTot": ("mAh", "charge drawn"),
+    "Res": ("ohm", "estimated resistance of the battery"),
+}
+_OUTPUTS = {f"C{number}": ("us", "motor and servo outputs") for number in range(1, 15)}
+_SERVOS = {f"servo{number}_raw": ("us", "motor and servo outputs") for number in range(1, 17)}
+
+
+def _along(axis: str, names: str) -> dict[str, Words]:
+    """Position, velocity and acceleration controller of one axis, with its fields' last letter."""
+    end = names[-1]
+    return {
+        f"P{end}": ("m", f"position {axis}"),
+        f"V{end}": ("m/s", f"speed {axis}"),
+        f"A{end}": ("m/s2", f"acceleration {axis}"),
+        f"TA{end}": ("m/s2", f"acceleration {axis} asked for"),
+        f"DA{end}": ("m/s2", f"acceleration {axis} planned"),
+    }
+
+
+_WORDS: Mapping[str, Mapping[str, Words]] = {
+    "ATT": _ATTITUDE,
+    "CTUN": {
+        "Alt": ("m", "height"),
+        "BarAlt": ("m", "height by the barometer"),
+        "CRt": ("cm/s", "climb rate"),
+        "ThO": ("", "throttle, 0 to 1"),
+        "ThrOut": ("", "throttle"),
+    },
+    "RATE": {
+        "R": ("deg/s", "roll rate"),
+        "P": ("deg/s", "pitch rate"),
+        "Y": ("deg/s", "yaw rate"),
+        "ROut": ("", "roll output, -1 to 1"),
+        "POut": ("", "pitch output, -1 to 1"),
+        "YOut": ("", "yaw output, -1 to 1"),
+    },
+    "PSCN": _along("north", "PN"),
+    "PSCE": _along("east", "PE"),
+    "PSCD": _along("down", "PD"),
+    "STER": {
+        "TurnRate": ("deg/s", "turn rate"),
+        "SteerOut": ("", "steering output"),
+        "LatAcc": ("m/s2", "lateral acceleration"),
+    },
+    "THR": {"Speed": ("m/s", "speed"), "ThrOut": ("%", "throttle output")},
+    "BAT": _BATTERY,
+    "CURR": {"Volt": ("", "battery voltage"), "Curr": ("", "battery current")},
+    "VIBE": {f"Vibe{axis}": ("m/s2", "vibration") for axis in "XYZ"},
+    "GPS": {"NSats": ("", "satellites"), "HDop": ("", "horizontal dilution"), "Spd": ("m/s", "speed over ground")},
+    "POS": {"RelHomeAlt": ("m", "height above home"), "Alt": ("m", "height above the sea")},
+    "RCOU": _OUTPUTS,
+    "MOT": {f"Mot{number}": ("us", "motor outputs") for number in range(1, 9)},
+    "XKF4": _ESTIMATOR,
+    "NKF4": _ESTIMATOR,
+    "XKF3": {
+        "IVN": ("m/s", "velocity innovation north"),
+        "IVE": ("m/s", "velocity innovation east"),
+        "IPN": ("m", "position innovation north"),
+        "IPE": ("m", "position innovation east"),
+    },
+    "MAG": {f"Mag{axis}": ("mGauss", "magnetic field") for axis in "XYZ"},
+    "BARO": {"Alt": ("m", "height by the barometer"), "Press": ("Pa", "air pressure")},
+    "ATTITUDE": {"roll": ("rad", "roll"), "pitch": ("rad", "pitch"), "yaw": ("rad", "heading")},
+    "VFR_HUD": {
+        "alt": ("m", "height"),
+        "groundspeed": ("m/s", "speed over ground"),
+        "throttle": ("%", "throttle"),
+        "climb": ("m/s", "climb rate"),
+    },
+    "SYS_STATUS": {"voltage_battery": ("mV", "battery voltage"), "current_battery": ("cA", "battery current")},
+    "GPS_RAW_INT": {"satellites_visible": ("", "satellites"), "eph": ("", "horizontal dilution, times 100")},
+    "VIBRATION": {f"vibration_{axis}": ("m/s2", "vibration") for axis in "xyz"},
+    "SERVO_OUTPUT_RAW": _SERVOS,
+    "vehicle_local_position": {
+        "x": ("m", "position north"),
+        "y": ("m", "position east"),
+        "z": ("m", "position down"),
+        "vx": ("m/s", "speed north"),
+        "vy": ("m/s", "speed east"),
+        "vz": ("m/s", "speed down"),
+    },
+    "battery_status": {
+        "voltage_v": ("V", "battery voltage"),
+        "current_a": ("A", "battery current"),
+        "remaining": ("", "charge left, 0 to 1"),
+    },
+    "cpuload": {"load": ("", "processor load, 0 to 1")},
+    "sensor_gps": {"satellites_used": ("", "satellites"), "eph": ("m", "horizontal accuracy")},
+}
+_WORDS_OF_TYPES: Mapping[str, Mapping[str, Words]] = {
+    "Odometry": {
+        "twist.twist.linear.x": ("m/s", "speed forward"),
+        "twist.twist.linear.y": ("m/s", "speed to the left"),
+        "twist.twist.angular.z": ("rad/s", "turn rate"),
+        "pose.pose.position.x": ("m", "position x"),
+        "pose.pose.position.y": ("m", "position y"),
+    },
+    "Twist": {"linear.x": ("m/s", "commanded speed"), "angular.z": ("rad/s", "commanded turn rate")},
+    "BatteryState": {
+        "voltage": ("V", "battery voltage"),
+        "current": ("A", "battery current"),
+        "percentage": ("", "charge left, 0 to 1"),
+    },
+    "Imu": {
+        "linear_acceleration.z": ("m/s2", "vertical acceleration"),
+        "angular_velocity.z": ("rad/s", "turn rate of the gyro"),
+    },
+    "PoseWithCovarianceStamped": {
+        "pose.pose.position.x": ("m", "position x"),
+        "pose.pose.position.y": ("m", "position y"),
+    },
+}
+
+_POSITIONS = {
+    "POS": {"Lat", "Lng", "Alt"},
+    "GPS": {"Lat", "Lng", "Alt"},
+    "AHR2": {"Lat", "Lng", "Alt"},
+    "PSCN": {"PN", "TPN", "DPN"},
+    "PSCE": {"PE", "TPE", "DPE"},
+    "NTUN": {"DPosX", "DPosY", "PosX", "PosY"},
+    "GLOBAL_POSITION_INT": {"lat", "lon", "alt"},
+    "GPS_RAW_INT": {"lat", "lon", "alt"},
+    "LOCAL_POSITION_NED": {"x", "y"},
+    "VFR_HUD": {"alt"},
+    "vehicle_local_position": {"x", "y"},
+    "vehicle_local_position_setpoint": {"x", "y"},
+    "vehicle_global_position": {"lat", "lon", "alt"},
+    "sensor_gps": {"lat", "lon", "alt", "latitude_deg", "longitude_deg", "altitude_msl_m"},
+}
+
+
+def words_of(channel: str, type: str, field: str) -> Words:
+    """Unit and words of a signal, both empty where they are not known; `type` is that of a ROS message, bare."""
+    known = _WORDS.get(channel) or _WORDS_OF_TYPES.get(type.removesuffix("Stamped")) or _WORDS_OF_TYPES.get(type) or {}
+    return known.get(field, ("", ""))
+
+
+def is_position(channel: str, field: str) -> bool:
+    """Whether a signal says where the robot was: on the earth, or on the map of its site."""
+    if channel.startswith("/"):
+        return "position." in field or field.rsplit(".", maxsplit=1)[-1] in ("latitude", "longitude", "altitude")
+    return field in _POSITIONS.get(channel, ())
