@@ -107,9 +107,9 @@ class Factor:
     @classmethod
     def of(cls, covariance: FloatArray) -> Factor:
         """Of a positive definite matrix, shape (n, n)."""
-        lower = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+        lower: FloatArray = np.linalg.cholesky(covariance)
         starts = range(0, len(lower), SLICE)
-        return cls(lower, tuple(np.linalg.inv(lower[i : i + SLICE, i : i + SLICE]) for i in starts))
+        return cls(lower, tuple(np.asarray(np.linalg.inv(lower[i : i + SLICE, i : i + SLICE])) for i in starts))
 
     def whitened(self, rows: FloatArray) -> FloatArray:
         """L^-1 of each row. rows: (m, n) -> (m, n)."""

@@ -15,37 +15,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING
 
-from pydantic import Field, ValidationError, model_validator
-
-from care_core import plain_yaml
 from care_core.errors import ConfigError, nearest
-from care_core.profile.schema import Bound, Schema, Strict
+from care_core.profile.schema import Schema
 from care_core.variables import OwnLimit, Role, Variable
 
+if TYPE_CHECKING:
+    from care_core.profile.site_file import Limit
+
 SITE_SCHEMA = "care.site/1"
-
-
-class _Limit(Bound):
-    mission: dict[str, float] = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _is_one_of_both(self) -> _Limit:
-        if self.value is not None and self.ratio is not None:
-            raise ValueError("a limit has a 'value' or a 'ratio', not both")
-        return self
-
-    @model_validator(mode="after")
-    def _mission_is_that_of_a_value(self) -> _Limit:
-        if self.mission and self.value is None:
-            raise ValueError("'mission' belongs to a 'value': a ratio holds for any mission")
-        return self
-
-
-class _SiteFile(Strict):
-    schema_: Literal["care.site/1"] = Field(alias="schema")
-    limits: dict[str, dict[str, _Limit]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +32,7 @@ class Site:
     """Limits by profile and objective, and the file that they stand in."""
 
     path: Path
-    limits: Mapping[str, Mapping[str, _Limit]]
+    limits: Mapping[str, Mapping[str, Limit]]
 
     def applied(self, schema: Schema) -> Schema:
         """The schema with these limits in the place of the profile's own.
@@ -65,7 +44,7 @@ class Site:
         changed = {name: self._limited(name, limit, schema) for name, limit in limits.items()}
         return replace(schema, variables={**schema.variables, **changed}) if changed else schema
 
-    def _limited(self, name: str, limit: _Limit, schema: Schema) -> Variable:
+    def _limited(self, name: str, limit: Limit, schema: Schema) -> Variable:
         objectives = {v.name: v for v in schema.objectives if v.kind != "functional"}
         if name not in objectives:
             hint = nearest(name, objectives) or f"Known are {', '.join(objectives)}."
@@ -96,17 +75,6 @@ def load_site(path: Path | None = None) -> Site | None:
     file = path or site_path()
     if path is None and not file.is_file():
         return None
-    try:
-        data = plain_yaml.load(file.read_text(encoding="utf-8"))
-    except OSError as err:
-        raise ConfigError(f"Cannot read the site file: {err.strerror}.", where=str(file)) from err
-    except (plain_yaml.PlainYamlError, UnicodeDecodeError) as err:
-        raise ConfigError("The site file is no YAML.", hint=str(err).splitlines()[0], where=str(file)) from err
-    try:
-        return Site(file, _SiteFile.model_validate(data).limits)
-    except ValidationError as err:
-        first = err.errors()[0]
-        key = ".".join(map(str, first["loc"]))
-        problem = first["msg"].removeprefix("Value error, ").rstrip(".")
-        hint = f"'{key}': {problem}." if key else f"It begins with 'schema: {SITE_SCHEMA}'."
-        raise ConfigError("This is no site file.", hint=hint, where=str(file)) from err
+    from care_core.profile.site_file import limits_of
+
+    return Site(file, limits_of(file))

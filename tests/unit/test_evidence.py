@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -80,7 +79,7 @@ def test_rules_do_not_touch_what_a_model_was_learned_for(tmp_path: Path) -> None
 
 @given(st.floats(0, 12), st.floats(0, 12))
 def test_a_bounded_rule_points_only_where_the_value_sets_the_check_off(value: float, bound: float) -> None:
-    rule = EvidenceRule(re.compile("x"), {"speed": Threshold("<", bound), "accel": None})
+    rule = EvidenceRule("x", {"speed": Threshold("<", bound), "accel": None})
     pointed = rule.points_at(VARIABLES, {"speed": value, "accel": 1.5})
     assert pointed == (("speed",) if value < bound else ())
     assert rule.points_at(VARIABLES, {"accel": 2.0}) == ("speed", "accel")

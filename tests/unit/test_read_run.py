@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -124,7 +123,7 @@ def made_schema(success: float | None = 1.0, mission: Mapping[str, Any] | None =
         logs=("dataflash-bin",),
         observational=False,
         mission={"kind": "made"} if mission is None else mission,
-        evidence=(EvidenceRule(re.compile("check speed", re.IGNORECASE), {"brake": None, "speed": None}, "too fast"),),
+        evidence=(EvidenceRule("check speed", {"brake": None, "speed": None}, "too fast"),),
         variables={variable.name: variable for variable in variables},
     )
 
