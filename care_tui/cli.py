@@ -89,6 +89,8 @@ def main() -> None:
     """Entry point of the console script."""
     # numpy's own threads only wait for each other on matrices as small as these. Read when numpy is first imported.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # No program of ours plugs into pydantic, and looking for one reads what is known of every installed package.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # Whoever closes a stream wants none of it (cron, `>&-`).
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -91,6 +90,8 @@ def as_care_error(err: Exception) -> CareError:
     """Any error as one that can be shown: message, hint, where."""
     if isinstance(err, CareError):
         return err
+    import logging
+
     logging.getLogger(__name__).error("unexpected error", exc_info=err)
     return CareError(
         f"Unexpected error: {type(err).__name__}: {err}",

@@ -286,12 +286,12 @@ def _diagnose(reading: Reading, health: Health, request: Request, progress: Prog
 
 def report_of(case: Case, format: ReportFormat) -> str:
     """The fix report in one of its formats; a page draws the signals of the case's log."""
-    from care_core.report.document import build_document
-    from care_core.report.terminal import to_text
-    from care_core.report.writers import to_json, to_markdown, to_yaml
-
     if format == "text":
+        from care_core.report.terminal import to_text
+
         return to_text(case.diagnosis)
+    from care_core.report.document import build_document
+
     document = build_document(case.diagnosis)
     if format == "patch":
         return document.diff
@@ -300,6 +300,8 @@ def report_of(case: Case, format: ReportFormat) -> str:
         from care_core.report.html import to_html
 
         return to_html(document, drawn_of(case))
+    from care_core.report.writers import to_json, to_markdown, to_yaml
+
     write = {"yaml": to_yaml, "markdown": to_markdown, "json": to_json}[format]
     return write(document)
 

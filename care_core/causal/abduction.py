@@ -13,16 +13,16 @@ Several runs of one configuration are conditioned on together; a second failure 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 
 from care_core.causal.mechanisms import FloatArray, Mechanism
 
 _Z = np.linspace(-6.0, 6.0, 2401)
-_CDF = np.array([NormalDist().cdf(z) for z in _Z])
+_CDF = np.array([0.5 * (1.0 + math.erf(z / math.sqrt(2.0))) for z in _Z.tolist()])
 _NODES = np.linspace(-5.0, 5.0, 101)
 """Values of what the runs of one configuration share."""
 _DENSITY = np.exp(-(_NODES**2) / 2) / np.exp(-(_NODES**2) / 2).sum()

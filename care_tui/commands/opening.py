@@ -25,7 +25,6 @@ from care_tui.commands.arguments import (
     bounds,
 )
 from care_tui.console import say
-from care_tui.jobs import CAUSES
 from care_tui.places import files_of, logs_in, written_s
 
 app = typer.Typer()
@@ -71,6 +70,7 @@ def open_app(
         raise UsageError("The terminal app needs a terminal.", hint="Use 'care triage LOG' here.")
     prepare_terminal(chosen)
     from care_tui.app import run
+    from care_tui.jobs import CAUSES
 
     request = None
     if path is not None:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import os
-import secrets
-import shlex
-import socket
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -28,6 +25,9 @@ def serve(
     port: Annotated[int, typer.Option("--port", min=1, max=65535, help="Port on this machine.")] = 8765,
 ) -> None:
     """Open the terminal app in a browser of this machine. For another one: ssh -L 8765:127.0.0.1:8765 ROBOT."""
+    import secrets
+    import shlex
+
     try:
         from care_tui.web import HOST, TokenServer
     except ModuleNotFoundError as err:
@@ -47,6 +47,8 @@ def serve(
 
 
 def _check_free(host: str, port: int) -> None:
+    import socket
+
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
