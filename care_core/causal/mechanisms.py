@@ -107,7 +107,7 @@ class Factor:
     @classmethod
     def of(cls, covariance: FloatArray) -> Factor:
         """Of a positive definite matrix, shape (n, n)."""
-        lower: FloatArray = np.linalg.cholesky(covariance)
+        lower: FloatArray = np.linalg.cholesky(covariance).astype(np.float64, copy=False)
         starts = range(0, len(lower), SLICE)
         return cls(lower, tuple(np.asarray(np.linalg.inv(lower[i : i + SLICE, i : i + SLICE])) for i in starts))
 
