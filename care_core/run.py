@@ -87,6 +87,18 @@ class Check:
 
 
 @dataclass(frozen=True, slots=True)
+class Robot:
+    """One robot among several. Runs belong together by `id`; `name` is what people read."""
+
+    id: str
+    name: str
+    source: str
+    """What says so."""
+    is_sure: bool
+    """Whether it tells this robot from others of its kind: a system id as delivered, or a model's name, does not."""
+
+
+@dataclass(frozen=True, slots=True)
 class LogInfo:
     """Where a run came from."""
 
@@ -99,6 +111,8 @@ class LogInfo:
     damage: tuple[Damage, ...] = ()
     facts: Mapping[str, str] = field(default_factory=dict)
     """What the log says of its robot: firmware, frame, distro."""
+    robot: Robot | None = None
+    """Whose log it is, None where nothing says so."""
 
 
 FitVerdict = Literal["fits", "partly", "no"]
@@ -147,6 +161,8 @@ class MissionInfo:
     fits: bool
     mismatch: str = ""
     """Why it is not the profile's mission, in one sentence; empty when it fits."""
+    asked: tuple[tuple[str, float], ...] = ()
+    """What the mission asks for, by context, known before it is flown: runs that were asked the same compare."""
 
 
 @dataclass(frozen=True, slots=True)

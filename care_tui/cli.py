@@ -29,6 +29,7 @@ from care_tui.commands import (
     past,
     profiles,
     serving,
+    watching,
 )
 from care_tui.commands.opening import OPEN
 from care_tui.console import emit, explain
@@ -79,7 +80,19 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Which parameter made the run fail, along which path, and what to change. 'care LOG' opens the terminal app.",
 )
-for commands in (opening, serving, diagnosing, asking, baselining, configuring, past, logs, collecting, learning):
+for commands in (
+    opening,
+    serving,
+    diagnosing,
+    asking,
+    baselining,
+    configuring,
+    past,
+    watching,
+    logs,
+    collecting,
+    learning,
+):
     app.add_typer(commands.app)
 app.add_typer(profiles.app, name="profiles", invoke_without_command=True)
 app.add_typer(formats.app, name="schema")

@@ -72,6 +72,8 @@ class Request:
     """A site file with the operator's own limits; that of the user's configuration folder when None."""
     reference: Path | None = None
     """A configuration file, or a log, that the operator vouches for: the reference, even before that of `since`."""
+    robot: str | None = None
+    """What the operator calls the robot; by what the log says when None."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +146,9 @@ def open_case(request: Request, progress: Progress) -> Case:
                 reason = err.message[:1].lower() + err.message[1:].rstrip(".")
                 choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, reason)))
         if reading is None:
-            return Case(_plainly(log, choice, health, request, sha256), (), log, None, request.configs)
-        diagnosis = _diagnose(reading, health, request, progress)
+            diagnosis = _of_robot(_plainly(log, choice, health, request, sha256), log, request)
+            return Case(diagnosis, (), log, None, request.configs)
+        diagnosis = _of_robot(_diagnose(reading, health, request, progress), log, request)
     return Case(diagnosis, reading.profile.schema.options, log, reading, request.configs)
 
 
@@ -157,6 +160,15 @@ def read_case(request: Request, progress: Progress) -> Reading:
     with opened(request.log) as (log, sha256):
         profile, choice = fitting(log, request.profile)
         return _read(log, profile, choice, request, configs, progress, sha256)
+
+
+def _of_robot(diagnosis: Diagnosis, log: Log, request: Request) -> Diagnosis:
+    """The diagnosis with whose run it is."""
+    from care_core.extract.identity import identify, named
+
+    robot = named(request.robot) if request.robot else identify(log)
+    run = diagnosis.run
+    return replace(diagnosis, run=replace(run, log=replace(run.log, robot=robot)))
 
 
 @contextmanager

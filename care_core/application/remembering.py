@@ -9,7 +9,8 @@ from care_core.errors import CareError
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis
-    from care_core.history.store import History
+    from care_core.history.store import About, History
+    from care_core.run import Run
 
 
 def remember(record: Callable[[History], None]) -> CareError | None:
@@ -31,5 +32,14 @@ def remember_triage(diagnosis: Diagnosis) -> CareError | None:
     from care_core.report.document import build_document
     from care_core.report.writers import published
 
-    document = published(build_document(diagnosis))
-    return remember(lambda history: history.add_triage(document, diagnosis.run.mission.index))
+    document, about = published(build_document(diagnosis)), about_run(diagnosis.run)
+    return remember(lambda history: history.add_triage(document, diagnosis.run.mission.index, about))
+
+
+def about_run(run: Run) -> About:
+    """What the history keeps of a run beside its document."""
+    from care_core.history.store import About
+    from care_core.vehicles import is_self_written
+
+    settings = {name: setting.value for name, setting in run.settings.items() if not is_self_written(name)}
+    return About(run.log.robot, dict(run.mission.asked), run.log.facts.get("firmware", ""), settings)

@@ -29,7 +29,7 @@ from care_core.logs.digest import Sha256, hashing
 from care_core.logs.plausible import clock_doubt, dead_sources
 from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
-from care_core.run import Check, Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value
+from care_core.run import Check, Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable
 
 
@@ -163,10 +163,11 @@ class _Source:
             found, facts=self.log.facts, settings={name: setting.value for name, setting in driven.items()}
         )
         mismatch = self.schema.learned_elsewhere or self.kind.mismatch(mission)
+        context = self._values(Role.CONTEXT, mission, self.doubts[index])
         return Run(
             config=config,
             sources=sources,
-            context=self._values(Role.CONTEXT, mission, self.doubts[index]),
+            context=context,
             metrics=self._values(Role.METRIC, mission, self.doubts[index]),
             objectives=self._values(Role.OBJECTIVE, mission, self.doubts[index]),
             settings=settings,
@@ -179,12 +180,17 @@ class _Source:
                 ended=self.kind.is_decided(mission),
                 fits=not mismatch,
                 mismatch=mismatch,
+                asked=tuple((name, value) for name, value in context.items() if is_known(value) and self._asks(name)),
             ),
             evidence=tuple(_pointed(evidence, self.schema, config) for evidence in self.kind.evidence(mission)),
             changes=_changes(self.settings, mission),
             checks=() if self.doubts[index] else self._checks(mission),
             modes=self.kind.modes(mission),
         )
+
+    def _asks(self, context: str) -> bool:
+        extract = self.schema.variables[context].extract
+        return extract is not None and extract.kind in _ASKING
 
     def _checks(self, mission: Mission) -> tuple[Check, ...]:
         return self.kind.checks(mission) if self.schema.objectives else self.kind.outcome(mission)
@@ -205,6 +211,8 @@ class _Source:
         return replace(value, hint=_TELEMETRY_ADVICE) if is_telemetry and value.channel else value
 
 
+_ASKING = ("mission_asked", "goals_asked")
+"""Extractors of what a mission asks for."""
 _TELEMETRY_ADVICE = "telemetry does not carry it: use the .BIN of the vehicle's memory card"
 _CLOCK_ADVICE = "judge a log whose messages carry the time at which they were recorded"
 _LOOK = "look at its source with 'care inspect'"

@@ -57,10 +57,11 @@ def is_log(path: Path) -> bool:
     suffix = path.suffix.lower()
     if suffix not in LOG_SUFFIXES or not path.is_file():
         return False
-    return suffix != SHARED_SUFFIX or _begins_like_a_log(path)
+    return suffix != SHARED_SUFFIX or begins_like_a_log(path)
 
 
-def _begins_like_a_log(path: Path) -> bool:
+def begins_like_a_log(path: Path) -> bool:
+    """Whether the first bytes of a file are those of a log."""
     try:
         sniff(path)
     except LogError:

@@ -120,6 +120,14 @@ def _metadata_beside(folder: Path) -> Metadata:
         return Metadata()
 
 
+def parse_part(name: str) -> tuple[str, int] | None:
+    """Series and number of a part of a split ROS 1 bag whose recorder dated it, None of any other file."""
+    match = _PART.match(name)
+    if match is None or not _DATE.search(match["series"]):
+        return None
+    return _DATE.sub("", match["series"]), int(match["number"])
+
+
 def _series(name: str) -> str:
     """What the parts of one split bag share: the name without number and time; the name itself of any other file."""
     match = _PART.match(name)

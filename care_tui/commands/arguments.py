@@ -60,6 +60,9 @@ Site = Annotated[
     Path | None,
     typer.Option("--site", metavar="FILE", help="Judge by the limits of this file; your own site.yaml if absent."),
 ]
+RobotName = Annotated[
+    str | None, typer.Option("--robot", metavar="NAME", help="Whose log it is; by what the log says if absent.")
+]
 Mission = Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last if absent.")]
 
 

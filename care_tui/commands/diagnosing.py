@@ -20,6 +20,7 @@ from care_tui.commands.arguments import (
     Out,
     ProfileName,
     Reference,
+    RobotName,
     Since,
     Site,
     Thresholds,
@@ -56,6 +57,7 @@ def triage(
     mission: Mission = None,
     since: Since = None,
     reference: Reference = None,
+    robot: RobotName = None,
     no_history: NoHistory = False,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
@@ -75,6 +77,7 @@ def triage(
         mission=mission,
         since=since,
         reference=reference,
+        robot=robot,
     )
     with Progress() as progress:
         case = care_core.triage(request, progress)

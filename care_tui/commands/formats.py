@@ -65,6 +65,14 @@ def verify() -> None:
     _print(verify_schema())
 
 
+@app.command("watch")
+def watch() -> None:
+    """Print the JSON Schema of a line of 'care watch --json'."""
+    from care_core.report.watching import watch_schema
+
+    _print(watch_schema())
+
+
 @app.command("whatif")
 def whatif() -> None:
     """Print the JSON Schema of 'care whatif --json'."""

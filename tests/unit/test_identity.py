@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from care_core.extract.identity import robot_of
+from care_core.extract.identity import identify, named, robot_of
+from care_core.logs.base import LogFormat
+from care_core.logs.opening import open_log
 from care_core.run import Setting
 from tests.made import MadeLog, T
 
@@ -32,8 +35,8 @@ def saying(*texts: str, facts: Mapping[str, str] | None = None, **numbers: float
 @pytest.mark.parametrize(
     ("log", "robot"),
     [
-        (saying("ArduCopter V4.5.4 (fd1bcc61)", BOARD, BRD_SERIAL_NUM=7), BOARD),
-        (saying("Dd1219c7c4c5404aaa1f6d2a48adfda4"), "Dd1219c7c4c5404aaa1f6d2a48adfda4"),
+        (saying("ArduCopter V4.5.4 (fd1bcc61)", BOARD, BRD_SERIAL_NUM=7), "003E0031 3532510E 38303638"),
+        (saying("Dd1219c7c4c5404aaa1f6d2a48adfda4"), "Dd1219c7c4c5404aaa"),
         (saying("New mission", BRD_SERIAL_NUM=7, SYSID_THISMAV=4), "serial 7"),
         (saying(BRD_SERIAL_NUM=0, SYSID_THISMAV=4), "system 4"),
         (saying(MAV_SYSID=12), "system 12"),
@@ -48,3 +51,91 @@ def test_the_best_name_a_log_gives(log: MadeLog, robot: str | None) -> None:
 
 def test_a_name_cannot_steer_a_terminal() -> None:
     assert robot_of(saying(facts={"robot": "\x1b[31mred"})) == "\\x1b[31mred"
+
+
+@dataclass
+class Told(MadeLog):
+    """A log that holds parameters as well."""
+
+    told: Mapping[str, float | str] = field(default_factory=dict)
+
+    def settings(self) -> Mapping[str, tuple[Setting, ...]]:
+        return {name: (Setting(name, value, "here"),) for name, value in self.told.items()}
+
+
+SYSTEM = {"SYSID_THISMAV": 1.0}
+MSG = {"MSG": {"Message": np.array(["hello", "CubeOrange 003F0033 31383430 34383235"] + ["x"] * 199, dtype=object)}}
+
+
+def uid(*values: int) -> dict[str, dict[str, Any]]:
+    cells = np.empty(201, dtype=object)
+    cells[:] = [tuple(values)] * 201
+    return {"AUTOPILOT_VERSION": {"uid2": cells}}
+
+
+SERIAL = bytes.fromhex("003F00333138343034383235")
+
+
+@pytest.mark.parametrize(
+    ("tables", "told", "facts", "id", "is_sure"),
+    [
+        (MSG, SYSTEM, {}, "003F0033 31383430 34383235", True),
+        (uid(*SERIAL, *[0] * 6), SYSTEM, {}, "003F0033 31383430 34383235", True),
+        (uid(*[0] * 18), {"SYSID_THISMAV": 7.0}, {"firmware": "ArduRover V4.5.4"}, "system 7", True),
+        (uid(*range(1, 19)), {"MAV_SYSID": 1.0}, {"firmware": "ArduCopter V4.7.0"}, "copter 1", False),
+        (
+            {},
+            {"MAV_SYS_ID": 3.0},
+            {"stack": "PX4", "uuid": "0035002B3434511732343031"},
+            "0035002B3434511732343031",
+            True,
+        ),
+        ({}, {}, {"system": "12.1"}, "system 12", True),
+        ({}, {}, {}, None, None),
+    ],
+)
+def test_the_board_comes_before_what_people_set(
+    tables: dict[str, Any], told: dict[str, float], facts: dict[str, str], id: str | None, is_sure: bool | None
+) -> None:
+    robot = identify(Told(tables, facts=facts, told=told))
+    assert (robot and robot.id, robot and robot.is_sure) == (id, is_sure)
+
+
+@pytest.mark.parametrize(
+    ("types", "facts", "told", "id"),
+    [
+        ({}, {"robot_name": "husky-3", "distro": "humble"}, {}, "husky-3"),
+        ({}, {"recorder.hostname": "spot"}, {"/ns/robot_name": "albert"}, "spot"),
+        ({}, {}, {"/ns/robot_name": "albert"}, "albert"),
+        ({"/r2/odom": "nav_msgs/msg/Odometry", "/r2/cmd_vel": "geometry_msgs/Twist"}, {}, {}, "r2"),
+        ({"/r2/odom": "nav_msgs/Odometry", "/cmd_vel": "geometry_msgs/Twist"}, {}, {}, None),
+        ({"/husky_velocity_controller/odom": "nav_msgs/Odometry"}, {}, {}, None),
+        ({"/odom": "nav_msgs/Odometry"}, {"robot": "none"}, {"/x/hostname": ""}, None),
+    ],
+)
+def test_a_ros_log_names_its_robot_where_somebody_wrote_it(
+    types: dict[str, str], facts: dict[str, str], told: dict[str, str], id: str | None
+) -> None:
+    log = Told({topic: {} for topic in types}, types=types, facts=facts, told=told, format=LogFormat.MCAP)
+    robot = identify(log)
+    assert (robot and robot.id) == id
+
+
+def test_the_model_is_told_and_told_to_be_no_more() -> None:
+    text = np.array(["<?xml version='1.0'?><!-- <robot> --><robot xmlns:x='y' name=\"husky\x1b\">"] * 201, dtype=object)
+    robot = identify(Told({"/robot_description": {"data": text}}, format=LogFormat.ROS2_DB3))
+    assert robot is not None
+    assert (robot.name, robot.is_sure) == ("husky\\x1b", False)
+
+
+def test_the_operator_knows_better() -> None:
+    assert named(" no 7\x1b ").id == "no 7\\x1b"
+
+
+def test_logs_of_real_boards(recorded: Path) -> None:
+    logs = recorded / "logs"
+    found = {}
+    for name in ("dataflash_bin/copter46_cut_80k.bin", "px4_ulg/px4_appended_multiple.ulg"):
+        robot = identify(open_log(logs / name))
+        found[name] = robot and robot.name
+    assert list(found.values()) == ["Pixhawk4 0047002B", "PX4FMU_V4PRO 0035002B"]

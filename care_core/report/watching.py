@@ -1,0 +1,165 @@
+"""`care.watch/1`: what `care watch` says of one finished log, as a line of JSON and as a line for people."""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from pydantic import ConfigDict, Field
+
+from care_core.diagnose.records import Status, overall
+from care_core.report.document import Strict
+from care_core.report.happened import HypothesisEntry
+from care_core.report.history import profile_of, verdict_of
+from care_core.report.wording import hypothesis_text
+from care_core.report.writers import STATUS_WORDS
+from care_core.run import FitVerdict, Robot
+from care_core.text import clean
+
+SCHEMA_ID: Final = "care.watch/1"
+UNREADABLE = "UNREADABLE"
+NO_ROBOT = "-"
+"""Where a log does not say whose it is."""
+
+_NUMBER, _VERDICT = 3, max(map(len, STATUS_WORDS.values()))
+_ROBOT_SHARE, _LOG_SHARE = 0.18, 0.27
+"""Of the columns of a line; the cause takes what is left."""
+
+
+class RobotEntry(Strict):
+    """`is_sure`: it tells this robot from others of its kind."""
+
+    id: str
+    name: str
+    source: str
+    is_sure: bool
+
+
+class WatchEntry(Strict):
+    """One log. `says` is the likeliest cause, or why nothing is judged; `unfinished` why it was judged though nobody
+    closed it; `is_new` is false where another watcher judged it, or an earlier call of `care`."""
+
+    model_config = ConfigDict(title=SCHEMA_ID)
+
+    schema_: Literal["care.watch/1"] = Field(default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema")
+    number: int
+    at: str
+    log: str
+    sha256: str | None
+    robot: RobotEntry | None
+    verdict: Literal["ok", "fault", "not_evaluated", "unreadable"]
+    says: str
+    explanation: HypothesisEntry | None
+    faults: list[str]
+    profile: str | None
+    fit: FitVerdict | None
+    unfinished: str | None
+    is_new: bool
+
+
+def watch_schema() -> dict[str, Any]:
+    """The JSON Schema of a line."""
+    return WatchEntry.model_json_schema(by_alias=True, mode="serialization")
+
+
+def judged_entry(
+    number: int, at: str, document: Mapping[str, Any], robot: Robot | None, *, unfinished: str = "", is_new: bool = True
+) -> WatchEntry:
+    """The entry of a triage, by its document `care.triage/1`."""
+    likeliest = next(iter(document.get("hypotheses", ())), None)
+    return WatchEntry(
+        number=number,
+        at=at,
+        log=clean(document["log"]["path"]),
+        sha256=document["log"]["sha256"],
+        robot=None if robot is None else robot_entry(robot),
+        verdict=status_of(document),
+        says=_says(document),
+        explanation=None if likeliest is None else HypothesisEntry(**likeliest),
+        faults=[entry["name"] for entry in document["objectives"] if entry["status"] == "fault"],
+        profile=profile_of(document) or None,
+        fit=document.get("fit", {}).get("verdict"),
+        unfinished=unfinished or None,
+        is_new=is_new,
+    )
+
+
+def unread_entry(number: int, at: str, log: Path, reason: str, *, sha256: str | None, unfinished: str) -> WatchEntry:
+    """The entry of a log that could not be read, and why."""
+    return WatchEntry(
+        number=number, at=at, log=clean(str(log)), sha256=sha256, robot=None, verdict="unreadable", says=clean(reason),
+        explanation=None, faults=[], profile=None, fit=None, unfinished=unfinished or None, is_new=True,
+    )  # fmt: skip
+
+
+def robot_entry(robot: Robot) -> RobotEntry:
+    """A robot as documents have it."""
+    return RobotEntry(id=clean(robot.id), name=clean(robot.name), source=clean(robot.source), is_sure=robot.is_sure)
+
+
+def status_of(document: Mapping[str, Any]) -> Status:
+    """What a triage came to, by its document."""
+    objectives = [entry["status"] for entry in document["objectives"]]
+    severities = [finding["severity"] for finding in document.get("findings", ())]
+    return overall(objectives, severities, document.get("fit", {}).get("verdict", "fits"))
+
+
+def _says(document: Mapping[str, Any]) -> str:
+    likeliest = next(iter(document.get("hypotheses", ())), None)
+    status = status_of(document)
+    if status == "fault" and likeliest is not None and likeliest["name"]:
+        text = hypothesis_text(HypothesisEntry(**likeliest)).removeprefix("the parameter ")
+        return clean(f"{likeliest['probability']:.0%} {text}")
+    if status == "fault":
+        return f"{verdict_of(document).removeprefix('FAULT ')}; no cause stands out"
+    if status == "ok":
+        return ""
+    reasons = [entry["reason"] for entry in document["objectives"] if entry["status"] == "not_evaluated"]
+    return clean(next(filter(None, reasons), "no profile fits, so nobody knows its limits"))
+
+
+def entry_json(entry: WatchEntry) -> str:
+    """The entry on one line."""
+    return entry.model_dump_json(by_alias=True) + "\n"
+
+
+def entry_line(entry: WatchEntry, clock: str, width: int | None, *, ascii: bool = False) -> str:
+    """The entry on one line for people: time, number, verdict, robot, cause, log. `width` in columns, None: as long as
+    it is."""
+    word = UNREADABLE if entry.verdict == "unreadable" else STATUS_WORDS[entry.verdict]
+    robot = entry.robot.name if entry.robot else NO_ROBOT
+    name = Path(entry.log).name
+    remarks = [f"unfinished: {entry.unfinished}"] if entry.unfinished else []
+    remarks += [] if entry.is_new else ["judged before"]
+    says = "; ".join((*([entry.says] if entry.says else []), *remarks))
+    if width is None:
+        return "  ".join((clock, f"{entry.number:>{_NUMBER}}", word, robot, says or "-", entry.log))
+    dots = "..." if ascii else "…"
+    name = _cut(name, int(width * _LOG_SHARE), dots, keep_end=True)
+    wide = int(width * _ROBOT_SHARE)
+    start = f"{clock} {entry.number:>{_NUMBER}} {word:<{_VERDICT}} {_padded(_cut(robot, wide, dots), wide)} "
+    room = width - _columns(start) - _columns(name) - 1
+    return f"{start}{_padded(_cut(says, room, dots), room)} {name}".rstrip()
+
+
+def _columns(text: str) -> int:
+    """Columns that a text takes in a terminal."""
+    return sum(
+        0 if unicodedata.combining(one) else 2 if unicodedata.east_asian_width(one) in "WF" else 1 for one in text
+    )
+
+
+def _padded(text: str, width: int) -> str:
+    return text + " " * (width - _columns(text))
+
+
+def _cut(text: str, width: int, dots: str, *, keep_end: bool = False) -> str:
+    """The text in at most `width` columns; what is left out is marked at its end, or in a name before its end."""
+    if _columns(text) <= width:
+        return text
+    left = max(width - len(dots), 0)
+    while _columns(text) > left:
+        text = text[1:] if keep_end else text[:-1]
+    return (f"{dots}{text}" if keep_end else f"{text}{dots}")[: max(width, 0)]
