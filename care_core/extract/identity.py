@@ -92,8 +92,8 @@ def _of_vehicle(log: Log) -> Iterator[Robot]:
         columns = (table.columns.get(field, ()) for field in _SAID[name])
         yield from (robot for column in columns for value in column if (robot := _board(value)) is not None)
     for name in _SERIALS:
-        if (number := code(settings, name) or 0) > 0:
-            yield Robot(f"serial {number}", f"serial {number}", name, is_sure=True)
+        if (serial := code(settings, name) or 0) > 0:
+            yield Robot(f"serial {serial}", f"serial {serial}", name, is_sure=True)
     told = (number for name in _SYSTEMS if (number := code(settings, name)))
     system = facts.get("system", "").partition(".")[0]
     number = next(told, int(system) if system.isdecimal() else 0)
