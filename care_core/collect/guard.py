@@ -1,15 +1,20 @@
 """Runs one command and outlives nobody: `python -I guard.py GRACE_S RECORD COMMAND...`.
 
 The command has a process group of its own. When the guard's standard input is closed, because whoever started it is
-done with it or was killed, the group is ended: asked first, and after GRACE_S made to. When the command ends by itself,
-what it leaves running is ended too, and RECORD is written: `{"code": 0, "time_s": 1.2}`, or `{"error": "..."}` where it
-could not be started. There is no RECORD of a command that was ended from here.
+done with it or was killed, everything is ended that the command started: asked first, and after GRACE_S made to. When
+the command ends by itself, what it leaves running is ended too, and RECORD is written: `{"code": 0, "time_s": 1.2}`, or
+`{"error": "..."}` where it could not be started. There is no RECORD of a command that was ended from here.
+
+Launchers of simulators give what they start sessions of its own (roslaunch does), which no signal to the group reaches.
+On Linux the guard adopts what loses its parent, so that whatever was started stays below it.
 
 Only the standard library is imported: this starts with every mission.
 """
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import json
 import os
 import signal
@@ -19,10 +24,16 @@ import threading
 import time
 from pathlib import Path
 
+_ADOPT_ORPHANS = 36
+"""PR_SET_CHILD_SUBREAPER of prctl(2)."""
+_LOOK_S = 0.02
+
 
 def main(grace_s: float, record: Path, command: list[str]) -> None:
     """Run the command until it ends or standard input is closed."""
     started = time.monotonic()
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_ADOPT_ORPHANS, 1, 0, 0, 0)
     try:
         # The pipe whose end is awaited must not be the command's too.
         child = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
@@ -48,16 +59,53 @@ def main(grace_s: float, record: Path, command: list[str]) -> None:
 
 
 def _end(group: int, grace_s: float) -> None:
-    """End every process of a group; one that does not within the grace is killed."""
+    """End every process of a group and everything below this one; what does not within the grace is killed."""
     deadline = time.monotonic() + grace_s
-    for sign in (signal.SIGTERM, 0, signal.SIGKILL):
+    left = _signal(group, signal.SIGTERM)
+    while left and time.monotonic() < deadline:
+        time.sleep(_LOOK_S)
+        left = _signal(group, 0)
+    while left and time.monotonic() < deadline + grace_s:  # what is killed may have started another meanwhile
+        left = _signal(group, signal.SIGKILL)
+        time.sleep(_LOOK_S)
+
+
+def _signal(group: int, sign: int) -> bool:
+    """Send a signal to the group and to what left it; whether anybody was there to get it."""
+    _bury()
+    is_left = False
+    for send, target in [(os.killpg, group), *((os.kill, process) for process in _below(os.getpid()))]:
         try:
-            os.killpg(group, sign)
-            while sign == 0 and time.monotonic() < deadline:
-                time.sleep(0.02)
-                os.killpg(group, 0)
+            send(target, sign)
+            is_left = True
         except (ProcessLookupError, PermissionError):  # nobody is left; or only what is dead and not yet reaped
-            return
+            continue
+    return is_left
+
+
+def _bury() -> None:
+    """Take note of adopted processes that ended, so that none counts as left."""
+    with contextlib.suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            continue
+
+
+def _below(process: int) -> list[int]:
+    """Living processes that a process started, and what these did; none where the system does not list them."""
+    children: dict[int, list[int]] = {}
+    dead: set[int] = set()
+    for place in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, parent = place.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[:2]
+        except (OSError, ValueError):  # it ended meanwhile
+            continue
+        children.setdefault(int(parent), []).append(int(place.parent.name))
+        if state == "Z":
+            dead.add(int(place.parent.name))
+    found = [process]
+    for one in found:  # grows while it is read
+        found += children.get(one, [])
+    return [one for one in found[1:] if one not in dead]
 
 
 def _write(record: Path, found: dict[str, float | str]) -> None:
