@@ -9,7 +9,7 @@ from __future__ import annotations
 MEBIBYTE = 1 << 20
 
 HELD_BYTES = 128 * MEBIBYTE
-"""Of a log held in memory as a whole: hours of flight. Of a mapped one, a cut while it is read ends the process."""
+"""Of a log held in memory as a whole: hours of flight. A larger one is read where it is asked for, again each time."""
 UNPACKED_BYTES, UNPACKED_RATIO = 256 * MEBIBYTE, 32
 """Laser scans pack 5:1, costmaps 30:1 and more, but no log is mostly empty costmaps."""
 CHUNK_BYTES = 128 * MEBIBYTE

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from care_core.logs.dataflash import DataFlashLog
-from care_core.logs.mapped import MappedFile
+from care_core.logs.mapped import FileArray
 from care_core.logs.mavlink_packets import find_packets
 
 Clock = Callable[[int], int]
@@ -44,7 +44,7 @@ def dataflash_with(source: Path, message: str, **values: float) -> bytes:
 def telemetry(source: Path, clock: Clock) -> bytes:
     """A .tlog with other stamps (us)."""
     raw = bytearray(source.read_bytes())
-    for start in find_packets(MappedFile(source).bytes()).start.tolist():
+    for start in find_packets(FileArray.open(source)).start.tolist():
         struct.pack_into(">Q", raw, start, clock(struct.unpack_from(">Q", raw, start)[0]))
     return bytes(raw)
 

@@ -40,7 +40,10 @@ def parameters_of(table: Table | None, number: Callable[[float], float]) -> dict
     """The history of PARM records (None: there are none); `number` makes the value that was set of a recorded one."""
     if table is None or not {"Name", "Value"} <= table.columns.keys():
         return {}
-    defaults = table.columns.get("Default", np.full(len(table), np.nan)).tolist()
+    if (table.kind("Name"), table.kind("Value")) != ("text", "number"):  # a broken declaration
+        return {}
+    has_default = "Default" in table.columns and table.kind("Default") == "number"
+    defaults = table["Default"].tolist() if has_default else [np.nan] * len(table)
     references = [number(default) if np.isfinite(default) else None for default in defaults]
     rows = zip(table.t.tolist(), table["Name"].tolist(), map(number, table["Value"].tolist()), references, strict=True)
     return history(rows, "PARM")
@@ -69,7 +72,7 @@ def wall_clock(tables: Mapping[str, Table]) -> str | None:
     """ISO 8601 UTC time of second 0 of the log, from the first GPS message that knows its week."""
     gps = tables.get("GPS")
     names = next((pair for pair in _GPS_FIELDS if gps is not None and set(pair) <= gps.columns.keys()), None)
-    if gps is None or names is None:
+    if gps is None or names is None or any(gps.kind(name) != "number" for name in names):
         return None
     week, milliseconds = (gps[name] for name in names)
     known = gps.where((week > 0) & (week <= _LAST_WEEK) & (milliseconds < _WEEK_MS) & np.isfinite(gps.t))

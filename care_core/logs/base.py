@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
 from care_core.run import Damage, Setting
 
@@ -45,11 +45,16 @@ class Channel:
         return cls(name, type, count, (count - 1) / span_s if count > 1 and span_s > 0 else None)
 
 
+Kind = Literal["number", "text", "other"]
+
+
 @runtime_checkable
 class LazyColumns(Protocol):
     """Columns that a reader decodes only when they are asked for, and then only the rows that are left."""
 
     def where(self, mask: NDArray[np.bool_] | slice) -> Mapping[str, NDArray[Any]]: ...
+
+    def kind(self, name: str) -> Kind: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +73,15 @@ class Table:
 
     def __getitem__(self, field: str) -> NDArray[Any]:
         return self.columns[field]
+
+    def kind(self, field: str) -> Kind:
+        """What a column holds; none is decoded for it."""
+        if isinstance(self.columns, LazyColumns):
+            return self.columns.kind(field)
+        column = self.columns[field]
+        if column.dtype.kind == "f":
+            return "number"
+        return "text" if all(isinstance(value, str) for value in column[:1]) else "other"
 
     def between(self, start_s: float, end_s: float) -> Table:
         """The messages with start_s <= t <= end_s."""

@@ -8,7 +8,7 @@ operations: nothing here loops over messages.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,13 +19,11 @@ from numpy.typing import NDArray
 
 from care_core.errors import LogError
 from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, shortest, wall_clock
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs.base import Channel, Kind, LogFormat, Table, Wanted
 from care_core.logs.clock import Clock, find_clock
 from care_core.logs.damage import summarised
-from care_core.logs.mapped import Bytes, MappedFile
+from care_core.logs.mapped import FileArray, Offsets
 from care_core.run import Damage, Setting
-
-Offsets = NDArray[np.integer[Any]]
 
 _FMT, _FMT_LENGTH = 0x80, 89
 _MAX_TYPES = 256
@@ -49,6 +47,10 @@ class RecordField(NamedTuple):
     dtype: np.dtype[Any]
     divisor: float
 
+    @property
+    def kind(self) -> Kind:
+        return "text" if self.dtype.kind == "S" else "other" if self.dtype.shape else "number"
+
 
 @dataclass(frozen=True, slots=True)
 class Format:
@@ -63,22 +65,23 @@ class Format:
 
     @property
     def time_field(self) -> tuple[str, float] | None:
-        """The name of the timestamp and its ticks per second."""
-        return time_field(self.name, self.fields)
+        """The name of the timestamp and its ticks per second; None where it is declared as text."""
+        found = time_field(self.name, self.fields)
+        return found if found is not None and self.fields[found[0]].kind == "number" else None
 
 
 class _RecordColumns(Mapping[str, NDArray[Any]]):
     """Columns of records of one layout. Numbers are decoded each time they are asked for: a log holds more than is
     looked at. Text is slow to decode and rare, so it is kept."""
 
-    def __init__(self, read_bytes: Callable[[], Bytes], fields: Mapping[str, RecordField], offsets: Offsets) -> None:
-        self._read_bytes, self._fields, self._offsets = read_bytes, fields, offsets
+    def __init__(self, data: FileArray, fields: Mapping[str, RecordField], offsets: Offsets) -> None:
+        self._data, self._fields, self._offsets = data, fields, offsets
         self._texts: dict[str, NDArray[Any]] = {}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name in self._texts:
             return self._texts[name]
-        column = _decode(self._read_bytes(), self._offsets, self._fields[name])
+        column = _decode(self._data, self._offsets, self._fields[name])
         if self._fields[name].dtype.kind == "S":
             self._texts[name] = column
         return column
@@ -92,8 +95,11 @@ class _RecordColumns(Mapping[str, NDArray[Any]]):
     def __len__(self) -> int:
         return len(self._fields)
 
+    def kind(self, name: str) -> Kind:
+        return self._fields[name].kind
+
     def where(self, mask: NDArray[np.bool_] | slice) -> _RecordColumns:
-        part = _RecordColumns(self._read_bytes, self._fields, self._offsets[mask])
+        part = _RecordColumns(self._data, self._fields, self._offsets[mask])
         part._texts = {name: column[mask] for name, column in self._texts.items()}
         return part
 
@@ -121,14 +127,13 @@ class DataFlashLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._file = MappedFile(path)
-        data = self._file.bytes()
+        self._data = data = FileArray.open(path)
         starts = _find_headers(data)
         formats, redefined = _read_formats(data, starts)
         starts, gaps = _follow_records(data, starts, formats)
         self._formats = {found[-1].name: found for found in _by_name(formats)}
         self._clock, starts, untimely = self._keep_time(data, starts)
-        types = data[starts + 2]
+        types = data.at(starts + 2)
         self._offsets = {
             declared.type: starts[types == declared.type] for found in self._formats.values() for declared in found
         }
@@ -142,17 +147,17 @@ class DataFlashLog:
 
     @cached_property
     def _channels(self) -> tuple[Channel, ...]:
-        data = self._file.bytes()
+        data = self._data
         found = []
         for name in sorted(self._formats):
-            t = self._times(data, name)
-            count = len(t)
+            count = self._count(name)
             if count:
+                t = self._times(data, name, ends_only=True)
                 found.append(Channel.over(name, self._formats[name][-1].code, count, float(t[-1] - t[0])))
         return tuple(found)
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        data = self._file.bytes()
+        data = self._data
         return {
             name: Table(self._times(data, name), self._columns(data, name, fields))
             for name, fields in wanted.items()
@@ -192,12 +197,12 @@ class DataFlashLog:
             parts += list(zip(declared, np.split(self._offsets[number], cuts), strict=True))
         return [(form, offsets) for form, offsets in parts if len(offsets)]
 
-    def _columns(self, data: Bytes, name: str, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
+    def _columns(self, data: FileArray, name: str, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
         parts = self._parts(name)
         known = [field for field in fields if any(field in form.fields for form, _ in parts)]
         if len(parts) == 1:
             form, offsets = parts[0]
-            return _RecordColumns(self._file.bytes, {field: form.fields[field] for field in known}, offsets)
+            return _RecordColumns(data, {field: form.fields[field] for field in known}, offsets)
         return {
             field: np.concatenate([
                 _decode(data, offsets, form.fields[field]) if field in form.fields else np.full(len(offsets), np.nan)
@@ -206,9 +211,11 @@ class DataFlashLog:
             for field in known
         }  # fmt: skip
 
-    def _times(self, data: Bytes, name: str) -> NDArray[np.float64]:
+    def _times(self, data: FileArray, name: str, *, ends_only: bool = False) -> NDArray[np.float64]:
+        """Seconds of the records of a message, or of the first and last of those of each declaration."""
         pieces = []
-        for form, offsets in self._parts(name):
+        for form, all_offsets in self._parts(name):
+            offsets = all_offsets[[0, -1]] if ends_only else all_offsets
             if form.time_field is not None:
                 pieces.append(self._clock.seconds(_stamps(data, offsets, form), offsets))
             elif form.type == _FMT:
@@ -225,15 +232,15 @@ class DataFlashLog:
 
     @cached_property
     def _timeline(self) -> tuple[Offsets, NDArray[np.float64]]:
-        data = self._file.bytes()
+        data = self._data
         starts = np.sort(np.concatenate(list(self._offsets.values())))
         places, stamps = self._stamped(data, starts)
         return places, self._clock.seconds(stamps, places)
 
-    def _stamped(self, data: Bytes, starts: Offsets) -> tuple[Offsets, NDArray[np.float64]]:
+    def _stamped(self, data: FileArray, starts: Offsets) -> tuple[Offsets, NDArray[np.float64]]:
         """Those of the records that carry a stamp, and their stamps in seconds."""
         form_of = {form.type: form for found in self._formats.values() for form in found if form.time_field}
-        types = data[starts + 2]
+        types = data.at(starts + 2)
         timed = np.zeros(_MAX_TYPES, dtype=bool)
         timed[list(form_of)] = True
         places, types = starts[timed[types]], types[timed[types]]
@@ -243,7 +250,7 @@ class DataFlashLog:
             stamps[own] = _stamps(data, places[own], form)
         return places, stamps
 
-    def _keep_time(self, data: Bytes, starts: Offsets) -> tuple[Clock, Offsets, tuple[Damage, ...]]:
+    def _keep_time(self, data: FileArray, starts: Offsets) -> tuple[Clock, Offsets, tuple[Damage, ...]]:
         """The clock of the log, the records without those whose stamp is impossible, and what is wrong with time."""
         places, stamps = self._stamped(data, starts)
         clock, impossible, jumps = find_clock(stamps, places)
@@ -251,13 +258,13 @@ class DataFlashLog:
         kept = starts[~np.isin(starts, places[impossible])] if lost else starts
         return clock, kept, (*summarised(jumps, "clock jumps"), *summarised(lost, "records with an impossible time"))
 
-    def _describe(self, data: Bytes, starts: Offsets, gaps: list[tuple[int, int]]) -> tuple[Damage, ...]:
+    def _describe(self, data: FileArray, starts: Offsets, gaps: list[tuple[int, int]]) -> tuple[Damage, ...]:
         form_of = {form.type: form for found in self._formats.values() for form in found}
 
         def time_at(byte: int) -> float | None:
             before = starts[max(0, int(np.searchsorted(starts, byte)) - 20) : np.searchsorted(starts, byte)]
             for offset in before[::-1]:
-                form = form_of[int(data[offset + 2])]
+                form = form_of[data.byte(int(offset) + 2)]
                 if form.time_field:
                     place = np.array([offset])
                     return float(self._clock.seconds(_stamps(data, place, form), place)[0])
@@ -267,25 +274,25 @@ class DataFlashLog:
         return summarised(found, "damaged places")
 
 
-def _find_headers(data: Bytes) -> Offsets:
+def _find_headers(data: FileArray) -> Offsets:
     """Every place where the two header bytes stand with a type byte after them, true records or not."""
     # A log can hold millions of records: four bytes a place do for all but the largest.
     kind = np.int32 if len(data) < 1 << 31 else np.int64
     found: list[Offsets] = [np.empty(0, dtype=kind)]
     for low in range(0, len(data) - 2, _CHUNK):
-        piece = data[low : low + _CHUNK + 2]
+        piece = data.between(low, low + _CHUNK + 2)
         found.append((np.flatnonzero((piece[:-2] == 0xA3) & (piece[1:-1] == 0x95)) + low).astype(kind))
     return np.concatenate(found)
 
 
-def _read_formats(data: Bytes, starts: Offsets) -> tuple[list[Format], list[Damage]]:
+def _read_formats(data: FileArray, starts: Offsets) -> tuple[list[Format], list[Damage]]:
     """Every distinct declaration in file order, and what is wrong with those that contradict an earlier one."""
-    places = starts[(data[starts + 2] == _FMT) & (starts + _FMT_LENGTH <= len(data))]
+    places = starts[(data.at(starts + 2) == _FMT) & (starts + _FMT_LENGTH <= len(data))]
     own = _to_format(_FMT, "FMT", _FMT_LENGTH, "BBnNZ", "Type,Length,Name,Format,Columns", 0)
     formats: dict[int, Format] = {_FMT: own}
     found, redefined = [own], []
     for byte in places.tolist():
-        body = data[byte + 3 : byte + _FMT_LENGTH].tobytes()
+        body = data.between(byte + 3, byte + _FMT_LENGTH).tobytes()
         name, code, columns = (_text(part) for part in (body[2:6], body[6:22], body[22:86]))
         if not name.isidentifier() or body[1] < 3 or not set(code) <= _FIELD_TYPES.keys():
             continue
@@ -318,12 +325,12 @@ def _by_name(formats: list[Format]) -> list[list[Format]]:
     return list(names.values())
 
 
-def _follow_records(data: Bytes, starts: Offsets, formats: list[Format]) -> tuple[Offsets, list[tuple[int, int]]]:
+def _follow_records(data: FileArray, starts: Offsets, formats: list[Format]) -> tuple[Offsets, list[tuple[int, int]]]:
     """The true records among the header places, and the gaps (first byte, byte after) between them.
 
     Records follow each other without space, so only the places where they do not are walked one by one.
     """
-    types = data[starts + 2]
+    types = data.at(starts + 2)
     lengths = np.zeros(_MAX_TYPES, dtype=np.uint8)
     for form in reversed(formats):
         lengths[form.type] = form.length
@@ -369,14 +376,9 @@ def _gap_text(low: int, high: int, size: int) -> str:
     return f"{high - low} bytes {where}are not readable records"
 
 
-def _decode(data: Bytes, offsets: Offsets, field: RecordField) -> NDArray[Any]:
+def _decode(data: FileArray, offsets: Offsets, field: RecordField) -> NDArray[Any]:
     """One field of the records at `offsets`: float64, or object for text and arrays."""
-    count = len(data) - field.offset - field.dtype.itemsize + 1
-    # A view of the field at every byte of the file, from which indexing copies only the records' own.
-    everywhere: NDArray[Any] = np.ndarray(
-        (count, *field.dtype.shape), field.dtype.base, data.data, field.offset, (1, *_inner_strides(field.dtype))
-    )
-    values = everywhere[offsets]
+    values = data.at(offsets + field.offset, field.dtype)
     if field.dtype.kind == "S":
         return np.array([_text(value) for value in values.tolist()], dtype=object)
     if field.dtype.shape:
@@ -387,11 +389,7 @@ def _decode(data: Bytes, offsets: Offsets, field: RecordField) -> NDArray[Any]:
         return np.asarray(values.astype(np.float64) / field.divisor)
 
 
-def _inner_strides(dtype: np.dtype[Any]) -> tuple[int, ...]:
-    return (dtype.base.itemsize,) if dtype.shape else ()
-
-
-def _stamps(data: Bytes, offsets: Offsets, form: Format) -> NDArray[np.float64]:
+def _stamps(data: FileArray, offsets: Offsets, form: Format) -> NDArray[np.float64]:
     """Timestamps in seconds of records that have one."""
     assert form.time_field is not None
     name, ticks = form.time_field

@@ -22,7 +22,7 @@ from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
 from care_core.logs.dataflash import time_field
-from care_core.logs.mapped import MappedFile
+from care_core.logs.mapped import FileArray
 from care_core.run import Damage, Setting
 
 Floats = NDArray[np.float64]
@@ -35,6 +35,7 @@ _FRACTION_CODES = frozenset("fdgcCeEL")
 _NAME_BYTES = 5  # four of a message's name and the comma
 _PIECE = 2048  # lines parsed in one go
 _HEADS = 1 << 18
+_CHUNK = 1 << 22
 _MOST_BROKEN = 100_000
 """Broken lines of a message that are told one by one before they are summed up."""
 _STEADY, _STEADY_HZ = ("CTUN", "ATT"), 10.0
@@ -59,7 +60,7 @@ class DataFlashTextLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._data = MappedFile(path).bytes()
+        self._data = FileArray.open(path)
         self._formats: dict[str, Columns] = {}
         self._counted_from = ""
         self._lines = self._index()
@@ -93,7 +94,7 @@ class DataFlashTextLog:
     @cached_property
     def _settings(self) -> Mapping[str, tuple[Setting, ...]]:
         table = self.read({"PARM": PARM_FIELDS}).get("PARM")
-        if table is not None and "Value" in table.columns:
+        if table is not None and "Value" in table.columns and table.kind("Value") == "number":
             table = table.where(np.isfinite(table["Value"]))
         return parameters_of(table, float)
 
@@ -103,7 +104,7 @@ class DataFlashTextLog:
         tables = self.read({"VER": ("FWS",), "MSG": ("Message",)})
         texts = [str(text) for table in tables.values() for column in table.columns.values() for text in column]
         first = int(min(places[0] for places in self._lines.values() if len(places)))
-        facts = facts_of([*texts, *(line.strip() for line in _text(self._data[:first]).splitlines())])
+        facts = facts_of([*texts, *(line.strip() for line in _text(self._data.between(0, first)).splitlines())])
         if self._counted_from:
             facts["clock"] = f"counted from {self._counted_from}, {_STEADY_HZ:.0f} a second"
         return facts
@@ -115,10 +116,14 @@ class DataFlashTextLog:
 
     def _index(self) -> dict[str, Offsets]:
         """Message name -> the first bytes of its lines. What does not begin like a message is under ''."""
-        self._ends = np.append(np.flatnonzero(self._data == ord("\n")), len(self._data))
+        size = len(self._data)
+        breaks = [
+            np.flatnonzero(self._data.between(low, low + _CHUNK) == ord("\n")) + low for low in range(0, size, _CHUNK)
+        ]
+        self._ends = np.concatenate([*breaks, [size]]).astype(np.int64)
         starts = np.append(0, self._ends[:-1] + 1)
-        starts = starts[starts < len(self._data)]
-        starts = starts[~np.isin(self._data[starts], (ord("\r"), ord("\n")))]  # a file can be all line ends
+        starts = starts[starts < size]
+        starts = starts[~np.isin(self._data.at(starts), (ord("\r"), ord("\n")))]  # a file can be all line ends
         names = np.concatenate([self._heads(part) for part in np.array_split(starts, len(starts) // _HEADS + 1)])
         order = np.argsort(names, kind="stable")
         firsts = np.flatnonzero(np.append(True, names[order][1:] != names[order][:-1]))
@@ -135,8 +140,7 @@ class DataFlashTextLog:
 
     def _heads(self, starts: Offsets) -> NDArray[np.bytes_]:
         """What stands before the comma in the first bytes of lines."""
-        within = np.minimum(starts[:, None] + np.arange(_NAME_BYTES), len(self._data) - 1)
-        heads = self._data[within]
+        heads = self._data.at(starts, (np.uint8, _NAME_BYTES))
         heads[np.cumsum(heads == ord(","), axis=1) > 0] = 0
         return np.asarray(heads.view(f"S{_NAME_BYTES}")[:, 0], dtype=np.bytes_)
 
@@ -144,7 +148,7 @@ class DataFlashTextLog:
         """The line that begins at a byte, without its end."""
         size = 256
         while True:
-            piece = self._data[place : place + size].tobytes()
+            piece = self._data.between(place, place + size).tobytes()
             end = piece.find(b"\n")
             if end >= 0 or place + size >= len(self._data):
                 return _text(piece[: end if end >= 0 else None]).rstrip("\r")
@@ -195,8 +199,7 @@ class DataFlashTextLog:
         if not count or set(codes) & (_TEXT_CODES | _MAYBE_TEXT_CODES):
             return None
         ends = self._ends[np.searchsorted(self._ends, places)]
-        data = self._data.data
-        lines = [bytes(data[a:b]) for a, b in zip((places + len(name) + 1).tolist(), ends.tolist(), strict=True)]
+        lines = self._data.parts(places + len(name) + 1, ends)
         if any(line.count(b",") != len(codes) - 1 for line in lines):
             return None
         if count < len(codes):
@@ -250,9 +253,11 @@ class DataFlashTextLog:
         places, stamps = [np.empty(0, dtype=np.int64)], [np.empty(0)]
         for name, own in self._lines.items():
             stamp = time_field(name, self._formats[name].names)
-            if stamp is not None and len(own):
+            column = self._columns(name, (stamp[0],)).get(stamp[0]) if stamp is not None else None
+            # A broken declaration has fewer values than names, or calls the time a text.
+            if stamp is not None and column is not None and column.dtype.kind == "f":
                 places.append(own)
-                stamps.append(self._columns(name, (stamp[0],))[stamp[0]] / stamp[1])
+                stamps.append(column / stamp[1])
         if len(places) == 1:
             self._keep_count()
             return ()

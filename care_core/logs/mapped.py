@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cached_property
-from io import SEEK_END, FileIO
+from io import SEEK_END, BytesIO, FileIO
 from pathlib import Path
+from threading import Lock
+from typing import Any
+from weakref import finalize
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from care_core import limits
 from care_core.errors import LogError
 
 Bytes = NDArray[np.uint8]
+Offsets = NDArray[np.integer[Any]]
 
 _BLOCK = 1 << 12
 """Bytes read at least: the headers of neighbouring records lie close together."""
+_WINDOW = 1 << 20
+"""Bytes read at most for records that lie apart: they stay in the processor's cache while they are picked out."""
 
 
 class FileBytes:
@@ -74,28 +79,102 @@ def opened(path: Path, magic: bytes, what: str) -> Iterator[FileBytes]:
         raise LogError(f"Cannot read the log: {err.strerror or err}.", where=str(path)) from err
 
 
-class MappedFile:
-    """A file as an array of bytes, for as long as its reader lives.
+class FileArray:
+    """A file as an array of bytes, shape (n,), that is read where it is indexed, for as long as its reader lives.
 
-    Held in memory; a large one is mapped instead, and then a cut between two reads is seen, but one in the middle of a
-    read ends the process.
+    Never mapped: of a mapped file, what somebody cuts off meanwhile ends the process with a signal. One of at most
+    `limits.HELD_BYTES` is read once and held; of a larger one so much is read as is asked for, window by window, which
+    costs the copying and saves the memory. Places come in the order of the file, as records do.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, stream: FileIO | BytesIO, path: Path) -> None:
+        self._stream, self.path = stream, path
+        self._size = stream.seek(0, SEEK_END)
+        self._lock = Lock()
+        self._held = self._filled(np.empty(self._size, np.uint8), 0) if self._size <= limits.HELD_BYTES else None
 
-    def bytes(self) -> Bytes:
-        """The bytes, shape (n,). Raises LogError where the file cannot be read, or has become shorter since."""
+    @classmethod
+    def open(cls, path: Path) -> FileArray:
+        """The bytes of a file. Raises LogError where it cannot be read."""
         try:
-            data = self._data
-            if data.base is not None and self._path.stat().st_size < len(data):
-                raise cut_while_read(self._path)
-        except (OSError, ValueError) as err:
-            raise LogError(f"Cannot read the file: {err}.", where=str(self._path)) from err
-        return data
+            stream = path.open("rb", buffering=0)
+        except OSError as err:
+            raise LogError(f"Cannot read the file: {err}.", where=str(path)) from err
+        found = cls(stream, path)
+        finalize(found, stream.close)
+        return found
 
-    @cached_property
-    def _data(self) -> Bytes:
-        if self._path.stat().st_size <= limits.HELD_BYTES:
-            return np.fromfile(self._path, dtype=np.uint8)
-        return np.asarray(np.memmap(self._path, dtype=np.uint8, mode="r"))
+    def __len__(self) -> int:
+        return self._size
+
+    def between(self, low: int, high: int) -> Bytes:
+        """The bytes of a stretch, as many as the file had when it was opened. Raises LogError for those gone."""
+        low, high = max(low, 0), min(high, self._size)
+        if self._held is not None:
+            return self._held[low:high]
+        return self._filled(np.empty(max(high - low, 0), dtype=np.uint8), low)
+
+    def _filled(self, found: Bytes, low: int) -> Bytes:
+        """The array with the bytes of the file from `low` in it."""
+        rest = found.data
+        try:
+            with self._lock:  # the app's threads share a log
+                self._stream.seek(low)
+                while len(rest):
+                    count = self._stream.readinto(rest)
+                    if not count:
+                        raise cut_while_read(self.path)
+                    rest = rest[count:]
+        except OSError as err:
+            raise LogError(f"Cannot read the file: {err}.", where=str(self.path)) from err
+        return found
+
+    def byte(self, place: int) -> int:
+        return int(self.between(place, place + 1)[0])
+
+    def at(self, places: Offsets, dtype: DTypeLike = np.uint8) -> NDArray[Any]:
+        """What is stored at places, shape (n,) and that of the type; past the end of the file are zeros."""
+        kind = np.dtype(dtype)
+        shape, inner = kind.shape, (kind.base.itemsize,) if kind.shape else ()
+        found = np.empty((len(places), *shape), kind.base)
+        for first, last, low, piece in self.windows(places, kind.itemsize):
+            # A view of the type at every byte, from which indexing copies only the wanted.
+            everywhere: NDArray[Any] = np.ndarray(
+                (len(piece) - kind.itemsize + 1, *shape), kind.base, piece.data, 0, (1, *inner)
+            )
+            found[first:last] = everywhere[places[first:last] - low]
+        return found
+
+    def parts(self, lows: Offsets, highs: Offsets) -> list[bytes]:
+        """The stretches from `lows` to `highs`, which follow each other in the file."""
+        found: list[bytes] = []
+        for first, last in _close(lows, _WINDOW):
+            low = int(lows[first])
+            text = self.between(low, int(highs[last - 1])).data
+            bounds = zip((lows[first:last] - low).tolist(), (highs[first:last] - low).tolist(), strict=True)
+            found += [bytes(text[a:b]) for a, b in bounds]
+        return found
+
+    def windows(self, places: Offsets, size: int) -> Iterator[tuple[int, int, int, Bytes]]:
+        """First and one past the last of the places that lie close together, where they begin, and the file's bytes
+        from there to `size` bytes past the last; they may be overwritten by the next."""
+        held = self._held
+        buffer = np.empty(_WINDOW + size if held is None else 0, dtype=np.uint8)
+        for first, last in _close(places, _WINDOW if held is None else self._size):
+            low, high = int(places[first]), int(places[last - 1]) + size
+            there = min(high, self._size)
+            piece = self._filled(buffer[: there - low], low) if held is None else held[low:there]
+            if there < high:
+                piece = np.append(piece, np.zeros(high - there, dtype=np.uint8))
+            yield first, last, low, piece
+
+
+def _close(places: Offsets, window: int) -> Iterator[tuple[int, int]]:
+    """First and one past the last of places, in the order of the file, that lie within so many bytes."""
+    first = 0
+    while first < len(places):
+        # A number of the array's own type: of another, the whole array is converted each time.
+        until = np.array(min(int(places[first]) + window, np.iinfo(places.dtype).max), dtype=places.dtype)
+        last = int(np.searchsorted(places, until, "right"))
+        yield first, last
+        first = last

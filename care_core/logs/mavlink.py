@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime, timezone
 from functools import cached_property
+from io import BytesIO
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
@@ -22,12 +23,13 @@ from care_core.logs.ardupilot import facts_of, history, shortest
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
-from care_core.logs.mapped import Bytes, MappedFile
+from care_core.logs.mapped import FileArray
 from care_core.logs.mavlink_packets import (
     STAMP_BYTES,
     V1,
     V2,
     Message,
+    Offsets,
     Packets,
     decode,
     definitions,
@@ -39,8 +41,6 @@ from care_core.logs.mavlink_packets import (
 )
 from care_core.logs.opening import is_raw_mavlink
 from care_core.run import Damage, Setting
-
-Offsets = NDArray[np.int64]
 
 _HEARTBEAT, _PARAM_VALUE, _STATUSTEXT, _AUTOPILOT_VERSION = 0, 22, 253, 148
 _TYPE_GCS, _AUTOPILOT_NONE, _AUTOPILOT_ARDUPILOT, _AUTOPILOT_PX4 = 6, 8, 3, 12
@@ -82,9 +82,10 @@ class MavlinkLog:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._file = MappedFile(path)
-        self._restamped = _restamped(self._file.bytes(), path)
-        data = self._bytes()
+        data = FileArray.open(path)
+        restamped = _restamped(data, path)
+        self._is_restamped = restamped is not None
+        self._data = data = data if restamped is None else restamped
         packets = find_packets(data)
         if not len(packets):
             raise LogError("The log holds no sound MAVLink packet.", hint="Copy it again.", where=str(path))
@@ -106,7 +107,7 @@ class MavlinkLog:
         )
 
     def channels(self) -> tuple[Channel, ...]:
-        data = self._bytes()
+        data = self._data
         found = []
         for name, (_, start) in sorted(chain(self._starts.items(), self._unknown.items())):
             t = self._times(data, start)
@@ -115,7 +116,7 @@ class MavlinkLog:
         return tuple(found)
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        data = self._bytes()
+        data = self._data
         tables = {}
         for name, fields in wanted.items():
             if name in self._starts:
@@ -151,7 +152,7 @@ class MavlinkLog:
             facts["firmware"] = f"{firmware} {_version(tables.get('AUTOPILOT_VERSION'))}".strip()
         if self._autopilot == _AUTOPILOT_PX4:
             facts["stack"] = "PX4"
-        if self._restamped is not None:
+        if self._is_restamped:
             facts["clock"] = "seconds since the vehicle was started, as its messages say"
         facts["system"] = f"{self.vehicle.system}.{self.vehicle.component}"
         others = [sender for sender in self._senders[1:] if sender.system != self.vehicle.system]
@@ -166,14 +167,10 @@ class MavlinkLog:
             return None
         return datetime.fromtimestamp(self._first_stamp_s, timezone.utc).isoformat(timespec="seconds")
 
-    def _bytes(self) -> Bytes:
-        """The packets with a stamp before each."""
-        return self._file.bytes() if self._restamped is None else self._restamped
-
-    def _times(self, data: Bytes, start: Offsets) -> NDArray[np.float64]:
+    def _times(self, data: FileArray, start: Offsets) -> NDArray[np.float64]:
         return self._clock.seconds(stamps(data, start), start)
 
-    def _rank(self, data: Bytes, packets: Packets) -> tuple[Sender, ...]:
+    def _rank(self, data: FileArray, packets: Packets) -> tuple[Sender, ...]:
         """Everybody heard, the vehicle's autopilot first, then by number of messages.
 
         An autopilot says what it is in its heartbeat; where nobody does, whoever is no ground station may be one.
@@ -208,7 +205,7 @@ class MavlinkLog:
             return f"{who.system}.{who.component}"
         return f"{who.system}.{who.component} ({_VEHICLES.get(kind, ('vehicle', ''))[0]})"
 
-    def _between(self, data: Bytes, packets: Packets) -> tuple[Packets, list[Damage]]:
+    def _between(self, data: FileArray, packets: Packets) -> tuple[Packets, list[Damage]]:
         """What lies between the sound packets: packets of messages that pymavlink defines not or otherwise, and damage.
 
         The byte that a message's definition adds to the checksum is one of 256. Where several packets of one number
@@ -236,27 +233,27 @@ class MavlinkLog:
         ]
 
 
-def _restamped(data: Bytes, path: Path) -> Bytes | None:
+def _restamped(data: FileArray, path: Path) -> FileArray | None:
     """The packets of a file that has no stamps with those that they carry themselves; None where it has stamps.
 
     Raises:
         LogError: it has none, and its messages carry none.
     """
-    if not is_raw_mavlink(bytes(data[:_HEAD_BYTES])):
+    if not is_raw_mavlink(data.between(0, _HEAD_BYTES).tobytes()):
         return None
     found = stamped(data)
     if found is None:
         hint = "Use the .tlog that the ground station wrote beside it."
         raise LogError("This is MAVLink without time stamps, and no message tells a time.", hint=hint, where=str(path))
-    return found
+    return FileArray(BytesIO(found), path)
 
 
-def _walk(data: Bytes, low: int, high: int) -> tuple[list[int], list[tuple[int, int]]]:
+def _walk(data: FileArray, low: int, high: int) -> tuple[list[int], list[tuple[int, int]]]:
     """Markers of the stamped frames that follow each other from byte `low`, and what is left of `low` to `high`."""
     framed: list[int] = []
     while low < high:
         marker = low + STAMP_BYTES
-        if marker + 12 > high or data[low] or data[marker] not in (V1, V2):
+        if marker + 12 > high or data.byte(low) or data.byte(marker) not in (V1, V2):
             return framed, [(low, high)]
         frame = frames(data, np.array([marker]))
         if not len(frame) or frame.end[0] > high:

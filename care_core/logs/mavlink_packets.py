@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from io import BytesIO
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.logs.mapped import Bytes
+from care_core.logs.mapped import Bytes, FileArray
 
 Offsets = NDArray[np.int64]
 
@@ -25,6 +26,8 @@ _SIGNED = 0x01
 _SIGNATURE_BYTES = 13
 _BOOT_TIME, _RESTART_S = "time_boot_ms", 1.0
 """A time so much earlier than the one before is of another start of the vehicle; less is a message overtaken."""
+_HEAD_BYTES, _LONGEST = 12, 280
+"""Bytes of the shortest packet, and of the longest: head, 255 of payload, checksum, signature."""
 _CHUNK = 1 << 22
 _BATCH = 1 << 17
 _KINDS = {
@@ -89,20 +92,21 @@ def _to_message(number: int, peer: Any) -> Message:
     return Message(number, peer.msgname, peer.crc_extra, fields)
 
 
-def find_packets(data: Bytes) -> Packets:
+def find_packets(data: FileArray) -> Packets:
     """Every stamped packet with the right checksum, in the order of the file; none overlaps another."""
     return _sound(data, _candidates(data), STAMP_BYTES)
 
 
-def stamped(data: Bytes) -> Bytes | None:
+def stamped(data: FileArray) -> bytes | None:
     """A stream of packets without stamps as the log that a ground station would have written, by the packets' own time.
 
     Many messages say when the vehicle sent them, in milliseconds since it was started (`time_boot_ms`); those between
     two came between. None where no message of the stream says so.
     """
-    padded = np.concatenate((np.zeros(STAMP_BYTES, np.uint8), data))
-    found = _sound(padded, _candidates(padded, stamped=False), 0)
-    seconds = _boot_times(padded, found)
+    padded = np.concatenate((np.zeros(STAMP_BYTES, np.uint8), data.between(0, len(data))))
+    stream = FileArray(BytesIO(padded.tobytes()), data.path)
+    found = _sound(stream, _candidates(stream, stamped=False), 0)
+    seconds = _boot_times(stream, found)
     if seconds is None:
         return None
     marker, sizes = found.start + STAMP_BYTES, found.end - found.start
@@ -112,10 +116,10 @@ def stamped(data: Bytes) -> Bytes | None:
     for low, end, at, stamp in zip((ends - sizes).tolist(), ends.tolist(), marker.tolist(), whole, strict=True):
         made[low : low + STAMP_BYTES] = stamp
         made[low + STAMP_BYTES : end] = padded[at : at + end - low - STAMP_BYTES]
-    return made
+    return made.tobytes()
 
 
-def _boot_times(data: Bytes, packets: Packets) -> NDArray[np.float64] | None:
+def _boot_times(data: FileArray, packets: Packets) -> NDArray[np.float64] | None:
     """When each packet was sent, seconds since the vehicle started; None where none says so."""
     known = np.full(len(packets), np.nan)
     senders = packets.system.astype(np.int32) << 8 | packets.component
@@ -135,7 +139,7 @@ def _boot_times(data: Bytes, packets: Packets) -> NDArray[np.float64] | None:
     return np.asarray(np.interp(np.arange(len(packets)), rows, own), np.float64)
 
 
-def _sound(data: Bytes, candidates: Sequence[Offsets], stamp_bytes: int) -> Packets:
+def _sound(data: FileArray, candidates: Sequence[Offsets], stamp_bytes: int) -> Packets:
     """The candidates with the right checksum, each with so many bytes of stamp of its own; none overlaps another."""
     pieces = [_checked(data, places) for places in candidates]
     found = Packets(*(np.concatenate(parts) for parts in zip(*map(_columns, pieces), strict=True)))
@@ -152,33 +156,33 @@ def _columns(packets: Packets) -> tuple[NDArray[Any], ...]:
     return packets.start, packets.end, packets.id, packets.system, packets.component
 
 
-def _candidates(data: Bytes, *, stamped: bool = True) -> list[Offsets]:
+def _candidates(data: FileArray, *, stamped: bool = True) -> list[Offsets]:
     """Places where a packet may begin: a marker, with a stamp before it whose highest byte is zero where `stamped`."""
     found: list[Offsets] = [np.empty(0, dtype=np.int64)]
     for low in range(STAMP_BYTES, len(data), _CHUNK):
-        piece = data[low : low + _CHUNK]
-        leads = data[low - STAMP_BYTES : low - STAMP_BYTES + len(piece)]
+        whole = data.between(low - STAMP_BYTES, low + _CHUNK)
+        piece, leads = whole[STAMP_BYTES:], whole[:-STAMP_BYTES]
         places = np.flatnonzero(((piece == V2) | (piece == V1)) & ((leads == 0) | (not stamped))) + low
         found += [places[at : at + _BATCH] for at in range(0, len(places), _BATCH)]
     return found
 
 
-def frames(data: Bytes, places: Offsets) -> Packets:
+def frames(data: FileArray, places: Offsets) -> Packets:
     """Packets as their headers describe them, unchecked; those that do not fit into the file are left out."""
-    places = places[places + 12 <= len(data)] if len(places) else places
-    is_v2 = data[places] == V2
-    head = np.where(is_v2, 10, 6)
-    flags = np.where(is_v2, data[places + 2], 0)
-    end = places + head + data[places + 1] + 2 + _SIGNATURE_BYTES * (flags & _SIGNED)
-    wide = data[places + 7] | data[places + 8].astype(np.int32) << 8 | data[places + 9].astype(np.int32) << 16
-    number = np.where(is_v2, wide, data[places + 5]).astype(np.int32)
-    sender = places + np.where(is_v2, 5, 3)
+    places = places[places + _HEAD_BYTES <= len(data)]
+    head = data.at(places, (np.uint8, _HEAD_BYTES))
+    is_v2 = head[:, 0] == V2
+    flags = np.where(is_v2, head[:, 2], 0)
+    end = places + np.where(is_v2, 10, 6) + head[:, 1] + 2 + _SIGNATURE_BYTES * (flags & _SIGNED)
+    wide = head[:, 7] | head[:, 8].astype(np.int32) << 8 | head[:, 9].astype(np.int32) << 16
+    number = np.where(is_v2, wide, head[:, 5]).astype(np.int32)
+    system, component = (np.where(is_v2, head[:, at + 2], head[:, at]) for at in (3, 4))
+    found = Packets(places - STAMP_BYTES, end, number, system, component)
     whole = (end <= len(data)) & (flags | _SIGNED == _SIGNED)
-    found = Packets(places - STAMP_BYTES, end, number, data[sender], data[sender + 1])
     return found.where(whole)
 
 
-def _checked(data: Bytes, places: Offsets) -> Packets:
+def _checked(data: FileArray, places: Offsets) -> Packets:
     extras = np.full(max(definitions()) + 2, -1, dtype=np.int16)
     extras[list(definitions())] = [message.extra for message in definitions().values()]
     found = frames(data, places)
@@ -187,7 +191,7 @@ def _checked(data: Bytes, places: Offsets) -> Packets:
     return found.where(_step(summed, extras[found.id].astype(np.uint8)) == stated)
 
 
-def wanted_extras(data: Bytes, packets: Packets) -> NDArray[np.int64]:
+def wanted_extras(data: FileArray, packets: Packets) -> NDArray[np.int64]:
     """What a message's definition would have to add for each packet's checksum to be right; -1 where nothing does."""
     summed, stated = _sums(data, packets)
     entry = np.full(1 << 16, -1, dtype=np.int64)
@@ -196,17 +200,24 @@ def wanted_extras(data: Bytes, packets: Packets) -> NDArray[np.int64]:
     return np.where(found < 0, -1, found ^ (summed & 0xFF))
 
 
-def payloads(data: Bytes, start: Offsets) -> tuple[Offsets, NDArray[np.int64]]:
+def payloads(data: FileArray, start: Offsets) -> tuple[Offsets, NDArray[np.int64]]:
     """First byte and size of the payloads of packets whose stamps begin at `start`."""
     marker = start + STAMP_BYTES
-    return marker + np.where(data[marker] == V2, 10, 6), data[marker + 1].astype(np.int64)
+    head = data.at(marker, (np.uint8, 2))
+    return marker + np.where(head[:, 0] == V2, 10, 6), head[:, 1].astype(np.int64)
 
 
-def _sums(data: Bytes, packets: Packets) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
+def _sums(data: FileArray, packets: Packets) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
     """CRC-16/MCRF4XX of packets without the byte that their message adds, and the checksums that they state."""
     marker = packets.start + STAMP_BYTES
-    first, size = payloads(data, packets.start)
-    tail = first + size
+    pieces = [_sums_of(piece, (marker[first:last] - low)) for first, last, low, piece in data.windows(marker, _LONGEST)]
+    none = np.empty(0, dtype=np.uint16)
+    return np.concatenate([none, *(summed for summed, _ in pieces)]), np.concatenate([none, *(s for _, s in pieces)])
+
+
+def _sums_of(data: Bytes, marker: Offsets) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
+    """The sums of packets whose markers stand at places of these bytes."""
+    tail = marker + np.where(data[marker] == V2, 10, 6) + data[marker + 1]
     covered = tail - marker - 1
     order = np.argsort(-covered, kind="stable")
     place, falling = marker[order] + 1, -covered[order]
@@ -231,25 +242,20 @@ def _crc_table() -> NDArray[np.uint16]:
     return table
 
 
-def stamps(data: Bytes, start: Offsets) -> NDArray[np.float64]:
+def stamps(data: FileArray, start: Offsets) -> NDArray[np.float64]:
     """The times before packets, in seconds."""
-    seconds = np.empty(len(start))
-    for low in range(0, len(start), _BATCH):
-        raw = data[start[low : low + _BATCH, None] + np.arange(STAMP_BYTES)]
-        seconds[low : low + _BATCH] = raw.view(">u8")[:, 0] / 1e6
-    return seconds
+    return np.asarray(data.at(start, ">u8") / 1e6, dtype=np.float64)
 
 
-def decode(data: Bytes, start: Offsets, field: PacketField) -> NDArray[Any]:
+def decode(data: FileArray, start: Offsets, field: PacketField) -> NDArray[Any]:
     """One field of packets of one message: float64, or object for text (str) and arrays (tuple).
 
     A sender leaves out the zeros at the end of a payload, so what lies past it is zero.
     """
     first, size = payloads(data, start)
     within = field.offset + np.arange(field.dtype.itemsize)
-    is_sent = within < size[:, None]
-    raw = data[np.where(is_sent, first[:, None] + within, 0)]
-    raw[~is_sent] = 0
+    raw = data.at(first + field.offset, (np.uint8, field.dtype.itemsize))
+    raw[within >= size[:, None]] = 0
     if field.dtype.kind == "S":
         return _objects([_text(row.tobytes()) for row in raw])
     if field.dtype.shape:

@@ -56,9 +56,37 @@ _UNKNOWN: Mapping[str, float] = {
 """Values by which a sender says that it does not know."""
 
 
+_TEXTS = frozenset(("Message", "Name"))
+"""What is text among the fields that are read of DataFlash messages. A mode is either, by firmware."""
+
+
 def as_dataflash(log: Log) -> Log:
-    """The log itself, or for telemetry the DataFlash log that it can stand for."""
-    return _Telemetry(log) if log.format is LogFormat.MAVLINK_TLOG else log
+    """The log as whoever reads DataFlash messages expects it: of telemetry the log that it can stand for, of a
+    DataFlash log the fields that its declarations give the kind that the firmware does."""
+    if log.format is LogFormat.MAVLINK_TLOG:
+        return _Telemetry(log)
+    return _Declared(log) if log.format in (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT) else log
+
+
+@dataclass(frozen=True, eq=False)
+class _Declared:
+    """A DataFlash log whose declarations may be broken: a field that holds text for numbers, or numbers for text, is as
+    good as absent."""
+
+    log: Log
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.log, name)
+
+    def read(self, wanted: Wanted) -> Mapping[str, Table]:
+        return {name: _as_expected(table) for name, table in self.log.read(wanted).items()}
+
+
+def _as_expected(table: Table) -> Table:
+    names = [
+        name for name in table.columns if name == "Mode" or table.kind(name) == ("text" if name in _TEXTS else "number")
+    ]
+    return table if len(names) == len(table.columns) else Table(table.t, {name: table[name] for name in names})
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -11,11 +12,15 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from care_core import limits
 from care_core.errors import CareError, LogError
 from care_core.extract.read import read_run
+from care_core.health.examine import examine
+from care_core.logs import mapped
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.opening import open_log
 from care_core.profile.schema import read_schema
+from care_core.profile.store import load_profile
 from care_core.run import is_known
 from tests.rewritten import write_text, write_ulog
 from tests.unit.test_mavlink import Station, flight, parameter
@@ -81,6 +86,77 @@ def test_a_log_cut_anywhere(kind: LogFormat, tmp_path: Path) -> None:
         counts.append(sum(channel.count for channel in log.channels()) if log else 0)
     assert counts == sorted(counts), "more of a log holds no fewer messages"
     assert counts[-1] > 0
+
+
+HELD = (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT, LogFormat.MAVLINK_TLOG)
+
+
+@pytest.mark.parametrize("kind", HELD)
+def test_a_log_too_large_to_hold_is_the_same_in_windows(
+    kind: LogFormat, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = MAKERS[kind](tmp_path / "log")
+    held = open_log(path)
+    monkeypatch.setattr(limits, "HELD_BYTES", 0)
+    monkeypatch.setattr(mapped, "_WINDOW", 1000)
+    windowed = open_log(path)
+    assert (windowed.channels(), windowed.settings(), windowed.damage) == (
+        held.channels(), held.settings(), held.damage
+    )  # fmt: skip
+    everything = {channel.name: FIELDS for channel in held.channels()}
+    expected, found = held.read(everything), windowed.read(everything)
+    assert expected.keys() == found.keys()
+    for name, table in expected.items():
+        np.testing.assert_array_equal(table.t, found[name].t)
+        for field in table.columns:
+            np.testing.assert_array_equal(table[field], found[name][field])
+
+
+@pytest.mark.parametrize("kind", HELD)
+def test_a_large_log_cut_while_it_is_read_is_an_error(
+    kind: LogFormat, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "HELD_BYTES", 0)
+    path = MAKERS[kind](tmp_path / "log")
+    log = open_log(path)
+    os.truncate(path, path.stat().st_size // 2)
+    with pytest.raises(LogError, match="cut while it was read"):
+        sum(
+            len(column)
+            for table in log.read({channel.name: FIELDS for channel in log.channels()}).values()
+            for column in table.columns.values()
+        )
+
+
+DECLARED = {"BAT": "Volt", "GPS": "GMS", "PARM": "Value", "MSG": "Message", "MODE": "ModeNum", "ATT": "TimeUS"}
+
+
+@pytest.mark.parametrize("name", DECLARED)
+@pytest.mark.parametrize("is_text", [False, True], ids=["BIN", "text"])
+def test_a_field_declared_as_what_it_is_not(is_text: bool, name: str, tmp_path: Path) -> None:
+    """Numbers as text, text as numbers: as good as absent, and the rest is read."""
+    whole = SAMPLE.read_bytes()
+    body = whole.index(name.encode().ljust(4, b"\0") + b"Q")
+    columns = whole[body + 20 : body + 84].split(b"\0")[0].decode().split(",")
+    place = body + 4 + columns.index(DECLARED[name])
+    size = {"Q": 8, "f": 4, "I": 4, "Z": 64, "B": 1, "M": 1}[chr(whole[place])]
+    path, code = tmp_path / "log", {8: b"d", 4: b"n", 1: b"b", 64: b"a"}[size]
+    if is_text:
+        write_text(path, SAMPLE)
+        line = re.search(rb"FMT, \d+, \d+, %s, (\w+), (\S+)" % name.encode(), path.read_bytes())
+        assert line is not None
+        at = line.start(1) + line[2].decode().split(",").index(DECLARED[name])
+        code = b"f" if name == "MSG" else b"Z"
+    else:
+        path.write_bytes(whole)
+        at = place
+    raw = bytearray(path.read_bytes())
+    raw[at : at + 1] = code
+    path.write_bytes(raw)
+    log = read_all(path)
+    assert log is not None
+    examine(log)
+    read_run(log, load_profile("arducopter").schema)
 
 
 @pytest.mark.parametrize("kind", MAKERS)
