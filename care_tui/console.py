@@ -15,8 +15,8 @@ from care_core.text import clean
 PIPE_CLOSED = 128 + 13
 """Exit code of a process whose reader went away, as the shell gives it for SIGPIPE."""
 
-QUIET_S = 1.0
-"""Work that takes longer says what it is doing."""
+QUIET_S, AGAIN_S = 1.0, 60.0
+"""Work that takes longer says what it is doing; how often it says so where no line can be rewritten."""
 
 _STATUS = re.compile(r"\b(FAULT|NOT EVALUATED|OK)\b")
 _COLOURS = {"FAULT": "\x1b[1;31m", "NOT EVALUATED": "\x1b[33m", "OK": "\x1b[32m"}
@@ -72,14 +72,15 @@ def painted(text: str) -> str:
 
 
 class Progress:
-    """Says on stderr what is being done: a line rewritten in place on a terminal, else one plain line after a second.
+    """Says on stderr what is being done: a line rewritten in place on a terminal, else plain lines: one after a second,
+    and one more each minute, for what runs through the night.
 
     Use as a context manager; the object is called with the step and the share that is done (0 to 1).
     """
 
     def __init__(self) -> None:
         self._in_place = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
-        self._started = time.monotonic()
+        self._due_s = time.monotonic() + QUIET_S
         self._said = False
 
     def __enter__(self) -> Progress:
@@ -93,9 +94,9 @@ class Progress:
         if self._in_place:
             print(f"\r\x1b[K{clean(step)} {share:.0%}"[:100], end="", file=sys.stderr, flush=True)
             self._said = True
-        elif share < 1.0 and not self._said and time.monotonic() - self._started > QUIET_S:
+        elif share < 1.0 and (now := time.monotonic()) > self._due_s:
             say(f"{step} ...")
-            self._said = True
+            self._due_s = now + AGAIN_S
 
 
 def explain(err: Exception) -> ExitCode:

@@ -386,13 +386,16 @@ def test_colour_only_on_a_terminal_that_wants_it(monkeypatch: pytest.MonkeyPatch
     assert console.painted("FAULT: x") == "FAULT: x"
 
 
-def test_slow_work_says_so_once(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    times: Iterable[float] = iter((0.0, 0.5, 1.5, 2.0))
+def test_slow_work_says_so_and_again_each_minute(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    times: Iterable[float] = iter((0.0, 0.5, 1.5, 2.0, 62.0))
     monkeypatch.setattr("time.monotonic", lambda: next(iter(times)))
     with console.Progress() as progress:
-        for share in (0.1, 0.5, 0.9):
-            progress("reading", share)
-    assert capsys.readouterr().err == "reading ...\n"
+        for step in range(1, 5):
+            progress(f"{step} of 5", step / 5)
+        progress("5 of 5", 1.0)
+    assert capsys.readouterr().err == "2 of 5 ...\n4 of 5 ...\n"
 
 
 def test_the_command_runs_as_a_process() -> None:
