@@ -259,16 +259,22 @@ def repeated(topic: Topic, raw: bytes, times: range) -> Iterator[tuple[int, Topi
     return ((time_ns, topic, raw) for time_ns in times)
 
 
-def robot_messages() -> Iterator[tuple[int, Topic, bytes]]:
-    """(time in ns, topic, serialised message) in time order: the mission of `GOOD_BAG` among the sensors' messages."""
+def mission_messages(stood_s: int) -> tuple[Iterator[tuple[int, Topic, bytes]], int, int]:
+    """The mission of `GOOD_BAG` after so many seconds, and the times in ns at which the log begins and ends."""
     from rosbags.rosbag1 import Reader
 
-    store = ros_types()
     with Reader(GOOD_BAG) as bag:
-        begin, end = bag.start_time, bag.end_time + STOOD_S * SECOND_NS
+        begin, end = bag.start_time, bag.end_time + stood_s * SECOND_NS
         topics = {c.id: Topic(c.topic, c.msgtype, c.msgdef.data, c.digest) for c in bag.connections}
-        mission = [(time_ns + STOOD_S * SECOND_NS, topics[c.id], bytes(raw)) for c, time_ns, raw in bag.messages()]
-    streams = [iter(mission)]
+        mission = [(time_ns + stood_s * SECOND_NS, topics[c.id], bytes(raw)) for c, time_ns, raw in bag.messages()]
+    return iter(mission), begin, end
+
+
+def robot_messages() -> Iterator[tuple[int, Topic, bytes]]:
+    """(time in ns, topic, serialised message) in time order: the mission of `GOOD_BAG` among the sensors' messages."""
+    store = ros_types()
+    mission, begin, end = mission_messages(STOOD_S)
+    streams = [mission]
     for name, message, rate in sensor_messages(store.types):
         kind = message.__msgtype__
         topic = Topic(name, kind, *store.generate_msgdef(kind))

@@ -12,6 +12,9 @@ HELD_BYTES = 128 * MEBIBYTE
 """Of a log held in memory as a whole: hours of flight. A larger one is read where it is asked for, again each time."""
 UNPACKED_BYTES, UNPACKED_RATIO = 256 * MEBIBYTE, 32
 """Laser scans pack 5:1, costmaps 30:1 and more, but no log is mostly empty costmaps."""
+WHOLE_BYTES = 256 * MEBIBYTE
+"""A log up to this size is digested as a whole, and a chunk that is opened is unpacked and checked to its end. Of a
+larger one only what is asked for is read: hours of cameras and point clouds that nobody looks at."""
 CHUNK_BYTES = 128 * MEBIBYTE
 """Recorders write chunks of 1 to 10 MB; the largest single messages are point clouds of some 50 MB."""
 

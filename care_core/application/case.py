@@ -127,14 +127,14 @@ def open_case(request: Request, progress: Progress) -> Case:
     Raises:
         CareError: the log cannot be read, or the operator named what is not there.
     """
+    from care_core.application.pace import watching
     from care_core.configs.loading import read_configs
     from care_core.errors import NoMissionError
     from care_core.health.examine import examine
     from care_core.run import Fit
 
     configs = read_configs(request.configs)
-    progress("opening the log", 0.0)
-    with opened(request.log) as (log, sha256):
+    with watching(progress) as progress, opened(request.log, progress) as (log, sha256):
         profile, choice = choose(log, request.profile)
         progress("looking at what happened", 0.1)
         health = examine(log)
@@ -172,11 +172,13 @@ def _of_robot(diagnosis: Diagnosis, log: Log, request: Request) -> Diagnosis:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[tuple[Log, Sha256]]:
+def opened(path: Path, progress: Progress | None = None) -> Iterator[tuple[Log, Sha256]]:
     """A log, and its digest in the making."""
     from care_core.logs.digest import hashing
     from care_core.logs.opening import open_as, sniff
 
+    if progress is not None:
+        progress("opening the log", 0.0)
     format = sniff(path)
     # Begun before anything else is imported: of a large log it takes as long as all the rest.
     with hashing(path) as sha256:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bz2
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,6 +12,7 @@ from typing import IO
 
 from care_core import limits
 from care_core.errors import LogError
+from care_core.logs.mapped import FileBytes
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
@@ -31,6 +32,32 @@ class Unpacker:
     def __init__(self, file_size: int) -> None:
         self._most = limits.unpacked_bytes(file_size)
         self._left = self._most
+        self._takes_parts = file_size > limits.WHOLE_BYTES
+
+    @property
+    def takes_parts(self) -> bool:
+        """Whether the file is so large that a chunk is unpacked only as far as it is asked for."""
+        return self._takes_parts
+
+    def head(self, compression: str, packed: FileBytes, start: int, end: int, wanted: int) -> bytes:
+        """The first bytes, `wanted` at least where it has so many, of what lies packed between two places of a file.
+
+        Raises:
+            CannotUnpackError: as when called.
+        """
+        if wanted > limits.CHUNK_BYTES or wanted > self._left:
+            raise CannotUnpackError(f"its chunks unpack to more than {limits.megabytes(self._most)}")
+        plain = bytearray()
+        try:
+            unpack = _unpacking(compression)
+            piece = _BLOCK
+            while start < end and len(plain) < wanted:
+                plain += unpack(packed[start : min(start + piece, end)])
+                start, piece = start + piece, 2 * piece
+        except (OSError, RuntimeError, EOFError, ValueError, MemoryError) as err:
+            raise CannotUnpackError(f"a {compression} chunk cannot be unpacked") from err
+        self._left -= len(plain)
+        return bytes(plain)
 
     def __call__(self, compression: str, data: bytes, size: int = 0) -> bytes:
         """Plain data; of data that was cut short, or broken in the middle, what comes before.
@@ -111,12 +138,37 @@ def unpack_head(packed: bytes) -> bytes:
     return next(_zstd_pieces(BytesIO(packed)), b"")
 
 
+def _unpacking(compression: str) -> Callable[[bytes], bytes]:
+    """What unpacks a stream piece by piece, with what each gives."""
+    if compression == "lz4":
+        from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+
+        frame = LZ4FrameDecompressor()
+        return lambda piece: b"" if frame.eof else bytes(frame.decompress(piece))
+    if compression == "zstd":
+        import zstandard
+
+        stream = zstandard.ZstdDecompressor().decompressobj()
+
+        def decompress(piece: bytes) -> bytes:
+            try:
+                return b"" if stream.eof else stream.decompress(piece)
+            except zstandard.ZstdError as err:
+                raise ValueError("not zstd") from err
+
+        return decompress
+    if compression == "bz2":
+        blocks = bz2.BZ2Decompressor()
+        return lambda piece: b"" if blocks.eof else blocks.decompress(piece)
+    raise CannotUnpackError(f"a chunk of unknown compression '{compression}'")
+
+
 def _unpack_bz2(data: bytes, limit: int) -> bytes:
     return bz2.BZ2Decompressor().decompress(data, limit)
 
 
 def _unpack_lz4(data: bytes, limit: int) -> bytes:
-    from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+    from lz4.frame import LZ4FrameDecompressor
 
     return bytes(LZ4FrameDecompressor().decompress(data, limit))
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from io import SEEK_END, BytesIO, FileIO
 from pathlib import Path
 from threading import Lock
@@ -23,6 +24,10 @@ _BLOCK = 1 << 12
 """Bytes read at least: the headers of neighbouring records lie close together."""
 _WINDOW = 1 << 20
 """Bytes read at most for records that lie apart: they stay in the processor's cache while they are picked out."""
+
+
+WATCH: ContextVar[Callable[[int, int], None] | None] = ContextVar("WATCH", default=None)
+"""Who is told, while files are read in this thread, the byte that was come to and the size of the file."""
 
 
 class FileBytes:
@@ -58,6 +63,8 @@ class FileBytes:
         found = self._stream.read(size)
         if len(found) < size:
             raise cut_while_read(self._path)
+        if (watch := WATCH.get()) is not None:
+            watch(low + size, self._size)
         return found
 
 
@@ -127,6 +134,8 @@ class FileArray:
                     rest = rest[count:]
         except OSError as err:
             raise LogError(f"Cannot read the file: {err}.", where=str(self.path)) from err
+        if (watch := WATCH.get()) is not None:
+            watch(low + len(found), self._size)
         return found
 
     def byte(self, place: int) -> int:

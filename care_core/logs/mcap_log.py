@@ -69,17 +69,22 @@ class McapPart:
             unpack = Unpacker(len(log))
             for chunk in self._chunks:
                 wanted = [number for number in chunk.index if number in numbers]
-                if wanted and (plain := self._open(chunk, log, unpack)):
+                if wanted and (plain := self._open(chunk, wanted, log, unpack)):
                     yield from self._of_chunk(chunk, wanted, unpack, *plain)
 
-    def _open(self, chunk: McapChunk, log: FileBytes, unpack: Unpacker) -> tuple[Source, int, int] | None:
+    def _open(
+        self, chunk: McapChunk, wanted: Sequence[int], log: FileBytes, unpack: Unpacker
+    ) -> tuple[Source, int, int] | None:
         key = f"chunk {chunk.pos}"
         try:
-            found = chunk.open(log, unpack)
+            found = chunk.open(log, unpack, wanted)
         except BrokenRecordError as err:
             self.flaws.setdefault(key, Flaw(str(err), chunk.pos, first_ns(_times_ns(chunk))))
             return None
-        if chunk.pos not in self._checked:
+        if unpack.takes_parts:  # what is not read cannot be summed up
+            if not chunk.is_whole:
+                self.flaws.setdefault(key, Flaw("a chunk is cut short", chunk.pos, first_ns(_times_ns(chunk))))
+        elif chunk.pos not in self._checked:
             self._checked.add(chunk.pos)
             why = chunk.flaw(*found)
             if why:

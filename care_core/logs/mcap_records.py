@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 import zlib
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any, NamedTuple
@@ -57,15 +57,31 @@ class McapChunk:
     """CRC-32 of the plain records, 0 where the recorder made none."""
     index: dict[int, NDArray[Any]] = field(default_factory=dict)
 
-    def open(self, log: FileBytes, unpack: Unpacker) -> tuple[Source, int, int]:
-        """The plain records as (buffer, begin, end); what is there of a cut chunk. Raises BrokenRecordError."""
+    def open(self, log: FileBytes, unpack: Unpacker, numbers: Collection[int] | None = None) -> tuple[Source, int, int]:
+        """The plain records as (buffer, begin, end); what is there of a cut chunk. Raises BrokenRecordError.
+
+        Args:
+            numbers: where a large file's chunk is asked for these channels alone, no more is unpacked than they need.
+        """
         if not self.compression:
             return log, self.start, self.end
+        needed = self._needed(numbers) if numbers is not None and unpack.takes_parts else 0
         try:
+            if needed:
+                plain = unpack.head(self.compression, log, self.start, self.end, needed)
+                return plain, 0, len(plain)
             plain = unpack(self.compression, log[self.start : self.end], self.size)
         except CannotUnpackError as err:
             raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
+
+    def _needed(self, numbers: Collection[int]) -> int:
+        """The bytes before the first message behind the last one of these channels; 0: all that there are."""
+        ends = [int(self.index[number]["offset"].max()) for number in numbers]
+        last = max(ends, default=0)
+        behind = [entries["offset"][entries["offset"] > last] for entries in self.index.values()]
+        needed = min((int(offsets.min()) for offsets in behind if len(offsets)), default=0)
+        return needed if 2 * needed < self.size else 0  # all at once is quicker
 
     def flaw(self, buffer: Source, begin: int, end: int) -> str:
         """Why the plain records cannot all be trusted, empty where they can."""

@@ -73,7 +73,7 @@ class Ros1Part:
                 if not wanted:
                     continue
                 try:
-                    plain = chunk.open(bag, unpack)
+                    plain = chunk.open(bag, unpack, wanted)
                 except BrokenRecordError as err:
                     self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, first_ns(_times_ns(chunk))))
                 else:

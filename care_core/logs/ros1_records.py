@@ -8,7 +8,7 @@ Format: wiki.ros.org/Bags/Format/2.0.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,15 +46,31 @@ class BagChunk:
     """Bytes of the plain data, 0 where the bag does not say."""
     index: dict[int, NDArray[Any]] = field(default_factory=dict)
 
-    def open(self, bag: FileBytes, unpack: Unpacker) -> tuple[Source, int, int]:
-        """The chunk's plain data as (buffer, begin, end); what is there of a cut one. Raises BrokenRecordError."""
+    def open(self, bag: FileBytes, unpack: Unpacker, numbers: Collection[int] | None = None) -> tuple[Source, int, int]:
+        """The chunk's plain data as (buffer, begin, end); what is there of a cut one. Raises BrokenRecordError.
+
+        Args:
+            numbers: where a large bag's chunk is asked for these connections alone, no more is unpacked than they need.
+        """
         if self.compression == "none":
             return bag, self.start, self.end
+        needed = self._needed(numbers) if numbers is not None and unpack.takes_parts else 0
         try:
+            if needed:
+                plain = unpack.head(self.compression, bag, self.start, self.end, needed)
+                return plain, 0, len(plain)
             plain = unpack(self.compression, bag[self.start : self.end], self.size)
         except CannotUnpackError as err:
             raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
+
+    def _needed(self, numbers: Collection[int]) -> int:
+        """The bytes before the first message behind the last one of these connections; 0: all that there are."""
+        ends = [int(self.index[number]["offset"].max()) for number in numbers if len(self.index[number])]
+        last = max(ends, default=0)
+        behind = [entries["offset"][entries["offset"] > last] for entries in self.index.values()]
+        needed = min((int(offsets.min()) for offsets in behind if len(offsets)), default=0)
+        return needed if 2 * needed < self.size else 0  # all at once is quicker
 
 
 @dataclass(slots=True)

@@ -165,6 +165,7 @@ class RosLog:
         self._missing = missing
         self._notes = notes or {}
         self._broken: dict[str, _Broken] = {}
+        self._broken_settings: Mapping[str, _Broken] = {}
         every = [times for part in parts for times in part.times_ns.values()]
         self._low_ns, self._high_ns, self._strays = _believable(every)
 
@@ -188,7 +189,7 @@ class RosLog:
         if promised and count < promised and not found:
             found.append(Damage(f"{count} of the {promised} messages that were recorded are there"))
         found += self._clock
-        for topic, broken in self._broken.items():
+        for topic, broken in {**self._broken_settings, **self._broken}.items():
             times = f"{broken.count} messages" if broken.count else "its messages"
             found.append(
                 Damage(f"{topic}: {times} cannot be decoded: {broken.why}", None, self._seconds(broken.time_ns))
@@ -257,9 +258,14 @@ class RosLog:
         `<namespace>/<parameter>` for dynamic_reconfigure, `<node>.<parameter>` for `/parameter_events` and for
         parameters that the recorder was given (`custom_data`); booleans as 0 or 1, lists as text.
         """
+        return self._settings
+
+    @cached_property
+    def _settings(self) -> Mapping[str, tuple[Setting, ...]]:
         types = {c.topic: short_name(c.type) for part in self._parts for c in part.connections.values()}
         fields = setting_fields(types)
         told = settings_in(types, self.read(fields)) if fields else {}
+        self._broken_settings = dict(self._broken)
         return {**self._metadata.settings(), **told}
 
     def _gather(
