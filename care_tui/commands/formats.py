@@ -33,6 +33,14 @@ def collect() -> None:
     _print(collect_schema())
 
 
+@app.command("fleet")
+def fleet() -> None:
+    """Print the JSON Schema of 'care fleet --json'."""
+    from care_core.report.fleet import fleet_schema
+
+    _print(fleet_schema())
+
+
 @app.command("history")
 def history() -> None:
     """Print the JSON Schema of 'care history --json'."""

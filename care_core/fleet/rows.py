@@ -1,0 +1,203 @@
+"""One log in one row: plain values, small enough to send between machines and to keep by the thousand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from care_core.causal.counterfactual import World, known_value
+from care_core.causal.model import Model
+from care_core.diagnose.ranking import deviating
+from care_core.diagnose.records import Confidence, Diagnosis, Status, What
+from care_core.health.records import FindingKind, Severity
+from care_core.run import FitVerdict, is_known
+from care_core.text import clean
+from care_core.variables import Op, Threshold
+
+MAIN = 0.5
+"""An explanation this likely is likelier than all others together: it is counted as the run's cause."""
+_SORTS = ("vehicle", "stack", "ros")
+"""The facts of a log that tell what sort of robot it is of, the best first."""
+TOLD = 0.05
+"""Explanations less likely than this are not kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """An explanation of a failure. `kind` is that of the finding which speaks for it, None for a parameter."""
+
+    what: What
+    name: str
+    probability: float
+    kind: FindingKind | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class NamedCause:
+    """An option that cost the run something, with what the run had and what would be better."""
+
+    option: str
+    confidence: Confidence
+    current: float
+    suggested: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A finding that no other one explains."""
+
+    kind: FindingKind
+    title: str
+    severity: Severity
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a profile's model needs to be asked about a run: how it was set, what it met, how it ended, its limits."""
+
+    config: Mapping[str, float]
+    observed: Mapping[str, float]
+    thresholds: Mapping[str, tuple[Op, float]]
+
+    def world(self, model: Model) -> World:
+        """The run, ready to be asked what other values would have done."""
+        bounds = {name: Threshold(op, value) for name, (op, value) in self.thresholds.items()}
+        return World(model, self.config, self.observed, bounds)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What became of one run. A log that cannot be read is a row too: `status` "unreadable", and `reason` says why."""
+
+    log: str
+    status: Status | Literal["unreadable"]
+    reason: str = ""
+    robot: str | None = None
+    """What tells it from all others; None where the log does not."""
+    called: str = ""
+    """What people call the robot."""
+    folder: str = ""
+    """The name of the folder that holds the log."""
+    start: str | None = None
+    """ISO 8601 in UTC, None where the log has no wall clock."""
+    duration_s: float = 0.0
+    sha256: str = ""
+    mission: int = 0
+    kind: str = ""
+    """What sort of robot it is: only robots of one sort are compared."""
+    firmware: str = ""
+    frame: str = ""
+    profile: str = ""
+    """Empty where none fits."""
+    version: str = ""
+    fit: FitVerdict = "no"
+    objectives: Mapping[str, float] = field(default_factory=dict)
+    breaches: tuple[str, ...] = ()
+    explained: tuple[Explained, ...] = ()
+    """What explains a failure, the likeliest first."""
+    causes: tuple[NamedCause, ...] = ()
+    findings: tuple[Seen, ...] = ()
+    change: Mapping[str, float] = field(default_factory=dict)
+    """The change that the run's own diagnosis advises."""
+    p_fixed: float | None = None
+    off: Mapping[str, float] = field(default_factory=dict)
+    """Options that are off their reference, with the reference."""
+    asked: Asked | None = None
+    """None where no model can be asked."""
+
+    @property
+    def is_judged(self) -> bool:
+        """Whether anything is known of how the run went."""
+        return self.status in ("ok", "fault")
+
+    @property
+    def main(self) -> Explained | None:
+        """What explains the failure better than everything else together, None where nothing does."""
+        first = self.explained[0] if self.explained else None
+        if first is None or not first.name or first.what == "chance" or first.probability < MAIN:
+            return None
+        return first
+
+    @property
+    def broken(self) -> float:
+        """Probability that something failed which no parameter repairs."""
+        return sum(one.probability for one in self.explained if one.what in ("hardware", "world") and one.name)
+
+
+def row_of(log: str, diagnosis: Diagnosis, world: World | None = None) -> Row:
+    """The row of a diagnosed run.
+
+    Args:
+        log: how the log is called.
+        world: the run as its profile's model was asked about it; None where no model was.
+    """
+    run, profile = diagnosis.run, diagnosis.profile
+    facts, robot = run.log.facts, run.log.robot
+    kinds = {finding.title: finding.kind for finding in diagnosis.health.findings}
+    causes = {cause.option.name: cause for fault in diagnosis.faults for cause in fault.causes if not cause.is_lead}
+    unknown = next((one.reason for one in diagnosis.objectives if one.status == "not_evaluated"), "")
+    return Row(
+        log=clean(log),
+        status=diagnosis.status,
+        reason=clean(unknown or diagnosis.health.too_little or "; ".join(profile.fit.reasons[:1])),
+        robot=robot.id if robot is not None and robot.is_sure else None,
+        called=robot.name if robot is not None and robot.is_sure else "",
+        start=run.log.start,
+        duration_s=run.log.duration_s,
+        sha256=run.log.sha256,
+        mission=run.mission.index,
+        kind=clean(next((facts[name] for name in _SORTS if facts.get(name)), run.log.format)),
+        firmware=clean(facts.get("firmware") or facts.get("distro") or ""),
+        frame=clean(facts.get("frame", "")),
+        profile=profile.name,
+        version=profile.version,
+        fit=profile.fit.verdict,
+        objectives={one.name: float(one.value) for one in diagnosis.objectives if is_known(one.value)},
+        breaches=tuple(one.name for one in diagnosis.objectives if one.status == "fault"),
+        explained=tuple(
+            Explained(one.what, clean(one.name), one.probability, kinds.get(one.name))
+            for one in diagnosis.hypotheses
+            if one.probability >= TOLD
+        ),
+        causes=tuple(
+            NamedCause(name, cause.confidence, cause.current, cause.suggested) for name, cause in causes.items()
+        ),
+        findings=tuple(
+            Seen(one.kind, clean(one.title), one.severity)
+            for one in diagnosis.health.findings
+            if one.severity != "info" and not one.after_impact
+        ),
+        change={} if diagnosis.fix is None else {one.option.name: one.suggested for one in diagnosis.fix.changes},
+        p_fixed=None if diagnosis.fix is None else diagnosis.fix.p_fixed,
+        off={} if world is None else {name: world.reference[name] for name in deviating(world.config, world.reference)},
+        asked=None if world is None else _asked(world),
+    )
+
+
+def unreadable(log: str, reason: str) -> Row:
+    """The row of a log that gave no run, and why."""
+    return Row(clean(log), "unreadable", clean(reason))
+
+
+def distinct(rows: Sequence[Row]) -> tuple[Row, ...]:
+    """The rows without copies: the same recording under two names is one run."""
+    return tuple({(row.sha256, row.mission) if row.sha256 else (row.log, 0): row for row in reversed(rows)}.values())[
+        ::-1
+    ]
+
+
+def by_folder(row: Row) -> Row:
+    """The row with the folder of its log for a robot, where the log names none."""
+    return row if row.robot or not row.folder else replace(row, robot=row.folder, called=row.folder)
+
+
+def _asked(world: World) -> Asked:
+    """Only what the model reads of the run."""
+    stages = {stage.variable for outcome in world.model.outcomes.values() for stage in outcome.stages}
+    known = {name: known_value(world.observed, name) for name in (*world.model.outcomes, *sorted(stages))}
+    return Asked(
+        dict(world.config),
+        {name: value for name, value in known.items() if value is not None},
+        {name: (bound.op, bound.value) for name, bound in world.thresholds.items()},
+    )

@@ -1,0 +1,35 @@
+"""The rows of a fleet with what they say together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from care_core.errors import ExitCode
+from care_core.fleet.rows import Row
+from care_core.fleet.shared import Pattern, shared
+from care_core.fleet.suggest import Silence, Suggestion, suggest
+
+
+@dataclass(frozen=True, slots=True)
+class Fleet:
+    """The rows in the order of their logs, what they share, and for each profile what is suggested."""
+
+    rows: tuple[Row, ...]
+    shared: tuple[Pattern, ...]
+    suggestions: tuple[Suggestion | Silence, ...]
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """What one log's code would be: a fault anywhere, else something not evaluated; unreadable where all are."""
+        statuses = {row.status for row in self.rows}
+        if statuses == {"unreadable"}:
+            return ExitCode.UNREADABLE
+        if "fault" in statuses:
+            return ExitCode.FAULT
+        return ExitCode.OK if statuses == {"ok"} else ExitCode.NOT_EVALUATED
+
+
+def together(rows: Sequence[Row]) -> Fleet:
+    """What these rows say together."""
+    return Fleet(tuple(rows), shared(rows), suggest(rows))
