@@ -8,16 +8,29 @@ from typing import Any, Final, Literal
 
 from pydantic import ConfigDict, Field
 
+from care_core.diagnose.records import Status, overall
 from care_core.history.store import HistoryError, Triaged, Verified
 from care_core.history.track_record import TrackRecord, sparkline, track_record, trends
+from care_core.history.trends import LEAST_RUNS, Direction, RobotRuns, Trend, by_robot
 from care_core.report.document import Strict
 from care_core.report.wording import fit_words
-from care_core.run import FitVerdict
-from care_core.text import clean
+from care_core.run import FitVerdict, Robot
+from care_core.text import clean, wrapped
 
 SCHEMA_ID: Final = "care.history/1"
-_SPARKS = 30
+_SPARKS = 24
 """Newest values that a trend shows."""
+_CHANGES = 4
+"""Most parameters that are named of those that changed at a run."""
+
+
+class RobotEntry(Strict):
+    """`is_sure`: it tells this robot from others of its kind."""
+
+    id: str
+    name: str
+    source: str
+    is_sure: bool
 
 
 class PastTriage(Strict):
@@ -53,6 +66,56 @@ class PromiseRecord(Strict):
     bins: list[PromiseBin]
 
 
+class ChangedEntry(Strict):
+    """A parameter, or the firmware, that differs from the run before."""
+
+    name: str
+    from_: float | str = Field(validation_alias="from", serialization_alias="from")
+    to: float | str
+
+
+class SinceEntry(Strict):
+    """The run from which on an objective is different, and what changed at it."""
+
+    at: str
+    log: str
+    before: float
+    after: float
+    p: float
+    changed: list[ChangedEntry]
+
+
+class TrendEntry(Strict):
+    """How an objective went, oldest first; `unit` "x": a multiple of what the reference configuration needs. `p` is
+    corrected for how many tests were made."""
+
+    objective: str
+    unit: str
+    values: list[float]
+    direction: Direction
+    tau: float | None
+    p: float | None
+    since: SinceEntry | None
+
+
+class MissionRunsEntry(Strict):
+    """Runs that were asked the same, judged by one profile (empty: none fitted)."""
+
+    profile: str
+    runs: int
+    trends: list[TrendEntry]
+
+
+class RobotRunsEntry(Strict):
+    """`robot` is None for runs of which nothing says whose they are; `faults` is the trend of having a fault."""
+
+    robot: RobotEntry | None
+    runs: int
+    faulty: int
+    faults: TrendEntry
+    missions: list[MissionRunsEntry]
+
+
 class HistoryDocument(Strict):
     """What `care history --json` prints; trends run from the oldest to the newest."""
 
@@ -63,6 +126,7 @@ class HistoryDocument(Strict):
     )
     triages: list[PastTriage]
     trends: dict[str, list[float]]
+    robots: list[RobotRunsEntry] = Field(default_factory=list)
     verified: PromiseRecord
 
 
@@ -71,12 +135,16 @@ def history_schema() -> dict[str, Any]:
     return HistoryDocument.model_json_schema(by_alias=True, mode="serialization")
 
 
-def history_document(triages: Sequence[Triaged], verified: Sequence[Verified]) -> HistoryDocument:
-    """The document of what is remembered. Raises HistoryError for a record that is no triage."""
+def history_document(
+    triages: Sequence[Triaged], verified: Sequence[Verified], limit: int | None = None
+) -> HistoryDocument:
+    """The document of what is remembered: of `limit` triages, and of all robots. Raises HistoryError for a record that
+    is no triage."""
     try:
         return HistoryDocument(
-            triages=[_past(one) for one in triages],
-            trends={name: list(values) for name, values in trends(triages).items()},
+            triages=[_past(one) for one in triages[:limit]],
+            trends={name: list(values) for name, values in trends(triages[:limit]).items()},
+            robots=[_robot(one) for one in robots_of(triages)],
             verified=_record(track_record(verified)),
         )
     except (AttributeError, KeyError, TypeError, ValueError) as err:
@@ -99,6 +167,61 @@ def _past(triaged: Triaged) -> PastTriage:
         options=[change["option"] for change in fix["changes"]] if fix else [],
         p_fixed=fix["p_fixed"] if fix else None,
     )
+
+
+def robots_of(triages: Sequence[Triaged]) -> tuple[RobotRuns, ...]:
+    """The past by robot and mission, with its trends."""
+    return by_robot(triages, {place: status_of(one.document) == "fault" for place, one in enumerate(triages)})
+
+
+def status_of(document: Mapping[str, Any]) -> Status:
+    """What a triage came to, by its document."""
+    objectives = [entry["status"] for entry in document["objectives"]]
+    severities = [finding["severity"] for finding in document.get("findings", ())]
+    return overall(objectives, severities, fit_of(document))
+
+
+def robot_entry(robot: Robot) -> RobotEntry:
+    """A robot as documents have it."""
+    return RobotEntry(id=clean(robot.id), name=clean(robot.name), source=clean(robot.source), is_sure=robot.is_sure)
+
+
+def _robot(one: RobotRuns) -> RobotRunsEntry:
+    return RobotRunsEntry(
+        robot=None if one.robot is None else robot_entry(one.robot),
+        runs=len(one.runs),
+        faulty=one.faulty,
+        faults=_trend(one.faults),
+        missions=[
+            MissionRunsEntry(profile=m.profile, runs=len(m.runs), trends=[_trend(trend) for trend in m.trends])
+            for m in one.missions
+        ],
+    )
+
+
+def _trend(trend: Trend) -> TrendEntry:
+    since = None
+    if trend.since is not None:
+        run = trend.since.run
+        since = SinceEntry(
+            at=run.document["log"].get("start") or run.at,
+            log=clean(run.log_path),
+            before=trend.since.before,
+            after=trend.since.after,
+            p=trend.since.p,
+            changed=[
+                ChangedEntry(name=clean(one.name), from_=_plain(one.before), to=_plain(one.after))
+                for one in trend.since.changed
+            ],
+        )
+    return TrendEntry(
+        objective=trend.objective, unit=trend.unit, values=list(trend.values), direction=trend.direction,
+        tau=trend.tau, p=trend.p, since=since,
+    )  # fmt: skip
+
+
+def _plain(value: float | str) -> float | str:
+    return clean(value) if isinstance(value, str) else value
 
 
 def profile_of(document: Mapping[str, Any]) -> str:
@@ -151,16 +274,77 @@ def _lines(document: HistoryDocument, ascii: bool) -> Iterator[str]:
         fix = "" if past.p_fixed is None else f"  change {', '.join(past.options)} ({past.p_fixed:.0%})"
         fit = fit_words(past.profile, past.fit).removeprefix("Profile ")
         yield clean(f"{when}  {Path(past.log).name}  {fit}  {past.verdict}{fix}")
-    if document.trends:
+    for robot in document.robots:
         yield ""
-        yield "Trends, oldest to newest"
-        width = max(map(len, document.trends))
-        for name, values in document.trends.items():
-            shown = values[-_SPARKS:]
-            span = f"{min(values):.4g} to {max(values):.4g}" if values else "never evaluated"
-            yield clean(f"  {name:<{width}}  {sparkline(shown, ascii=ascii)}  {span}")
+        yield from _robot_lines(robot, ascii)
+    if any(trend.since for robot in document.robots for trend in _all_trends(robot)):
+        yield ""
+        yield from wrapped("What changed at the same run need not be the cause: 'care triage LOG' asks for that.")
     yield ""
     yield from _promises(document.verified)
+
+
+def _all_trends(robot: RobotRunsEntry) -> list[TrendEntry]:
+    return [robot.faults, *(trend for mission in robot.missions for trend in mission.trends)]
+
+
+def _robot_lines(robot: RobotRunsEntry, ascii: bool) -> Iterator[str]:
+    name = "Robot not known" if robot.robot is None else f"Robot {robot.robot.name}"
+    source = "--robot NAME tells whose a log is" if robot.robot is None else robot.robot.source
+    doubt = ", others may share it" if robot.robot is not None and not robot.robot.is_sure else ""
+    faulty = "none" if not robot.faulty else f"{robot.faulty} of them"
+    yield from wrapped(f"{name} ({source}{doubt}): {_count(robot.runs, 'run')}, {faulty} with a fault")
+    width = max(len(trend.objective) for trend in _all_trends(robot))
+    yield from _trend_lines(robot.faults, "  ", width + 2, ascii)
+    for number, mission in enumerate(robot.missions, start=1):
+        judged = f"by {mission.profile}" if mission.profile else "without a profile"
+        yield clean(f"  mission {number}: {_count(mission.runs, 'run')} judged {judged}")
+        for trend in mission.trends:
+            yield from _trend_lines(trend, "    ", width, ascii)
+
+
+def _count(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def _trend_lines(trend: TrendEntry, indent: str, width: int, ascii: bool) -> Iterator[str]:
+    values = trend.values
+    span = "" if not values else f", {_span(min(values), max(values), trend.unit)}"
+    said = {
+        "too few": f"{_count(len(values), 'value')}{span}: too few to tell ({LEAST_RUNS})",
+        "constant": f"always {_figure(values[0], trend.unit)}" if values else "",
+        "none": f"no trend{span}",
+        "worse": f"GETS WORSE{span}",
+        "better": f"gets better{span}",
+    }[trend.direction]
+    chance = "" if trend.p is None else f" (p {_p(trend.p)})"
+    line = f"{indent}{trend.objective:<{width}}  {sparkline(values[-_SPARKS:], ascii=ascii)}  {said}{chance}"
+    yield from wrapped(line, rest=" " * (len(indent) + width + 2))
+    if trend.since is not None:
+        since = trend.since
+        when = since.at[:16].replace("T", " ")
+        moved = f"{_span(since.before, since.after, trend.unit)} since {when}, {Path(since.log).name} (p {_p(since.p)})"
+        shown = [f"{one.name} {_value(one.from_)} -> {_value(one.to)}" for one in since.changed[:_CHANGES]]
+        more = len(since.changed) - len(shown)
+        others = f" and {more} more" if more else ""
+        what = f"changed at that run: {', '.join(shown)}{others}" if shown else "no parameter changed at that run"
+        yield from wrapped(f"{moved}; {what}", first=indent + "  ")
+
+
+def _span(low: float, high: float, unit: str) -> str:
+    return f"{low:.4g} to {_figure(high, unit)}"
+
+
+def _figure(value: float, unit: str) -> str:
+    return f"{value:.4g} {unit}".rstrip() if unit != "x" else f"{value:.4g} x what it needs"
+
+
+def _value(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.7g}"
+
+
+def _p(p: float) -> str:
+    return "below 0.001" if p < 0.001 else f"{p:.2g}"
 
 
 def _promises(record: PromiseRecord) -> Iterator[str]:

@@ -9,10 +9,9 @@ from typing import Any, Final, Literal
 
 from pydantic import ConfigDict, Field
 
-from care_core.diagnose.records import Status, overall
 from care_core.report.document import Strict
 from care_core.report.happened import HypothesisEntry
-from care_core.report.history import profile_of, verdict_of
+from care_core.report.history import RobotEntry, profile_of, robot_entry, status_of, verdict_of
 from care_core.report.wording import hypothesis_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import FitVerdict, Robot
@@ -26,15 +25,6 @@ NO_ROBOT = "-"
 _NUMBER, _VERDICT = 3, max(map(len, STATUS_WORDS.values()))
 _ROBOT_SHARE, _LOG_SHARE = 0.18, 0.27
 """Of the columns of a line; the cause takes what is left."""
-
-
-class RobotEntry(Strict):
-    """`is_sure`: it tells this robot from others of its kind."""
-
-    id: str
-    name: str
-    source: str
-    is_sure: bool
 
 
 class WatchEntry(Strict):
@@ -92,18 +82,6 @@ def unread_entry(number: int, at: str, log: Path, reason: str, *, sha256: str | 
         number=number, at=at, log=clean(str(log)), sha256=sha256, robot=None, verdict="unreadable", says=clean(reason),
         explanation=None, faults=[], profile=None, fit=None, unfinished=unfinished or None, is_new=True,
     )  # fmt: skip
-
-
-def robot_entry(robot: Robot) -> RobotEntry:
-    """A robot as documents have it."""
-    return RobotEntry(id=clean(robot.id), name=clean(robot.name), source=clean(robot.source), is_sure=robot.is_sure)
-
-
-def status_of(document: Mapping[str, Any]) -> Status:
-    """What a triage came to, by its document."""
-    objectives = [entry["status"] for entry in document["objectives"]]
-    severities = [finding["severity"] for finding in document.get("findings", ())]
-    return overall(objectives, severities, document.get("fit", {}).get("verdict", "fits"))
 
 
 def _says(document: Mapping[str, Any]) -> str:

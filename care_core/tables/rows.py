@@ -46,7 +46,11 @@ def _as_text(path: Path) -> str:
 
 def write_table(path: Path, rows: Sequence[TableRow], schema: Schema) -> None:
     """Write the table as CSV or Parquet, by suffix; whole or not at all."""
-    columns = [*ABOUT, *schema.variables]
+    write_rows(path, rows, [*ABOUT, *schema.variables])
+
+
+def write_rows(path: Path, rows: Sequence[TableRow], columns: list[str]) -> None:
+    """Write rows as CSV or Parquet, by suffix; whole or not at all. A row may lack columns."""
     if path.suffix.lower() == ".parquet":
         _write_parquet(path, rows, columns)
         return

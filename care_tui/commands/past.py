@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from care_core.errors import CareError, UsageError
+from care_core.errors import CareError, UsageError, nearest
 from care_tui.commands.arguments import AsJson, Force, Out, is_json
 from care_tui.console import emit, say
+
+if TYPE_CHECKING:
+    from care_core.history.store import Triaged
 
 app = typer.Typer()
 
@@ -25,6 +28,7 @@ def mention(problem: CareError | None) -> None:
 @app.command()
 def history(
     profile: Annotated[str | None, typer.Option("--profile", "-p", help="Only runs of this profile.")] = None,
+    robot: Annotated[str | None, typer.Option("--robot", metavar="NAME", help="Only runs of this robot.")] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="How many triages are listed.")] = 20,
     json: AsJson = False,
     ascii: Annotated[bool, typer.Option("--ascii", help="Draw trends without block characters.")] = False,
@@ -32,10 +36,13 @@ def history(
         Path | None,
         typer.Option("--card", metavar="FOLDER", help="Write this profile's verified fixes beside its card."),
     ] = None,
+    export: Annotated[
+        Path | None, typer.Option("--export", metavar="FILE", help="Write a row for each run to this .csv or .parquet.")
+    ] = None,
     out: Out = None,
     force: Force = False,
 ) -> None:
-    """List past triages and verified fixes. With the trend of each objective, and how often fixes worked."""
+    """List past triages and verified fixes. Says whether it gets worse, on which robot, since which change."""
     from care_core.history.store import SWITCH, History, history_path
     from care_core.history.track_record import track_record, write_record
     from care_core.profile.store import load_profile
@@ -49,5 +56,25 @@ def history(
         chosen = load_profile(card)
         written = write_record(chosen.path, track_record(store.verifications(chosen.schema.name)))
         say(f"wrote {written}")
-    document = history_document(store.triages(profile, limit), store.verifications(profile))
+    triages = store.triages(profile)
+    if robot is not None:
+        triages = _of_robot(triages, robot)
+    if export is not None:
+        from care_core.report.exporting import export_history
+        from care_core.tables.rows import check_table_path
+
+        check_table_path(export)
+        say(f"wrote {export}: {export_history(export, triages)} runs")
+        return
+    document = history_document(triages, store.verifications(profile), limit)
     emit(history_json(document) if json or is_json(out) else history_text(document, ascii=ascii), out, force=force)
+
+
+def _of_robot(triages: tuple[Triaged, ...], name: str) -> tuple[Triaged, ...]:
+    """Those of the robot of this id or name, whatever the case. Raises UsageError where there is none."""
+    known = {word: one.robot for one in triages if one.robot for word in (one.robot.id, one.robot.name)}
+    found = {robot.id for word, robot in known.items() if word.casefold() == name.casefold()}
+    if not found:
+        hint = nearest(name, known) or "'care history' lists them."
+        raise UsageError(f"No run of a robot '{name}' is remembered.", hint=hint, where="--robot")
+    return tuple(one for one in triages if one.robot is not None and one.robot.id in found)
