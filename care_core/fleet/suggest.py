@@ -131,16 +131,22 @@ def _tried(
     name: str, model: Model, candidates: Sequence[tuple[Variable, float]], rows: Sequence[Row], unit: Unit
 ) -> list[Suggestion]:
     """Every candidate with what it would do to each robot. A run is asked all of them at once."""
-    runs = [(row, _probabilities(row, model, candidates)) for row in rows]
-    robots = list(dict.fromkeys(name_of(row, unit) for row in rows))
-    found = []
-    for place, (option, value) in enumerate(candidates):
-        outlooks = []
-        for robot in robots:
-            own = [_Run(row, option.name, value, then, place) for row, then in runs if name_of(row, unit) == robot]
-            outlooks.append(_outlook(robot, own))
-        found.append(Suggestion(name, option, value, unit, tuple(outlooks)))
-    return found
+    robots: dict[str, list[tuple[Row, Probabilities | None]]] = {}
+    for row in rows:
+        robots.setdefault(name_of(row, unit), []).append((row, _probabilities(row, model, candidates)))
+    return [
+        Suggestion(
+            name,
+            option,
+            value,
+            unit,
+            tuple(
+                _outlook(robot, [_Run(row, option.name, value, then, place) for row, then in own])
+                for robot, own in robots.items()
+            ),
+        )
+        for place, (option, value) in enumerate(candidates)
+    ]
 
 
 def _probabilities(row: Row, model: Model, candidates: Sequence[tuple[Variable, float]]) -> Probabilities | None:

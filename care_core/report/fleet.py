@@ -29,6 +29,8 @@ NAMED = 8
 PATTERNS = 8
 """Things shared that are told in words; the document holds all."""
 _LONGEST_NAME = 24
+_SHORT = 30
+"""Letters in brackets that stand on one line with the name before them."""
 
 
 class ExplainedEntry(Strict):
@@ -403,8 +405,9 @@ def _headline(one: Pattern, short: Mapping[str, str]) -> str:
 
 
 def _names(names: Sequence[str], short: Mapping[str, str]) -> str:
-    told = [short.get(name, run_name(name)) for name in names[:NAMED]]
-    return ", ".join(told) + (f" and {len(names) - NAMED} more" if len(names) > NAMED else "")
+    return ", ".join(_on_one_line(short.get(name, run_name(name))) for name in names[:NAMED]) + (
+        f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    )
 
 
 def _details(one: Pattern) -> Iterator[str]:
@@ -425,7 +428,7 @@ def _range(values: tuple[float, float]) -> str:
 def _since(since: Since) -> str:
     day = _day(since.start)
     if not since.earlier:
-        return f"it is there from the first run on, {day}"
+        return f"it is there from the first run with a date on, {day}"
     after = f"in {since.later_with} of {since.later} runs from then on"
     runs = f"the {since.earlier} runs" if since.earlier > 1 else "the run"
     word = "since" if since.is_sure else "first seen on"
@@ -484,13 +487,18 @@ def _outlook_lines(one: Suggestion, short: Mapping[str, str], only: Collection[s
 
 
 def _outlook(one: Outlook, short: Mapping[str, str]) -> str:
-    name = short.get(one.name, run_name(one.name))
+    name = _on_one_line(short.get(one.name, run_name(one.name)))
     odds = "" if one.now is None or one.then is None else f"{one.now:.0%} -> {one.then:.0%}"
     if one.effect == "has it":
         odds = "" if one.now is None else f"{one.now:.0%}"
     inside = "; ".join(filter(None, (odds, one.why)))
-    # A name and its numbers stand on one line.
-    return f"{name}\u00a0({inside.replace(' ', chr(160))})" if inside and len(inside) < 40 else f"{name} ({inside})"
+    if not inside:
+        return name
+    return f"{name}\u00a0({_on_one_line(inside)})" if len(inside) < _SHORT else f"{name} ({inside})"
+
+
+def _on_one_line(text: str) -> str:
+    return text.replace(" ", "\u00a0")
 
 
 def main_words(explained: Explained) -> str:

@@ -138,7 +138,7 @@ def test_there_is_no_since_where_a_run_has_no_date_or_nothing_came_before() -> N
     since = causes(rows)[0].since
     assert since is not None
     assert since.earlier == 0
-    assert "from the first run on, 3 November 2026 09:00 UTC" in "\n".join(shared_lines(together(rows), {}))
+    assert "from the first run with a date on, 3 November 2026 09:00 UTC" in "\n".join(shared_lines(together(rows), {}))
     # One run before, of four: that says nothing. With six it may.
     assert causes([*rows, run("d", None, 1)])[0].since is None
     early = [run(f"e{n}", None, 1) for n in range(6)]
