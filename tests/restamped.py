@@ -41,6 +41,18 @@ def dataflash_with(source: Path, message: str, **values: float) -> bytes:
     return bytes(raw)
 
 
+def dataflash_times(source: Path, message: str, factor: float, *names: str) -> bytes:
+    """A .BIN with some fields of a message in another unit."""
+    raw = bytearray(source.read_bytes())
+    log = DataFlashLog(source)
+    (form,) = log._formats[message]
+    for field in (form.fields[name] for name in names):
+        for start in log._offsets[form.type].tolist():
+            place = slice(start + field.offset, start + field.offset + field.dtype.itemsize)
+            raw[place] = (np.frombuffer(raw[place], field.dtype) * factor).astype(field.dtype).tobytes()
+    return bytes(raw)
+
+
 def telemetry(source: Path, clock: Clock) -> bytes:
     """A .tlog with other stamps (us)."""
     raw = bytearray(source.read_bytes())

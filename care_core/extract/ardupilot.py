@@ -549,6 +549,13 @@ def path_error(mission: Mission, args: Args) -> Value:
 
 
 _BATTERY: Wanted = {"BAT": ("Inst", "Instance", "Volt", "Curr", "EnrgTot")}
+_LEAST_V = 2.0
+"""A lithium cell is empty above it."""
+_LEAST_W, _MOST_W = 1.0, 1e5
+"""Mean power while armed: an autopilot and its receivers alone take more than a watt, air taxis up to 100 kW."""
+_AGREE, _ENOUGH_FOR_DOUBT = 2.0, 20
+"""By what factor the monitor's counter and voltage times current may differ; thinned logs miss peaks, not half."""
+_NO_VOLTAGE = Unavailable("BAT says the same voltage throughout, or none", "is BATT_MONITOR one that measures voltage?")
 
 
 @extractor("energy_used", needs=merge_needs((NEEDS, _BATTERY)), unit="Wh", args=PHASE_ARGS)
@@ -563,28 +570,56 @@ def energy_used(mission: Mission, args: Args) -> Value:
     table = mission.tables.get("BAT")
     if table is None or not len(table):
         return missing("BAT")
-    used = [_energy(battery, *span) for battery in _instances(table)]
-    known = [value for value in used if value is not None]
+    batteries = [battery for battery in _instances(table) if not has(battery, "Volt") or _has_voltage(battery)]
+    if not batteries:
+        return _NO_VOLTAGE
+    used = [_energy(battery, *span) for battery in batteries]
+    known = [value for value in used if isinstance(value, float)]
     if known:
-        return sum(known)
+        return _unless_absurd(sum(known), mission.end_s - mission.start_s) if "phase" not in args else sum(known)
     if not has(table, "EnrgTot") and not has(table, "Volt", "Curr"):
         return missing("BAT energy, or voltage with current")
-    return Unavailable("BAT says the same current throughout, or none", "is BATT_MONITOR one that measures current?")
+    doubt = next((value for value in used if isinstance(value, Unavailable)), None)
+    return doubt or Unavailable(
+        "BAT says the same current throughout, or none", "is BATT_MONITOR one that measures current?"
+    )
 
 
-def _energy(battery: Table, start_s: float, end_s: float) -> float | None:
+def _energy(battery: Table, start_s: float, end_s: float) -> float | Unavailable | None:
     """Wh of one battery between two times, None where its monitor counts and measures nothing."""
     inside = battery.between(start_s, end_s)
+    measured, drawn = _known(inside, "Volt", "Curr"), None
+    if len(measured) >= _MIN_ROWS and is_alive(measured["Curr"]) and measured["Curr"].any():
+        power = measured["Volt"] * measured["Curr"]
+        drawn = float(np.sum((power[1:] + power[:-1]) / 2 * np.diff(measured.t)) / 3600)
     counted = _known(inside, "EnrgTot")
-    if len(counted) and np.ptp(counted["EnrgTot"]) > 0 and (np.diff(counted["EnrgTot"]) >= 0).all():
-        whole = _known(battery, "EnrgTot")
-        start, end = np.interp((start_s, end_s), whole.t, whole["EnrgTot"])
-        return float(end - start)
-    measured = _known(inside, "Volt", "Curr")
-    if len(measured) < _MIN_ROWS or not is_alive(measured["Curr"]) or not measured["Curr"].any():
-        return None
-    power = measured["Volt"] * measured["Curr"]
-    return float(np.sum((power[1:] + power[:-1]) / 2 * np.diff(measured.t)) / 3600)
+    if not len(counted) or np.ptp(counted["EnrgTot"]) <= 0 or (np.diff(counted["EnrgTot"]) < 0).any():
+        return drawn
+    whole = _known(battery, "EnrgTot")
+    start, end = np.interp((start_s, end_s), whole.t, whole["EnrgTot"])
+    used = float(end - start)
+    if drawn is not None and len(measured) >= _ENOUGH_FOR_DOUBT and not 1 / _AGREE < used / max(drawn, 1e-9) < _AGREE:
+        return Unavailable(
+            f"BAT counts {used:.3g} Wh, but its voltage times current over time makes {drawn:.3g} Wh",
+            "is the scale of the current sensor right, and the log's clock?",
+        )
+    return used
+
+
+def _unless_absurd(used: float, time_s: float) -> Value:
+    """The energy, unless no vehicle runs on so little or so much."""
+    power_w = used * 3600 / time_s if time_s > 0 else math.inf
+    if _LEAST_W <= power_w <= _MOST_W:
+        return used
+    return Unavailable(
+        f"BAT says {power_w:.3g} W on average, on which no vehicle runs", "is the scale of the current sensor right?"
+    )
+
+
+def _has_voltage(battery: Table) -> bool:
+    """Whether what is called the voltage of a battery is measured: it moves, and no cell is empty at less than 2 V."""
+    volts = battery["Volt"][np.isfinite(battery["Volt"])]
+    return is_alive(volts) and float(volts.max()) >= _LEAST_V
 
 
 def _known(table: Table, *fields: str) -> Table:
@@ -599,6 +634,9 @@ def min_voltage(mission: Mission, args: Args) -> Value:
     """The lowest battery voltage between arming and disarming."""
     if not _is_armed(mission):
         return _NOT_FLOWN
+    table = mission.tables.get("BAT")
+    if table is not None and has(table, "Volt") and not _has_voltage(next(iter(_instances(table)), table)):
+        return _NO_VOLTAGE
     volts = series(mission, "BAT", ("Volt",), {}, under_way=False)
     return volts if isinstance(volts, Unavailable) else statistic(volts["Volt"], "min")
 
@@ -609,7 +647,10 @@ def start_voltage(mission: Mission, args: Args) -> Value:
     table = mission.tables.get("BAT")
     if table is None or not has(table, "Volt"):
         return missing("BAT")
-    before = next(iter(_instances(table))).between(-math.inf, mission.start_s)
+    battery = next(iter(_instances(table)), table)
+    if _is_armed(mission) and not _has_voltage(battery):  # no motor, no change
+        return _NO_VOLTAGE
+    before = battery.between(-math.inf, mission.start_s)
     return float(before["Volt"][-1]) if len(before) else Unavailable("no BAT before arming", "log while disarmed")
 
 

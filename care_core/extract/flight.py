@@ -27,6 +27,7 @@ NEEDS: Wanted = merge_needs(
         ITEMS,
         {
             "POS": ("RelHomeAlt",),
+            "GPS": ("I", "GMS"),
             **MODES,
             "MSG": ("Message",),
             "ARM": ("ArmState", "Forced"),
@@ -247,6 +248,9 @@ def _track(mission: Mission, home: Sequence[float] | None) -> Track | None:
     position = mission.table("POS")
     if home is None or position is None or not has(position, "Lat", "Lng", "RelHomeAlt"):
         return None
+    position = position.where(np.isfinite(position["Lat"] + position["Lng"] + position["RelHomeAlt"]))
+    if not len(position):
+        return None
     north = (position["Lat"] - home[0]) * _METRES_PER_DEGREE
     east = (position["Lng"] - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
     return Track(position.t, north, east, position["RelHomeAlt"])
@@ -334,6 +338,8 @@ def _return_phases(mission: Mission, track: Track, homeward_s: float, *, returns
         phases["return"] = Phase(homeward_s, leave_s)
     slow_below = _number(mission.settings.get("LAND_ALT_LOW"), 1000.0) / 100
     low = np.flatnonzero((t >= leave_s) & (height <= slow_below))
+    if not len(low):  # a height that no landing ends below
+        return phases
     slow_s = float(t[low[0]])
     if height.max() > slow_below + 1.0:
         phases["descent"] = Phase(leave_s, slow_s)

@@ -46,7 +46,7 @@ def parameters_of(table: Table | None, number: Callable[[float], float]) -> dict
     defaults = table["Default"].tolist() if has_default else [np.nan] * len(table)
     references = [number(default) if np.isfinite(default) else None for default in defaults]
     rows = zip(table.t.tolist(), table["Name"].tolist(), map(number, table["Value"].tolist()), references, strict=True)
-    return history(rows, "PARM")
+    return history((row for row in rows if np.isfinite(row[2])), "PARM")
 
 
 def shortest(value: float) -> float:

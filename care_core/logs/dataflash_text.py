@@ -93,10 +93,7 @@ class DataFlashTextLog:
 
     @cached_property
     def _settings(self) -> Mapping[str, tuple[Setting, ...]]:
-        table = self.read({"PARM": PARM_FIELDS}).get("PARM")
-        if table is not None and "Value" in table.columns and table.kind("Value") == "number":
-            table = table.where(np.isfinite(table["Value"]))
-        return parameters_of(table, float)
+        return parameters_of(self.read({"PARM": PARM_FIELDS}).get("PARM"), float)
 
     @cached_property
     def facts(self) -> Mapping[str, str]:

@@ -34,7 +34,7 @@ JUMPS: Mapping[str, Mapping[str, float]] = {
 """A step that no vehicle makes from one sample to the next and back again: away by more, and back to within half."""
 
 
-MOVING: Mapping[str, tuple[str, ...]] = {"POS": ("Lat", "Lng", "RelHomeAlt"), "ATT": ("Roll", "Pitch", "Yaw")}
+MOVING: Mapping[str, tuple[str, ...]] = {"POS": ("Lat", "Lng"), "ATT": ("Roll", "Pitch")}
 """Fields of which at least one changes in any flight, by the estimator's noise alone."""
 
 FASTEST_HZ: Mapping[str, float] = {
@@ -50,6 +50,8 @@ AT_ONCE = frozenset(("PARM", "CMD", "MSG", "RALY", "FNCE", "ORGN"))
 SLOWEST_S: Mapping[str, float] = {"BAT": 60.0, "POS": 30.0, "ATT": 30.0}
 """Longest usual time between two messages of a sensor, also in thinned logs."""
 
+_PACE, _GPS_STEP_S = 1.2, 60.0
+"""How far the log's clock may run from the satellites': in 24 logs of four firmwares they agree to 0.3 %."""
 _ENOUGH = 20
 """Samples that must agree before a source is called dead or a clock wrong."""
 
@@ -97,7 +99,24 @@ def clock_doubt(tables: Mapping[str, Table], start_s: float, end_s: float) -> st
         stands = _longest_stand(inside) if name in MOVING else 0
         if stands >= _ENOUGH:
             return f"the log's clock stands still: {stands} {name} messages in a row have the same time"
+    pace = _satellites_pace(tables.get("GPS"), start_s, end_s)
+    if not 1 / _PACE < pace < _PACE:
+        return f"the log's clock goes wrong: by the satellites' time {pace:.3g} s pass in each of its seconds"
     return ""
+
+
+def _satellites_pace(gps: Table | None, start_s: float, end_s: float) -> float:
+    """Seconds by the satellites' time (`GMS`, ms of the week) in one of the log's; 1 where nothing tells."""
+    if gps is None or "GMS" not in gps.columns:
+        return 1.0
+    inside = gps.between(start_s, end_s)
+    first = inside.where(_instances(inside)[0]) if len(inside) else inside
+    known = first.where(first["GMS"] > 0)
+    true_s, said_s = np.diff(known["GMS"]) / 1e3, np.diff(known.t)
+    steady = (true_s > 0) & (true_s < _GPS_STEP_S)  # a new week, a receiver that found the time
+    if steady.sum() < _ENOUGH or said_s[steady].sum() <= 0:
+        return 1.0
+    return float(true_s[steady].sum() / said_s[steady].sum())
 
 
 def _longest_stand(t: Floats) -> int:

@@ -89,6 +89,44 @@ def test_a_dead_current_sensor(care: Care, tmp_path: Path, source: Path, values:
     }
 
 
+@pytest.mark.parametrize("source", [GOOD, FAILED], ids=["good", "failed"])
+@pytest.mark.parametrize("volts", [0.0, 0.0126, 12.6])
+def test_a_dead_voltage_sensor(care: Care, tmp_path: Path, source: Path, volts: float) -> None:
+    path = tmp_path / "a.BIN"
+    path.write_bytes(restamped.dataflash_with(source, "BAT", Volt=volts))
+    sound = judged(care, source)[1]
+    code, objectives = judged(care, path)
+    energy = objectives.pop("energy")
+    assert code != ExitCode.OK
+    assert energy["status"] == "not_evaluated"
+    assert "voltage" in energy["reason"]
+    assert {name: one["status"] for name, one in objectives.items()} == {
+        name: sound[name]["status"] for name in objectives
+    }
+
+
+@pytest.mark.parametrize("factor", [1e-3, 0.2, 5.0, 1e3])
+def test_a_current_in_the_wrong_unit(care: Care, tmp_path: Path, factor: float) -> None:
+    """Both it and the counter by a thousand, or the counter alone."""
+    names = ("Curr", "EnrgTot", "CurrTot") if factor in (1e-3, 1e3) else ("EnrgTot",)
+    path = tmp_path / "a.BIN"
+    path.write_bytes(restamped.dataflash_times(GOOD, "BAT", factor, *names))
+    code, objectives = judged(care, path)
+    assert code == ExitCode.NOT_EVALUATED
+    assert objectives["energy"]["status"] == "not_evaluated", objectives["energy"]
+    assert "BAT" in objectives["energy"]["reason"]
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+@pytest.mark.parametrize("source", [GOOD, FAILED], ids=["good", "failed"])
+def test_a_clock_that_is_not_the_satellites(care: Care, tmp_path: Path, source: Path, factor: float) -> None:
+    path = tmp_path / "a.BIN"
+    path.write_bytes(restamped.dataflash(source, lambda stamp: int(stamp * factor)))
+    code, objectives = judged(care, path)
+    check_not_judged(code, objectives)
+    assert "satellites" in objectives["mission_time"]["reason"]
+
+
 def test_energy_is_integrated_where_the_counter_is_no_number(care: Care, tmp_path: Path) -> None:
     path = tmp_path / "a.BIN"
     path.write_bytes(restamped.dataflash_with(GOOD, "BAT", EnrgTot=math.nan))
@@ -97,13 +135,35 @@ def test_energy_is_integrated_where_the_counter_is_no_number(care: Care, tmp_pat
     assert energy["value"] == pytest.approx(sound["value"], rel=0.05)
 
 
-def test_a_position_that_never_changes(care: Care, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"Lat": -353632610, "Lng": 1491652300, "RelHomeAlt": 10.0},
+        {"Lat": -353632610, "Lng": 1491652300},
+        {"Lat": 0, "Lng": 0},
+    ],
+    ids=["all", "the height moves", "nowhere"],
+)
+def test_a_position_that_never_changes(care: Care, tmp_path: Path, values: dict[str, float]) -> None:
     path = tmp_path / "a.BIN"
-    path.write_bytes(restamped.dataflash_with(GOOD, "POS", Lat=-353632610, Lng=1491652300, RelHomeAlt=10.0))
+    path.write_bytes(restamped.dataflash_with(GOOD, "POS", **values))
     code, objectives = judged(care, path)
     assert code == ExitCode.NOT_EVALUATED
     assert "measures nothing" in objectives["mission_success"]["reason"]
     assert objectives["path_error_max"]["status"] == "not_evaluated"
+
+
+@pytest.mark.parametrize(
+    ("message", "values"),
+    [("POS", {"RelHomeAlt": math.nan}), ("PARM", {"Value": math.nan}), ("PARM", {"Value": 0.0}), ("ATT", {"Roll": 0})],
+)
+def test_values_that_cannot_be_raise_nothing(
+    care: Care, tmp_path: Path, message: str, values: dict[str, float]
+) -> None:
+    path = tmp_path / "a.BIN"
+    path.write_bytes(restamped.dataflash_with(GOOD, message, **values))
+    code, _ = judged(care, path)
+    assert code in (ExitCode.OK, ExitCode.NOT_EVALUATED)
 
 
 def test_nothing_found_is_not_said_of_a_log_whose_clock_cannot_be(tmp_path: Path, care: Care) -> None:

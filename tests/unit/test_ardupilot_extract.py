@@ -138,7 +138,7 @@ def test_phases_cover_the_flight() -> None:
 
 def test_energy_is_integrated_where_the_monitor_does_not_count() -> None:
     battery = flight()["BAT"]
-    plain = Table(battery.t, {"Volt": np.full(len(battery), 10.0), "Curr": 36.0 + 1e-9 * battery.t})
+    plain = Table(battery.t, {"Volt": 10.0 + 1e-9 * battery.t, "Curr": 36.0 + 1e-9 * battery.t})
     assert value(only(flight(BAT=plain)), "energy_used") == pytest.approx(6.0)
 
 

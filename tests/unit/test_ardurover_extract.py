@@ -63,7 +63,7 @@ def drive(**replaced: Table) -> dict[str, Table]:
         ),
         "ORGN": table([(9.0, 1, *HOME)], "Type", "Lat", "Lng"),
         "POS": Table(AT, {"Lat": HOME[0] + north / METRES, "Lng": HOME[1] + east / EAST, "RelHomeAlt": level}),
-        "BAT": Table(AT, {"Volt": level + 12.0, "Curr": np.where(moving, 10.0, 0.5)}),
+        "BAT": Table(AT, {"Volt": level + 12.0 - 1e-9 * AT, "Curr": np.where(moving, 10.0, 0.5)}),
         "THR": Table(AT, {"ThrOut": 40.0 * moving, "DesSpeed": 5.0 * moving, "Speed": 4.0 * moving}),
         "STER": Table(AT, {"SteerOut": turn * 100, "LatAcc": turn / 10, "DesTurnRate": turn * 2, "TurnRate": turn}),
     }  # fmt: skip

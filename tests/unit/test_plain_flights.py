@@ -100,7 +100,7 @@ def test_a_flight_without_a_mission_that_is_cut_off_has_no_landing() -> None:
 
 def test_a_disarming_by_force_in_the_air_fails() -> None:
     at = np.arange(0.0, 75.0, 0.5)
-    level = np.full_like(at, HOME[1])
+    level = HOME[1] + 1e-7 * np.sin(at)
     up = {"Lat": np.full_like(at, north(0)), "Lng": level, "RelHomeAlt": np.where(at > 12, 20.0, 0.0)}
     forced = table([(10.0, 1, 0), (70.0, 0, 1)], "ArmState", "Forced")
     found = checks(flown(mode=5, ARM=forced, POS=replace(flight()["POS"], t=at, columns=up)))
@@ -109,7 +109,7 @@ def test_a_disarming_by_force_in_the_air_fails() -> None:
 
 def test_armed_on_the_ground_alone_is_neither_good_nor_bad() -> None:
     at = np.arange(0.0, 75.0, 0.5)
-    still = {"Lat": np.full_like(at, north(0)), "Lng": np.full_like(at, HOME[1]), "RelHomeAlt": 0.01 * np.sin(at)}
+    still = {"Lat": np.full_like(at, north(0)), "Lng": HOME[1] + 1e-7 * np.sin(at), "RelHomeAlt": 0.01 * np.sin(at)}
     found = checks(flown(mode=0, POS=replace(flight()["POS"], t=at, columns=still)))
     assert not is_known(found["took_off"])
     assert not is_known(found["landed"])
