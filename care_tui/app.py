@@ -12,7 +12,7 @@ from typing import ClassVar
 
 from textual.app import App, SystemCommand
 from textual.binding import Binding, BindingType
-from textual.events import Paste
+from textual.events import CursorPosition, Paste
 from textual.reactive import Reactive
 from textual.screen import Screen
 from textual.scrollbar import ScrollBar, ScrollBarRender
@@ -20,6 +20,7 @@ from textual.scrollbar import ScrollBar, ScrollBarRender
 from care_core.application.case import Case, Request, exit_code
 from care_core.errors import CareError, ExitCode, UsageError, nearest
 from care_tui.jobs import Engine
+from care_tui.link import Link
 from care_tui.places import as_path, is_openable
 from care_tui.render.rows import ASCII, UNICODE
 from care_tui.screens.base import CareScreen
@@ -30,6 +31,9 @@ from care_tui.settings import SERVER, Settings
 from care_tui.themes import DEFAULT, HIGH_CONTRAST
 from care_tui.widgets.step_bar import STEPS
 
+_LEAVE_S = 0.05
+"""How often an app that is about to end looks whether the terminal's last answer is there: a shell would take it for
+typed."""
 _LOOK_S = 2.0
 """How often an app in a browser looks for its server."""
 
@@ -74,6 +78,7 @@ class CareApp(App[int], inherit_bindings=False):
             self.theme = settings.theme
         self.set_keymap(dict(settings.keys))
         self.set_class(settings.ascii, "-ascii")
+        self.link = Link(self.write_control, self._writes_waiting)
         self.code = ExitCode.INTERRUPTED if request else ExitCode.OK
         self._glyphs = ASCII if settings.ascii else UNICODE
         self._walk = WalkScreen(engine or Engine(), settings, self._glyphs, request=request)
@@ -106,6 +111,18 @@ class CareApp(App[int], inherit_bindings=False):
         if self._driver is not None:
             self._driver.write(sequence)
 
+    def _writes_waiting(self) -> int:
+        """Writes that the thread which writes to the terminal has not begun; drivers without one keep none."""
+        thread = getattr(self._driver, "_writer_thread", None)
+        return 0 if thread is None else int(thread._queue.qsize())
+
+    def post_display_hook(self) -> None:
+        if self._driver is not None and not self.is_headless and not self.is_web:
+            self.link.drawn()
+
+    def on_cursor_position(self, _event: CursorPosition) -> None:
+        self.link.answered()
+
     def on_paste(self, event: Paste) -> None:
         """A file that is dropped on the terminal arrives as its pasted path."""
         path = as_path(event.text)
@@ -134,7 +151,13 @@ class CareApp(App[int], inherit_bindings=False):
         for screen in self.screen_stack:
             if isinstance(screen, PanesScreen):
                 screen.cancel_all()
-        self.exit(code)
+        self._exit_with(code)
+
+    def _exit_with(self, code: ExitCode) -> None:
+        if self.link.is_busy:
+            self.set_timer(_LEAVE_S, lambda: self._exit_with(code))
+        else:
+            self.exit(code)
 
     def action_help(self) -> None:
         screen = self.screen

@@ -10,6 +10,8 @@ from textual.binding import Binding, BindingType
 from textual.screen import Screen
 from textual.widgets import Static
 
+from care_tui.link import Link
+
 MIN_WIDTH, MIN_HEIGHT = 60, 20
 WIDE = 160
 """From this width on, lists and what they explain stand side by side, each with the room of a whole terminal."""
@@ -31,6 +33,12 @@ class CareScreen(Screen[None]):
             f"Terminal too small: {MIN_WIDTH} x {MIN_HEIGHT} is needed. q quits.", id="too-small", markup=False
         )
         yield from self.compose_body()
+
+    def _on_timer_update(self) -> None:
+        # Its timer goes on until the link is free; what is to be drawn gathers meanwhile.
+        link = getattr(self.app, "link", None)
+        if not isinstance(link, Link) or not link.is_busy:
+            super()._on_timer_update()
 
     @abstractmethod
     def compose_body(self) -> ComposeResult:
