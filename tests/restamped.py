@@ -6,6 +6,7 @@ import struct
 from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -80,3 +81,24 @@ def mcap(source: Path, clock: Clock) -> bytes:
             writer.add_message(channels[connection.id], stamp_ns, bytes(raw), stamp_ns)
     writer.finish()  # type: ignore[no-untyped-call]
     return stream.getvalue()
+
+
+def bag(source: Path, path: Path, topic: str, change: Callable[[Any], None]) -> Path:
+    """A ROS 1 bag in which the messages of a topic are changed."""
+    from rosbags.rosbag1 import Reader, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with Reader(source) as read, Writer(path) as write:
+        written = {
+            one.id: write.add_connection(one.topic, one.msgtype, msgdef=one.msgdef.data, md5sum=one.digest)
+            for one in read.connections
+        }
+        for connection, time_ns, raw in read.messages():
+            content: bytes | memoryview = raw
+            if connection.topic == topic:
+                message = store.deserialize_ros1(raw, connection.msgtype)
+                change(message)
+                content = store.serialize_ros1(message, connection.msgtype)
+            write.write(written[connection.id], time_ns, content)
+    return path

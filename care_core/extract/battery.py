@@ -11,6 +11,12 @@ from care_core.extract.registry import Args, Mission, extractor, missing, one_of
 from care_core.logs.plausible import is_alive
 from care_core.run import Unavailable, Value
 
+_LEAST_V, _MOST_V = 2.0, 1e3
+"""A lithium cell is empty above the one, no vehicle's battery reaches the other. Simple drivers say a fixed voltage."""
+_LEAST_W = 1.0
+"""Mean power of a mission: a computer alone takes more."""
+_AGREE, _ENOUGH_AH = 2.0, 0.01
+"""By what factor the charge that is gone and current over time may differ, and the least that is compared."""
 _TOO_SHORT = Unavailable("the mission takes no time", "record the whole mission")
 
 
@@ -24,17 +30,37 @@ def battery_energy(mission: Mission, args: Args) -> Value:
     if isinstance(battery, Unavailable):
         return battery
     inside = (battery.t >= mission.start_s) & (battery.t <= mission.end_s)
+    counts = np.isfinite(battery.charge).all() and np.ptp(battery.charge[inside]) > 0
     if np.isfinite(battery.current).all() and is_alive(battery.current[inside]) and battery.current[inside].any():
-        power = battery.voltage * battery.current
-        joule = np.concatenate([[0.0], np.cumsum(np.diff(battery.t) * (power[1:] + power[:-1]) / 2)])
-        start, end = np.interp([mission.start_s, mission.end_s], battery.t, joule)
-        return abs(float(end - start)) / 3600
-    if np.isfinite(battery.charge).all() and np.ptp(battery.charge[inside]) > 0:
+        joule = _over(mission, battery.t, battery.voltage * battery.current)
+        drawn, gone = abs(_over(mission, battery.t, battery.current)) / 3600, float(np.ptp(battery.charge[inside]))
+        if counts and max(drawn, gone) > _ENOUGH_AH and not 1 / _AGREE < drawn / gone < _AGREE:
+            return Unavailable(
+                f"the battery counts {gone:.3g} Ah, but its current over time makes {drawn:.3g} Ah",
+                "is its current in amperes, its charge in ampere hours?",
+            )
+        return _unless_absurd(abs(joule), mission.end_s - mission.start_s)
+    if counts:
         start, end = np.interp([mission.start_s, mission.end_s], battery.t, battery.charge)
         return float(start - end) * float(battery.voltage[inside].mean())
     if np.isfinite(battery.current).any() or np.isfinite(battery.charge).any():
         return Unavailable("the battery says the same current and charge throughout", "check its sensor and driver")
     return Unavailable("the battery reports neither current nor charge", "have its driver fill in one of them")
+
+
+def _over(mission: Mission, t: Floats, rate: Floats) -> float:
+    """A rate over the seconds of the mission."""
+    sums = np.concatenate([[0.0], np.cumsum(np.diff(t) * (rate[1:] + rate[:-1]) / 2)])
+    start, end = np.interp([mission.start_s, mission.end_s], t, sums)
+    return float(end - start)
+
+
+def _unless_absurd(joule: float, time_s: float) -> Value:
+    """The energy in Wh, unless no robot runs on so little."""
+    power_w = joule / time_s if time_s > 0 else 0.0
+    if power_w >= _LEAST_W:
+        return joule / 3600
+    return Unavailable(f"the battery says {power_w:.3g} W, on which no robot runs", "is its current in amperes?")
 
 
 @extractor("battery_power", needs={}, parts=("battery",), unit="W")
@@ -86,4 +112,7 @@ def _battery(mission: Mission) -> _Battery | Unavailable:
         or table.t[inside][-1] < mission.end_s - edge_s
     ):
         return Unavailable(f"{channel} does not cover the mission", "record it from the first goal to the last")
+    volts = float(table["voltage"][known].max())
+    if not _LEAST_V <= volts <= _MOST_V:
+        return Unavailable(f"the battery says {volts:.3g} V, which none has", "check its sensor, and the driver's unit")
     return _Battery(table.t[known], *(np.asarray(table[name][known], np.float64) for name in BATTERY_FIELDS))

@@ -117,6 +117,21 @@ def test_a_current_in_the_wrong_unit(care: Care, tmp_path: Path, factor: float) 
     assert "BAT" in objectives["energy"]["reason"]
 
 
+@pytest.mark.parametrize(
+    ("name", "factor"), [("voltage", 0.0), ("voltage", 1e3), ("voltage", 1e-3), ("current", 1e3), ("current", 1e-3)]
+)
+def test_a_robots_battery_in_the_wrong_unit(care: Care, tmp_path: Path, name: str, factor: float) -> None:
+    def change(battery: Any) -> None:
+        setattr(battery, name, getattr(battery, name) * factor)
+
+    code, objectives = judged(care, restamped.bag(DRIVE, tmp_path / "a.bag", "/battery_state", change), "move_base")
+    energy = objectives.pop("energy")
+    assert code == ExitCode.NOT_EVALUATED
+    assert energy["status"] == "not_evaluated"
+    assert "the battery" in energy["reason"]
+    assert {one["status"] for one in objectives.values()} == {"ok"}
+
+
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 @pytest.mark.parametrize("source", [GOOD, FAILED], ids=["good", "failed"])
 def test_a_clock_that_is_not_the_satellites(care: Care, tmp_path: Path, source: Path, factor: float) -> None:
