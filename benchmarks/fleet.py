@@ -7,8 +7,8 @@ value of one parameter written over the recorded one, so that no two are the sam
 The peak of a worker is its largest resident memory so far (`ru_maxrss`) after a tenth, half and all of the logs; what
 the process takes that hands out the work and keeps the rows stands beside it.
 
-What a million logs cost is computed from what is measured here: seconds of processor a log, bytes of a row, items that
-can be handed out a second, and what a task would take in a scheduler that is given all of them at once.
+What a million logs cost is computed from what is measured here: seconds of processor a log, bytes of a row, what handing
+out an item takes, and what a task would take in a scheduler that is given all of them at once.
 """
 
 from __future__ import annotations
@@ -115,19 +115,20 @@ def nothing(number: int) -> int:
 
 
 def handing_out(tasks: int) -> tuple[float, float]:
-    """Items of no work a second, and bytes that a task takes here where all are given to the scheduler at once."""
+    """Seconds of processor that an item of no work takes of client and scheduler, which are this process; and bytes
+    that a task takes in it where all are given to the scheduler at once."""
     with connected(workers=1) as client:
         list(each(client, nothing, range(100), limit_s=600.0))
-        began = time.perf_counter()
+        began = time.process_time()
         list(each(client, nothing, range(tasks // 10), limit_s=600.0))
-        rate = tasks // 10 / (time.perf_counter() - began)
+        cpu_s = (time.process_time() - began) / (tasks // 10)
         before = resident_mb()
         futures = client.map(partial(slow, 3600.0), range(tasks), pure=False)
         while client.run_on_scheduler(known_tasks) < tasks:
             time.sleep(0.1)
         bytes_a_task = (resident_mb() - before) * 1e6 / tasks
         client.cancel(futures, force=True)
-        return rate, bytes_a_task
+        return cpu_s, bytes_a_task
 
 
 def slow(seconds: float, number: int) -> int:
@@ -165,19 +166,21 @@ def report(logs: int, workers: Sequence[int], tasks: int) -> Iterator[str]:
             yield f"  {_bar(growth <= FLAT)} the peak grows to {growth:.2f} of what it was, at most {FLAT}"
             if count == 1:
                 yield f"  {_bar(rate >= WORTH * loop)} {rate / loop:.2f} of the loop, at least {WORTH}"
-    began = time.perf_counter()
+    together(rows)  # what is read and worked out once, is
+    began = time.process_time()
     found = together(rows)
-    shared_s = time.perf_counter() - began
+    shared_s = (time.process_time() - began) / len(rows)
     sent, held = row_bytes(rows)
-    yield f"looking at {len(rows)} rows together: {shared_s:.1f} s, {len(found.shared)} things shared"
+    yield f"looking at {len(rows)} rows together: {shared_s * 1e3:.1f} ms a row; {len(found.shared)} things shared"
     yield f"a row: {sent:.0f} bytes sent, {held:.0f} kept"
-    handed, task = handing_out(tasks)
-    yield f"handed out: {handed:.0f} items a second; a task given ahead: {task:.0f} bytes of the scheduler"
+    handed_s, task = handing_out(tasks)
+    yield f"handing out: {handed_s * 1e3:.1f} ms of processor a log; a task given ahead: {task:.0f} bytes of the scheduler"
     yield "a million logs, computed:"
-    yield f"  processor {MILLION * cpu_s / 3600:.0f} h; workers that one client keeps busy {handed * cpu_s:.0f}"
+    yield f"  processor {MILLION * cpu_s / 3600:.0f} h on workers, {MILLION * handed_s / 3600:.1f} h here"
+    yield f"  workers that can be kept busy from here: {cpu_s / handed_s:.0f}"
     yield f"  rows {MILLION * held / 1e9:.1f} GB here, {MILLION * sent / 1e9:.1f} GB sent"
     yield f"  tasks, if given all at once, {MILLION * task / 1e9:.1f} GB of the scheduler"
-    yield f"  looking at them together {MILLION * shared_s / len(rows) / 60:.0f} min"
+    yield f"  looking at them together {MILLION * shared_s / 3600:.1f} h"
 
 
 def _bar(is_kept: bool) -> str:

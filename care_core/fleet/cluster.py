@@ -11,6 +11,7 @@ them work, and nothing listens for browsers.
 from __future__ import annotations
 
 import logging
+import signal
 import sys
 import tempfile
 import time
@@ -96,6 +97,7 @@ def _local(workers: int, memory: str | None) -> Iterator[Any]:
         }
         with (
             dask.config.set(settings),
+            _deaf(),
             distributed.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
@@ -110,6 +112,25 @@ def _local(workers: int, memory: str | None) -> Iterator[Any]:
             distributed.Client(cluster) as client,
         ):
             yield client
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Have the server that our processes are forked from, and with it all of them, not hear Ctrl+C: it is this
+    process's to handle, which ends them."""
+    from multiprocessing import forkserver
+    from threading import current_thread, main_thread
+
+    from distributed.utils import get_mp_context
+
+    get_mp_context()  # what the server imports beforehand
+    if current_thread() is main_thread():
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.signal(signal.SIGINT, before)
+    yield
 
 
 def _check_workers(client: Any, scheduler: str) -> None:
