@@ -7,8 +7,8 @@ value of one parameter written over the recorded one, so that no two are the sam
 The peak of a worker is its largest resident memory so far (`ru_maxrss`) after a tenth, half and all of the logs; what
 the process takes that hands out the work and keeps the rows stands beside it.
 
-What a million logs cost is computed from what is measured here: seconds of processor a log, bytes of a row, what handing
-out an item takes, and what a task would take in a scheduler that is given all of them at once.
+What a million logs cost is computed from what is measured here: seconds of processor a log, bytes of a row, what
+handing out an item takes, and what a task would take in a scheduler that is given all of them at once.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def make_logs(folder: Path, count: int) -> None:
     """So many logs of 50 robots, no two alike."""
     for number in range(count):
         source, parameter, (low, high) = ORIGINALS[number % len(ORIGINALS)]
-        raw = source.read_bytes().replace(_MACHINE, f"{number % ROBOTS:031x}".encode())
+        raw = source.read_bytes().replace(_MACHINE, f"{number % ROBOTS:08x}".ljust(len(_MACHINE), "0").encode())
         value = low + (high - low) * number / count
         at = raw.find(parameter.ljust(_NAME_BYTES, b"\0"))
         if at < 0:
@@ -174,7 +174,8 @@ def report(logs: int, workers: Sequence[int], tasks: int) -> Iterator[str]:
     yield f"looking at {len(rows)} rows together: {shared_s * 1e3:.1f} ms a row; {len(found.shared)} things shared"
     yield f"a row: {sent:.0f} bytes sent, {held:.0f} kept"
     handed_s, task = handing_out(tasks)
-    yield f"handing out: {handed_s * 1e3:.1f} ms of processor a log; a task given ahead: {task:.0f} bytes of the scheduler"
+    yield f"handing out: {handed_s * 1e3:.1f} ms of processor a log"
+    yield f"a task given ahead: {task:.0f} bytes of the scheduler"
     yield "a million logs, computed:"
     yield f"  processor {MILLION * cpu_s / 3600:.0f} h on workers, {MILLION * handed_s / 3600:.1f} h here"
     yield f"  workers that can be kept busy from here: {cpu_s / handed_s:.0f}"
