@@ -11,7 +11,8 @@ conditions and half on another day.
 Per world: failed runs; those in which some single reset truly helps; how often the first cause is one of these, and the
 same for the plain classifier; answers at high confidence, and how many of them are wrong; promised probability of the
 suggested fixes against the truth (share of 400 simulated next missions under the same conditions that meet everything);
-Brier score of the promise; how often the engine abstains, and how often there was indeed nothing to name.
+Brier score of the promise, and of the probabilities of every reset (each option alone, and all of them); how often the
+engine abstains, and how often there was indeed nothing to name.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.mechanisms import FloatArray
-from care_core.diagnose.judging import judge
+from care_core.diagnose.judging import judge, world_of
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Cause, Diagnosis
 from care_core.diagnose.triage import diagnose
@@ -163,6 +164,9 @@ class Score:
     abstained_rightly: int = 0
     promised: list[float] = field(default_factory=list)
     kept: list[float] = field(default_factory=list)
+    asked: list[float] = field(default_factory=list)
+    """Probabilities of every reset of every failed run, and in `true` what they are."""
+    true: list[float] = field(default_factory=list)
 
     def add(self, other: Score) -> None:
         for name, value in vars(other).items():
@@ -206,7 +210,12 @@ def _judge(
     diagnosis = diagnose(judged, profile, choice, top=10)
     off = deviating(config, dict.fromkeys(OPTIONS, REFERENCE))
     now = true_probability(world, config, noise)
-    gain = {name: true_probability(world, {**config, name: REFERENCE}, noise) - now for name in off}
+    resets = [{**config, name: REFERENCE} for name in off]
+    true = [true_probability(world, reset, noise) for reset in resets]
+    gain = {name: kept - now for name, kept in zip(off, true, strict=True)}
+    everything = dict.fromkeys(OPTIONS, REFERENCE)
+    score.asked.extend(world_of(judged, profile).probability([*resets, everything]))
+    score.true.extend([*true, true_probability(world, everything, noise)])
     enough = max(WORTH, max(gain.values(), default=0.0) / 2)
     helps = {name for name in off if gain[name] >= enough}
     first = first_cause(diagnosis)
@@ -255,14 +264,19 @@ def _run_of(schema: Schema, row: Mapping[str, float]) -> Run:
 
 def show(scores: Mapping[str, Score]) -> None:
     print(f"{'world':24s}{'failed':>7s}{'helped':>7s}{'rank 1':>7s}{'plain':>7s}{'high':>6s}{'wrong':>6s}"
-          f"{'promise':>9s}{'truth':>7s}{'Brier':>7s}{'abstains':>9s}{'rightly':>8s}")  # fmt: skip
+          f"{'promise':>9s}{'truth':>7s}{'Brier':>7s}{'resets':>7s}{'abstains':>9s}{'rightly':>8s}")  # fmt: skip
     for name, s in scores.items():
         promised, kept = np.array(s.promised), np.array(s.kept)
-        # The expected Brier score of promises against missions that succeed with these probabilities.
-        brier = float(((promised - kept) ** 2 + kept * (1 - kept)).mean()) if len(kept) else float("nan")
         means = (float(np.mean(v)) if len(v) else float("nan") for v in (promised, kept))
+        resets = brier(np.array(s.asked), np.array(s.true))
         print(f"{name:24s}{s.faults:7d}{s.helped:7d}{s.right:7d}{s.plain_right:7d}{s.high:6d}{s.high_wrong:6d}"
-              "{:9.2f}{:7.2f}".format(*means) + f"{brier:7.3f}{s.abstained:9d}{s.abstained_rightly:8d}")  # fmt: skip
+              "{:9.2f}{:7.2f}".format(*means) + f"{brier(promised, kept):7.3f}{resets:7.3f}"
+              f"{s.abstained:9d}{s.abstained_rightly:8d}")  # fmt: skip
+
+
+def brier(promised: FloatArray, kept: FloatArray) -> float:
+    """The expected Brier score of promises against missions that succeed with the probabilities `kept`."""
+    return float(((promised - kept) ** 2 + kept * (1 - kept)).mean()) if len(kept) else float("nan")
 
 
 def main() -> None:

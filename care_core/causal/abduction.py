@@ -9,6 +9,9 @@ first run met the second meets again (the persistence rho, of the noise variance
 and the next outcome is the conditional of a joint Gaussian (Rasmussen and Williams 2006, Eq. A.6), for yes-or-no
 outcomes of a probit: a run passes where a standard normal stays below the quantile of its predicted probability.
 Several runs of one configuration are conditioned on together; a second failure is evidence against chance.
+
+A run that ends before it has an outcome still has metrics on the way to it. Where the graph names them, their errors
+are part of the outcome's, and each goes on to x' as its own mechanism lets it.
 """
 
 from __future__ import annotations
@@ -26,6 +29,9 @@ _CDF = np.array([0.5 * (1.0 + math.erf(z / math.sqrt(2.0))) for z in _Z.tolist()
 _NODES = np.linspace(-5.0, 5.0, 101)
 """Values of what the runs of one configuration share."""
 _DENSITY = np.exp(-(_NODES**2) / 2) / np.exp(-(_NODES**2) / 2).sum()
+
+FARTHEST = 3.0
+"""Standard deviations beyond which a metric's error counts no more: what is farther came from outside the model."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,6 +75,25 @@ def next_value(kin: Kinship, latent: FloatArray, expected: float, seen: FloatArr
     mean_variance = (kin.here + (len(seen) - 1) * kin.repeated) / len(seen)
     centre = latent + kin.covariance / mean_variance * (float(seen.mean()) - expected)
     return centre, np.sqrt(np.maximum(kin.variance - kin.covariance**2 / mean_variance, 1e-12))
+
+
+def by_mediators(
+    kin: Sequence[Kinship], errors: FloatArray, weights: FloatArray, among: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """What metrics say of an outcome that k runs do not have: centre and variance of its error at m configurations, as
+    shares of its standard deviation and of its variance; shape (m,) each.
+
+    Args:
+        kin: of each of q metrics. errors: of them in the runs, shape (k, q). weights: of a metric's error in the
+            outcome's, shape (q,). among: correlations of the metrics' errors, shape (q, q).
+    """
+    runs = len(errors)
+    seen = np.array([(one.here + (runs - 1) * one.repeated) / runs for one in kin])
+    spread = np.sqrt([one.variance for one in kin])
+    carried = weights[:, None] * np.array([one.covariance for one in kin]) / spread
+    centre: FloatArray = (errors.mean(axis=0) / seen) @ carried
+    share = carried / np.sqrt(seen)[:, None]
+    return centre, 1.0 - np.einsum("im,ij,jm->m", share, among, share)
 
 
 def next_passes(kin: Kinship, chance: FloatArray, here: float, passed: Sequence[bool]) -> FloatArray:

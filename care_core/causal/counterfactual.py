@@ -9,14 +9,14 @@ and for another day apart (`Model.training.persistence`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
-from care_core.causal.abduction import kinship, next_passes, next_value
+from care_core.causal.abduction import FARTHEST, Kinship, by_mediators, kinship, next_passes, next_value
 from care_core.causal.mechanisms import LEAST, TAIL, FloatArray, Mechanism, columns, restored, transformed
-from care_core.causal.model import UNKNOWN_PERSISTENCE, Model, OutcomeRecord, StageRecord
+from care_core.causal.model import UNKNOWN_PERSISTENCE, Mediation, Model, OutcomeRecord, StageRecord
 from care_core.run import is_known
 from care_core.variables import Threshold, Variable
 
@@ -196,10 +196,57 @@ class World:
             return next_value(kin, latent[:-1], float(latent[-1]), seen)
 
         centre, sd = self._once(outcome.objective, columns(configs, mechanism.inputs), ask)
+        if not len(seen):
+            shift, left = self._by_mediators(outcome.mediation, configs)
+            centre, sd = centre + sd * shift, sd * np.sqrt(left)
         bound = self.thresholds.get(outcome.objective)
         low, high = (restored(centre + mechanism.error_quantile(q) * sd, mechanism.transform) for q in INTERVAL)
         p_ok = np.full(len(configs), np.nan) if bound is None else _probability_of(mechanism, bound, centre, sd)
         return Predicted(restored(centre, mechanism.transform), low, high, p_ok)
+
+    def _by_mediators(self, mediation: Mediation | None, configs: Sequence[Config]) -> tuple[FloatArray, FloatArray]:
+        """What the metrics of runs that ended before an objective had a value say of it: centre of its error and what
+        is left of its variance, as shares; shape (m,) each.
+
+        A metric that the graph puts behind what ended a run says how it ended, not what its objective would have been.
+        """
+        nothing = np.zeros(len(configs)), np.ones(len(configs))
+        if mediation is None or not self._behind_the_end().isdisjoint(mediation.metrics):
+            return nothing
+        kin, errors = [], []
+        for name in mediation.metrics:
+            mechanism = self.model.mechanisms[name]
+            values = [known_value(seen, name) for seen in (self.observed, *self.repeats)]
+            seen = np.array([v for v in values if v is not None and v > LEAST[mechanism.transform]])
+            if len(seen) < len(values):
+                return nothing
+            here = columns([self.config], mechanism.inputs)
+            kin.append(self._kinship_of(name, here, columns(configs, mechanism.inputs)))
+            error = transformed(seen, mechanism.transform) - mechanism.latent(here)
+            far = FARTHEST * np.sqrt(kin[-1].here)
+            errors.append(np.clip(error, -far, far))
+        return by_mediators(kin, np.array(errors).T, np.array(mediation.weights), np.array(mediation.among))
+
+    def _kinship_of(self, metric: str, here: FloatArray, x: FloatArray) -> Kinship:
+        """How the metric's errors at x (m, p) go with those here (1, p)."""
+        mechanism, persistence = self.model.mechanisms[metric], self._persistence(metric)
+
+        def ask(rows: FloatArray) -> tuple[FloatArray, ...]:
+            kin = kinship(mechanism, rows, here, persistence)
+            return kin.variance, kin.covariance
+
+        variance, covariance = self._once(f"on its way/{metric}", x, ask)
+        return replace(kinship(mechanism, here, here, persistence), variance=variance, covariance=covariance)
+
+    def _behind_the_end(self) -> frozenset[str]:
+        """Metrics that the graph puts behind a stage that this run failed."""
+        failed = [
+            stage.variable
+            for outcome in self.model.outcomes.values()
+            for stage in outcome.stages
+            if self._passed(outcome.objective, stage, self.observed) is False
+        ]
+        return self.model.graph.descendants(*failed)
 
 
 def known_value(observed: Mapping[str, object], name: str) -> float | None:

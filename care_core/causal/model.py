@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from pydantic import AliasChoices, BaseModel, ConfigDict, Field
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, model_validator
 
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
@@ -121,6 +121,22 @@ class Summary(Record):
         return float(np.interp(share, np.linspace(0, 1, len(self.quantiles)), self.quantiles))
 
 
+class Mediation(Record):
+    """Metrics whose errors in a run are part of an objective's, all in standard deviations around the predictions."""
+
+    metrics: tuple[str, ...] = Field(min_length=1)
+    weights: tuple[float, ...]
+    """Of each metric's error in the objective's."""
+    among: tuple[tuple[float, ...], ...]
+    """Correlations of the metrics' errors."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Mediation:
+        if {len(self.metrics)} != {len(self.weights), len(self.among), *map(len, self.among)}:
+            raise ValueError("metrics, weights and correlations differ in number")
+        return self
+
+
 class StageRecord(Record):
     """One condition on the way to a functional objective: the mission passes when `variable` equals `passes`."""
 
@@ -135,6 +151,8 @@ class OutcomeRecord(Record):
     objective: str
     stages: tuple[StageRecord, ...] = ()
     mechanism: str = ""
+    mediation: Mediation | None = None
+    """Of the one mechanism."""
 
 
 class SkillRecord(Record):

@@ -30,13 +30,14 @@ Pairs = Sequence[tuple[int, int]]
 def persistence(
     frame: pd.DataFrame, schema: Schema, outcomes: Mapping[str, OutcomeRecord], mechanisms: Mapping[str, Mechanism]
 ) -> dict[str, Persistence]:
-    """Per objective, where the table repeats configurations; empty where it does not."""
+    """Per objective and metric on the way to one, where the table repeats configurations; empty where it does not."""
     same, another = repeated(frame, schema)
     if not same and not another:
         return {}
     found = {}
-    for name, outcome in outcomes.items():
-        keys = [stage.mechanism for stage in outcome.stages] or [outcome.mechanism]
+    asked = {name: [s.mechanism for s in outcome.stages] or [outcome.mechanism] for name, outcome in outcomes.items()}
+    asked |= {name: [name] for outcome in outcomes.values() if outcome.mediation for name in outcome.mediation.metrics}
+    for name, keys in asked.items():
         targets = [_targets(key, name, frame, schema) for key in keys]
         both = [
             _share(part, [(mechanisms[key], y) for key, y in zip(keys, targets, strict=True)], frame, unknown)

@@ -22,6 +22,7 @@ from care_core.learn.bootstrap import support as measure_support
 from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME
 from care_core.learn.identification import identify, is_answered_by
 from care_core.learn.knowledge import with_known
+from care_core.learn.mediation import with_mediation
 from care_core.learn.outcomes import badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
 from care_core.learn.relative import of_ratios, relative
 from care_core.learn.repeats import persistence
@@ -78,6 +79,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, report:
     report("fitting mechanisms", 0.4)
     outcomes, mechanisms = fit_outcomes(frame, schema, graph, rng, effort=OUTCOME)
     mechanisms |= _metric_mechanisms(frame, schema, graph, settings)
+    outcomes = with_mediation(outcomes, mechanisms, with_known(graph, frame, schema), frame, schema)
     training = _training(frame, schema, structure, settings)
     training = training.model_copy(update={"persistence": persistence(frame, schema, outcomes, mechanisms)})
     learned = Learned(graph, support, outcomes, mechanisms, training)

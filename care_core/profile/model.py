@@ -248,7 +248,8 @@ def _array(name: str, stored: bytes) -> FloatArray:
 def _check_references(record: _ModelFile) -> None:
     for outcome in record.outcomes:
         keys = [stage.mechanism for stage in outcome.stages] or [outcome.mechanism]
-        for key in keys:
+        carriers = () if outcome.mediation is None else outcome.mediation.metrics
+        for key in (*keys, *carriers):
             if key not in record.mechanisms:
                 raise ValueError(f"'{outcome.objective}' is predicted by '{key}', which is not there")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from care_core.causal.abduction import Kinship, next_passes, next_value
+from care_core.causal.abduction import Kinship, by_mediators, next_passes, next_value
 
 KIN = Kinship(variance=np.array([1.0, 1.5]), covariance=np.array([0.7, 0.4]), here=1.0, repeated=0.7)
 RNG = np.random.default_rng(0)
@@ -41,3 +41,26 @@ def test_passing_is_conditioned_as_simulated(passed: list[bool]) -> None:
     here, chance = float((first < threshold).mean()), float((after < threshold).mean())
     found = next_passes(KIN, np.array([here, chance]), here, passed)
     assert found[1] == pytest.approx((after[match] < threshold).mean(), abs=0.01)
+
+
+def test_what_an_outcome_would_have_been_is_read_off_the_metrics_on_its_way() -> None:
+    among, weights = np.array([[1.0, 0.3], [0.3, 1.0]]), np.array([0.6, -0.5])
+    kept = np.array([0.8, 0.2])
+    left_over = RNG.multivariate_normal(np.zeros(2), among - among * np.outer(kept, kept), 100_000)
+    after = kept * np.array([1.0, -1.0]) + left_over
+    outcome = after @ weights + np.sqrt(1 - weights @ among @ weights) * RNG.normal(size=len(after))
+    # In their own units the metrics' errors are twice and three times as large, the second's half as large at x'.
+    kin = [
+        Kinship(variance=np.array([4.0]), covariance=np.array([0.8 * 4.0]), here=4.0, repeated=2.0),
+        Kinship(variance=np.array([2.25]), covariance=np.array([0.2 * 4.5]), here=9.0, repeated=2.0),
+    ]
+    centre, left = by_mediators(kin, np.array([[2.0, -3.0]]), weights, among)
+    assert centre[0] == pytest.approx(outcome.mean(), abs=0.03)
+    assert left[0] == pytest.approx(outcome.var(), abs=0.03)
+
+
+def test_metrics_that_do_not_persist_say_nothing() -> None:
+    kin = [Kinship(variance=np.ones(3), covariance=np.zeros(3), here=1.0, repeated=0.0)]
+    centre, left = by_mediators(kin, np.array([[2.0]]), np.array([0.9]), np.eye(1))
+    assert centre.tolist() == [0.0] * 3
+    assert left.tolist() == [1.0] * 3

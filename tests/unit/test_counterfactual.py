@@ -13,7 +13,7 @@ from care_core.causal.mechanisms import TAIL
 from care_core.profile.store import Profile
 from care_core.run import Unavailable
 from care_core.variables import Threshold
-from tests.planted import DEFAULTS, OPTIONS, SCHEMA, fly_many, planted_run, world_of
+from tests.planted import CALM, DEFAULTS, OPTIONS, SCHEMA, fly_many, planted_run, world_of
 
 BOUNDS = {v.name: v.threshold for v in SCHEMA.objectives if v.threshold is not None}
 CONFIGS = st.fixed_dictionaries(
@@ -179,3 +179,23 @@ def test_the_interval_of_a_new_mission_holds_four_in_five(planted: Profile) -> N
         p = world(planted, {}).predict(name, [{str(key): value for key, value in one.items()} for one in configs])
         seen = flown[name].to_numpy()
         assert 0.65 < np.mean((p.low <= seen) & (seen <= p.high)) < 0.93
+
+
+def test_metrics_of_a_run_that_ended_early_tell_what_it_would_have_taken(planted: Profile) -> None:
+    calm, busy = (planted_run({**CALM, "replans": noise}, radius=0.1) for noise in (0.0, 2.0))
+    assert isinstance(busy.objectives["time"], Unavailable)
+    unseen = world_of(planted, busy, {}).predict("time", [DEFAULTS])
+    expected, longer = (world_of(planted, run).predict("time", [DEFAULTS]) for run in (calm, busy))
+    # 1.4 more replans of 6 s each, half of which the next run is taken to meet again.
+    assert longer.value[0] - expected.value[0] == pytest.approx(0.5 * 1.4 * 6, abs=2.0)
+    assert longer.high[0] - longer.low[0] < unseen.high[0] - unseen.low[0]
+
+
+def test_metrics_behind_what_ended_the_run_say_nothing_of_it(planted: Profile) -> None:
+    run, graph = planted_run({**CALM, "replans": 2.0}, radius=0.1), planted.model.graph
+    behind = replace(graph, directed=frozenset({*graph.directed, ("success", "replans")} - {("replans", "success")}))
+    here = world_of(planted, run)
+    unseen = world_of(planted, run, {}).predict("time", [DEFAULTS])
+    told = replace(here, model=replace(here.model, graph=behind)).predict("time", [DEFAULTS])
+    assert told.value[0] == unseen.value[0]
+    assert here.predict("time", [DEFAULTS]).value[0] != unseen.value[0]
