@@ -107,6 +107,42 @@ def check_replaceable(path: Path, text: str) -> None:
         )
 
 
+BUNDLE_FOLDER = "care-bundle"
+_ZIP_HEAD, _ZIP_NAME_AT = b"PK\x03\x04", 30
+"""How a zip begins, and where the name of its first file stands (PKWARE APPNOTE 4.3.7)."""
+
+
+def write_bundle(path: Path, content: bytes, *, force: bool = False) -> None:
+    """Write a bundle whole or not at all. What is there already is replaced where it is a bundle; with `force`, where
+    it is anything but a log.
+
+    Raises:
+        UsageError: it is something else, or the folder may not be written to.
+    """
+    refuse_recording(path)
+    if path.is_dir():
+        raise UsageError("This is a folder.", hint="Name a file in it.", where=str(path))
+    try:
+        if not force and path.is_file() and path.stat().st_size and not _is_bundle(path):
+            raise UsageError(
+                "There is a file of another kind, which is kept.",
+                hint="Name another file, or replace it with --force.",
+                where=str(path),
+            )
+        replace_file(path, content)
+    except OSError as err:
+        raise UsageError(
+            f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
+        ) from err
+
+
+def _is_bundle(path: Path) -> bool:
+    """Whether a file is a zip whose first file lies in a bundle's folder."""
+    with path.open("rb") as stream:
+        head = stream.read(_ZIP_NAME_AT + len(BUNDLE_FOLDER) + 1)
+    return head.startswith(_ZIP_HEAD) and head.endswith(f"{BUNDLE_FOLDER}/".encode())
+
+
 def _decoded(head: bytes) -> str:
     """The first bytes of a file as text, which may end inside a character; empty where they are none."""
     try:

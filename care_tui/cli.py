@@ -19,6 +19,7 @@ from care_tui import __version__
 from care_tui.commands import (
     asking,
     baselining,
+    bundling,
     collecting,
     configuring,
     diagnosing,
@@ -86,6 +87,7 @@ for commands in (
     serving,
     diagnosing,
     fleet,
+    bundling,
     asking,
     baselining,
     configuring,

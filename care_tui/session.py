@@ -12,7 +12,7 @@ from care_core.errors import CareError
 from care_core.variables import Variable
 from care_tui.basket import Basket
 
-FORMATS: tuple[ReportFormat, ...] = ("yaml", "markdown", "html", "json", "patch")
+FORMATS: tuple[ReportFormat, ...] = ("yaml", "markdown", "html", "json", "junit", "patch")
 State = Literal["empty", "loading", "data", "error"]
 
 

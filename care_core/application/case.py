@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Literal
 from care_core.errors import CareError, ExitCode
 
 if TYPE_CHECKING:
+    from care_core.application.sharing import Sharing
     from care_core.causal.model import Model
     from care_core.configs.loading import ConfigFile
     from care_core.diagnose.judging import Judged
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 Progress = Callable[[str, float], None]
 """Is told the step and the share that is done, 0 to 1."""
 
-ReportFormat = Literal["text", "yaml", "markdown", "html", "json", "patch"]
+ReportFormat = Literal["text", "yaml", "markdown", "html", "json", "junit", "patch"]
 
 SUFFIXES: Mapping[str, ReportFormat] = {
     ".yaml": "yaml",
@@ -41,6 +42,7 @@ SUFFIXES: Mapping[str, ReportFormat] = {
     ".html": "html",
     ".htm": "html",
     ".json": "json",
+    ".xml": "junit",
     ".patch": "patch",
     ".diff": "patch",
 }
@@ -114,9 +116,10 @@ class Case:
     def model(self) -> Model | None:
         return None if self.reading is None else self.reading.profile.model
 
-    def report(self, format: ReportFormat = "text") -> str:
-        """The fix report in one of its formats."""
-        return report_of(self, format)
+    def report(self, format: ReportFormat = "text", sharing: Sharing | None = None) -> str:
+        """The fix report in one of its formats; `sharing` is what of the run goes into it, by default what suits the
+        format."""
+        return report_of(self, format, sharing)
 
 
 def open_case(request: Request, progress: Progress) -> Case:
@@ -298,26 +301,43 @@ def _diagnose(reading: Reading, health: Health, request: Request, progress: Prog
     )
 
 
-def report_of(case: Case, format: ReportFormat) -> str:
+SENT: frozenset[ReportFormat] = frozenset({"markdown", "html", "junit"})
+"""Formats that are made to be sent: without positions, unless they are asked for."""
+
+
+def report_of(case: Case, format: ReportFormat, sharing: Sharing | None = None) -> str:
     """The fix report in one of its formats; a page draws the signals of the case's log."""
+    shared = case
+    if sharing is not None or format in SENT:
+        from care_core.application.sharing import Sharing
+
+        sharing = sharing or Sharing(positions=False)
+        shared = sharing.of(case)
     if format == "text":
         from care_core.report.terminal import to_text
 
-        return to_text(case.diagnosis)
+        return to_text(shared.diagnosis)
     from care_core.report.document import build_document
 
-    document = build_document(case.diagnosis)
+    document = build_document(shared.diagnosis)
     if format == "patch":
         return document.diff
     if format == "html":
         from care_core.application.plotting import drawn_of
         from care_core.report.html import to_html
 
-        return to_html(document, drawn_of(case))
-    from care_core.report.writers import to_json, to_markdown, to_yaml
+        return to_html(document, drawn_of(shared, sharing or Sharing(positions=False)))
+    if format == "junit":
+        from care_core.report.junit import suite_of, to_junit
 
-    write = {"yaml": to_yaml, "markdown": to_markdown, "json": to_json}[format]
-    return write(document)
+        return to_junit([suite_of(document)])
+    if format == "markdown":
+        from care_core.report.markdown import to_markdown
+
+        return to_markdown(document)
+    from care_core.report.writers import to_json, to_yaml
+
+    return {"yaml": to_yaml, "json": to_json}[format](document)
 
 
 def exit_code(diagnosis: Diagnosis) -> ExitCode:

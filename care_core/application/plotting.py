@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case
+from care_core.application.sharing import EVERYTHING, Sharing
 from care_core.application.signal_words import is_position, words_of
 from care_core.application.signals import Line as Values
 from care_core.application.signals import Signal, Source, lines_of, signals_of, type_name, whole_of
@@ -62,32 +64,37 @@ _COUNTERS: Mapping[Source, str] = {("BAT", "EnrgTot"): "energy"}
 """Counters that an objective is the growth of."""
 
 
-def drawn_of(case: Case, *, positions: bool = True) -> Drawn:
-    """What there is to draw of a case; `positions`: signals too that say where the robot was."""
+def drawn_of(case: Case, sharing: Sharing = EVERYTHING) -> Drawn:
+    """What there is to draw of a case, as far as it goes to others."""
     diagnosis = case.diagnosis
     if case.log is None:
         return Drawn(faults=diagnosis.faults)
     span = whole_of(case)
-    groups = [
-        group
-        for group in _groups(signals_of(case))
-        if positions or not any(is_position(one.channel, one.field) for one in group)
-    ]
-    chosen = _chosen(case, groups)
-    sources = [
-        source for group, _ in chosen for one in group for source in ((one.channel, one.field), one.wanted) if source
-    ]
+    groups, telling = ranked(case, sharing)
+    first = max(min(telling, MOST_PLOTS), FEWEST)
+    chosen = [(group, place < first) for place, group in enumerate(groups[: first + MOST_OTHERS])]
+    sources = [source for group, _ in chosen for source in sources_of(group)]
     values = lines_of(case, sources, span)
     plots = [_plot(case, group, values, span, matters=matters) for group, matters in chosen]
+    text = sharing.text(case)
     return Drawn(
         faults=diagnosis.faults,
-        plots=tuple(plot for plot in plots if plot is not None),
+        plots=tuple(replace(plot, source=text(plot.source), lines=_named(plot.lines, text)) for plot in plots if plot),
         marks=_marks(case, span),
         deadlines=tuple(_deadlines(case, span)),
         start_s=span[0],
         end_s=span[1],
         is_mission=diagnosis.run.mission.end_s > diagnosis.run.mission.start_s,
     )
+
+
+def sources_of(group: Sequence[Signal]) -> list[Source]:
+    """The channels and fields of signals, and of what they were to follow."""
+    return [source for one in group for source in ((one.channel, one.field), one.wanted) if source]
+
+
+def _named(lines: Sequence[Line], text: Callable[[str], str]) -> tuple[Line, ...]:
+    return tuple(replace(line, name=text(line.name)) for line in lines)
 
 
 def _groups(signals: Sequence[Signal]) -> list[list[Signal]]:
@@ -99,8 +106,9 @@ def _groups(signals: Sequence[Signal]) -> list[list[Signal]]:
     return [group[:MOST_TOGETHER] for group in groups.values()]
 
 
-def _chosen(case: Case, groups: Sequence[list[Signal]]) -> list[tuple[list[Signal], bool]]:
-    """The groups to be drawn, and whether a finding, a fault or a causal path speaks of them."""
+def ranked(case: Case, sharing: Sharing = EVERYTHING) -> tuple[list[list[Signal]], int]:
+    """The signals of a case that share a plot, those first that a finding, a fault or a causal path speaks of, and how
+    many groups that are; as far as they go to others."""
     diagnosis = case.diagnosis
     matters = {result.variable.name for result in diagnosis.objectives if result.status == "fault"}
     matters |= {node.name for fault in diagnosis.faults for cause in fault.causes[:1] for node in cause.path}
@@ -116,11 +124,13 @@ def _chosen(case: Case, groups: Sequence[list[Signal]]) -> list[tuple[list[Signa
             return 1.0, -len(used & matters) / len(used)
         return (2.0, 0.0) if group[0].wanted else (3.0, 0.0)
 
+    groups = [
+        group
+        for group in _groups(signals_of(case))
+        if sharing.positions or not any(is_position(one.channel, one.field) for one in group)
+    ]
     ordered = sorted(groups, key=rank)
-    telling = [group for group in ordered if rank(group)[0] < 2][:MOST_PLOTS]
-    first = ordered[: max(len(telling), FEWEST)]
-    rest = ordered[len(first) : len(first) + MOST_OTHERS]
-    return [*((group, True) for group in first), *((group, False) for group in rest)]
+    return ordered, sum(rank(group)[0] < 2 for group in ordered)
 
 
 def _channels(finding: Finding) -> list[str]:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from care_core.errors import UsageError
 from care_tui.console import check_writable
+
+if TYPE_CHECKING:
+    from care_core.application.sharing import Sharing
 
 LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="The log to read.", show_default=False)]
 ProfileName = Annotated[
@@ -64,6 +67,28 @@ RobotName = Annotated[
     str | None, typer.Option("--robot", metavar="NAME", help="Whose log it is; by what the log says if absent.")
 ]
 Mission = Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last if absent.")]
+
+
+Positions = Annotated[
+    bool | None,
+    typer.Option(
+        "--positions/--no-positions",
+        help="With or without where the robot was; without in Markdown, HTML, JUnit and bundles if absent.",
+        show_default=False,
+    ),
+]
+Anonymous = Annotated[
+    bool, typer.Option("--anonymous", help="Leave out names, hosts, serial numbers, paths, positions and dates.")
+]
+
+
+def sharing_for(positions: bool | None, *, anonymous: bool) -> Sharing | None:
+    """What of a run goes into a document; None where its format says so."""
+    if positions is None and not anonymous:
+        return None
+    from care_core.application.sharing import Sharing
+
+    return Sharing(positions=bool(positions), anonymous=anonymous)
 
 
 def bounds(texts: Iterable[str]) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,14 +11,16 @@ import typer
 import care_core
 from care_core.application.case import SUFFIXES, Case, ReportFormat, Request, exit_code
 from care_core.application.remembering import remember_triage
-from care_core.errors import LogError, UsageError
+from care_core.errors import ExitCode, LogError, UsageError
 from care_tui.commands.arguments import (
+    Anonymous,
     AsJson,
     ConfigPaths,
     Force,
     Keep,
     Mission,
     Out,
+    Positions,
     ProfileName,
     Reference,
     RobotName,
@@ -25,16 +28,20 @@ from care_tui.commands.arguments import (
     Site,
     Thresholds,
     bounds,
+    sharing_for,
 )
 from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit, painted
 
 if TYPE_CHECKING:
-    pass
+    from care_core.application.sharing import Sharing
 
 app = typer.Typer()
 
 SAMPLE = "arducopter_failed.BIN"
+
+_GRAVEST = (ExitCode.FAULT, ExitCode.UNREADABLE, ExitCode.NOT_EVALUATED, ExitCode.OK)
+"""Exit codes of several logs, the one that stands for all first."""
 
 
 @app.command()
@@ -47,7 +54,11 @@ def triage(
     config: ConfigPaths = None,
     json: AsJson = False,
     yaml: Annotated[bool, typer.Option("--yaml", help="Print YAML, with the diff and its commands.")] = False,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print Markdown for a ticket.")] = False,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print Markdown for a ticket or a forum.")] = False,
+    html: Annotated[bool, typer.Option("--html", help="Print a page with paths and signals drawn.")] = False,
+    junit: Annotated[bool, typer.Option("--junit", help="Print JUnit XML for a CI, each log by itself.")] = False,
+    positions: Positions = None,
+    anonymous: Anonymous = False,
     out: Out = None,
     force: Force = False,
     top: Annotated[int, typer.Option("--top", min=1, help="How many causes a fault may have.")] = 5,
@@ -61,10 +72,13 @@ def triage(
     no_history: NoHistory = False,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
-    flags: tuple[tuple[ReportFormat, bool], ...] = (("json", json), ("yaml", yaml), ("markdown", markdown))
-    formats = [name for name, wanted in flags if wanted]
+    flags: dict[ReportFormat, bool] = {
+        "json": json, "yaml": yaml, "markdown": markdown, "html": html, "junit": junit
+    }  # fmt: skip
+    formats = [name for name, wanted in flags.items() if wanted]
     if len(formats) > 1:
-        raise UsageError("Only one of --json, --yaml and --markdown can be printed.", hint="Leave the others out.")
+        raise UsageError(f"Only one of --{' and --'.join(formats)} can be printed.", hint="Leave the others out.")
+    format = formats[0] if formats else _format_of(out)
     request = Request(
         logs[0],
         profile,
@@ -79,12 +93,33 @@ def triage(
         reference=reference,
         robot=robot,
     )
+    sharing = sharing_for(positions, anonymous=anonymous)
+    if format == "junit":
+        raise typer.Exit(_write_junit(request, sharing, out, force=force, no_history=no_history))
     with Progress() as progress:
         case = care_core.triage(request, progress)
     if not no_history:
         mention(remember_triage(case.diagnosis))
-    emit(_written(case, formats[0] if formats else _format_of(out), to_file=out is not None), out, force=force)
+    emit(_written(case, format, sharing, to_file=out is not None), out, force=force)
     raise typer.Exit(exit_code(case.diagnosis))
+
+
+def _write_junit(
+    request: Request, sharing: Sharing | None, out: Path | None, *, force: bool, no_history: bool
+) -> ExitCode:
+    """Triage each log by itself and write a suite for each; the gravest of their exit codes."""
+    from care_core.application.testing import Tested, tested
+    from care_core.report.junit import to_junit
+
+    found: list[Tested] = []
+    with Progress() as progress:
+        for log in (request.log, *request.repeats):
+            found.append(tested(replace(request, log=log, repeats=()), sharing, progress))
+            if found[-1].case is not None and not no_history:
+                mention(remember_triage(found[-1].case.diagnosis))
+    emit(to_junit([one.suite for one in found]), out, force=force)
+    codes = {one.code for one in found}
+    return next(code for code in _GRAVEST if code in codes)
 
 
 @app.command()
@@ -97,7 +132,7 @@ def demo() -> None:
         raise LogError("The bundled sample is missing.", hint="Install the program again.", where=str(path))
     with Progress() as progress:
         case = care_core.triage(path, progress)
-    emit(_written(case, None, to_file=False))
+    emit(_written(case, None, None, to_file=False))
     raise typer.Exit(exit_code(case.diagnosis))
 
 
@@ -105,6 +140,6 @@ def _format_of(out: Path | None) -> ReportFormat | None:
     return None if out is None else SUFFIXES.get(out.suffix.lower())
 
 
-def _written(case: Case, format: ReportFormat | None, *, to_file: bool) -> str:
-    text = case.report(format or "text")
+def _written(case: Case, format: ReportFormat | None, sharing: Sharing | None, *, to_file: bool) -> str:
+    text = case.report(format or "text", sharing)
     return text if to_file or format else painted(text)

@@ -16,7 +16,14 @@ from care_tui.render.rows import error_rows, plain_rows
 from care_tui.screens.export import ExportDialog
 from care_tui.session import FORMATS
 
-LABELS = {"yaml": "YAML", "markdown": "Markdown", "html": "HTML, its text here", "json": "JSON", "patch": "patch"}
+LABELS = {
+    "yaml": "YAML",
+    "markdown": "Markdown",
+    "html": "HTML, its text here",
+    "json": "JSON",
+    "junit": "JUnit",
+    "patch": "patch",
+}
 
 
 class ReportPage(DiagnosisPage):

@@ -19,7 +19,7 @@ from care_core.text import clean
 from care_tui.jobs import Engine, as_care_error
 from care_tui.widgets.line_input import LineInput
 
-NAMES = ".yaml, .md, .html, .json or .patch"
+NAMES = ".yaml, .md, .html, .json, .xml or .patch"
 
 
 class OverwriteDialog(ModalScreen[bool]):

@@ -28,7 +28,8 @@ def _in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (["f"], "00000042.care.md", "markdown", "markdown"),
         (["f", "f"], "00000042.care.html", "html", "markdown"),
         (["f", "f", "f"], "00000042.care.json", "json", "json"),
-        (["f", "f", "f", "f"], "00000042.care.patch", "patch", "patch"),
+        (["f", "f", "f", "f"], "00000042.care.xml", "junit", "junit"),
+        (["f", "f", "f", "f", "f"], "00000042.care.patch", "patch", "patch"),
     ],
 )
 async def test_export_writes_the_format_in_view_beside_the_operator(

@@ -17,9 +17,10 @@ from care_core.history.store import Triaged
 from care_core.report.document import build_document
 from care_core.report.history import history_document, history_json, history_text
 from care_core.report.html import to_html
+from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
 from care_core.report.whatif import whatif_json, whatif_text
-from care_core.report.writers import published, to_json, to_markdown, to_yaml
+from care_core.report.writers import published, to_json, to_yaml
 from care_core.run import Fit, FitVerdict
 from care_tui.render.causes import cause_item
 from care_tui.render.fix import option_item, outcome_rows

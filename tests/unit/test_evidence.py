@@ -21,8 +21,8 @@ from care_core.logs.opening import open_log
 from care_core.profile.schema import EvidenceRule, Schema, Side, read_schema
 from care_core.profile.store import Profile, load_profile
 from care_core.report.document import build_document
+from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
-from care_core.report.writers import to_markdown
 from care_core.run import Evidence, ProfileChoice, Run, Unavailable
 from care_core.variables import Role, Threshold, Variable
 from tests.planted import OPTIONS, SCHEMA, planted_run

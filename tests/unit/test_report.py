@@ -21,8 +21,9 @@ from care_core.files import write_atomically
 from care_core.health.records import NOTHING_SEEN
 from care_core.report.document import build_document, json_schema
 from care_core.report.html import to_html
+from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
-from care_core.report.writers import to_json, to_markdown, to_yaml
+from care_core.report.writers import to_json, to_yaml
 from care_core.run import Damage, Fit, ProfileChoice
 from care_core.text import clean
 from tests.made import DRIVEN, ENERGY, HOSTILE, LAND_SPEED, made_diagnosis

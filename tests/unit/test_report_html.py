@@ -8,7 +8,8 @@ from html.parser import HTMLParser
 from care_core.diagnose.records import Circumstance, Dismissal
 from care_core.report.document import build_document
 from care_core.report.html import to_html
-from care_core.report.writers import to_json, to_markdown
+from care_core.report.markdown import to_markdown
+from care_core.report.writers import to_json
 from tests.made import made_diagnosis
 
 HOSTILE = '<script>alert("x")</script> & \x1b[31m'

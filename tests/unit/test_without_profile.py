@@ -20,8 +20,8 @@ from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 from care_core.report.document import build_document
 from care_core.report.html import to_html
+from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text
-from care_core.report.writers import to_markdown
 from care_core.run import Check, Unavailable, Value, is_known
 from tests.nav2_drive import recorded
 from tests.rewritten import write_text

@@ -1,0 +1,38 @@
+"""Logs as test suites: each is triaged by itself, and one that cannot be read is an error and stops no other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from care_core.application.case import Case, Progress, Request, exit_code, open_case
+from care_core.errors import ExitCode, LogError
+
+if TYPE_CHECKING:
+    from care_core.application.sharing import Sharing
+    from care_core.report.junit import Suite
+
+
+@dataclass(frozen=True, eq=False)
+class Tested:
+    """A log as a suite, what it means for the process, and its case, None where it could not be read."""
+
+    suite: Suite
+    code: ExitCode
+    case: Case | None = None
+
+
+def tested(request: Request, sharing: Sharing | None, progress: Progress) -> Tested:
+    """Triage a log. Raises CareError for what is wrong with the request, not with the log."""
+    from care_core.application.sharing import Sharing
+    from care_core.report.document import build_document
+    from care_core.report.junit import suite_of, unreadable
+
+    sharing = sharing or Sharing(positions=False)
+    try:
+        case = open_case(request, progress)
+    except LogError as err:
+        name = f"log{request.log.suffix}" if sharing.anonymous else request.log.name
+        return Tested(unreadable(name, err.message), err.exit_code)
+    document = build_document(sharing.of(case).diagnosis)
+    return Tested(suite_of(document), exit_code(case.diagnosis), case)

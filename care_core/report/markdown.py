@@ -1,0 +1,233 @@
+"""The report as a post in a forum or a ticket: short enough for either, no wide tables, the long parts folded.
+
+Discourse takes 32,000 characters, GitHub 65,536. Names of files stand without their folders. A text of a log makes no
+markup, notifies nobody and becomes no link.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from care_core.report.document import (
+    CauseEntry,
+    FixEntry,
+    FixSet,
+    ObjectiveEntry,
+    PredictedValue,
+    Report,
+    SinceEntry,
+    wanted_text,
+)
+from care_core.report.happened import finding_sentence
+from care_core.report.together import listed, together
+from care_core.report.wording import SEVERITY_WORDS, chance, fit_text, hypothesis_text, noted
+from care_core.report.writers import STATUS_WORDS, plain_verdict
+from care_core.run import shown
+from care_core.text import seconds
+from care_core.variables import ASSUMED
+
+LONGEST = 30_000
+"""Characters of a post."""
+_MOST_LINES, _MOST_CHARACTERS = 40, 500
+"""Lines of a list, and characters of a line; more is said to be left out."""
+_SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~])")
+_LINKS = re.compile(r"(?<=:)(?=//)|(?<=www)(?=\.)", re.IGNORECASE)
+
+Section = list[str]
+
+
+def to_markdown(report: Report) -> str:
+    """A report to paste into a ticket. Where it would be too long, its last parts are left out, and that is said."""
+    first, *rest = (list(section) for section in _sections(report))
+    kept, left_out = [first, rest.pop()], 0
+    length = sum(len(line) + 1 for section in kept for line in section)
+    for section in rest:
+        length += sum(len(line) + 1 for line in section)
+        if length > LONGEST:
+            left_out += 1
+        else:
+            kept.insert(-1, section)
+    if left_out:
+        kept.insert(-1, ["", f"*{left_out} parts are left out here; the HTML report holds them.*"])
+    return "\n".join(line for section in kept for line in section) + "\n"
+
+
+def _sections(report: Report) -> Iterator[Iterable[str]]:
+    """The parts in their order; the first and the last are always there."""
+    yield _head(report)
+    yield _listed("What explains it", (f"{h.probability:.0%}: {hypothesis_text(h)}" for h in report.hypotheses))
+    told = (f"{SEVERITY_WORDS[one.severity]}: {finding_sentence(one)}" for one in noted(report.findings))
+    yield _listed("Findings, the first cause first", told)
+    yield _objectives(report.objectives)
+    for faults in together(report.faults, lambda fault: [cause.path for cause in fault.causes]):
+        yield _causes([one.objective for one in faults], faults[-1].causes)
+    if report.fix is not None:
+        yield _fix(report, report.fix)
+    if report.since is not None:
+        yield _since(report.since)
+    yield _listed("It may be no parameter", (f"{one.circumstance}: {one.text}" for one in report.rivals))
+    yield _listed("What would tell more", report.tell_more)
+    yield _listed("Set aside by the operator", (f"{one.option}: {one.reason}" for one in report.dismissed))
+    yield _listed("Notes", report.notes)
+    yield _account(report)
+    yield _origin(report)
+
+
+def _head(report: Report) -> Iterator[str]:
+    yield f"# Triage of {_escape(Path(report.log.path).name)}"
+    yield ""
+    yield _escape(fit_text(report.profile.name if report.profile else "", report.fit)) + "."
+    yield ""
+    yield _verdict(report)
+
+
+def _verdict(report: Report) -> str:
+    if report.fit.verdict == "no":
+        status, said = plain_verdict(report)
+        return f"**{STATUS_WORDS[status].capitalize()}**: {_escape(said)}."
+    broken = [objective.name for objective in report.objectives if objective.status == "fault"]
+    names = ", ".join(f"`{name}`" for name in broken)
+    if report.abstained:
+        found = f"**Fault**: {names}. " if broken else ""
+        return f"{found}**No change advised**: {_escape(report.abstained)}"
+    worst = [_escape(one.title) for one in report.findings if one.severity == "critical" and not one.after_impact]
+    if not broken and worst:
+        return f"**Fault**: {'; '.join(worst)}."
+    if not broken:
+        unknown = any(objective.status == "not_evaluated" for objective in report.objectives)
+        return "**No fault found**, but not everything could be evaluated." if unknown else "**No fault found.**"
+    if report.fix is None:
+        return f"**Fault**: {names}."
+    fix = report.fix
+    likely = f"{chance(fix.p_fixed, fix.guess)} that all objectives are met"
+    return f"**Fault**: {names}. Change {_changes(fix)}: {likely}."
+
+
+def _changes(fix: FixSet) -> str:
+    return ", ".join(f"`{change.option}` {change.values}" for change in fix.changes)
+
+
+def _objectives(objectives: Iterable[ObjectiveEntry]) -> Iterator[str]:
+    lines = [_objective(one) for one in objectives]
+    if lines:
+        yield from ("", "## Objectives", "", *lines)
+
+
+def _objective(one: ObjectiveEntry) -> str:
+    parts = [f"- {STATUS_WORDS[one.status]} `{one.name}`"]
+    if one.value is not None:
+        parts.append(f" {one.value:.4g} {one.unit}".rstrip())
+    wanted = wanted_text(one)
+    parts += [f", wanted {_escape(wanted)}"] if wanted else []
+    parts += [f": {_escape(one.reason)}"] if one.reason else []
+    return "".join(parts)
+
+
+def _causes(names: list[str], causes: Iterable[CauseEntry]) -> Iterator[str]:
+    yield from ("", f"## Causes of {listed([f'`{name}`' for name in names])}", "")
+    lines = [line for cause in causes for line in _cause(cause)]
+    yield from lines or ["None was found among the options of the profile."]
+
+
+def _cause(cause: CauseEntry) -> Iterator[str]:
+    driven = f"{cause.current:g}{ASSUMED if cause.assumed else ''}"
+    suggested = "" if cause.suggested is None else f" → {cause.suggested:g}"
+    fixed = "" if cause.p_fixed is None else f"{cause.p_fixed:.0%} fixed by it alone, "
+    outside = "" if cause.in_support else ", outside the training runs"
+    yield f"{cause.rank}. **`{cause.option}`** {driven}{suggested} ({fixed}{cause.confidence} confidence{outside})"
+    yield f"   {' → '.join(cause.path)}"
+
+
+def _fix(report: Report, fix: FixEntry) -> Iterator[str]:
+    objectives = {objective.name: objective for objective in report.objectives}
+    yield from ("", "## Fix", "")
+    for name, predicted in fix.predicted.items():
+        yield f"- {STATUS_WORDS[predicted.status]} `{name}` {_prediction(objectives[name], predicted, fix.guess)}"
+    yield from _folded("The difference to the configuration as driven", report.diff.rstrip("\n"), "diff")
+    yield from ("", *_fenced("\n".join(report.apply), "sh"))
+    if fix.alternatives:
+        yield from ("", "Or:", "")
+        yield from (f"- {_changes(other)}: {chance(other.p_fixed, other.guess)}" for other in fix.alternatives)
+
+
+def _prediction(objective: ObjectiveEntry, predicted: PredictedValue, is_guess: bool) -> str:
+    """A yes-or-no objective has a probability, not a value."""
+    if objective.kind == "functional":
+        return chance(predicted.value, is_guess)
+    return f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
+
+
+def _since(since: SinceEntry) -> Iterator[str]:
+    yield from ("", f"## Changed since {_code(Path(since.log).name)}", "")
+    lines = [f"- {_escape(warning)}" for warning in since.warnings]
+    for change in since.changes:
+        option = f" ({change.option})" if change.option and change.option != change.parameter else ""
+        values = f"{_escape(shown(change.from_))} → {_escape(shown(change.to))}"
+        lines.append(f"- {_code(change.parameter)}{option}: {values}")
+    yield from _at_most(lines)
+    if not since.changes:
+        yield "No parameter that anybody sets."
+
+
+def _account(report: Report) -> Iterator[str]:
+    if report.account:
+        yield from ("", "<details><summary>What happened</summary>", "")
+        yield from _at_most([f"- {seconds(one.time_s)}: {_clipped(one.text)}" for one in report.account])
+        yield from ("", "</details>")
+
+
+def _origin(report: Report) -> Iterator[str]:
+    log, profile = report.log, report.profile
+    sha256 = f", SHA-256 `{log.sha256}`" if log.sha256 else ""
+    yield from ("", f"Log {_code(Path(log.path).name)}, {log.format}, {log.duration_s:.0f} s{sha256}.")
+    if profile is not None:
+        yield _escape(f"Profile {profile.name} {profile.version} ({profile.platform}).")
+    for damage in log.damage[:5]:
+        yield f"Damage: {_clipped(damage.what)}."
+    if len(log.damage) > 5:
+        yield f"Damage: {len(log.damage) - 5} more places."
+
+
+def _listed(title: str, sentences: Iterable[str]) -> Iterator[str]:
+    lines = [f"- {_clipped(sentence)}" for sentence in sentences]
+    if lines:
+        yield from ("", f"## {title}", "", *_at_most(lines))
+
+
+def _at_most(lines: list[str]) -> Iterator[str]:
+    yield from lines[:_MOST_LINES]
+    if len(lines) > _MOST_LINES:
+        yield f"- and {len(lines) - _MOST_LINES} more"
+
+
+def _clipped(text: str) -> str:
+    return _escape(text if len(text) <= _MOST_CHARACTERS else f"{text[: _MOST_CHARACTERS - 4]} ...")
+
+
+def _folded(title: str, text: str, language: str) -> Iterator[str]:
+    """A code block that opens on a click; both forums want empty lines inside."""
+    yield from ("", f"<details><summary>{title}</summary>", "", *_fenced(text, language), "", "</details>")
+
+
+def _fenced(text: str, language: str) -> Iterator[str]:
+    """A code block; its fence is longer than any run of backticks inside."""
+    fence = "`" * max(3, 1 + _longest_run(text))
+    yield from (f"{fence}{language}", text, fence)
+
+
+def _escape(text: str) -> str:
+    """A text that is no markup, calls nobody by name and becomes no link."""
+    return _LINKS.sub(r"\\", _SPECIAL.sub(r"\\\1", text)).replace("@", "(at)")
+
+
+def _code(text: str) -> str:
+    """A code span: nothing in it is escaped, so its fence is longer than any run of backticks inside."""
+    fence = "`" * (1 + _longest_run(text))
+    pad = " " if "`" in text else ""
+    return f"{fence}{pad}{text}{pad}{fence}"
+
+
+def _longest_run(text: str) -> int:
+    return max(map(len, re.findall("`+", text)), default=0)
