@@ -113,27 +113,31 @@ _ZIP_HEAD, _ZIP_NAME_AT = b"PK\x03\x04", 30
 
 
 def write_bundle(path: Path, content: bytes, *, force: bool = False) -> None:
-    """Write a bundle whole or not at all. What is there already is replaced where it is a bundle; with `force`, where
-    it is anything but a log.
+    """Write a bundle whole or not at all.
 
     Raises:
-        UsageError: it is something else, or the folder may not be written to.
+        UsageError: something else is there, or the folder may not be written to.
     """
-    refuse_recording(path)
-    if path.is_dir():
-        raise UsageError("This is a folder.", hint="Name a file in it.", where=str(path))
+    check_bundle(path, force=force)
     try:
-        if not force and path.is_file() and path.stat().st_size and not _is_bundle(path):
-            raise UsageError(
-                "There is a file of another kind, which is kept.",
-                hint="Name another file, or replace it with --force.",
-                where=str(path),
-            )
         replace_file(path, content)
     except OSError as err:
         raise UsageError(
             f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
         ) from err
+
+
+def check_bundle(path: Path, *, force: bool = False) -> None:
+    """Raise UsageError for a file that no bundle may replace: any but a bundle; with `force`, a log or an archive."""
+    if not path.is_file() or _is_bundle(path):
+        return
+    refuse_recording(path)
+    if not force and path.stat().st_size:
+        raise UsageError(
+            "There is a file of another kind, which is kept.",
+            hint="Name another file, or replace it with --force.",
+            where=str(path),
+        )
 
 
 def _is_bundle(path: Path) -> bool:

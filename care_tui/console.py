@@ -51,6 +51,11 @@ def check_writable(out: Path) -> None:
     from care_core.files import refuse_recording
 
     refuse_recording(out)
+    check_place(out)
+
+
+def check_place(out: Path) -> None:
+    """Refuse a place where no file can be written, whatever it holds. Raises UsageError."""
     if out.is_dir():
         raise UsageError("This is a folder.", hint="Name a file in it.", where=str(out))
     if not out.parent.is_dir():

@@ -27,7 +27,7 @@ from care_core.report.together import listed, together
 from care_core.report.wording import SEVERITY_WORDS, chance, fit_text, hypothesis_text, noted
 from care_core.report.writers import STATUS_WORDS, plain_verdict
 from care_core.run import shown
-from care_core.text import seconds
+from care_core.text import clean, seconds
 from care_core.variables import ASSUMED
 
 _SIGNS = {"ok": "✓", "fault": "✗", "not_evaluated": "?"}
@@ -279,7 +279,7 @@ def _signals(drawn: Drawn) -> Iterator[str]:
     for limit in drawn.deadlines:
         if drawn.start_s < limit.value < drawn.end_s:
             yield f'<p class="quiet">The broken upright line at {limit.value - drawn.start_s:.1f} s: '
-            yield f"{escape(limit.words)}.</p>"
+            yield f"{escape(clean(limit.words))}.</p>"
     numbered = list(enumerate(drawn.plots, start=1))
     for number, plot in numbered:
         if plot.matters:

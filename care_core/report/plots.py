@@ -153,7 +153,7 @@ def plot_figure(plot: Plot, drawn: Drawn, name: str) -> Iterator[str]:
     for limit in plot.limits:
         if frame.low <= limit.value <= frame.high:
             side = " low" if frame.y_share(limit.value) < 0.2 else ""
-            text = f"{escape(clean(limit.words))}: {figures(limit.value, 4)} {escape(plot.unit)}".rstrip()
+            text = f"{escape(clean(limit.words))}: {figures(limit.value, 4)} {escape(clean(plot.unit))}".rstrip()
             yield f'<span class="limit{side}" style="top:{frame.y_share(limit.value):.1%}">{text}</span>'
     yield '</div><div class="x" aria-hidden="true">'
     for time_s in frame.times:
@@ -178,7 +178,7 @@ def _signs(drawn: Drawn, frame: _Frame) -> Iterator[tuple[int, int, str, float]]
 
 
 def _caption(plot: Plot) -> Iterator[str]:
-    unit = f", {escape(plot.unit)}" if plot.unit else ""
+    unit = f", {escape(clean(plot.unit))}" if plot.unit else ""
     named = f"<strong>{escape(clean(plot.words))}</strong>{unit} <code>{escape(clean(plot.source))}</code>"
     head = named if plot.words else f"<code>{escape(clean(plot.source))}</code>{unit}"
     yield f"<figcaption>{head}"
@@ -198,7 +198,7 @@ def _svg(plot: Plot, drawn: Drawn, frame: _Frame, name: str) -> Iterator[str]:
         f'aria-labelledby="{name}-title {name}-text">'
     )
     yield f'<title id="{name}-title">{escape(clean(plot.title))} over the mission</title>'
-    yield f'<desc id="{name}-text">{escape(_told(plot, drawn))}</desc>'
+    yield f'<desc id="{name}-text">{escape(clean(_told(plot, drawn)))}</desc>'
     for band in plot.bands:
         left, right = frame.x(max(band.start_s, drawn.start_s)), frame.x(min(band.end_s, drawn.end_s))
         yield (

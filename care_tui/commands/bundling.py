@@ -23,7 +23,7 @@ from care_tui.commands.arguments import (
     Thresholds,
     bounds,
 )
-from care_tui.console import Progress, check_writable, emit, say
+from care_tui.console import Progress, check_place, emit, say
 
 app = typer.Typer()
 
@@ -49,10 +49,11 @@ def bundle(
     """
     from care_core.application.bundling import bundle_of
     from care_core.application.sharing import Sharing
-    from care_core.files import write_bundle
+    from care_core.files import check_bundle, write_bundle
 
     target = out or Path("run.care.zip" if anonymous else f"{clean(log.stem)}.care.zip")
-    check_writable(target)
+    check_place(target)
+    check_bundle(target, force=force)
     request = Request(log, profile, tuple(config or ()), thresholds=bounds(threshold or ()), site=site, mission=mission)
     sharing = Sharing(positions=bool(positions), anonymous=anonymous)
     with Progress() as progress:

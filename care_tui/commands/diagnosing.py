@@ -108,13 +108,13 @@ def _write_junit(
     request: Request, sharing: Sharing | None, out: Path | None, *, force: bool, no_history: bool
 ) -> ExitCode:
     """Triage each log by itself and write a suite for each; the gravest of their exit codes."""
-    from care_core.application.testing import Tested, tested
+    from care_core.application.suites import LogSuite, suite_of_log
     from care_core.report.junit import to_junit
 
-    found: list[Tested] = []
+    found: list[LogSuite] = []
     with Progress() as progress:
         for log in (request.log, *request.repeats):
-            found.append(tested(replace(request, log=log, repeats=()), sharing, progress))
+            found.append(suite_of_log(replace(request, log=log, repeats=()), sharing, progress))
             if found[-1].case is not None and not no_history:
                 mention(remember_triage(found[-1].case.diagnosis))
     emit(to_junit([one.suite for one in found]), out, force=force)

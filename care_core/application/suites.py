@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Tested:
+class LogSuite:
     """A log as a suite, what it means for the process, and its case, None where it could not be read."""
 
     suite: Suite
@@ -22,7 +22,7 @@ class Tested:
     case: Case | None = None
 
 
-def tested(request: Request, sharing: Sharing | None, progress: Progress) -> Tested:
+def suite_of_log(request: Request, sharing: Sharing | None, progress: Progress) -> LogSuite:
     """Triage a log. Raises CareError for what is wrong with the request, not with the log."""
     from care_core.application.sharing import Sharing
     from care_core.report.document import build_document
@@ -33,6 +33,6 @@ def tested(request: Request, sharing: Sharing | None, progress: Progress) -> Tes
         case = open_case(request, progress)
     except LogError as err:
         name = f"log{request.log.suffix}" if sharing.anonymous else request.log.name
-        return Tested(unreadable(name, err.message), err.exit_code)
+        return LogSuite(unreadable(name, err.message), err.exit_code)
     document = build_document(sharing.of(case).diagnosis)
-    return Tested(suite_of(document), exit_code(case.diagnosis), case)
+    return LogSuite(suite_of(document), exit_code(case.diagnosis), case)
