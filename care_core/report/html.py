@@ -322,7 +322,7 @@ def _since(since: SinceEntry) -> Iterator[str]:
 def _footer(report: Report) -> Iterator[str]:
     log, profile = report.log, report.profile
     yield "<footer>"
-    yield f"<p>Log <code>{escape(log.path)}</code>, {escape(log.format)}, {log.duration_s:.0f} s"
+    yield f"<p>Log <code>{escape(Path(log.path).name)}</code>, {escape(log.format)}, {log.duration_s:.0f} s"
     yield f", SHA-256 <code>{escape(log.sha256)}</code>.<br>" if log.sha256 else ".<br>"
     if profile is not None:
         yield f"Profile {escape(profile.name)} {escape(profile.version)} ({escape(profile.platform)})."
