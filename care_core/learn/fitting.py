@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.optimize import minimize
 
 from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism, Transform, solve, transformed
@@ -223,7 +224,7 @@ def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_
     p = points.shape[1]
     if p == 0 or np.ptp(targets) == 0:
         return Kernel(np.zeros(p), 0.0, 0.0, 1.0)
-    squared = (points[:, None, :] - points[None, :, :]) ** 2
+    squared = _pairs(points)
     start = np.r_[np.full(p, np.log(0.3)), 0.0, 0.0, np.log(0.5)]
     bounds = [(-6.0, 2.0)] * p + [(-4.0, 3.0)] * 2 + [(np.log(least_noise), 1.0)]
     best = minimize(
@@ -239,33 +240,58 @@ def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_
     return Kernel(theta[:p], float(theta[p]), float(theta[p + 1]), float(theta[p + 2]))
 
 
+@lru_cache(maxsize=2)
+def _below(n: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows and columns of the places below the diagonal of a matrix of n rows."""
+    return np.tril_indices(n, -1)
+
+
+def _pairs(points: FloatArray) -> FloatArray:
+    """Squared distance of every pair of points by input, shape (p, n (n - 1) / 2): what is left of a symmetric matrix,
+    in the order of its rows below the diagonal."""
+    rows, others = _below(len(points))
+    columns = np.ascontiguousarray(points.T)
+    squared: FloatArray = (columns[:, rows] - columns[:, others]) ** 2
+    return squared
+
+
 def _negative_log_posterior(
     log_theta: FloatArray, squared: FloatArray, targets: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Value and gradient with respect to the logarithms of (relevances, additive, joint, noise)."""
-    n, p = len(targets), squared.shape[2]
+    """Value and gradient with respect to the logarithms of (relevances, additive, joint, noise).
+
+    Args:
+        squared: of `_pairs`; a point and itself are at no distance, so their part of each sum is known.
+    """
+    n, p = len(targets), len(squared)
+    below = _below(n)
     relevance, (additive, joint, noise) = np.exp(log_theta[:p]), np.exp(log_theta[p:])
-    weighted = squared * relevance**2
+    weighted = squared * (relevance**2)[:, None]
+    together = np.exp(-0.5 * weighted.sum(axis=0))
     each = np.exp(-0.5 * weighted)
-    together = np.exp(-0.5 * weighted.sum(axis=2))
-    mean_each = each.mean(axis=2)
-    covariance = additive**2 * mean_each + joint**2 * together + np.eye(n) * (noise**2 + JITTER)
-    try:
-        chol = np.linalg.cholesky(covariance)
-    except np.linalg.LinAlgError:
+    mean_each = each.mean(axis=0)
+    covariance = np.zeros((n, n))
+    covariance[below] = additive**2 * mean_each + joint**2 * together
+    np.fill_diagonal(covariance, additive**2 + joint**2 + noise**2 + JITTER)
+    chol, failed = dpotrf(covariance, lower=1)
+    if failed:
         return 1e10, np.zeros_like(log_theta)
-    inverse = cho_solve((chol, True), np.eye(n))
-    alpha = inverse @ targets
+    inverse, _ = dpotri(chol, lower=1)  # below the diagonal
+    alpha, _ = dpotrs(chol, targets, lower=1)
     value = 0.5 * targets @ alpha + np.log(np.diag(chol)).sum()
-    sensitivity = 0.5 * (inverse - np.outer(alpha, alpha))
-    pull = np.einsum("ij,ijk->k", sensitivity * joint**2 * together, weighted)
-    pull += np.einsum("ij,ijk,ijk->k", sensitivity * additive**2 / p, weighted, each)
+    # Each pair stands for two places of the symmetric matrix.
+    sensitivity = inverse[below] - alpha[below[0]] * alpha[below[1]]
+    trace = 0.5 * float(np.trace(inverse) - alpha @ alpha)
+    acting, with_others = sensitivity * (additive**2 / p), sensitivity * joint**2 * together
+    pull = weighted @ with_others
+    weighted *= each
+    pull += weighted @ acting
     ratio = (relevance / RELEVANCE_SCALE) ** 2
     gradient = np.r_[
         -pull + 2 * ratio / (1 + ratio),
-        2 * (sensitivity * additive**2 * mean_each).sum(),
-        2 * (sensitivity * joint**2 * together).sum(),
-        2 * noise**2 * np.trace(sensitivity),
+        2 * (p * float(acting @ mean_each) + additive**2 * trace),
+        2 * (float(with_others.sum()) + joint**2 * trace),
+        2 * noise**2 * trace,
     ]
     return float(value + np.log1p(ratio).sum()), gradient
 

@@ -5,9 +5,17 @@ import pytest
 from scipy.optimize import check_grad
 from threadpoolctl import threadpool_limits
 
-from care_core.causal.mechanisms import FloatArray, Mechanism
+from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism
 from care_core.errors import LearningError
-from care_core.learn.fitting import Effort, Inputs, _negative_log_posterior, best_transform, fit_mechanism
+from care_core.learn.fitting import (
+    RELEVANCE_SCALE,
+    Effort,
+    Inputs,
+    _negative_log_posterior,
+    _pairs,
+    best_transform,
+    fit_mechanism,
+)
 from care_core.learn.skill import calibration_error
 
 RNG = np.random.default_rng
@@ -120,7 +128,7 @@ def test_the_transform_takes_the_skew_away(y: FloatArray, expected: str) -> None
 
 def test_the_gradient_is_the_gradient() -> None:
     points, targets = RNG(0).normal(size=(25, 3)), RNG(1).normal(size=25)
-    squared = (points[:, None, :] - points[None, :, :]) ** 2
+    squared = _pairs(points)
 
     def value(theta: FloatArray) -> float:
         return _negative_log_posterior(theta, squared, targets)[0]
@@ -129,4 +137,10 @@ def test_the_gradient_is_the_gradient() -> None:
         return _negative_log_posterior(theta, squared, targets)[1]
 
     for seed in range(3):
-        assert check_grad(value, gradient, RNG(seed).uniform(-1, 0.5, 6)) < 1e-3
+        theta = RNG(seed).uniform(-1, 0.5, 6)
+        assert check_grad(value, gradient, theta) < 1e-3
+        kernel = Kernel(np.exp(theta[:3]), *np.exp(theta[3:]).tolist())
+        covariance = kernel(points, points) + np.eye(25) * (kernel.noise**2 + JITTER)
+        fit = 0.5 * targets @ np.linalg.solve(covariance, targets) + 0.5 * np.linalg.slogdet(covariance)[1]
+        prior = np.log1p((kernel.relevance / RELEVANCE_SCALE) ** 2).sum()
+        assert value(theta) == pytest.approx(fit + prior, rel=1e-12)
