@@ -73,6 +73,7 @@ BENCHMARKS = (
     Benchmark("wild_logs", "benchmarks.wild_logs --shared {shared}", "no crash, each refusal a sentence", "none known"),
     Benchmark("few_runs", "benchmarks.few_runs --shared {shared} --tables {tables}", "above the peers", "CBI, plain"),
     Benchmark("learning", "benchmarks.learning --shared {shared}", "120 s, 2 GB", "causal-learn's FCI"),
+    Benchmark("fleet", "benchmarks.fleet", "peak grows by 15 % at most; 0.8 of a loop on one worker", "a plain loop"),
     Benchmark("ingest", "benchmarks.ingest", "1.5, 6, 3 s; 300 MB; 5 times faster", "pymavlink, rosbags, mcap"),
     Benchmark("tui", "benchmarks.tui", "0.7 s to the first frame, 50 ms a key, 2 kB", "none"),
 )

@@ -17,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeVar
 
@@ -50,8 +51,10 @@ def connected(scheduler: str | None = None, *, workers: int = 1, memory: str | N
     """
     try:
         import distributed
+
+        import_module("cryptography")  # for the certificate of a local cluster
     except ModuleNotFoundError as err:
-        raise UsageError("Dask is not installed.", hint=f"{INSTALL}.") from err
+        raise UsageError(f"A fleet needs {err.name}, which is not installed.", hint=f"{INSTALL}.") from err
     if scheduler is None:
         _check_memory(memory)
         with _local(workers, memory) as client:

@@ -228,7 +228,8 @@ def _why_not(best: Suggestion) -> str:
     change, units = f"{best.option.name} {best.option.show(best.value)}", f"{best.unit}s"
     helped, harmed = best.having("helped"), best.having("harmed")
     if not helped:
-        return f"no single value of an option would repair one of the {best.failing} {units} that fail"
+        what = "any" if best.unit == "run" else "most failures of any"
+        return f"no single value of an option would repair {what} of the {best.failing} {units} that fail"
     told = f"{change} would help {len(helped)} of the {best.failing} {units} that fail"
     if harmed:
         return f"{told}, and harm {len(harmed)} that did well with what they have"

@@ -397,7 +397,7 @@ def shared_lines(fleet: Fleet, short: Mapping[str, str]) -> Iterator[str]:
 
 
 def _headline(one: Pattern, short: Mapping[str, str]) -> str:
-    words = {"cause": "explains the failures", "finding": "is found", "breach": "is outside its limit"}[one.kind]
+    words = {"cause": "explains failures", "finding": "is found", "breach": "is outside its limit"}[one.kind]
     name = {"parameter": f"the parameter {one.name}"}.get(one.what, one.name) if one.kind == "cause" else one.name
     runs = f" ({one.runs} of {one.of_runs} runs)" if one.unit == "robot" and one.of_runs > one.of else ""
     on = f"on {len(one.affected)} of {one.of} {one.unit}s{runs}, {one.sort}"

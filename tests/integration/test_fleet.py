@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -100,6 +101,15 @@ def test_logs_are_triaged_by_a_scheduler_that_is_named(tmp_path: Path) -> None:
     assert (rows[0].log, rows[0].folder) == ("memory://fleet/r1/flight.BIN", "r1")
     assert all(row.reason for row in rows[1:])
     assert said[-1].startswith("triaged 3 of 3 logs, 2 unreadable")
+
+
+@pytest.mark.parametrize("name", ["distributed", "cryptography"])
+def test_without_the_extra_it_is_said_how_to_have_it(care: Care, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.setitem(sys.modules, name, None)
+    outcome = care("fleet", FLIGHT)
+    assert outcome.code == 2
+    assert f"A fleet needs {name}" in outcome.stderr
+    assert "pip install 'care-tui[fleet]'" in outcome.stderr
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def test_a_cause_on_several_robots_with_what_sets_them_apart() -> None:
     assert (since.start[:10], since.earlier, since.later_with, since.later) == ("2026-11-12", 4, 4, 8)
     assert since.chance == pytest.approx(comb(8, 4) / comb(12, 4))
     text = " ".join(" ".join(shared_lines(together([*bad, *good, *early]), {})).split())
-    assert "the parameter speed explains the failures on 4 of 8 robots (4 of 12 runs), multicopter: r0, r1, r2" in text
+    assert "the parameter speed explains failures on 4 of 8 robots (4 of 12 runs), multicopter: r0, r1, r2" in text
     assert f"all 4 have firmware {NEW}, of the 4 others none ({OLD})" in text
     assert f"none ({OLD}); may be chance" not in text
 
