@@ -27,6 +27,10 @@ _KINDS = {
 """How the first line of a text shows what it is."""
 
 
+_FIRST_WORD = re.compile(r"[^\W\d_]+")
+"""Plain text is told by how it begins: "12 logs of 3 robots" and "Profile rover fits" are not somebody's notes."""
+
+
 def bundled(kind: Literal["profiles", "samples"], name: str = "") -> Path:
     """The path of a bundled profile or sample, or of the folder that holds them all; it may not exist."""
     checkout = _PACKAGE.parent
@@ -163,7 +167,8 @@ def _kind(text: str) -> str:
     line = start.partition("\n")[0].rstrip()
     if start[:1] in ("{", "["):
         return "care document" if _OWN_DOCUMENT.match(start) else "json"
-    return next((kind for kind, shape in _KINDS.items() if shape.match(line)), "text")
+    kind = next((kind for kind, shape in _KINDS.items() if shape.match(line)), "text")
+    return f"text {_FIRST_WORD.findall(line)[:1]}" if kind == "text" else kind
 
 
 def refuse_recording(path: Path) -> None:

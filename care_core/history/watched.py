@@ -34,7 +34,7 @@ class Ledger:
         with self.history.reading() as connection:
             rows = connection.execute(
                 "select 1 from watched where stamp = ? and (state in ('done', 'failed') or attempts >= ?) limit 1",
-                (stamp, MOST_ATTEMPTS),
+                (_storable(stamp), MOST_ATTEMPTS),
             )
             return rows.fetchone() is not None
 
@@ -53,7 +53,16 @@ class Ledger:
             connection.execute(
                 "insert or replace into watched values (?, ?, ?, ?, ?, ?, ?, coalesce("
                 "(select reason from watched where log_sha256 = ?), ''))",
-                (sha256, str(path), stamp, new, attempts + (not done), _holder(), time.time() + valid_s, sha256),
+                (
+                    sha256,
+                    _storable(str(path)),
+                    _storable(stamp),
+                    new,
+                    attempts + (not done),
+                    _holder(),
+                    time.time() + valid_s,
+                    sha256,
+                ),
             )
             return "done" if done else "mine"
 
@@ -78,6 +87,11 @@ class Ledger:
                 "update watched set state = ?, reason = ? where log_sha256 = ?",
                 ("failed" if is_final else "left", reason, sha256),
             )
+
+
+def _storable(name: str) -> str:
+    """A name with the bytes that are no UTF-8 as escapes: a database holds text."""
+    return name.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _holder() -> str:

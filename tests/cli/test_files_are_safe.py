@@ -29,13 +29,15 @@ GOOD = DATA / "arducopter_good.BIN"
         ("flight.log", b"x, broken\nMSG, 100, ArduCopter\n" * 50),
         ("notes.json", b'{"my": "notes"}\n'),
         ("notes.md", b"Buy batteries.\n"),
+        ("notes.txt", b"Buy batteries.\n"),
         ("thesis.json", "über\n".encode("latin-1")),
     ],
 )
 def test_a_file_of_another_kind_is_kept(care: Care, tmp_path: Path, name: str, content: bytes) -> None:
     path = tmp_path / name
     path.write_bytes(content)
-    command = ("triage", GOOD, "--no-history", "--markdown" if name.endswith(".md") else "--json", "--out", path)
+    flags = {".md": ("--markdown",), ".txt": ()}.get(path.suffix, ("--json",))
+    command = ("triage", GOOD, "--no-history", *flags, "--out", path)
     code, _, err = care(*command)
     assert code == ExitCode.USAGE
     assert "--force" in err or "never overwritten" in err
@@ -43,12 +45,12 @@ def test_a_file_of_another_kind_is_kept(care: Care, tmp_path: Path, name: str, c
     assert care(*command, "--force").code in (ExitCode.OK, ExitCode.USAGE)
 
 
-@pytest.mark.parametrize("flag", ["--json", "--yaml", "--markdown"])
-def test_a_report_replaces_its_like(care: Care, tmp_path: Path, flag: str) -> None:
+@pytest.mark.parametrize("flags", [["--json"], ["--yaml"], ["--markdown"], []], ids=str)
+def test_a_report_replaces_its_like(care: Care, tmp_path: Path, flags: list[str]) -> None:
     path = tmp_path / "report"
     path.write_bytes(b"")
     for _ in range(2):
-        assert care("triage", GOOD, "--no-history", flag, "--out", path).code == ExitCode.OK
+        assert care("triage", GOOD, "--no-history", *flags, "--out", path).code == ExitCode.OK
     assert path.stat().st_size
 
 

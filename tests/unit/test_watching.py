@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sqlite3
 import sys
 import time
@@ -26,6 +27,7 @@ from care_core.report.document import build_document
 from care_core.report.watching import WatchEntry, entry_json, entry_line, judged_entry, unread_entry, watch_schema
 from care_core.report.writers import published
 from care_core.run import Robot
+from care_core.text import clean
 from tests.made import HOSTILE, made_diagnosis
 
 DOCUMENT = published(build_document(made_diagnosis()))
@@ -39,7 +41,7 @@ def judge(path: Path, _task: Task) -> Triage | Failed:
         return Failed("It is bad.", is_final=True)
     if content.startswith(b"kill"):
         return Failed("reading it ended the process", is_final=False)
-    log = {**DOCUMENT["log"], "path": str(path), "sha256": sha256(content).hexdigest()}
+    log = {**DOCUMENT["log"], "path": clean(str(path)), "sha256": sha256(content).hexdigest()}
     return {**DOCUMENT, "log": log}, 1, About(ROBOT)
 
 
@@ -103,6 +105,14 @@ def test_a_new_start_knows_what_is_done_by_place_and_by_content(bench: Bench) ->
     bench.started()
     assert bench.looks() == []
     assert bench.watcher.known == 2
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names are text")
+def test_a_name_that_is_no_text_stops_nothing(bench: Bench) -> None:
+    (bench.folder / os.fsdecode(b"\xff\xfe.BIN")).write_text("good")
+    assert [entry.verdict for entry in bench.looks()] == ["fault"]
+    bench.started()
+    assert bench.looks() == []
 
 
 def test_a_copy_that_comes_later_is_shown_and_not_judged_again(bench: Bench) -> None:
