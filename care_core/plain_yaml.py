@@ -17,8 +17,6 @@ from care_core import limits
 
 _SHALLOW = 400
 """A text whose longest line and brackets together are fewer cannot be nested any deeper."""
-
-
 _LONG_TEXT = 1000
 """Characters that count as one value more."""
 _WIDTH = 120

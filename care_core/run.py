@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeGuard
 
@@ -44,6 +44,10 @@ class Setting:
     high: float | None = None
     changed_at_s: float | None = None
     """Seconds from the start of the log of the last change after the first value, None when it never changed."""
+
+
+Find = Callable[[str], Setting | None]
+"""What files give a parameter, by its name in a log; None where they give nothing."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from care_core.text import clean
 if TYPE_CHECKING:
     from care_core.application.case import Case
     from care_core.configs.compare import Side
-    from care_core.configs.edit import EditedFile
+    from care_core.configs.edit import EditedFile, Wanted
     from care_core.diagnose.records import Diagnosis, Fix
     from care_core.report.document import TriageDocument
 
@@ -85,7 +85,29 @@ def apply_report(
     Raises:
         CareError: the report suggests no change or is damaged, or no file can hold it.
     """
-    from care_core.configs.edit import Wanted, apply_changes
+    from care_core.configs.edit import apply_changes
+
+    return apply_changes(configs, _wanted(report, alternative, profile))
+
+
+def override_of(report: Path, configs: Sequence[str], alternative: int = 0, profile: str | None = None) -> str:
+    """A report's fix as a file of its own, to be loaded after the others: for one that several nodes load.
+
+    Args and Raises as `apply_report`; `configs` say the format alone.
+    """
+    from care_core.configs.formats import text_for, write_params
+    from care_core.configs.loading import read_configs
+    from care_core.configs.yaml_tree import typed
+    from care_core.run import Setting
+
+    format = read_configs(configs)[0].format
+    wanted = _wanted(report, alternative, profile)
+    texts = {one.parameter: text_for(format, one.option, one.value) for one in wanted}
+    return write_params({name: Setting(name, typed(text), str(report)) for name, text in texts.items()}, format)
+
+
+def _wanted(report: Path, alternative: int, profile: str | None) -> list[Wanted]:
+    from care_core.configs.edit import Wanted
     from care_core.profile.store import load_profile
     from care_core.report.reading import profile_of, read_report
 
@@ -104,7 +126,7 @@ def apply_report(
             raise ConfigError(f"The profile has no option '{clean(change.option)}'.", where=str(report))
         named = [change.parameter] if isinstance(change.parameter, str) else change.parameter
         wanted += [Wanted(option, parameter, float(change.to)) for parameter in named]
-    return apply_changes(configs, wanted)
+    return wanted
 
 
 def patch_of(files: Iterable[EditedFile]) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections import ChainMap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from care_core.errors import ConfigError
-from care_core.run import Setting
+from care_core.run import Find, Setting
 from care_core.text import clean
 from care_core.variables import Variable
 
@@ -51,9 +52,9 @@ def _number(name: str, text: str, where: str) -> float:
         ) from None
 
 
-def find(files: Sequence[Mapping[str, Setting]], parameter: str) -> Setting | None:
-    """The value that files loaded one after the other give a parameter."""
-    return next((settings[parameter] for settings in reversed(files) if parameter in settings), None)
+def finder(files: Sequence[Mapping[str, Setting]]) -> Find:
+    """The values that files loaded one after the other give parameters."""
+    return dict(ChainMap(*(dict(settings) for settings in reversed(files)))).get
 
 
 def is_name(name: str) -> bool:

@@ -1,8 +1,8 @@
 """Changes put into configuration files: only the value on the line concerned is touched.
 
 Comments, order, spacing and line ends stay, since nothing is parsed and written again: the reader says on which line a
-parameter is, and the value there is replaced. The edited text is then read once more, so a line that cannot be edited
-safely is refused, never damaged.
+parameter is, and the value there is replaced. The edited text is then read once more, whatever the number of changes,
+so a line that cannot be edited safely is refused, never damaged.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ _LINES = {
     ConfigFormat.ROS2_YAML: _YAML_VALUE,
 }
 """Before the value, the value, behind it."""
+_APART = "One file is loaded for both: put one of them into a file of its own, loaded after it."
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,14 +42,21 @@ class Wanted:
 
 @dataclass(slots=True)
 class Edit:
-    """What was done on one line. `before` is None for a parameter that was added."""
+    """What was done to one setting of a file, None for parameters that no file held."""
 
     where: str
     """file:line"""
     parameters: list[str]
-    before: float | str | None
+    held: Setting | None
     after: str
     notes: list[str]
+    shared: set[str] = field(default_factory=set)
+    """What else has its value from there, since the file is loaded more than once, and nobody wanted to change."""
+
+    @property
+    def before(self) -> float | str | None:
+        """The value that the file had, None where it had none."""
+        return None if self.held is None else self.held.value
 
 
 @dataclass(slots=True)
@@ -56,11 +64,20 @@ class EditedFile:
     """A file with its text before and after."""
 
     path: Path
-    namespace: str
-    held: ConfigFile
+    held: tuple[ConfigFile, ...]
+    """What it holds, once for each namespace that it is loaded into."""
     before: str
     after: str
     edits: list[Edit] = field(default_factory=list)
+
+    @property
+    def format(self) -> ConfigFormat:
+        """How the file is written."""
+        return self.held[0].format
+
+    def holds(self, setting: Setting) -> bool:
+        """Whether a setting is of this file."""
+        return any(held.settings.get(setting.name) is setting for held in self.held)
 
 
 def apply_changes(names: Sequence[str], wanted: Sequence[Wanted]) -> tuple[EditedFile, ...]:
@@ -74,8 +91,8 @@ def apply_changes(names: Sequence[str], wanted: Sequence[Wanted]) -> tuple[Edite
     Raises:
         ConfigError: a file cannot be read, or a parameter cannot be set in any of them.
     """
-    files = [_opened(held, *split_name(name)) for held, name in zip(read_configs(names), names, strict=True)]
-    held = [file.held for file in files]
+    held = read_configs(names)
+    files = _opened(held, [split_name(name)[0] for name in names])
     found = resolve(held, [one.parameter for one in wanted])
     unsure = {parameter for named in guesses(held, found).values() for parameter in named}
     for one in wanted:
@@ -83,65 +100,109 @@ def apply_changes(names: Sequence[str], wanted: Sequence[Wanted]) -> tuple[Edite
         if setting is None:
             _add(files, one)
         else:
-            file = next(file for file in files if file.held.settings.get(setting.name) is setting)
-            _set(file, setting, one, unsure=one.parameter in unsure)
-    return tuple(files)
+            _set(next(file for file in files if file.holds(setting)), setting, one, unsure=one.parameter in unsure)
+    for file in files:
+        _check(file)
+    return files
 
 
-def _opened(held: ConfigFile, path: Path, namespace: str) -> EditedFile:
-    with path.open(encoding="utf-8", newline="") as stream:  # as it is, with its line ends
-        text = stream.read()
-    return EditedFile(path, namespace, held, text, text)
+def _opened(held: Sequence[ConfigFile], paths: Sequence[Path]) -> tuple[EditedFile, ...]:
+    """Each file once, however often it is loaded, in the order in which it is named first."""
+    loaded: dict[Path, list[ConfigFile]] = {}
+    for file, path in zip(held, paths, strict=True):
+        same = next((known for known in loaded if known.samefile(path)), path)
+        loaded.setdefault(same, []).append(file)
+    return tuple(EditedFile(path, tuple(several), text := _as_it_is(path), text) for path, several in loaded.items())
+
+
+def _as_it_is(path: Path) -> str:
+    with path.open(encoding="utf-8", newline="") as stream:  # with its line ends
+        return stream.read()
 
 
 def _set(file: EditedFile, setting: Setting, one: Wanted, *, unsure: bool) -> None:
-    after = text_for(file.held.format, one.option, one.value)
-    earlier = next((edit for edit in file.edits if edit.where == setting.source), None)
+    after = text_for(file.format, one.option, one.value)
+    earlier = next((edit for edit in file.edits if edit.held is not None and _is_same(file, edit.held, setting)), None)
     if earlier is not None:
         if earlier.after != after:
             raise ConfigError(
                 f"{earlier.parameters[0]} and {one.parameter} want different values on one line.",
-                hint="Give each its own line.",
+                hint=_APART,
                 where=setting.source,
             )
         earlier.parameters.append(one.parameter)
+        earlier.shared.discard(setting.name)
         return
-    lines = file.after.splitlines(keepends=True)
-    index = int(setting.source.rpartition(":")[2]) - 1
-    lines[index] = _with_value(lines[index], file.held.format, setting, after)
-    edited = "".join(lines)
-    if not _reads_back(file, edited, setting, after):
-        raise ConfigError(
-            f"{one.parameter} cannot be changed in place: its value is not plain on its line.",
-            hint=f"Set it to {after} by hand.",
-            where=setting.source,
-        )
-    file.after = edited
+    file.after = _with_line(file.after, file.format, setting, after)
     notes = ["takes effect after a restart"] if one.option.reboot_required else []
     if unsure:
         notes.append("the file does not say whose parameter this is: every node that loads it gets the value")
-    file.edits.append(Edit(setting.source, [one.parameter], setting.value, after, notes))
+    others = [held for held in file.held if held.settings.get(setting.name) is not setting]
+    shared = {other.name for held in others for other in held.settings.values() if _is_same(file, setting, other)}
+    file.edits.append(Edit(setting.source, [one.parameter], setting, after, notes, shared))
 
 
-def _with_value(line: str, format: ConfigFormat, setting: Setting, after: str) -> str:
-    """The line with another value; unchanged where it is not of a plain form."""
-    body = line.rstrip("\r\n")
+def _is_same(file: EditedFile, one: Setting, other: Setting) -> bool:
+    """Whether two settings are one value of a file that is loaded more than once."""
+    return one.source == other.source and _own_name(file, one) == _own_name(file, other)
+
+
+def _own_name(file: EditedFile, setting: Setting) -> str:
+    """A setting's name without the namespace that the file is loaded into."""
+    namespace = next(held.namespace for held in file.held if held.settings.get(setting.name) is setting)
+    return setting.name.lstrip("/").removeprefix(namespace.strip("/")).lstrip("/")
+
+
+def _with_line(text: str, format: ConfigFormat, setting: Setting, after: str) -> str:
+    """The text with another value on the line of a setting; unchanged where that line is not of a plain form."""
+    lines = text.splitlines(keepends=True)
+    index = int(setting.source.rpartition(":")[2]) - 1
+    body = lines[index].rstrip("\r\n")
     key = re.escape(re.split(r"[/.]", setting.name)[-1])
     match = re.fullmatch(_LINES[format].format(key=key), body)
-    return line if match is None else f"{match[1]}{after}{match[3]}{line[len(body) :]}"
+    if match is not None:
+        lines[index] = f"{match[1]}{after}{match[3]}{lines[index][len(body) :]}"
+    return "".join(lines)
 
 
-def _reads_back(file: EditedFile, text: str, setting: Setting, after: str) -> bool:
-    """Whether the edited text holds the new value, and every other one as before."""
+def _check(file: EditedFile) -> None:
+    """Raise ConfigError where the edited text does not read as the old one with the new values."""
+    changed = [edit for edit in file.edits if edit.held is not None]
+    if not changed or _reads_back(file, file.after, file.edits):
+        return
+    for edit in changed:
+        assert edit.held is not None
+        alone = _with_line(file.before, file.format, edit.held, edit.after)
+        if not _reads_back(file, alone, [edit]):
+            break
+    raise ConfigError(
+        f"{edit.parameters[0]} cannot be changed in place: its value is not plain on its line.",
+        hint=f"Set it to {edit.after} by hand.",
+        where=edit.where,
+    )
+
+
+def _reads_back(file: EditedFile, text: str, edits: Sequence[Edit]) -> bool:
+    """Whether a text holds what was changed and added, and everything else as before."""
+    return all(_reads_back_in(file, held, text, edits) for held in file.held)
+
+
+def _reads_back_in(file: EditedFile, held: ConfigFile, text: str, edits: Sequence[Edit]) -> bool:
     try:
-        before = read_text(file.after.lstrip("\ufeff"), file.path, file.namespace)
-        now = read_text(text.lstrip("\ufeff"), file.path, file.namespace)
+        now = read_text(text.lstrip("\ufeff"), file.path, held.namespace)
     except ConfigError:
         return False
-    others = {name: shown(one.value) for name, one in before.settings.items() if name != setting.name}
-    kept = {name: shown(one.value) for name, one in now.settings.items() if name != setting.name}
-    held = now.settings.get(setting.name)
-    return now.format is before.format and others == kept and held is not None and _is(held.value, after)
+    lines = {edit.where for edit in edits if edit.held is not None}
+    new_values = {(edit.where, _own_name(file, edit.held)): edit.after for edit in edits if edit.held is not None}
+    added = {edit.parameters[0] for edit in edits if edit.held is None}
+    if now.format is not held.format or now.settings.keys() != held.settings.keys() | added:
+        return False
+    for name, before in held.settings.items():
+        value = now.settings[name].value
+        new = new_values.get((before.source, _own_name(file, before))) if before.source in lines else None
+        if not (shown(value) == shown(before.value) if new is None else _is(value, new)):
+            return False
+    return True
 
 
 def _is(value: float | str, text: str) -> bool:
@@ -154,17 +215,17 @@ def _is(value: float | str, text: str) -> bool:
 
 
 def _add(files: Sequence[EditedFile], one: Wanted) -> None:
-    file = next((f for f in files if f.held.format in (ConfigFormat.ARDUPILOT_PARAM, ConfigFormat.QGC_PARAMS)), None)
+    file = next((f for f in files if f.format in (ConfigFormat.ARDUPILOT_PARAM, ConfigFormat.QGC_PARAMS)), None)
     if file is None:
         raise ConfigError(
             f"No file holds {one.parameter}.",
             hint="Name the file that does, with its namespace if it has none (NAMESPACE=FILE), or add the line to it.",
             where=", ".join(str(f.path) for f in files),
         )
-    after = text_for(file.held.format, one.option, one.value)
+    after = text_for(file.format, one.option, one.value)
     end = "\r\n" if "\r\n" in file.after else "\n"
     separator = "" if not file.after or file.after.endswith(("\n", "\r")) else end
-    if file.held.format is ConfigFormat.QGC_PARAMS:
+    if file.format is ConfigFormat.QGC_PARAMS:
         row = f"1\t1\t{one.parameter}\t{after}\t{6 if one.option.type in ('int', 'bool', 'enum') else 9}"
     else:
         row = f"{one.parameter},{after}"

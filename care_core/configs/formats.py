@@ -1,6 +1,6 @@
 """The formats of configuration files, told apart by content.
 
-One module a format, each with `read`, `find` (the value that loaded files give a parameter), `write`, `text_of`,
+One module a format, each with `read`, `finder` (the values that loaded files give parameters), `write`, `text_of`,
 `line_of` and `commands`.
 """
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import gc
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from care_core.configs import ros1_yaml
 from care_core.configs.formats import MODULES, ConfigFormat, format_of
 from care_core.errors import ConfigError
-from care_core.run import Setting
+from care_core.run import Find, Setting
 
 _LARGEST_BYTES = 1_000_000
 
@@ -22,6 +24,7 @@ class ConfigFile:
     path: str
     format: ConfigFormat
     settings: Mapping[str, Setting]
+    namespace: str = ""
 
 
 def read_config(path: str | Path, namespace: str = "") -> Mapping[str, Setting]:
@@ -43,13 +46,26 @@ def _read(path: Path, namespace: str) -> ConfigFile:
 def read_text(text: str, path: Path, namespace: str = "") -> ConfigFile:
     """A configuration file's text as `read_configs` reads the file. Raises ConfigError."""
     format = format_of(text, path)
-    if not namespace:
-        return ConfigFile(str(path), format, MODULES[format].read(text, path))
-    if format not in (ConfigFormat.ROS1_YAML, ConfigFormat.ROS2_YAML):
+    if namespace and format not in (ConfigFormat.ROS1_YAML, ConfigFormat.ROS2_YAML):
         raise ConfigError(
             "Only ROS parameters have namespaces.", hint=f"Leave '{namespace}=' out.", where=f"{namespace}={path}"
         )
-    return ConfigFile(f"{namespace}={path}", format, MODULES[format].read(text, path, namespace))
+    with _no_collector():
+        if not namespace:
+            return ConfigFile(str(path), format, MODULES[format].read(text, path))
+        return ConfigFile(f"{namespace}={path}", format, MODULES[format].read(text, path, namespace), namespace)
+
+
+@contextmanager
+def _no_collector() -> Iterator[None]:
+    """While a tree grows nothing of it is garbage, and the collector would walk all of it again and again."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def _text(path: Path) -> str:
@@ -91,10 +107,11 @@ def resolve(files: Sequence[ConfigFile], parameters: Iterable[str]) -> dict[str,
     loaded: dict[ConfigFormat, list[Mapping[str, Setting]]] = {}
     for file in files:
         loaded.setdefault(file.format, []).append(file.settings)
+    finders: list[Find] = [MODULES[format].finder(settings) for format, settings in loaded.items()]
     found: dict[str, Setting] = {}
     for parameter in parameters:
-        for format, settings in loaded.items():
-            setting: Setting | None = MODULES[format].find(settings, parameter)
+        for find in finders:
+            setting = find(parameter)
             if setting is not None:
                 found[parameter] = setting
     return found

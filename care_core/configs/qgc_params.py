@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from care_core.configs.ardupilot_param import commands, find, is_name, line_of, not_a_name, plain, text_of
+from care_core.configs.ardupilot_param import commands, finder, is_name, line_of, not_a_name, plain, text_of
 from care_core.errors import ConfigError
 from care_core.run import Setting
 
-__all__ = ["commands", "find", "is_row", "line_of", "read", "text_of", "write"]
+__all__ = ["commands", "finder", "is_row", "line_of", "read", "text_of", "write"]
 
 HEADER = "# Vehicle-Id Component-Id Name Value Type"
 

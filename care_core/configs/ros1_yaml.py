@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from care_core.configs import yaml_tree
-from care_core.run import Setting
+from care_core.run import Find, Setting
 from care_core.variables import Variable
 
 DYNAMIC_RECONFIGURE = "dynamic_reconfigure.encoding.Config"
@@ -28,8 +29,13 @@ def read(text: str, path: Path, namespace: str = "") -> dict[str, Setting]:
     return settings
 
 
-def find(files: Sequence[Mapping[str, Setting]], parameter: str) -> Setting | None:
-    """The value that files loaded one after the other give a parameter of the log.
+def finder(files: Sequence[Mapping[str, Setting]]) -> Find:
+    """The values that files loaded one after the other give parameters of a log."""
+    return partial(_find, tuple(files))
+
+
+def _find(files: Sequence[Mapping[str, Setting]], parameter: str) -> Setting | None:
+    """The value that files give a parameter.
 
     A file does not name the namespace it is loaded into: `DWAPlannerROS/sim_time` in it is
     `/move_base/DWAPlannerROS/sim_time` in the log. In one file the longest trailing part counts. A bare last name

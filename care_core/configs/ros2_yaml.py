@@ -9,17 +9,17 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 from care_core.configs import yaml_tree
 from care_core.configs.ros1_yaml import line_of, text_of
 from care_core.errors import ConfigError
-from care_core.run import Setting
+from care_core.run import Find, Setting
 from care_core.variables import Variable
 
-__all__ = ["PARAMETERS", "commands", "find", "line_of", "read", "text_of", "write"]
+__all__ = ["PARAMETERS", "commands", "finder", "line_of", "read", "text_of", "write"]
 
 PARAMETERS = "ros__parameters"
 """The key under which a node's parameters are."""
@@ -47,21 +47,29 @@ def read(text: str, path: Path, namespace: str = "") -> dict[str, Setting]:
     return settings
 
 
-def find(files: Sequence[Mapping[str, Setting]], parameter: str) -> Setting | None:
-    """The value that files loaded together give a parameter.
+def finder(files: Sequence[Mapping[str, Setting]]) -> Find:
+    """The values that files loaded together give parameters.
 
     As rclcpp does it: of the nodes whose name or pattern fits, the one named last counts, where a node that several
     files name stands at its first place and has the value of the last of them.
     """
-    node, _, path = parameter.partition(".")
     merged: dict[str, Setting] = {}
     for settings in files:
         merged.update(settings)
-    order: dict[str, int] = {}
-    for name in merged:
-        order.setdefault(name.partition(".")[0], len(order))
-    fitting = [pattern for pattern in order if f"{pattern}.{path}" in merged and _pattern(pattern).fullmatch(node)]
-    return merged[f"{max(fitting, key=order.__getitem__)}.{path}"] if fitting else None
+    order = {pattern: place for place, pattern in enumerate(dict.fromkeys(name.partition(".")[0] for name in merged))}
+    wild = [pattern for pattern in order if "*" in pattern]
+
+    @cache
+    def fitting(node: str) -> tuple[str, ...]:
+        """The patterns that fit a node, the one that counts most first."""
+        found = [pattern for pattern in wild if _pattern(pattern).fullmatch(node)]
+        return tuple(sorted([*found, node] if node in order else found, key=order.__getitem__, reverse=True))
+
+    def find(parameter: str) -> Setting | None:
+        node, _, path = parameter.partition(".")
+        return next((merged[name] for pattern in fitting(node) if (name := f"{pattern}.{path}") in merged), None)
+
+    return find
 
 
 @lru_cache(maxsize=1024)

@@ -130,6 +130,16 @@ def plain(value: float | str) -> Any:
     return value
 
 
+def typed(text: str) -> float | str:
+    """A value as a line of a file has it: an integer, a number or a word."""
+    for number in (int, float):
+        try:
+            return number(text)
+        except ValueError:
+            continue
+    return text
+
+
 def dump(tree: Mapping[str, Any], remarks: Mapping[tuple[str, ...], str]) -> str:
     """A nested mapping as text; `remarks` are comments at the end of the line of the key that a path leads to."""
     if not tree:

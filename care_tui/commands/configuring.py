@@ -47,6 +47,9 @@ def apply(
         typer.Argument(metavar="CONFIG...", help="Files in the order they are loaded, for ROS also NAMESPACE=FILE."),
     ],
     out: Annotated[Path | None, typer.Option("--out", "-o", help="The new file; a folder for several.")] = None,
+    override: Annotated[
+        bool, typer.Option("--override", help="Leave the files alone: write the changes into one to be loaded last.")
+    ] = False,
     in_place: Annotated[bool, typer.Option("--in-place", help="Change the files, each kept as FILE.bak.")] = False,
     force: Force = False,
     alternative: Annotated[int, typer.Option("--alternative", min=0, help="Another of the report's fixes.")] = 0,
@@ -55,10 +58,15 @@ def apply(
     ] = None,
 ) -> None:
     """Put a report's fix into configuration files. Comments and order stay. Without -o, print the patch."""
-    from care_core.application.configuring import patch_of
+    from care_core.application.configuring import override_of, patch_of
 
-    if out is not None and in_place:
-        raise UsageError("Either --out or --in-place.", hint="Leave one out.", where="--in-place")
+    if in_place and (override or out is not None):
+        raise UsageError(
+            f"Either {'--override' if override else '--out'} or --in-place.", hint="Leave one out.", where="--in-place"
+        )
+    if override:
+        _write_or_print(override_of(report, config, alternative, profile), out, force=force)
+        return
     edited = care_core.apply(report, *config, alternative=alternative, profile=profile)
     for line in _told(edited):
         say(line)
@@ -79,8 +87,22 @@ def _told(edited: Sequence[EditedFile]) -> Iterator[str]:
         yield f"{edit.where}: {', '.join(edit.parameters)}  {shown(edit.before)} -> {edit.after}"
         if len(edit.parameters) > 1:
             yield f"  ! one line sets {len(edit.parameters)} parameters"
+        if edit.shared:
+            yield f"  ! the file is loaded for {', '.join(sorted(edit.shared))} too: --override leaves that as it is"
         for note in edit.notes:
             yield f"  ! {note}"
+
+
+def _write_or_print(text: str, out: Path | None, *, force: bool) -> None:
+    from care_core.files import check_replaceable, write_atomically
+
+    if out is None:
+        emit(text)
+        return
+    if not force:
+        check_replaceable(out, text)
+    write_atomically(out, text)
+    say(f"wrote {out}: load it after the other files")
 
 
 def _replace(file: EditedFile) -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from care_core.configs.compare import Side, compare
 from care_core.configs.driven import same_value
 from care_core.configs.edit import Wanted, apply_changes
-from care_core.configs.loading import read_config
+from care_core.configs.loading import ConfigFile, read_config, read_text
 from care_core.errors import ConfigError
 from care_core.run import Setting
 from care_core.variables import Role, Variable
@@ -192,3 +192,65 @@ def test_apply_refuses_what_it_cannot_do(care: Care, files: tuple[Path, Path], t
     assert care("apply", report, config, "--alternative", "9").code == 2
     assert care("apply", report, tmp_path / "none.param").code == 2
     assert care("apply", config, config).code == 2
+
+
+def test_two_keys_on_one_line_are_set_each(tmp_path: Path) -> None:
+    other = Variable("b", Role.OPTION, parameters=("/move_base/DWA/b",))
+    named = written(tmp_path, "a.yaml", "DWA: {max_vel: 0.5, b: 2.0}\n")
+    (file,) = apply_changes([named], [*wanted(SPEED, 0.7), *wanted(other, 0.7)])
+    assert file.after == "DWA: {max_vel: 0.7, b: 0.7}\n"
+
+
+def test_a_file_that_two_costmaps_load_is_edited_once_and_says_who_else_reads_it(tmp_path: Path) -> None:
+    named = written(tmp_path, "common.yaml", "r: 0.5\n")
+    both = [f"move_base/global_costmap={named}", f"move_base/local_costmap={named}"]
+    (file,) = apply_changes(both, wanted(RADIUS, 0.7)[:1])
+    assert file.after == "r: 0.7\n"
+    assert file.edits[0].shared == {"move_base/local_costmap/r"}
+
+    (file,) = apply_changes(both, wanted(RADIUS, 0.7))
+    assert file.edits[0].parameters == list(RADIUS.parameters)
+    assert file.edits[0].shared == set()
+
+    different = [Wanted(RADIUS, RADIUS.parameters[0], 0.7), Wanted(RADIUS, RADIUS.parameters[1], 0.8)]
+    with pytest.raises(ConfigError, match="one line"):
+        apply_changes(both, different)
+
+
+def test_a_file_is_read_twice_however_many_changes_go_into_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read: list[str] = []
+
+    def counting(text: str, path: Path, namespace: str = "") -> ConfigFile:
+        read.append(text)
+        return read_text(text, path, namespace)
+
+    monkeypatch.setattr("care_core.configs.edit.read_text", counting)
+    options = [Variable(f"p{i}", Role.OPTION, parameters=(f"/n/p{i}",)) for i in range(20)]
+    named = written(tmp_path, "n.yaml", "n:\n" + "".join(f"  p{i}: 0.5\n" for i in range(20)))
+    (file,) = apply_changes([named], [Wanted(one, one.parameters[0], 0.7) for one in options])
+    assert file.after == file.before.replace("0.5", "0.7")
+    assert len(read) == 1  # beside the first reading, which `read_configs` does
+
+
+def test_a_recorded_configuration_keeps_every_byte_and_a_change_is_the_only_difference(
+    recorded: Path, tmp_path: Path
+) -> None:
+    files = [path for path in (recorded / "logs" / "configs").rglob("*") if path.is_file()]
+    assert len(files) > 30
+    for path in files:
+        (file,) = apply_changes([str(path)], [])
+        assert file.after.encode() == path.read_bytes()
+        held = file.held[0].settings
+        numbers = [one for one in held.values() if isinstance(one.value, (int, float))][::7]
+        changes = [
+            Wanted(
+                Variable("o", Role.OPTION, "int" if isinstance(one.value, int) else "float"), one.name, one.value + 1
+            )
+            for one in numbers
+            if isinstance(one.value, (int, float)) and (value := 2 * one.value + 1) is not None
+        ]
+        (file,) = apply_changes([str(path)], changes)
+        copy = tmp_path / f"copy{path.suffix}"
+        copy.write_bytes(file.after.encode())
+        found = compare(Side("a", held, file.format), Side("b", read_config(copy), file.format), everything=True)
+        assert {one.parameter for one in found} == {one.name for one in numbers}
