@@ -40,7 +40,7 @@ def read_config(path: str | Path, namespace: str = "") -> Mapping[str, Setting]:
 
 
 def _read(path: Path, namespace: str) -> ConfigFile:
-    return read_text(_text(path), path, namespace)
+    return read_text(text_of_file(path), path, namespace)
 
 
 def read_text(text: str, path: Path, namespace: str = "") -> ConfigFile:
@@ -68,7 +68,8 @@ def _no_collector() -> Iterator[None]:
             gc.enable()
 
 
-def _text(path: Path) -> str:
+def text_of_file(path: Path) -> str:
+    """The text of a configuration file, without the mark that some editors begin it with. Raises ConfigError."""
     try:
         if path.stat().st_size > _LARGEST_BYTES:
             raise ConfigError("Too large for a configuration file.", hint="Is it a log?", where=str(path))

@@ -12,9 +12,6 @@ from care_core.configs import yaml_tree
 from care_core.run import Find, Setting
 from care_core.variables import Variable
 
-DYNAMIC_RECONFIGURE = "dynamic_reconfigure.encoding.Config"
-"""Class in the tag of a file that `dynparam dump` wrote."""
-
 
 def read(text: str, path: Path, namespace: str = "") -> dict[str, Setting]:
     """Parameters by path (`DWAPlannerROS/sim_time`, without a leading slash), under the namespace given."""
@@ -23,7 +20,7 @@ def read(text: str, path: Path, namespace: str = "") -> dict[str, Setting]:
         return {}
     outer = (namespace.strip("/"),) if namespace.strip("/") else ()
     settings = {}
-    for leaf in yaml_tree.leaves(root, unwrap=DYNAMIC_RECONFIGURE):
+    for leaf in yaml_tree.leaves(root, unwrap=yaml_tree.DYNAMIC_RECONFIGURE):
         name = "/".join((*outer, *leaf.keys))
         settings[name] = Setting(name, leaf.value, f"{path}:{leaf.line}")
     return settings

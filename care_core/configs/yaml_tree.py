@@ -31,6 +31,10 @@ _LIST_TAG = "tag:yaml.org,2002:seq"
 _BOOL_TAG = "tag:yaml.org,2002:bool"
 
 
+DYNAMIC_RECONFIGURE = "dynamic_reconfigure.encoding.Config"
+"""Class in the tag of a file that `dynparam dump` wrote."""
+
+
 class Leaf(NamedTuple):
     """A value of the file: the keys that lead to it, and its line, from 1."""
 
@@ -64,8 +68,13 @@ def leaves(root: MappingNode, *, unwrap: str = "") -> Iterator[Leaf]:
     return _mapping(root, (), unwrap)
 
 
+def is_dumped(node: MappingNode, name: str = DYNAMIC_RECONFIGURE) -> bool:
+    """Whether a mapping is a Python object of that class, as its tag says."""
+    return name in str(node.tag)
+
+
 def _mapping(node: MappingNode, keys: tuple[str, ...], unwrap: str) -> Iterator[Leaf]:
-    dumped = bool(unwrap) and unwrap in str(node.tag)
+    dumped = bool(unwrap) and is_dumped(node, unwrap)
     for key, value in node.value:
         name = str(key.value).strip("/") or str(key.value)
         if dumped and name == "dictitems" and isinstance(value, MappingNode):
@@ -74,11 +83,12 @@ def _mapping(node: MappingNode, keys: tuple[str, ...], unwrap: str) -> Iterator[
             continue
         elif isinstance(value, MappingNode):
             yield from _mapping(value, (*keys, name), unwrap)
-        elif (plain := _plain(value)) is not None:
+        elif (plain := plain_value(value)) is not None:
             yield Leaf((*keys, name), plain, value.start_mark.line + 1)
 
 
-def _plain(node: Node) -> float | str | None:
+def plain_value(node: Node) -> float | str | None:
+    """A number, text or list as its text; None for nothing, and for what holds mappings."""
     if isinstance(node, ScalarNode) and node.tag != _NULL_TAG:
         return _scalar(node)
     return _list(node) if isinstance(node, SequenceNode) and node.tag == _LIST_TAG else None

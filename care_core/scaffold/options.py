@@ -9,8 +9,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from care_core.configs.driven import same_value
+from care_core.metadata.fact import Fact
+from care_core.metadata.navigation import fact_of
 from care_core.run import Setting
-from care_core.scaffold.facts import Fact, fact_of
 from care_core.scaffold.never import SAFETY, reason_against
 from care_core.scaffold.seen import Ecosystem, Seen
 from care_core.variables import Role, ValueType, Variable
@@ -126,7 +127,7 @@ def _against(ecosystem: Ecosystem, driven: _Driven, logs: int, fact: Fact | None
         return "their value is a text, a list or no number"
     if len(driven.last) < logs:
         return f"not every log holds them (an option needs a value in all {logs})"
-    default = driven.default if fact is None or driven.default is not None else fact.default
+    default = driven.default if fact is None or driven.default is not None else fact.default_number
     is_new = len(driven.values) == 1 and driven.name not in known
     if is_new and default is None and ecosystem in ("ardupilot", "px4"):
         return "they never changed, and no log says their default"

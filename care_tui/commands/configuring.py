@@ -1,4 +1,4 @@
-"""Commands on configurations: diff, apply."""
+"""Commands on configurations: diff, apply, lint."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import typer
 import care_core
 from care_core.errors import ExitCode, UsageError
 from care_core.text import clean
-from care_tui.commands.arguments import Force
+from care_tui import __version__
+from care_tui.commands.arguments import AsJson, Force, Out, is_json
 from care_tui.console import emit, say
 
 if TYPE_CHECKING:
@@ -78,6 +79,48 @@ def apply(
             _replace(file)
     else:
         _write_to(out or Path(), edited, force=force)
+
+
+@app.command()
+def lint(
+    config: Annotated[
+        list[str], typer.Argument(metavar="CONFIG...", help="Configuration files, for ROS also NAMESPACE=FILE.")
+    ],
+    target: Annotated[
+        str, typer.Option("--target", "-t", help="What they are for: noetic, humble, copter-4.6; told by them else.")
+    ] = "",
+    profile: Annotated[
+        str | None, typer.Option("--profile", "-p", help="Check against this profile's acceptable values as well.")
+    ] = None,
+    as_json: AsJson = False,
+    sarif: Annotated[bool, typer.Option("--sarif", help="Print SARIF 2.1.0, for code hosts and editors.")] = False,
+    out: Out = None,
+    force: Force = False,
+) -> None:
+    """Find dead keys, wrong values and contradictions in configuration files. Ends with 0 at most notes, 1 more."""
+    from json import dumps
+
+    from care_core.lint.linting import lint as lint_files
+    from care_core.lint.records import Severity
+    from care_core.report.linting import counted, lint_document, lint_sarif, lint_text
+
+    if as_json and sarif:
+        raise UsageError("Either --json or --sarif.", hint="Leave one out.", where="--sarif")
+    schema = None
+    if profile is not None:
+        from care_core.profile.store import load_profile
+
+        schema = load_profile(profile).schema
+    found = lint_files(config, target.casefold(), schema)
+    if sarif:
+        emit(dumps(lint_sarif(found, __version__), indent=2) + "\n", out, force=force)
+    elif as_json or is_json(out):
+        emit(lint_document(found, target).model_dump_json(indent=2, by_alias=True) + "\n", out, force=force)
+    else:
+        emit(lint_text(found), out, force=force)
+    say(counted(found))
+    severe = [one for file in found for one in file.findings if one.severity is not Severity.NOTE]
+    raise typer.Exit(ExitCode.FAULT if severe else ExitCode.OK)
 
 
 def _told(edited: Sequence[EditedFile]) -> Iterator[str]:

@@ -49,6 +49,14 @@ def history() -> None:
     _print(history_schema())
 
 
+@app.command("lint")
+def lint() -> None:
+    """Print the JSON Schema of 'care lint --json'."""
+    from care_core.report.linting import lint_schema
+
+    _print(lint_schema())
+
+
 @app.command("triage")
 def triage() -> None:
     """Print the JSON Schema of 'care triage --json'."""

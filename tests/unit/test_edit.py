@@ -242,13 +242,10 @@ def test_a_recorded_configuration_keeps_every_byte_and_a_change_is_the_only_diff
         assert file.after.encode() == path.read_bytes()
         held = file.held[0].settings
         numbers = [one for one in held.values() if isinstance(one.value, (int, float))][::7]
-        changes = [
-            Wanted(
-                Variable("o", Role.OPTION, "int" if isinstance(one.value, int) else "float"), one.name, one.value + 1
-            )
-            for one in numbers
-            if isinstance(one.value, (int, float)) and (value := 2 * one.value + 1) is not None
-        ]
+        changes = []
+        for one in numbers:
+            option = Variable("o", Role.OPTION, "int" if isinstance(one.value, int) else "float")
+            changes.append(Wanted(option, one.name, 3 * float(one.value) + 5))
         (file,) = apply_changes([str(path)], changes)
         copy = tmp_path / f"copy{path.suffix}"
         copy.write_bytes(file.after.encode())

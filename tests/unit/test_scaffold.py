@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from care_core import plain_yaml
 from care_core.errors import UsageError
 from care_core.logs.base import LogFormat
+from care_core.metadata.navigation import fact_of
 from care_core.run import Setting
-from care_core.scaffold.facts import fact_of
 from care_core.scaffold.limits import RATIO, limits
 from care_core.scaffold.measures import Measure
 from care_core.scaffold.never import reason_against
@@ -125,7 +125,7 @@ def test_failsafes_are_safety_options() -> None:
 def test_the_table_knows_a_parameter_by_its_owner() -> None:
     dwa = fact_of("ros1", "/move_base/DWAPlannerROS/sim_time")
     assert dwa is not None
-    assert (dwa.type, dwa.default, dwa.low) == ("float", 1.7, 0.0)
+    assert (dwa.type, dwa.default_number, dwa.low) == ("float", 1.7, 0.0)
     layer = fact_of("ros1", "/move_base/global_costmap/obstacles_laser/combination_method")
     assert layer is not None
     assert dict(layer.values)[1.0] == "Maximum"

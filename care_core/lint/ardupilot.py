@@ -1,0 +1,211 @@
+"""Rules for the parameters of ArduPilot vehicles: names by release, ranges, listed values."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from difflib import get_close_matches
+
+from care_core.configs.driven import SIMULATOR_PREFIX
+from care_core.lint.generic import found
+from care_core.lint.records import Document, Entry, Finding, Severity
+from care_core.metadata import ardupilot
+from care_core.metadata.ardupilot import Release
+from care_core.metadata.fact import Fact
+from care_core.vehicles.parameters import spellings
+from care_core.vehicles.self_written import is_self_written
+from care_core.vehicles.vehicle import Kind
+
+_VEHICLE_LINE = re.compile(r"#.*\b(copter|helicopter|multirotor|plane|rover|sub|tracker|blimp)\b", re.IGNORECASE)
+_VERSION_LINE = re.compile(r"#.*?\b[Vv]?(?:ersion:?\s*)?(\d\.\d+)\b")
+_LETTERS = {
+    "copter": "C", "helicopter": "C", "multirotor": "C", "plane": "P", "rover": "R", "sub": "S", "tracker": "T",
+    "blimp": "B",
+}  # fmt: skip
+_KINDS: dict[str, Kind] = {"C": "copter", "P": "quadplane", "R": "rover", "S": "sub", "T": "tracker", "B": "blimp"}
+_LISTS = f"{ardupilot.SOURCE}s of 3.4 to 4.8"
+_HEAD = 12
+"""Lines in which ground stations say of what vehicle a file is."""
+_ALIKE = 0.84
+"""Least likeness of a name to the one that is meant, of difflib: one letter off in names of seven and more."""
+_RATIOS = ((100.0, "centimetres or hundredths"), (1000.0, "thousandths"))
+_COMPLETE = (4, 1)
+"""The lists of earlier releases leave many parameters out: groups of helicopters and controllers."""
+_CHOICES, _GAPS = 4, 0.3
+"""Least number of values of a list of choices, and the most of them that may be missing in between, as a share."""
+_SIMULATED = (10.0, 100.0)
+"""Drivers of simulated sensors, which lists leave out."""
+_FAR = 10.0
+"""Documented ranges are what is usual: what lies beyond the bound by less than this factor is worth a note alone."""
+
+
+def releases_of(document: Document, target: str) -> tuple[tuple[Release, ...], bool]:
+    """The releases that a file may be for, and whether anybody says so.
+
+    Args:
+        target: what the operator says: `copter-4.5`, `rover`; empty where nothing is said.
+    """
+    asked = _asked(*_words(target)) if target else _asked(*_header(document.text))
+    if asked:
+        return asked, True
+    names = {entry.name for entry in document.entries}
+    counts: Counter[Release] = Counter(release for name in names for release in ardupilot.known_in(name))
+    most = max(counts.values(), default=0)
+    return tuple(release for release in ardupilot.ALL if counts[release] == most and most), False
+
+
+def _words(target: str) -> tuple[str, str]:
+    vehicle, _, version = target.casefold().partition("-")
+    return _LETTERS.get(vehicle.removeprefix("ardu"), ""), version
+
+
+def _header(text: str) -> tuple[str, str]:
+    head = text.splitlines()[:_HEAD]
+    vehicle = next((match[1].casefold() for line in head if (match := _VEHICLE_LINE.match(line))), "")
+    if not vehicle:
+        return "", ""
+    version = next((match[1] for line in head if (match := _VERSION_LINE.match(line))), "")
+    return _LETTERS[vehicle], version
+
+
+def _asked(letter: str, version: str) -> tuple[Release, ...]:
+    own = tuple(one for one in ardupilot.ALL if one.vehicle == letter)
+    return tuple(one for one in own if one.version == version) or own
+
+
+def check(document: Document, target: str) -> Iterator[Finding]:
+    """What is wrong with a file of an ArduPilot vehicle's parameters."""
+    releases, is_told = releases_of(document, target)
+    for entry in document.entries:
+        if entry.name.startswith(SIMULATOR_PREFIX):
+            continue
+        known = ardupilot.known_in(entry.name)
+        if not known:
+            yield _unknown(document, entry)
+        elif not known & set(releases):
+            yield _elsewhere(document, entry, releases, is_told)
+        elif not is_self_written(entry.name):
+            yield from _value(document, entry, ardupilot.facts_of(entry.name, releases))
+
+
+def _unknown(document: Document, entry: Entry) -> Finding:
+    held = {one.name for one in document.entries}
+    close = [
+        name
+        for name in get_close_matches(entry.name, _alike(entry.name), n=3, cutoff=_ALIKE)
+        if name not in held and _digits(name) == _digits(entry.name)
+    ]
+    if close:
+        text = f"No release of ArduPilot has a parameter {entry.name}."
+        return found("unknown-key", Severity.WARNING, document, entry, text, f"Did you mean {close[0]}?", _LISTS)
+    text = f"ArduPilot's lists have no parameter {entry.name}: a script's, a custom build's, or one before 3.4."
+    return found("unknown-key", Severity.NOTE, document, entry, text, "Check its spelling.", _LISTS)
+
+
+def _alike(name: str) -> list[str]:
+    return [known for known in ardupilot.names() if known[:1] == name[:1] and abs(len(known) - len(name)) <= 2]
+
+
+def _digits(name: str) -> list[str]:
+    return re.findall(r"\d+", name)
+
+
+def _elsewhere(document: Document, entry: Entry, releases: Sequence[Release], is_told: bool) -> Finding:
+    """A name of other releases than those the file is for."""
+    new = _renamed(entry.name, releases)
+    is_sure = is_told and (new is not None or all(_parts(one) >= _COMPLETE for one in releases))
+    severity = Severity.WARNING if is_sure else Severity.NOTE
+    told = _told(releases) if is_told else f"the releases that know most of this file ({_told(releases)})"
+    known = _told([one for one in ardupilot.ALL if one in ardupilot.known_in(entry.name)])
+    if new:
+        return found("renamed", severity, document, entry, f"{entry.name} is {new[0]} in {told}.", new[1], _LISTS)
+    text = f"{entry.name} is not in {told}, but in {known}."
+    return found("unknown-key", severity, document, entry, text, "Is the file for this firmware?", _LISTS)
+
+
+def _renamed(name: str, releases: Sequence[Release]) -> tuple[str, str] | None:
+    for release in releases:
+        for one in spellings(name, _KINDS[release.vehicle]):
+            if one.name != name and release in ardupilot.known_in(one.name):
+                scale = "" if one.scale == 1 else f", and its value times {one.scale:g}"
+                return one.name, f"Write {one.name}{scale}."
+    return None
+
+
+def _told(releases: Sequence[Release]) -> str:
+    if len(releases) == 1:
+        return str(releases[0])
+    vehicles = list(dict.fromkeys(one.vehicle for one in releases))
+    if len(vehicles) > 1:
+        return ", ".join(ardupilot.NAMES[vehicle] for vehicle in vehicles)
+    return f"{releases[0]} to {releases[-1].version}"
+
+
+def _value(document: Document, entry: Entry, facts: Sequence[Fact]) -> Iterator[Finding]:
+    """A value that no release that the file may be for allows."""
+    value = entry.number
+    if value is None or not facts:
+        return
+    fact = facts[-1]
+    bounded = [one for one in facts if one.low is not None and one.high is not None]
+    if len(bounded) == len(facts):
+        if not any(_within(value, one) for one in bounded):
+            yield from _outside(document, entry, value, bounded)
+    elif all(_is_enumeration(one) for one in facts):
+        ever = {code for one in ardupilot.facts_of(entry.name) for code, _ in one.values}
+        if value not in {*ever, 0.0, -1.0} and not (value in _SIMULATED and entry.name.endswith("_TYPE")):
+            text = f"{entry.name} is {value:g}, which is none of the values of {fact.source}."
+            yield found("not-in-values", Severity.WARNING, document, entry, text, _listed(fact), fact.source)
+    elif all(one.bits for one in facts) and value > 0 and value.is_integer():
+        unknown = [bit for bit in range(32) if int(value) >> bit & 1 and not any(bit in one.bits for one in facts)]
+        if unknown:
+            text = f"{entry.name} is {value:g}: bit {', '.join(map(str, unknown))} means nothing to {fact.source}."
+            yield found("not-in-values", Severity.NOTE, document, entry, text, "", fact.source)
+
+
+def _is_enumeration(fact: Fact) -> bool:
+    """Whether a list of values is all there is: choices that are counted from 0 or 1, not presets of a number."""
+    codes = [code for code, _ in fact.values if code >= 0]
+    if fact.low is not None or fact.bits or len(codes) < _CHOICES or not all(code.is_integer() for code in codes):
+        return False
+    return min(codes) <= 1 and max(codes) + 1 - len(codes) <= len(codes) * _GAPS
+
+
+def _parts(release: Release) -> tuple[int, ...]:
+    return tuple(map(int, release.version.split(".")))
+
+
+def _within(value: float, fact: Fact) -> bool:
+    assert fact.low is not None
+    assert fact.high is not None
+    near = 1e-6 * max(abs(fact.low), abs(fact.high))
+    return fact.low - near <= value <= fact.high + near or any(value == code for code, _ in fact.values)
+
+
+def _outside(document: Document, entry: Entry, value: float, facts: Sequence[Fact]) -> Iterator[Finding]:
+    """A number outside the documented ranges. 0 and -1 mean "off" or "not set" for many parameters and are let be."""
+    fact = facts[-1]
+    low, high = fact.low or 0.0, fact.high or 0.0
+    if value in (0.0, -1.0):
+        return
+    unit = f" {fact.unit}" if fact.unit else ""
+    text = f"{entry.name} is {value:g}{unit}, outside {low:g} to {high:g}."
+    for ratio, words in _RATIOS:
+        fits = [scaled for scaled in (value / ratio, value * ratio) if low < scaled < high]
+        if low >= 0 and value > 0 and fits and not low / _FAR <= value <= high * _FAR:
+            hint = f"Is it in {words}? {fits[0]:g} would be within the range."
+            yield found("wrong-unit", Severity.WARNING, document, entry, text, hint, fact.source)
+            return
+    yield found("out-of-range", Severity.NOTE, document, entry, text, "The range is what is usual.", fact.source)
+
+
+def _listed(fact: Fact) -> str:
+    codes = [f"{code:g}" for code, _ in fact.values]
+    return f"They are {', '.join(codes[:12])}{', ...' if len(codes) > 12 else ''}."
+
+
+def is_of_vehicle(names: Iterable[str]) -> bool:
+    """Whether these are ArduPilot's parameters, not PX4's: the two share few names."""
+    held = list(names)
+    return sum(bool(ardupilot.known_in(name)) for name in held) * 2 > len(held)

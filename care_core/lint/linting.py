@@ -1,0 +1,104 @@
+"""Files in, findings out: which family of rules a file belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from care_core.configs.driven import option_value, readable
+from care_core.configs.formats import MODULES, ConfigFormat
+from care_core.configs.loading import split_name
+from care_core.errors import UsageError, nearest
+from care_core.lint import ardupilot, contradictions, generic, navigation
+from care_core.lint.reading import read_document
+from care_core.lint.records import Document, Entry, Finding, Severity
+from care_core.metadata.navigation import DISTRIBUTIONS
+from care_core.run import Setting
+
+if TYPE_CHECKING:
+    from care_core.profile.schema import Schema
+
+_VEHICLES = ("copter", "plane", "rover", "sub", "tracker", "blimp")
+_MAY_BE_ELSEWHERE = frozenset({"unknown-key", "misplaced-key", "not-loaded"})
+
+
+@dataclass(frozen=True, slots=True)
+class Linted:
+    """One file and what was found in it, in the order of its lines."""
+
+    document: Document
+    findings: tuple[Finding, ...]
+
+
+def lint(names: Sequence[str], target: str = "", schema: Schema | None = None) -> tuple[Linted, ...]:
+    """What is wrong with configuration files.
+
+    Args:
+        names: `FILE`, or for ROS `NAMESPACE=FILE`.
+        target: the distribution or firmware that the files are for (`noetic`, `humble`, `copter-4.6`); told from the
+            files where it is empty.
+        schema: of a profile, whose ranges are checked as well.
+
+    Raises:
+        CareError: no such file, not text, or an unknown target.
+    """
+    _check_target(target)
+    return tuple(_lint(name, target, schema) for name in names)
+
+
+def _check_target(target: str) -> None:
+    ros = [name for several in DISTRIBUTIONS.values() for name in several]
+    vehicle = target.partition("-")[0].removeprefix("ardu")
+    if target and target not in ros and vehicle not in _VEHICLES:
+        hint = nearest(target, [*ros, *_VEHICLES]) or "Write a distribution (humble) or a firmware (copter-4.6)."
+        raise UsageError(f"No tables for '{target}'.", hint=hint, where="--target")
+
+
+def _lint(name: str, target: str, schema: Schema | None) -> Linted:
+    path, namespace = split_name(name)
+    document, refused = read_document(path, namespace)
+    findings = [*refused, *generic.check(document), *_of_ecosystem(document, target)]
+    if schema is not None:
+        findings += _of_profile(document, schema)
+    order = sorted(set(findings), key=lambda one: (one.line, one.column, one.rule))
+    return Linted(document, tuple(order))
+
+
+def _of_ecosystem(document: Document, target: str) -> Iterator[Finding]:
+    if document.format in (ConfigFormat.ROS1_YAML, ConfigFormat.ROS2_YAML):
+        yield from navigation.check(document, target if target in _all_distributions() else "")
+        return
+    values = {entry.name: entry for entry in document.entries}
+    yield from contradictions.pairs(document, values, contradictions.VEHICLE_PAIRS)
+    if ardupilot.is_of_vehicle(values):
+        yield from ardupilot.check(document, "" if target in _all_distributions() else target)
+
+
+def _all_distributions() -> set[str]:
+    return {name for several in DISTRIBUTIONS.values() for name in several}
+
+
+def _of_profile(document: Document, schema: Schema) -> Iterator[Finding]:
+    """Values outside what a profile holds acceptable."""
+    entries = {_setting_name(document, entry): entry for entry in document.entries}
+    settings = {name: Setting(name, entry.value, "") for name, entry in entries.items()}
+    find = MODULES[document.format].finder([settings])
+    for option in schema.options:
+        for parameter in readable(option):
+            setting = find(parameter)
+            value = None if setting is None else option_value(option, setting)
+            if setting is None or value is None or option.accepts(value):
+                continue
+            text = f"{option.name} is {option.show(value)}, acceptable is {option.acceptable}."
+            hint = "What is predicted there is a guess."
+            yield generic.found("outside-profile", Severity.NOTE, document, entries[setting.name], text, hint)
+
+
+def _setting_name(document: Document, entry: Entry) -> str:
+    """A value's name as the reader of the format has it."""
+    if document.format is not ConfigFormat.ROS2_YAML or "ros__parameters" not in entry.keys:
+        return "/".join((*document.namespace.strip("/").split("/"), *entry.keys)).strip("/")
+    split = entry.keys.index("ros__parameters")
+    node = "/".join((document.namespace.strip("/"), *entry.keys[:split])).strip("/")
+    return f"/{node}.{'.'.join(entry.keys[split + 1 :])}"

@@ -1,0 +1,279 @@
+"""Rules for ROS navigation: names by who reads them and in which distribution, types, ranges, contradictions."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from difflib import get_close_matches
+
+from care_core.errors import UsageError, nearest
+from care_core.lint import contradictions
+from care_core.lint.generic import found
+from care_core.lint.records import Document, Entry, Finding, Severity
+from care_core.lint.rules import MEANT, ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED
+from care_core.lint.scopes import COSTMAP, Place, Scoped, costmaps, scoped, split
+from care_core.metadata import navigation
+from care_core.metadata.fact import Fact
+from care_core.metadata.navigation import DISTRIBUTIONS, STACKS
+
+_ALIKE = 0.8
+_PLACEHOLDER = re.compile(r"\$\(|\$\{|<.*>|[A-Z][A-Z0-9_]*$|.*\{.*\}")
+"""A text that a launch file replaces before the node reads it."""
+_ANGLE_TOLERANCE = re.compile(r"(yaw_goal_tolerance|angular_dist_threshold|rotate_to_heading_min_angle)$")
+_DEAD_WITH_PLUGINS = ("map_type", "static_map")
+_COPIED = {
+    "StaticLayer": ("map_topic", "unknown_cost_value", "lethal_cost_threshold"),
+    "VoxelLayer": ("origin_z", "z_resolution", "z_voxels", "mark_threshold", "unknown_threshold", "publish_voxel_map"),
+    "InflationLayer": ("cost_scaling_factor", "inflation_radius"),
+}
+"""What a costmap hands on to a layer of that class from its own namespace (copyParentParameters)."""
+_COSTMAP_SOURCE = "costmap_2d_ros.cpp of ros-planning/navigation (noetic)"
+
+
+def distribution_of(target: str, ros: str) -> str:
+    """The distribution that the operator names. Raises UsageError for one that is not known."""
+    names = DISTRIBUTIONS["ros2" if ros == "ros2" else "ros1"]
+    if not target or target in names:
+        return target
+    known = [name for several in DISTRIBUTIONS.values() for name in several]
+    if target in known:
+        return ""
+    raise UsageError(f"No tables for '{target}'.", hint=nearest(target, known), where="--target")
+
+
+def check(document: Document, target: str) -> Iterator[Finding]:
+    """What is wrong with a file of ROS parameters."""
+    result = scoped(document)
+    distribution = distribution_of(target, result.ros)
+    likely = frozenset({distribution}) if distribution else _likely(result)
+    for place in result.places:
+        yield from _place(document, result, place, likely, is_told=bool(distribution))
+    for entry, key in result.not_loaded:
+        name = split(entry)[-2]
+        text = f"Nothing loads {name}: no list of {key} names it."
+        yield found("not-loaded", Severity.NOTE, document, entry, text, f"Add it to {key}, or leave it out.")
+    yield from _nodes(document, distribution)
+    yield from _contradictions(document, result)
+
+
+def _likely(result: Scoped) -> frozenset[str]:
+    """The distributions that know most of a file's names."""
+    counts: Counter[str] = Counter()
+    for place in result.places:
+        for owner in place.owners:
+            facts = navigation.known(result.ros, owner, place.name)
+            if facts:
+                counts.update({name for fact in facts for name in navigation.distributions(fact, result.ros)})
+                break
+    most = max(counts.values(), default=0)
+    return frozenset(name for name, count in counts.items() if count == most)
+
+
+def _place(
+    document: Document, result: Scoped, place: Place, likely: frozenset[str], *, is_told: bool
+) -> Iterator[Finding]:
+    ros = result.ros
+    facts = [fact for owner in place.owners for fact in navigation.known(ros, owner, place.name)]
+    if not place.owners:
+        return
+    if not facts:
+        finding = _unknown(document, result, place)
+        if finding is not None:
+            yield finding
+        return
+    now = [fact for fact in facts if navigation.distributions(fact, ros) & likely]
+    if not now:
+        finding = _other_distribution(document, result, place, facts, likely, is_told=is_told)
+        if finding is not None:
+            yield finding
+    dead = _dead(result, place)
+    if dead:
+        yield found("dead-key", Severity.WARNING, document, place.entry, *dead, _COSTMAP_SOURCE)
+        return
+    yield from _value(document, place.entry, now or facts, ros)
+
+
+def _unknown(document: Document, result: Scoped, place: Place) -> Finding | None:
+    """A name that its reader does not read."""
+    owner = place.owners[0]
+    own = [name for one in place.owners for name in navigation.keys_of(result.ros, one)]
+    last = place.name.rpartition(".")[2]
+    if result.ros == "ros1" and _is_searched(result, place):
+        return None
+    meant = MEANT.get((owner, place.name)) or next(
+        iter(get_close_matches(last, [name.rpartition(".")[2] for name in own], n=1, cutoff=_ALIKE)), ""
+    )
+    elsewhere = [one for one in navigation.readers(result.ros, place.name) if one not in place.owners]
+    hint = f"Did you mean {meant}?" if meant else "Is it of another plugin, or of another release?"
+    if elsewhere and not (meant and MEANT.get((owner, place.name))):
+        text = f"{owner} does not read {place.name}; {', '.join(elsewhere[:3])} would."
+        hint = hint if meant else "Move it there, or leave it out."
+        return found("misplaced-key", Severity.WARNING, document, place.entry, text, hint, STACKS[result.ros])
+    text = f"{owner} does not read {place.name}, in no distribution from {' to '.join(_ends(result))}."
+    return found("unknown-key", Severity.WARNING, document, place.entry, text, hint, STACKS[result.ros])
+
+
+def _ends(result: Scoped) -> tuple[str, str]:
+    names = DISTRIBUTIONS[result.ros]
+    return names[0], names[-1]
+
+
+def _is_searched(result: Scoped, place: Place) -> bool:
+    """Whether ROS 1 looks for a name in the namespaces above the one that needs it (searchParam)."""
+    searched = {"obstacle_range", "raytrace_range", "controller_frequency", "footprint", "robot_radius",
+                "footprint_topic", "published_footprint_topic"}  # fmt: skip
+    return place.name in searched
+
+
+def _other_distribution(
+    document: Document,
+    result: Scoped,
+    place: Place,
+    facts: Sequence[Fact],
+    likely: frozenset[str],
+    *,
+    is_told: bool,
+) -> Finding | None:
+    """A name of other distributions than the file's; where nobody says which that is, one that has a new name."""
+    severity = Severity.WARNING if is_told else Severity.NOTE
+    order = DISTRIBUTIONS[result.ros]
+    told = f"; the old name is not read in {next(iter(likely))}" if is_told else ""
+    renames = ROS1_RENAMED if result.ros == "ros1" else ROS2_RENAMED
+    generic = re.sub(r"^\w+\.", "<source>.", place.name)
+    for one in renames:
+        is_newer = any(order.index(name) >= order.index(one.since) for name in likely)
+        if one.owner in place.owners and one.old in (place.name, generic) and is_newer:
+            new = one.new.replace("<source>", place.name.partition(".")[0])
+            text = f"{place.name} is {new} since {one.since}{told}."
+            return found(
+                "renamed", severity, document, place.entry, text, f"Write {new.rpartition('.')[2]}.", STACKS[result.ros]
+            )
+    if not is_told:
+        return None
+    known = frozenset(name for fact in facts for name in navigation.distributions(fact, result.ros))
+    text = f"{place.owners[0]} reads {place.name} in {_span(known, order)}, not in {next(iter(likely))}."
+    return found(
+        "unknown-key", severity, document, place.entry, text, "Is the file for this distribution?", STACKS[result.ros]
+    )
+
+
+def _span(names: frozenset[str], order: Sequence[str]) -> str:
+    held = [name for name in order if name in names]
+    return ", ".join(held) if len(held) < 3 else f"{held[0]} to {held[-1]}"
+
+
+def _dead(result: Scoped, place: Place) -> tuple[str, str] | None:
+    """A name of a ROS 1 costmap that has no effect once the file lists its layers."""
+    if result.ros != "ros1" or place.owners != (COSTMAP,) or place.scope not in result.plugins:
+        return None
+    if place.name in _DEAD_WITH_PLUGINS:
+        return f"{place.name} is not used where plugins are listed.", "Leave it out."
+    classes = set(result.plugins[place.scope].values())
+    for layer, names in _COPIED.items():
+        if place.name in names and layer not in classes:
+            return f"{place.name} is for a {layer}, and no layer here is one.", f"Add a {layer}, or leave it out."
+    return None
+
+
+def _value(document: Document, entry: Entry, facts: Sequence[Fact], ros: str) -> Iterator[Finding]:
+    """A value that no distribution the file may be for takes."""
+    if isinstance(entry.value, str) and _PLACEHOLDER.match(entry.value):
+        return
+    if any(not fact.type for fact in facts):
+        return
+    fact = facts[-1]
+    types: set[str] = {"int" if one.type == "enum" else one.type for one in facts}
+    if entry.kind not in types and not _is_taken(entry, types, ros):
+        refused = "rclcpp does not start the node" if ros == "ros2" else "the default is used instead"
+        text = f"{entry.keys[-1]} is {_a(entry.kind)}, declared is {_a(' or '.join(sorted(types)))}: {refused}."
+        severity = Severity.ERROR if ros == "ros2" else Severity.WARNING
+        yield found("wrong-type", severity, document, entry, text, _as_type(entry, types), fact.source)
+        return
+    number = entry.number
+    if number is None:
+        return
+    if fact.values and not any(number == code for code, _ in fact.values):
+        listed = ", ".join(f"{code:g} ({label})" for code, label in fact.values)
+        text = f"{entry.keys[-1]} is {number:g}, which is none of its values."
+        yield found("not-in-values", Severity.WARNING, document, entry, text, f"They are {listed}.", fact.source)
+    elif all(_is_outside(number, one) for one in facts):
+        low, high = ("any" if bound is None else f"{bound:g}" for bound in (fact.low, fact.high))
+        text = f"{entry.keys[-1]} is {number:g}, outside {low} to {high}: the node takes the bound."
+        yield found("out-of-range", Severity.WARNING, document, entry, text, "", fact.source)
+    elif _ANGLE_TOLERANCE.search(entry.keys[-1]) and math.pi < abs(number) <= 360 and number > 2 * math.pi:
+        text = f"{entry.keys[-1]} is {number:g} rad, more than a whole turn."
+        hint = f"Is it in degrees? {math.radians(number):.4g} rad would be."
+        yield found("wrong-unit", Severity.WARNING, document, entry, text, hint, "an angle is at most 2 pi")
+
+
+def _is_outside(number: float, fact: Fact) -> bool:
+    """Any negative value is as good as another where they mean "off", as a negative bound says."""
+    is_off = number < 0 and fact.low is not None and fact.low < 0
+    is_below = fact.low is not None and number < fact.low and not is_off
+    return is_below or (fact.high is not None and number > fact.high)
+
+
+def _is_taken(entry: Entry, types: set[str], ros: str) -> bool:
+    """Whether the client library takes a value of that type for another."""
+    if ros == "ros2":
+        return entry.kind == "list" and types <= {"str", "list"}
+    return (
+        (entry.kind, *types) in {("int", "float"), ("float", "int")}
+        or entry.kind == "list"
+        or "str" in types
+        or (entry.kind == "int" and "float" in types)
+    )
+
+
+def _a(kind: str) -> str:
+    words = {"int": "an integer", "float": "a number with a point", "bool": "true or false", "str": "a text"}
+    return " or ".join(words.get(one, f"a {one}") for one in kind.split(" or "))
+
+
+def _as_type(entry: Entry, types: set[str]) -> str:
+    number = entry.number
+    if number is not None and types == {"float"}:
+        return f"Write {number:g}.0."
+    if number is not None and types == {"int"} and number.is_integer():
+        return f"Write {number:.0f}."
+    if number in (0.0, 1.0) and types == {"bool"}:
+        return f"Write {'true' if number else 'false'}."
+    return ""
+
+
+def _nodes(document: Document, distribution: str) -> Iterator[Finding]:
+    order = DISTRIBUTIONS["ros2"]
+    seen: set[str] = set()
+    for entry in document.entries:
+        for old, new, since in ROS2_NODES_RENAMED:
+            if entry.keys[0] == old and old not in seen:
+                seen.add(old)
+                is_told = distribution in order and order.index(distribution) >= order.index(since)
+                if distribution and not is_told:
+                    continue
+                text = f"The node {old} is {new} since {since}: later distributions do not read this part."
+                severity = Severity.WARNING if is_told else Severity.NOTE
+                yield found("renamed", severity, document, entry, text, f"Name it {new}.", STACKS["ros2"])
+
+
+def _contradictions(document: Document, result: Scoped) -> Iterator[Finding]:
+    scopes = result.scopes()
+    for values in scopes.values():
+        yield from contradictions.pairs(document, values, contradictions.ROS_PAIRS)
+    for scope in costmaps(result):
+        own = scopes.get(scope, {})
+        radius = contradictions.inscribed_radius(own.get("footprint"), own.get("robot_radius"))
+        loaded = [
+            values["inflation_radius"]
+            for keys, values in scopes.items()
+            if "inflation_radius" in values and keys[: len(scope)] == scope and len(keys) <= len(scope) + 1
+            and _inflates(result, values["inflation_radius"])
+        ]  # fmt: skip
+        yield from contradictions.inflation(document, radius, loaded)
+
+
+def _inflates(result: Scoped, entry: Entry) -> bool:
+    """Whether it is an inflation layer that reads a value."""
+    return any(place.entry is entry and place.owners in (("InflationLayer",), (COSTMAP,)) for place in result.places)

@@ -1,0 +1,114 @@
+"""Files read for the rules: every value with its place, also those that a later one hides, and what cannot be read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+
+from care_core.configs import qgc_params, yaml_tree
+from care_core.configs.ardupilot_param import FLAGS
+from care_core.configs.formats import ConfigFormat, format_of
+from care_core.configs.loading import text_of_file
+from care_core.errors import ConfigError
+from care_core.lint.records import Document, Entry, Finding, Severity
+from care_core.lint.rules import BY_ID
+
+_PARAMETER = re.compile(r"\s*([^\s,]+)(?:\s*,\s*|\s+)(\S+)")
+_TAGS = {"int": "int", "float": "float", "bool": "bool", "str": "str", "seq": "list"}
+_DICTITEMS = "dictitems"
+
+Named = tuple[tuple[str, ...], str, str]
+
+
+def read_document(path: Path, namespace: str = "") -> tuple[Document, tuple[Finding, ...]]:
+    """A file, and what stands in the way of reading it.
+
+    Raises:
+        ConfigError: no such file, or not text.
+    """
+    text = text_of_file(path)
+    format = format_of(text, path)
+    if format in (ConfigFormat.ARDUPILOT_PARAM, ConfigFormat.QGC_PARAMS):
+        return _of_parameters(path, format, text)
+    try:
+        root = yaml_tree.compose(text, path)
+    except ConfigError as err:
+        line = int(number) if (number := err.where.rpartition(":")[2]).isdigit() else 1
+        finding = syntax(path, line, 1, "", err.message, err.hint)
+        return Document(path, format, text, (), (), namespace), (finding,)
+    entries: list[Entry] = []
+    named: list[Named] = []
+    if root is not None:
+        _walk(root, (), entries, named)
+    return Document(path, format, text, tuple(entries), tuple(named), namespace), ()
+
+
+def syntax(path: Path, line: int, column: int, parameter: str, text: str, hint: str) -> Finding:
+    """A line that cannot be read."""
+    source = BY_ID["syntax"].source
+    return Finding("syntax", Severity.ERROR, path, line, column, parameter, text, hint or "Correct the line.", source)
+
+
+def _walk(node: MappingNode, keys: tuple[str, ...], entries: list[Entry], named: list[Named]) -> None:
+    dumped = yaml_tree.is_dumped(node)
+    for key, value in node.value:
+        name = str(key.value).strip("/") or str(key.value)
+        here = keys if dumped and name == _DICTITEMS else (*keys, *name.split("/"))
+        if isinstance(value, MappingNode):
+            _walk(value, here, entries, named)
+        elif not dumped and (plain := yaml_tree.plain_value(value)) is not None:
+            kind = _TAGS.get(str(value.tag).rpartition(":")[2], "str")
+            mark = key.start_mark
+            entries.append(Entry(here, plain, mark.line + 1, mark.column + 1, kind))
+        elif isinstance(value, SequenceNode):
+            named += _plugins(value, here)
+
+
+def _plugins(node: SequenceNode, keys: tuple[str, ...]) -> Iterator[Named]:
+    for item in node.value:
+        if isinstance(item, MappingNode):
+            found = {str(key.value): _text(value) for key, value in item.value}
+            if "name" in found and "type" in found:
+                yield keys, found["name"], found["type"]
+
+
+def _text(node: Node) -> str:
+    return str(node.value) if isinstance(node, ScalarNode) else ""
+
+
+def _of_parameters(path: Path, format: ConfigFormat, text: str) -> tuple[Document, tuple[Finding, ...]]:
+    entries, findings = [], []
+    for number, line in enumerate(text.splitlines(), start=1):
+        body = line.partition("#")[0].rstrip()
+        for flag in FLAGS:
+            body = body.removesuffix(flag).rstrip()
+        if not body.strip():
+            continue
+        found = _row(line) if format is ConfigFormat.QGC_PARAMS else _pair(body)
+        if found is None:
+            findings.append(syntax(path, number, 1, "", "This line is no parameter.", "A line is NAME,VALUE."))
+            continue
+        name, value, column, kind = found
+        try:
+            held = float(int(value, 16)) if value.lower().startswith("0x") else float(value)
+        except ValueError:
+            findings.append(syntax(path, number, column, name, f"The value of {name} is no number: '{value}'.", ""))
+            continue
+        entries.append(Entry((name,), held, number, column, kind))
+    return Document(path, format, text, tuple(entries)), tuple(findings)
+
+
+def _pair(body: str) -> tuple[str, str, int, str] | None:
+    match = _PARAMETER.fullmatch(body)
+    return None if match is None else (match[1], match[2], match.start(1) + 1, "float")
+
+
+def _row(line: str) -> tuple[str, str, int, str] | None:
+    if not qgc_params.is_row(line):
+        return None
+    vehicle, component, name, value, kind = line.split("\t")
+    column = len(vehicle) + len(component) + 3
+    return name.strip(), value.strip(), column, "float" if kind.strip() in ("9", "10") else "int"

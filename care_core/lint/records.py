@@ -1,0 +1,71 @@
+"""What a file holds, line by line, and what is found in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from care_core.configs.formats import ConfigFormat
+
+
+class Severity(str, Enum):
+    """How bad a finding is. Only a note leaves the exit code at 0."""
+
+    ERROR = "error"
+    """The node or the ground station refuses the file or the value."""
+    WARNING = "warning"
+    """The file does not do what it says."""
+    NOTE = "note"
+    """Worth a look, and often meant."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A value in a file: the keys that lead to it, and where it stands, from 1."""
+
+    keys: tuple[str, ...]
+    value: float | str
+    line: int
+    column: int
+    kind: str = ""
+    """How the file writes it: int, float, bool, str or list."""
+
+    @property
+    def name(self) -> str:
+        """The parameter as the file has it."""
+        return "/".join(self.keys)
+
+    @property
+    def number(self) -> float | None:
+        """The value, None where it is no number."""
+        return None if isinstance(self.value, str) else float(self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A configuration file, read as far as it can be."""
+
+    path: Path
+    format: ConfigFormat
+    text: str
+    entries: tuple[Entry, ...]
+    named: tuple[tuple[tuple[str, ...], str, str], ...] = ()
+    """Plugins that a list of mappings names (ROS 1): the keys of the list, the name, the class."""
+    namespace: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something wrong at one place of a file."""
+
+    rule: str
+    severity: Severity
+    path: Path
+    line: int
+    column: int
+    parameter: str
+    text: str
+    hint: str
+    source: str
+    """Where the rule has it from."""

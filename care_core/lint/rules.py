@@ -1,0 +1,87 @@
+"""The rules as data: what each finds, and from what source it is known."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Rule(NamedTuple):
+    """A rule by its id, as reports and SARIF name it."""
+
+    id: str
+    about: str
+    source: str
+
+
+_TABLES = "the sources of each release, as tables"
+RULES: tuple[Rule, ...] = (
+    Rule("syntax", "A line that the reader of the format refuses.", "the format: YAML, NAME VALUE, or five columns"),
+    Rule("duplicate", "The same parameter twice in one file.", "how the readers of the format work"),
+    Rule("unknown-key", "A name that nothing reads in any release.", _TABLES),
+    Rule("misplaced-key", "A name that is read elsewhere, but not at that place.", _TABLES),
+    Rule("renamed", "A name that another release has instead.", _TABLES),
+    Rule("dead-key", "A name that is known and has no effect here.", "the source file that the finding names"),
+    Rule("not-loaded", "Parameters of a plugin that no list names.", "plugins are loaded by the lists that name them"),
+    Rule("wrong-type", "A value of another type than is declared.", "rclcpp refuses it, roscpp takes the default"),
+    Rule("out-of-range", "A value outside the declared range.", _TABLES),
+    Rule("not-in-values", "A value that is none of those declared.", _TABLES),
+    Rule("wrong-unit", "A value off by the ratio of two units.", "the declared range, or what an angle can be"),
+    Rule("contradiction", "Two values that cannot both be meant.", "the source that the finding names"),
+    Rule("outside-profile", "A value outside what the profile holds acceptable.", "the profile's `range`"),
+)  # fmt: skip
+BY_ID = {rule.id: rule for rule in RULES}
+
+
+class Renamed(NamedTuple):
+    """A parameter of a node or plugin that another name replaced in a distribution."""
+
+    owner: str
+    old: str
+    new: str
+    since: str
+
+
+ROS1_RENAMED: tuple[Renamed, ...] = tuple(
+    Renamed("DWAPlannerROS", old, new, "melodic")
+    for old, new in (
+        ("max_trans_vel", "max_vel_trans"), ("min_trans_vel", "min_vel_trans"), ("max_rot_vel", "max_vel_theta"),
+        ("min_rot_vel", "min_vel_theta"), ("rot_stopped_vel", "theta_stopped_vel"),
+        ("acc_limit_trans", "acc_lim_trans"),
+    )
+)  # fmt: skip
+"""dwa_planner_ros.cpp of melodic and noetic warns of the old names and does not read them."""
+
+ROS2_RENAMED: tuple[Renamed, ...] = (
+    Renamed("behavior_server", "recovery_plugins", "behavior_plugins", "humble"),
+    Renamed("behavior_server", "costmap_topic", "local_costmap_topic", "iron"),
+    Renamed("behavior_server", "footprint_topic", "local_footprint_topic", "iron"),
+    Renamed("controller_server", "goal_checker_plugin", "goal_checker_plugins", "galactic"),
+    Renamed("controller_server", "progress_checker_plugin", "progress_checker_plugins", "iron"),
+    Renamed("bt_navigator", "default_bt_xml_filename", "default_nav_to_pose_bt_xml", "galactic"),
+    Renamed("bt_navigator", "error_code_names", "error_code_name_prefixes", "kilted"),
+    Renamed("ObstacleLayer", "<source>.obstacle_range", "<source>.obstacle_max_range", "galactic"),
+    Renamed("ObstacleLayer", "<source>.raytrace_range", "<source>.raytrace_max_range", "galactic"),
+    Renamed("VoxelLayer", "<source>.obstacle_range", "<source>.obstacle_max_range", "galactic"),
+    Renamed("VoxelLayer", "<source>.raytrace_range", "<source>.raytrace_max_range", "galactic"),
+    Renamed("RegulatedPurePursuitController", "desired_linear_vel", "max_linear_vel", "lyrical"),
+    Renamed(
+        "RegulatedPurePursuitController", "max_allowed_time_to_collision",
+        "max_allowed_time_to_collision_up_to_carrot", "humble",
+    ),
+    Renamed("Polygon", "max_points", "min_points", "iron"),
+)  # fmt: skip
+"""Old and new name in the sources of neighbouring distributions."""
+
+ROS2_NODES_RENAMED: tuple[tuple[str, str, str], ...] = (("recoveries_server", "behavior_server", "humble"),)
+"""Nodes: the old name, the new one, and the distribution that has it."""
+
+MEANT: dict[tuple[str, str], str] = {
+    ("DWAPlannerROS", "max_vel_rot"): "max_vel_theta",
+    ("DWAPlannerROS", "min_vel_rot"): "min_vel_theta",
+    ("DWAPlannerROS", "acc_lim_th"): "acc_lim_theta",
+    ("DWAPlannerROS", "vtheta_samples"): "vth_samples",
+    ("TrajectoryPlannerROS", "vth_samples"): "vtheta_samples",
+    ("behavior_server", "transform_timeout"): "transform_tolerance",
+    ("move_base", "recovery_behaviour_enabled"): "recovery_behavior_enabled",
+}
+"""Names that nobody reads, and the one that is meant, where the spelling alone does not tell."""

@@ -1,0 +1,147 @@
+"""ArduPilot's parameters by kind of vehicle and release, from the table beside this module."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from care_core.metadata.fact import Fact, number
+from care_core.metadata.words import word_of
+
+_TABLE = Path(__file__).with_name("ardupilot.tsv")
+SOURCE = "ArduPilot's parameter list"
+VEHICLES: Mapping[str, str] = {
+    "copter": "C", "heli": "C", "plane": "P", "quadplane": "P", "rover": "R", "sub": "S", "tracker": "T", "blimp": "B",
+}  # fmt: skip
+"""The letter of a kind of vehicle in the table."""
+RELEASES: Mapping[str, tuple[str, ...]] = {
+    "C": ("3.5", "3.6", "3.7", "4.0", "4.1", "4.2", "4.3", "4.4", "4.5", "4.6", "4.7", "4.8"),
+    "P": ("3.8", "3.9", "3.10", "4.0", "4.1", "4.2", "4.3", "4.4", "4.5", "4.6", "4.7", "4.8"),
+    "R": ("3.4", "3.5", "3.6", "4.0", "4.1", "4.2", "4.4", "4.5", "4.6", "4.7", "4.8"),
+    "S": ("3.4", "3.5", "3.6", "4.0", "4.1", "4.5", "4.7", "4.8"),
+    "T": ("4.5", "4.6", "4.7", "4.8"),
+    "B": ("4.7", "4.8"),
+}
+NAMES = {"C": "Copter", "P": "Plane", "R": "Rover", "S": "Sub", "T": "Tracker", "B": "Blimp"}
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """A release of one vehicle's firmware."""
+
+    vehicle: str
+    """A letter of the table."""
+    version: str
+
+    def __str__(self) -> str:
+        return f"{NAMES[self.vehicle]} {self.version}"
+
+
+ALL = tuple(Release(vehicle, version) for vehicle, versions in RELEASES.items() for version in versions)
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    releases: frozenset[Release]
+    cells: tuple[str, ...]
+
+
+def known_in(name: str) -> frozenset[Release]:
+    """The releases that document a parameter; empty for none."""
+    return frozenset().union(*(row.releases for row in _rows().get(name, ())))
+
+
+def names() -> Iterable[str]:
+    """Every parameter of the table."""
+    return _rows().keys()
+
+
+def facts_of(name: str, releases: Iterable[Release] = ALL) -> tuple[Fact, ...]:
+    """What these releases say of a parameter, the newest last; several where they differ."""
+    wanted = frozenset(releases)
+    return tuple(_fact(name, row, row.releases & wanted) for row in _rows().get(name, ()) if row.releases & wanted)
+
+
+def fact_of(name: str, kind: str, version: tuple[int, ...] | None = None) -> Fact | None:
+    """What a vehicle's firmware says of a parameter; the newest release that knows it where the version is unknown."""
+    letter = VEHICLES.get(kind)
+    exact = None if version is None else ".".join(map(str, version[:2]))
+    own = [one for one in ALL if one.vehicle == letter]
+    for releases in ([one for one in own if one.version == exact], own, ALL):
+        found = facts_of(name, releases)
+        if found:
+            return max(found, key=lambda fact: _newest(fact.releases))
+    return None
+
+
+def _newest(releases: str) -> tuple[int, ...]:
+    return max(tuple(map(int, version.split("."))) for version in re.findall(r"\d+\.\d+", releases))
+
+
+def _fact(name: str, row: _Row, releases: Iterable[Release]) -> Fact:
+    low, high, unit, values, bits, flags = row.cells
+    told = sorted(releases, key=ALL.index)
+    span = str(told[0]) if len(told) == 1 else f"{told[0]} to {told[-1]}"
+    return Fact(
+        name,
+        NAMES[told[-1].vehicle],
+        f"{SOURCE}, {span}",
+        low=number(low),
+        high=number(high),
+        values=tuple((code, "") for code in _codes(values)),
+        bits=frozenset(int(code) for code in _codes(bits)),
+        unit=unit,
+        reboot="R" in flags,
+        read_only="O" in flags,
+        releases=span,
+        line=word_of("ardupilot", name).line,
+    )
+
+
+def _codes(text: str) -> Iterator[float]:
+    for part in text.split("|") if text else ():
+        first, dots, last = part.partition("..")
+        yield from map(float, range(int(first), int(last) + 1)) if dots else [float(part)]
+
+
+@cache
+def _rows() -> Mapping[str, list[_Row]]:
+    found: dict[str, list[_Row]] = {}
+    with _TABLE.open(encoding="utf-8") as stream:
+        lines = (line.rstrip("\n") for line in stream if not line.startswith("#"))
+        next(lines)
+        for line in lines:
+            pattern, releases, *cells = line.split("\t")
+            row = _Row(_releases(releases), tuple(cells))
+            for name in _expanded(pattern):
+                found.setdefault(name, []).append(row)
+    return found
+
+
+def _expanded(pattern: str) -> Iterator[str]:
+    before, brace, rest = pattern.partition("{")
+    if not brace:
+        yield pattern
+        return
+    numbers, _, after = rest.partition("}")
+    for part in numbers.split("|"):
+        first, dots, last = part.partition("..")
+        several = map(str, range(int(first), int(last) + 1)) if dots else [part]
+        yield from (f"{before}{one}{after}" for one in several)
+
+
+@cache
+def _releases(text: str) -> frozenset[Release]:
+    """Releases out of "C4.1-4.3,4.6- R": a vehicle's letter, and spans of its releases."""
+    found = set()
+    for part in text.split():
+        vehicle, versions = part[0], RELEASES[part[0]]
+        for span in part[1:].split(",") if part[1:] else ("-",):
+            first, dash, last = span.partition("-")
+            start = versions.index(first) if first else 0
+            end = versions.index(last) if last else len(versions) - 1 if dash else start
+            found |= {Release(vehicle, version) for version in versions[start : end + 1]}
+    return frozenset(found)

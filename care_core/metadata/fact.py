@@ -1,0 +1,48 @@
+"""A parameter as a public source declares it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+FactType = Literal["float", "int", "bool", "enum", "str", "list", ""]
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """What a table says of a parameter; None or empty where its source says nothing.
+
+    Values that are listed are exhaustive only where no range is given: ArduPilot lists presets beside a range.
+    """
+
+    name: str
+    owner: str
+    """Who reads it: a node, a plugin's class, a kind of vehicle."""
+    source: str
+    """Where the table has it from, in words."""
+    type: FactType = ""
+    default: str = ""
+    low: float | None = None
+    high: float | None = None
+    values: tuple[tuple[float, str], ...] = ()
+    bits: frozenset[int] = frozenset()
+    unit: str = ""
+    reboot: bool = False
+    read_only: bool = False
+    releases: str = ""
+    """The releases that know it, "" for all that the table covers."""
+    line: str = ""
+    """What it does, in one line."""
+
+    @property
+    def default_number(self) -> float | None:
+        """The default as an option counts it (true: 1), None where it is unknown or no number."""
+        try:
+            return float({"true": "1", "false": "0"}.get(self.default, self.default))
+        except ValueError:
+            return None
+
+
+def number(text: str) -> float | None:
+    """A cell of a table."""
+    return float(text) if text else None

@@ -1,0 +1,40 @@
+"""What parameters do, in one line each, and the unit where their source names none: our own words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+_TABLE = Path(__file__).with_name("words.tsv")
+
+
+class Word(NamedTuple):
+    """A parameter in words; empty where nobody wrote any."""
+
+    unit: str
+    line: str
+
+
+_NOTHING = Word("", "")
+
+
+def word_of(ecosystem: str, name: str, owner: str = "") -> Word:
+    """The words for a parameter as one owner reads it, else as all do.
+
+    Args:
+        ecosystem: ros or ardupilot.
+    """
+    words = _words()
+    return words.get((ecosystem, owner, name)) or words.get((ecosystem, "", name)) or _NOTHING
+
+
+@cache
+def _words() -> Mapping[tuple[str, str, str], Word]:
+    found = {}
+    for line in _TABLE.read_text(encoding="utf-8").splitlines():
+        if line and not line.startswith("#"):
+            ecosystem, owner, name, unit, text = line.split("\t")
+            found[ecosystem, owner, name] = Word(unit, text)
+    return found

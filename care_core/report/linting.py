@@ -1,0 +1,133 @@
+"""What is wrong with configuration files, for other programs (`care.lint/1`, SARIF 2.1.0) and for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Final, Literal
+
+from pydantic import ConfigDict, Field
+
+from care_core.lint.linting import Linted
+from care_core.lint.records import Finding, Severity
+from care_core.lint.rules import RULES
+from care_core.report.document import Strict
+from care_core.text import clean, wrapped
+
+SCHEMA_ID: Final = "care.lint/1"
+_SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+_INDENT = "    "
+
+
+class FindingEntry(Strict):
+    """Something wrong at one place of a file; line and column from 1."""
+
+    rule: str
+    severity: Literal["error", "warning", "note"]
+    file: str
+    line: int
+    column: int
+    parameter: str
+    text: str
+    hint: str
+    source: str
+
+
+class FileEntry(Strict):
+    """A file that was read, with how many values it has."""
+
+    file: str
+    format: str
+    values: int
+
+
+class LintDocument(Strict):
+    """What is wrong with configuration files, as `care lint --json` prints it."""
+
+    model_config = ConfigDict(title=SCHEMA_ID)
+
+    schema_: Literal["care.lint/1"] = Field(default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema")
+    target: str
+    files: list[FileEntry]
+    findings: list[FindingEntry]
+
+
+def lint_schema() -> dict[str, Any]:
+    """The JSON Schema of the lint document."""
+    return LintDocument.model_json_schema(by_alias=True, mode="serialization")
+
+
+def lint_document(linted: Sequence[Linted], target: str) -> LintDocument:
+    """The findings as a document."""
+    return LintDocument(
+        target=target,
+        files=[
+            FileEntry(file=str(one.document.path), format=one.document.format.value, values=len(one.document.entries))
+            for one in linted
+        ],
+        findings=[_entry(finding) for one in linted for finding in one.findings],
+    )
+
+
+def _entry(finding: Finding) -> FindingEntry:
+    return FindingEntry(
+        rule=finding.rule,
+        severity=finding.severity.value,
+        file=str(finding.path),
+        line=finding.line,
+        column=finding.column,
+        parameter=clean(finding.parameter),
+        text=clean(finding.text),
+        hint=clean(finding.hint),
+        source=finding.source,
+    )
+
+
+def lint_text(linted: Sequence[Linted]) -> str:
+    """One paragraph a finding: where, how bad, what, what to do, and the source."""
+    return "".join(f"{line}\n" for one in linted for finding in one.findings for line in _lines(finding))
+
+
+def _lines(finding: Finding) -> Iterator[str]:
+    yield clean(f"{finding.path}:{finding.line}:{finding.column}: {finding.severity.value} [{finding.rule}]")
+    yield from wrapped(f"{finding.text} {finding.hint}".strip(), _INDENT)
+    yield from wrapped(f"source: {finding.source}", _INDENT)
+
+
+def counted(linted: Sequence[Linted]) -> str:
+    """How many findings of each severity in how many files."""
+    findings = [finding for one in linted for finding in one.findings]
+    parts = []
+    for severity in Severity:
+        count = sum(finding.severity is severity for finding in findings)
+        if count:
+            parts.append(f"{count} {severity.value}{'' if count == 1 else 's'}")
+    files = f"{len(linted)} file{'' if len(linted) == 1 else 's'}"
+    return f"{', '.join(parts) or 'nothing found'} in {files}"
+
+
+def lint_sarif(linted: Sequence[Linted], version: str) -> dict[str, Any]:
+    """The findings as SARIF 2.1.0, which code hosts and editors show at the line."""
+    rules = [{"id": rule.id, "shortDescription": {"text": rule.about}, "help": {"text": rule.source}} for rule in RULES]
+    order = {rule.id: index for index, rule in enumerate(RULES)}
+    driver = {"name": "care lint", "version": version, "rules": rules}
+    results = [_result(finding, order[finding.rule]) for one in linted for finding in one.findings]
+    return {
+        "$schema": _SARIF_SCHEMA,
+        "version": "2.1.0",
+        "runs": [{"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}],
+    }
+
+
+def _result(finding: Finding, index: int) -> dict[str, Any]:
+    entry = _entry(finding)
+    place = {
+        "artifactLocation": {"uri": finding.path.as_posix()},
+        "region": {"startLine": finding.line, "startColumn": finding.column},
+    }
+    return {
+        "ruleId": entry.rule,
+        "ruleIndex": index,
+        "level": entry.severity,
+        "message": {"text": f"{entry.text} {entry.hint} (source: {entry.source})"},
+        "locations": [{"physicalLocation": place}],
+    }

@@ -1,0 +1,214 @@
+"""What is wrong with configuration files, without a log."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from care_core.errors import UsageError
+from care_core.lint.linting import lint
+from care_core.lint.records import Finding
+from care_core.lint.rules import RULES
+from care_core.report.linting import lint_document, lint_sarif, lint_schema, lint_text
+from tests.conftest import Care
+
+
+def findings(tmp_path: Path, name: str, text: str, target: str = "") -> tuple[Finding, ...]:
+    path = tmp_path / name
+    path.write_text(text)
+    (linted,) = lint([str(path)], target)
+    return linted.findings
+
+
+def told(tmp_path: Path, name: str, text: str, target: str = "") -> list[tuple[int, str, str]]:
+    return [(one.line, one.rule, one.severity.value) for one in findings(tmp_path, name, text, target)]
+
+
+HUSKY = """controller_frequency: 5.0
+recovery_behaviour_enabled: true
+DWAPlannerROS:
+  acc_lim_x: 2.5
+  acc_lim_th: 3.2
+  max_vel_trans: 0.5
+  max_vel_rot: 1.0
+  min_vel_rot: 0.2
+  yaw_goal_tolerance: 0.1
+"""
+
+
+def test_the_dead_keys_of_a_planner_are_found_with_what_is_meant(tmp_path: Path) -> None:
+    found = findings(tmp_path, "planner.yaml", HUSKY)
+    assert [(one.line, one.column, one.hint) for one in found] == [
+        (2, 1, "Did you mean recovery_behavior_enabled?"),
+        (5, 3, "Did you mean acc_lim_theta?"),
+        (7, 3, "Did you mean max_vel_theta?"),
+        (8, 3, "Did you mean min_vel_theta?"),
+    ]
+    assert {one.rule for one in found} == {"unknown-key"}
+    assert all("ros-planning/navigation" in one.source for one in found)
+
+
+def test_a_key_renamed_between_distributions_is_a_note_until_one_is_named(tmp_path: Path) -> None:
+    text = "DWAPlannerROS:\n  max_trans_vel: 0.5\n  max_vel_x: 0.5\n  acc_lim_theta: 3.2\n"
+    assert told(tmp_path, "a.yaml", text, "kinetic") == []
+    assert told(tmp_path, "a.yaml", text, "noetic") == [(2, "renamed", "warning")]
+    rpp = """controller_server:
+  ros__parameters:
+    controller_plugins: ["FollowPath"]
+    FollowPath:
+      plugin: "nav2_regulated_pure_pursuit_controller::RegulatedPurePursuitController"
+      desired_linear_vel: 0.5
+"""
+    assert told(tmp_path, "b.yaml", rpp, "jazzy") == []
+    assert told(tmp_path, "b.yaml", rpp, "rolling") == [(6, "renamed", "warning")]
+
+
+def test_a_key_that_another_plugin_reads_is_misplaced(tmp_path: Path) -> None:
+    text = "global_costmap:\n  update_frequency: 5.0\n  meter_scoring: true\n"
+    (found,) = findings(tmp_path, "a.yaml", text)
+    assert (found.line, found.rule) == (3, "misplaced-key")
+    assert "TrajectoryPlannerROS" in found.text
+
+
+COSTMAP = """local_costmap:
+  local_costmap:
+    ros__parameters:
+      update_frequency: {rate}
+      footprint: "[[0.3, 0.2], [0.3, -0.2], [-0.3, -0.2], [-0.3, 0.2]]"
+      plugins: ["inflation_layer"]
+      inflation_layer:
+        plugin: "nav2_costmap_2d::InflationLayer"
+        inflation_radius: {radius}
+      obstacle_layer:
+        plugin: "nav2_costmap_2d::ObstacleLayer"
+        enabled: true
+"""
+
+
+def test_inflation_is_weighed_against_the_footprint_and_types_against_what_is_declared(tmp_path: Path) -> None:
+    not_loaded = (11, "not-loaded", "note")
+    assert told(tmp_path, "a.yaml", COSTMAP.format(rate="5.0", radius="0.55")) == [not_loaded]
+    assert told(tmp_path, "a.yaml", COSTMAP.format(rate="5.0", radius="0.15")) == [
+        (9, "contradiction", "warning"),
+        not_loaded,
+    ]
+    assert told(tmp_path, "a.yaml", COSTMAP.format(rate="5", radius="0.55")) == [(4, "wrong-type", "error"), not_loaded]
+
+
+def test_values_out_of_range_of_no_value_and_in_another_unit(tmp_path: Path) -> None:
+    text = """DWAPlannerROS:
+  sim_time: 1.7
+  max_vel_x: 0.2
+  min_vel_x: 0.5
+  yaw_goal_tolerance: 10.0
+  acc_lim_x: 90.0
+  max_vel_theta: fast
+"""
+    assert told(tmp_path, "a.yaml", text) == [
+        (4, "contradiction", "warning"),
+        (5, "wrong-unit", "warning"),
+        (6, "out-of-range", "warning"),
+        (7, "wrong-type", "warning"),
+    ]
+    layer = "obstacle_layer:\n  enabled: true\n  observation_sources: scan\n  combination_method: 7\n"
+    assert told(tmp_path, "b.yaml", f"global_costmap:\n  {layer.replace(chr(10), chr(10) + '  ')}\n") == [
+        (5, "not-in-values", "warning")
+    ]
+
+
+def test_the_parameters_of_a_vehicle(tmp_path: Path) -> None:
+    text = """# Vehicle: Copter
+# Version: 4.6
+BATT_LOW_VOLT,10.5
+BATT_CRT_VOLT,11
+WPNAV_SPEEED,500
+WPNAV_ACCEL,250
+PSC_POSXY_P,1
+PSC_POSXY_P,1.2
+FLTMODE1,77
+RTL_ALT_M,15
+"""
+    assert told(tmp_path, "a.param", text) == [
+        (4, "contradiction", "warning"),
+        (5, "unknown-key", "warning"),
+        (8, "duplicate", "warning"),
+        (9, "not-in-values", "warning"),
+        (10, "renamed", "warning"),
+    ]
+    found = findings(tmp_path, "a.param", text)
+    assert found[1].hint == "Did you mean WPNAV_SPEED?"
+    assert found[4].hint == "Write RTL_ALT, and its value times 100."
+    assert told(tmp_path, "a.param", "WPNAV_SPEED,50000\nWPNAV_ACCEL,250\nRTL_ALT,1500\n") == [
+        (1, "wrong-unit", "warning")
+    ]
+
+
+def test_a_line_that_cannot_be_read_is_a_finding_and_the_rest_is_still_read(tmp_path: Path) -> None:
+    text = "RTL_ALT,1500\nonly\nWPNAV_SPEED,fast\nLAND_SPEED,50\n"
+    assert told(tmp_path, "a.param", text) == [(2, "syntax", "error"), (3, "syntax", "error")]
+    assert told(tmp_path, "a.yaml", "a: [1\nb: 2\n")[0][1:] == ("syntax", "error")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "my_own_node:\n  gain: 3\n  nested: {a: 1}\n",
+        "/**:\n  ros__parameters:\n    anything: 3\n",
+        "amcl:\n  ros__parameters:\n    use_sim_time: $(var sim)\n    scan_topic: scan\n",
+        "bt_navigator:\n  ros__parameters:\n    what_my_plugin_reads: 3\n",
+        "costmap_common: {}\n",
+        "",
+    ],
+)
+def test_what_nobody_knows_is_let_be(tmp_path: Path, text: str) -> None:
+    assert told(tmp_path, "a.yaml", text) == []
+
+
+def test_the_profile_adds_its_own_range(tmp_path: Path, care: Care) -> None:
+    path = tmp_path / "a.param"
+    path.write_text("WPNAV_SPEED,1900\n")
+    result = care("lint", str(path), "--profile", "arducopter")
+    assert "outside-profile" in result.stdout
+    assert result.code == 0
+
+
+def test_documents_follow_their_schemas(tmp_path: Path, care: Care) -> None:
+    path = tmp_path / "planner.yaml"
+    path.write_text(HUSKY)
+    linted = lint([str(path)])
+    document = json.loads(lint_document(linted, "").model_dump_json(by_alias=True))
+    jsonschema.validate(document, lint_schema())
+    sarif = lint_sarif(linted, "1")
+    results = sarif["runs"][0]["results"]
+    assert [one["locations"][0]["physicalLocation"]["region"]["startLine"] for one in results] == [2, 5, 7, 8]
+    assert [RULES[one["ruleIndex"]].id for one in results] == [one["ruleId"] for one in results]
+    assert f"{path}:2:1: warning [unknown-key]" in lint_text(linted)
+
+    result = care("lint", str(path), "--sarif")
+    assert result.code == 1
+    assert json.loads(result.stdout)["version"] == "2.1.0"
+    assert care("lint", str(path), "--target", "notic").code == 2
+    with pytest.raises(UsageError, match="notic"):
+        lint([str(path)], "notic")
+
+
+def test_recorded_configurations_have_the_findings_that_were_looked_at_by_hand(recorded: Path) -> None:
+    """Errors and warnings of each file, all of them checked against the sources; any more is a false alarm."""
+    wanted = {
+        "aion_r1_rover.param": 1, "solo_copter36.param": 2, "linorobot2_navigation.yaml": 7,
+        "nav2_bringup_nav2_params.yaml": 1, "tb3_humble_burger.yaml": 1, "tb3_jazzy_burger.yaml": 2,
+        "vacuum_robot_nav2_params.yaml": 1, "husky/planner.yaml": 5, "jackal/base_local_planner_params.yaml": 1,
+        "jackal/costmap_common_params.yaml": 6, "jackal/map_nav_params_global_costmap_params.yaml": 1,
+        "amcl_params.yaml": 1, "carlike_teb_local_planner_params.yaml": 2, "diff_drive_costmap_common_params.yaml": 1,
+        "diff_drive_teb_local_planner_params.yaml": 2, "dwa_local_planner_params.yaml": 1,
+        "turtlebot2/global_costmap_params.yaml": 1, "turtlebot2/local_costmap_params.yaml": 1,
+    }  # fmt: skip
+    for path in sorted((recorded / "logs" / "configs").rglob("*")):
+        if path.is_file():
+            (linted,) = lint([str(path)])
+            count = sum(one.severity.value != "note" for one in linted.findings)
+            expected = next((n for name, n in wanted.items() if str(path).endswith(name)), 0)
+            assert count == expected, (path.name, linted.findings)
