@@ -33,38 +33,38 @@ VEHICLE_PAIRS: tuple[Pair, ...] = (
             Pair(f"{prefix}CRT_MAH", f"{prefix}LOW_MAH", "what is left is low before it is critical", _MONITOR, True),
         )
     ),
-    Pair("MOT_BAT_VOLT_MIN", "MOT_BAT_VOLT_MAX", "the least is above the most", "AP_MotorsMulticopter scales by both"),
+    Pair("MOT_BAT_VOLT_MIN", "MOT_BAT_VOLT_MAX", "", "AP_MotorsMulticopter scales by both"),
     Pair("MOT_SPIN_ARM", "MOT_SPIN_MIN", "armed motors would turn faster than flying ones", "the list asks for it"),
-    Pair("MOT_SPIN_MIN", "MOT_SPIN_MAX", "the least is above the most", "AP_MotorsMulticopter scales by both"),
-    Pair("MOT_PWM_MIN", "MOT_PWM_MAX", "the least is above the most", "AP_MotorsMulticopter refuses it", True),
+    Pair("MOT_SPIN_MIN", "MOT_SPIN_MAX", "", "AP_MotorsMulticopter scales by both"),
+    Pair("MOT_PWM_MIN", "MOT_PWM_MAX", "", "AP_MotorsMulticopter refuses it", True),
     Pair("FENCE_ALT_MIN", "FENCE_ALT_MAX", "the floor is above the ceiling", "AC_Fence keeps between them"),
-    Pair("ARSPD_FBW_MIN", "ARSPD_FBW_MAX", "the least is above the most", "the list of ARSPD_FBW_MIN"),
-    Pair("AIRSPEED_MIN", "AIRSPEED_MAX", "the least is above the most", "the list of AIRSPEED_MIN"),
+    Pair("ARSPD_FBW_MIN", "ARSPD_FBW_MAX", "", "the list of ARSPD_FBW_MIN"),
+    Pair("AIRSPEED_MIN", "AIRSPEED_MAX", "", "the list of AIRSPEED_MIN"),
     Pair("BAT_CRIT_THR", "BAT_LOW_THR", _BATTERY, "PX4's battery thresholds follow each other"),
     Pair("BAT_EMERGEN_THR", "BAT_CRIT_THR", _BATTERY, "PX4's battery thresholds follow each other"),
     Pair("MPC_XY_CRUISE", "MPC_XY_VEL_MAX", "the speed is above its limit", "PX4's position controller limits it"),
-    Pair("MPC_THR_MIN", "MPC_THR_MAX", "the least is above the most", "PX4's position controller scales by both"),
+    Pair("MPC_THR_MIN", "MPC_THR_MAX", "", "PX4's position controller scales by both"),
 )  # fmt: skip
 
-_LIMITS = "the planner samples between them"
+_LIMITS = "the planners of ROS navigation sample velocities between the two"
 ROS_PAIRS: tuple[Pair, ...] = (
-    Pair("min_vel_x", "max_vel_x", "the least is above the most", _LIMITS),
-    Pair("min_vel_y", "max_vel_y", "the least is above the most", _LIMITS),
-    Pair("min_vel_theta", "max_vel_theta", "the least is above the most", _LIMITS),
-    Pair("min_vel_trans", "max_vel_trans", "the least is above the most", _LIMITS),
-    Pair("min_trans_vel", "max_trans_vel", "the least is above the most", _LIMITS),
-    Pair("min_rot_vel", "max_rot_vel", "the least is above the most", _LIMITS),
-    Pair("min_speed_xy", "max_speed_xy", "the least is above the most", _LIMITS),
-    Pair("vx_min", "vx_max", "the least is above the most", _LIMITS),
-    Pair("ax_min", "ax_max", "the least is above the most", _LIMITS),
-    Pair("min_particles", "max_particles", "the least is above the most", "amcl keeps their number between them"),
-    Pair("laser_min_range", "laser_max_range", "the least is above the most", "amcl keeps ranges between them", True),
+    Pair("min_vel_x", "max_vel_x", "", _LIMITS),
+    Pair("min_vel_y", "max_vel_y", "", _LIMITS),
+    Pair("min_vel_theta", "max_vel_theta", "", _LIMITS),
+    Pair("min_vel_trans", "max_vel_trans", "", _LIMITS),
+    Pair("min_trans_vel", "max_trans_vel", "", _LIMITS),
+    Pair("min_rot_vel", "max_rot_vel", "", _LIMITS),
+    Pair("min_speed_xy", "max_speed_xy", "", _LIMITS),
+    Pair("vx_min", "vx_max", "", _LIMITS),
+    Pair("ax_min", "ax_max", "", _LIMITS),
+    Pair("min_particles", "max_particles", "", "amcl keeps their number between them"),
+    Pair("laser_min_range", "laser_max_range", "", "amcl keeps ranges between them", True),
     Pair("min_obstacle_height", "max_obstacle_height", "no point is between them", "the layer keeps what is between"),
     Pair("obstacle_min_range", "obstacle_max_range", "no point is between them", "the layer keeps what is between"),
     Pair("raytrace_min_range", "raytrace_max_range", "nothing is cleared", "the layer clears between them"),
-    Pair("min_lookahead_dist", "max_lookahead_dist", "the least is above the most", "the look-ahead is between"),
-    Pair("min_rotational_vel", "max_rotational_vel", "the least is above the most", "the behaviour turns between"),
-    Pair("v_linear_min", "v_linear_max", "the least is above the most", "the controller keeps between them"),
+    Pair("min_lookahead_dist", "max_lookahead_dist", "", "the look-ahead is between"),
+    Pair("min_rotational_vel", "max_rotational_vel", "", "the behaviour turns between"),
+    Pair("v_linear_min", "v_linear_max", "", "the controller keeps between them"),
 )  # fmt: skip
 
 _INFLATION = (
@@ -81,7 +81,8 @@ def pairs(document: Document, values: Mapping[str, Entry], known: Sequence[Pair]
         if pair.off and (low.number <= 0 or high.number <= 0):
             continue
         if low.number > high.number:
-            text = f"{low.keys[-1]} ({low.number:g}) is above {high.keys[-1]} ({high.number:g}): {pair.why}."
+            why = f": {pair.why}" if pair.why else ""
+            text = f"{low.keys[-1]} ({low.number:g}) is above {high.keys[-1]} ({high.number:g}){why}."
             hint = f"The other is in line {high.line}."
             yield found("contradiction", Severity.WARNING, document, low, text, hint, pair.source)
 
