@@ -18,10 +18,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis import PLATFORMS, Peers, Tally, evaluate, table_of
+from care_core.files import PROFILE_FILE
 from care_core.learn.table import read_table
 from care_core.learn.train import TrainSettings, train
 from care_core.profile.model import write_model
-from care_core.profile.store import PROFILE_FILE, Profile, load_profile
+from care_core.profile.store import Profile, load_profile
 
 SIZES = {"arducopter": (50, 100, 200, 400), "move_base": (50, 100, 200, 300)}
 RESAMPLES = 5

@@ -13,6 +13,8 @@ from care_core.errors import UsageError
 from care_core.logs.finding import LOG_SUFFIXES
 from care_core.logs.opening import is_recording
 
+PROFILE_FILE = "profile.yaml"
+
 _PACKAGE = Path(__file__).parent
 _HEAD_BYTES = 4096
 _OWN_DOCUMENT = re.compile(r'\{\s*"(schema": "care\.|\$defs"|\$schema")')
@@ -36,6 +38,21 @@ def bundled(kind: Literal["profiles", "samples"], name: str = "") -> Path:
     checkout = _PACKAGE.parent
     folder = checkout / kind if (checkout / "pyproject.toml").is_file() else _PACKAGE / f"_{kind}"
     return folder / name if name else folder
+
+
+def profile_folders() -> dict[str, Path]:
+    """Folders of the installed profiles by name, in order: those that came with this installation, and the user's own,
+    which stand for those of the same name."""
+    places = (bundled("profiles"), own_profiles())
+    found = {path.parent.name: path.parent for place in places for path in place.glob(f"*/{PROFILE_FILE}")}
+    return {name: found[name] for name in sorted(found)}
+
+
+def own_profiles() -> Path:
+    """The folder for profiles of the user's own; it may not exist."""
+    from platformdirs import user_data_path
+
+    return user_data_path("care", appauthor=False) / "profiles"
 
 
 def write_atomically(path: Path, text: str, mode: int | None = None) -> None:

@@ -23,6 +23,7 @@ from care_tui.commands import (
     collecting,
     configuring,
     diagnosing,
+    doctor,
     fleet,
     formats,
     learning,
@@ -31,6 +32,7 @@ from care_tui.commands import (
     past,
     profiles,
     serving,
+    shell,
     watching,
 )
 from care_tui.commands.opening import OPEN
@@ -96,6 +98,8 @@ for commands in (
     logs,
     collecting,
     learning,
+    doctor,
+    shell,
 ):
     app.add_typer(commands.app)
 app.add_typer(profiles.app, name="profiles", invoke_without_command=True)

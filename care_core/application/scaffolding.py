@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.errors import CareError, LogError, UsageError
-from care_core.profile.store import PROFILE_FILE, Profile, available_profiles, load_profile
+from care_core.files import PROFILE_FILE
+from care_core.profile.store import Profile, available_profiles, load_profile
 from care_core.tables.readiness import RUNS_FILE, Readiness, read_columns, readiness
 
 if TYPE_CHECKING:

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from care_core import plain_yaml
 from care_core.errors import UsageError
+from care_core.files import PROFILE_FILE
 from care_core.profile.model import write_model
 from care_core.profile.schema import parse_schema, read_schema
-from care_core.profile.store import CARD_FILE, PROFILE_FILE, load_profile
+from care_core.profile.store import CARD_FILE, load_profile
 from care_core.tables.rows import INSTALL_LEARN
 
 if TYPE_CHECKING:

@@ -23,8 +23,9 @@ from care_core.collect.space import Axis, Space
 from care_core.configs.driven import option_value, readable
 from care_core.configs.loading import read_configs, resolve, split_name
 from care_core.errors import UsageError, nearest
+from care_core.files import PROFILE_FILE
 from care_core.profile.schema import Schema
-from care_core.profile.store import PROFILE_FILE, load_profile
+from care_core.profile.store import load_profile
 from care_core.run import Setting
 from care_core.variables import Variable
 

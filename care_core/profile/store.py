@@ -8,11 +8,11 @@ from pathlib import Path
 
 from care_core.causal.model import Model
 from care_core.errors import ProfileError, nearest
-from care_core.files import bundled
+from care_core.files import PROFILE_FILE, profile_folders
 from care_core.profile.model import read_model
 from care_core.profile.schema import Schema, read_schema
 
-PROFILE_FILE, CARD_FILE = "profile.yaml", "MODEL_CARD.md"
+CARD_FILE = "MODEL_CARD.md"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,16 +44,7 @@ def available_profiles() -> list[Path]:
 
     A profile of the user's stands for the one that came under the same name.
     """
-    found = {path.parent.name: path.parent for path in bundled("profiles").glob(f"*/{PROFILE_FILE}")}
-    found |= {path.parent.name: path.parent for path in own_profiles().glob(f"*/{PROFILE_FILE}")}
-    return [found[name] for name in sorted(found)]
-
-
-def own_profiles() -> Path:
-    """The folder for profiles of the user's own; it may not exist."""
-    from platformdirs import user_data_path
-
-    return user_data_path("care", appauthor=False) / "profiles"
+    return list(profile_folders().values())
 
 
 def load_profile(name_or_path: str | Path) -> Profile:

@@ -16,8 +16,18 @@ if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
 
 LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="The log to read.", show_default=False)]
+
+
+def profile_names(incomplete: str) -> list[str]:
+    """Installed profiles whose names begin so, for a shell's completion; where none does, the shell names folders."""
+    from care_core.files import profile_folders
+
+    return [name for name in profile_folders() if name.startswith(incomplete)]
+
+
 ProfileName = Annotated[
-    str | None, typer.Option("--profile", "-p", help="Name or folder; chosen by the log if absent.")
+    str | None,
+    typer.Option("--profile", "-p", help="Name or folder; chosen by the log if absent.", autocompletion=profile_names),
 ]
 ConfigPaths = Annotated[
     list[str] | None,

@@ -41,6 +41,14 @@ def fleet() -> None:
     _print(fleet_schema())
 
 
+@app.command("doctor")
+def doctor() -> None:
+    """Print the JSON Schema of 'care doctor --json'."""
+    from care_core.report.checkup import doctor_schema
+
+    _print(doctor_schema())
+
+
 @app.command("history")
 def history() -> None:
     """Print the JSON Schema of 'care history --json'."""

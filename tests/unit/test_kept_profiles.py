@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from care_core.files import PROFILE_FILE
 from care_core.profile import kept as keeping
 from care_core.profile import schema_file
 from care_core.profile.schema import Schema, parse_schema, read_schema
-from care_core.profile.store import PROFILE_FILE, available_profiles
+from care_core.profile.store import available_profiles
 
 TEXT = (available_profiles()[0] / PROFILE_FILE).read_text(encoding="utf-8")
 

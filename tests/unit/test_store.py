@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from care_core.errors import ProfileError
-from care_core.profile.store import PROFILE_FILE, Profile, available_profiles, load_profile
+from care_core.files import PROFILE_FILE
+from care_core.profile.store import Profile, available_profiles, load_profile
 from tests.planted import SCHEMA
 
 YAML = """\
