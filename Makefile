@@ -10,7 +10,7 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check bench docs profiles screenshots walk fuzz kills matrix sbom clean
+.PHONY: demo test check bench docs profiles screenshots man walk fuzz kills matrix sbom clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
@@ -37,6 +37,10 @@ profiles: $(DEV)
 
 screenshots: $(BASE)
 	$(BIN)/python -m benchmarks.screenshots
+
+# The manual page, from the help of the commands.
+man: $(BASE)
+	$(BIN)/python -m care_tui.manual docs/care.1
 
 walk: $(BASE)
 	$(BIN)/python -m benchmarks.walk

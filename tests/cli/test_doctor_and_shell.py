@@ -1,0 +1,92 @@
+"""What works here, the shell's completion, and the manual page."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from care_core.application import checkup
+from care_core.report.checkup import DoctorDocument, doctor_schema, doctor_text
+from tests.conftest import Care
+
+ROOT = Path(__file__).parents[2]
+
+
+def statuses(text: str) -> dict[str, str]:
+    return {check["name"]: check["status"] for check in json.loads(text)["checks"]}
+
+
+def test_where_all_is_well_the_doctor_says_so(care: Care) -> None:
+    outcome = care("doctor", "--json")
+    assert outcome.code == 0
+    jsonschema.validate(json.loads(outcome.stdout), doctor_schema())
+    found = statuses(outcome.stdout)
+    assert found["profiles"] == found["history"] == found["folder of settings"] == "ok"
+    assert found["terminal"] == "warn", "the tests have none"
+    text = doctor_text(DoctorDocument.model_validate_json(outcome.stdout))
+    assert all(len(line) <= 80 for line in text.splitlines())
+    assert "works here" in text
+
+
+def test_what_is_broken_is_said_with_what_to_do(care: Care, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = tmp_path / "history.sqlite3"
+    store.write_bytes(b"no database at all, but long enough to be read" * 30)
+    monkeypatch.setenv("CARE_HISTORY", str(store))
+    (tmp_path / "file").write_text("no folder", encoding="utf-8")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "file"))
+    unsound = Path(os.environ["XDG_DATA_HOME"]) / "care" / "profiles" / "mine"
+    unsound.mkdir(parents=True)
+    (unsound / "profile.yaml").write_text("nonsense: 1\n", encoding="utf-8")
+    monkeypatch.setattr(checkup, "_is_installed", lambda name: name not in ("pyulog", "textual"))
+    outcome = care("doctor", "--json")
+    assert outcome.code == 1
+    found = statuses(outcome.stdout)
+    broken = {name for name, status in found.items() if status == "fail"}
+    assert broken == {"history", "folder of settings", "profile mine", "packages"}
+    assert found["extra px4"] == "warn"
+    assert "pip install 'care-tui[px4]'" in outcome.stdout
+    assert all(check["do"] for check in json.loads(outcome.stdout)["checks"] if check["status"] == "fail")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_gets_its_script(care: Care, shell: str) -> None:
+    outcome = care("completion", shell)
+    assert outcome.code == 0
+    assert f"complete_{shell}" in outcome.stdout
+    assert care("completion", "tcsh").code == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("care wat", {"watch"}),
+        ("care watch --not", {"--notify-command"}),
+        ("care triage --profile ardu", {"arducopter", "ardurover"}),
+        ("care profiles sh", {"show"}),
+        ("care triage a", set()),  # the shell names files itself
+    ],
+)
+def test_commands_options_and_profiles_are_completed(words: str, found: set[str]) -> None:
+    variables = {
+        "_CARE_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" ")),
+        "PYTHONPATH": str(ROOT),
+    }  # fmt: skip
+    code = "import sys; from care_tui.start import main\ntry: main()\nfinally: assert 'numpy' not in sys.modules"
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, **variables}, check=True
+    )
+    assert set(answer.stdout.split()) == found
+
+
+def test_the_manual_page_is_that_of_the_help(care: Care) -> None:
+    page = care("man").stdout
+    assert page == (ROOT / "docs" / "care.1").read_text(encoding="utf-8"), "make man"
+    for text in (".TH CARE 1", "care watch", "\\-\\-notify\\-command CMD", ".SH EXIT STATUS", "care profiles check"):
+        assert text in page.replace('"care" "', "care ").replace("\\fB", "")
+    assert not [line for line in page.splitlines() if line.startswith("'")]
