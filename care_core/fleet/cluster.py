@@ -107,6 +107,7 @@ def _local(workers: int, memory: str | None) -> Iterator[Any]:
                 processes=True,
                 host="127.0.0.1",
                 dashboard_address="127.0.0.1:0",
+                worker_dashboard_address="127.0.0.1:0",
                 memory_limit=memory or "auto",
                 security=distributed.Security.temporary(),
                 silence_logs=logging.CRITICAL,

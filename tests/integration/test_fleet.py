@@ -89,16 +89,18 @@ def test_nothing_listens_beyond_this_machine_and_nobody_without_the_certificate_
 def test_logs_are_triaged_by_a_scheduler_that_is_named(tmp_path: Path) -> None:
     (tmp_path / "none.BIN").write_bytes(b"no log")
     fsspec = pytest.importorskip("fsspec")
-    fsspec.filesystem("memory").pipe("/fleet/r1/flight.BIN", FLIGHT.read_bytes())
+    store = fsspec.filesystem("memory")
+    store.pipe("/robots/r1/flight.BIN", FLIGHT.read_bytes())
     broken = [Source(str(path), path) for path in (tmp_path / "none.BIN", tmp_path / "gone.bag")]
-    sources = [*gather(["memory://fleet"]), *broken]
+    sources = [*gather(["memory://robots"]), *broken]
     said: list[str] = []
     here = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": "127.0.0.1:0", "processes": False}
     with distributed.LocalCluster(n_workers=1, **here) as running:
         named = Cluster(running.scheduler_address)
         rows = triage_all(sources, Request(Path()), named, lambda step, _share: said.append(step))
     assert [row.status for row in rows] == ["ok", "unreadable", "unreadable"]
-    assert (rows[0].log, rows[0].folder) == ("memory://fleet/r1/flight.BIN", "r1")
+    assert (rows[0].log, rows[0].folder) == ("memory://robots/r1/flight.BIN", "r1")
+    store.rm("/robots", recursive=True)
     assert all(row.reason for row in rows[1:])
     assert said[-1].startswith("triaged 3 of 3 logs, 2 unreadable")
 
