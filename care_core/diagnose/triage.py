@@ -406,8 +406,10 @@ def _off(case: _Case) -> frozenset[str]:
 def _promise(world: World, broken: Sequence[str]) -> str:
     """Which next run the probabilities are for, and what is known of how it resembles this one."""
     known = [world.model.training.persistence[name] for name in broken if name in world.model.training.persistence]
-    pairs = max((persistence.pairs[0] for persistence in known), default=0)
-    measured = f"measured on {pairs} pairs of training runs" if pairs else "not measured, no training run was repeated"
+    same, another = (max((persistence.pairs[i] for persistence in known), default=0) for i in (0, 1))
+    measured = f"measured on {same} pairs of training runs" if same else "not measured, no training run was repeated"
+    if another and not same:
+        measured = f"not measured, training repeated runs on other days only ({another} pairs)"
     seen = f", seen in {1 + len(world.repeats)} runs" if world.repeats else ""
     return f"probabilities are for the next run under the same conditions{seen}; how alike such runs are was {measured}"
 

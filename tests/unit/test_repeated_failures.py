@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from care_core.causal.model import Persistence
 from care_core.diagnose.judging import Judged, judge, with_repeats
 from care_core.diagnose.triage import triage
 from care_core.errors import UsageError
@@ -40,6 +41,25 @@ def test_a_second_slow_run_takes_chance_out_of_the_promise(planted: Profile) -> 
                (("alone", alone), ("again", again), ("relieved", relieved))}  # fmt: skip
     assert changed["again"] < changed["alone"] < changed["relieved"]
     assert any("seen in 2 runs" in note for note in again.notes)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "said"),
+    [
+        ((0, 0), "not measured, no training run was repeated"),
+        ((0, 53), "not measured, training repeated runs on other days only (53 pairs)"),
+        ((4, 53), "measured on 4 pairs of training runs"),
+    ],
+)
+def test_a_promise_says_what_is_known_of_how_runs_resemble_each_other(
+    planted: Profile, pairs: tuple[int, int], said: str
+) -> None:
+    seen = {"time": Persistence(same=0.6, another=0.3, pairs=pairs)}
+    training = planted.model.training.model_copy(update={"persistence": seen})
+    profile = Profile(planted.path, planted.schema)
+    vars(profile)["model"] = replace(planted.model, training=training)  # as if it had been read
+    run = judged(profile, "a", outcome(260.0), reserve=40.0)
+    assert any(note.endswith(said) for note in triage(run, profile, CHOICE).notes)
 
 
 def test_another_configuration_and_the_same_log_are_no_repeats(planted: Profile) -> None:
