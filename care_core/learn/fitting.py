@@ -39,6 +39,8 @@ RELEVANCE_SCALE = 0.1
 """Relevance below which an input counts as unused in the penalty."""
 UNUSED = 0.02
 """Relevance below which an input is left out: six standard deviations of it move nothing by 1 %."""
+WEAK = 0.2
+"""Least relevance of any option where runs are few: the slope it may have before runs show one."""
 NOISE, BINARY_NOISE = 0.02, 0.3
 """Least noise, as a share of the target's standard deviation. Yes-or-no outcomes near a limit go either way: a
 regression that reproduces every one of them has learned them by heart."""
@@ -64,6 +66,8 @@ class Inputs:
     read: NDArray[np.bool_]
     nominal: Nominal | None = None
     """What physics says of a positive target; its arguments are among the names."""
+    least: float = 0.0
+    """No relevance ends below it."""
 
     @classmethod
     def all_read(cls, names: Sequence[str], log: NDArray[np.bool_]) -> Inputs:
@@ -128,7 +132,7 @@ def fit(
     points = ((raw - centre) / sd).astype(np.float32).astype(float)
     mean, scale = float(coded.mean()), float(coded.std()) or 1.0
     targets = ((coded - mean) / scale).astype(np.float32).astype(float)
-    kernel = _fit_kernel(points, targets, effort.iterations, BINARY_NOISE if binary else NOISE)
+    kernel = _fit_kernel(points, targets, effort.iterations, BINARY_NOISE if binary else NOISE, inputs.least)
     used = kernel.relevance > UNUSED
     kernel = replace(kernel, relevance=kernel.relevance[used], idle=int((~used).sum()))
     points = points[:, used]
@@ -220,13 +224,13 @@ def _skewness(values: FloatArray) -> float:
     return 0.0 if sd == 0 else float((((values - values.mean()) / sd) ** 3).mean())
 
 
-def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_noise: float) -> Kernel:
+def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_noise: float, least: float) -> Kernel:
     p = points.shape[1]
     if p == 0 or np.ptp(targets) == 0:
         return Kernel(np.zeros(p), 0.0, 0.0, 1.0)
     squared = _pairs(points)
     start = np.r_[np.full(p, np.log(0.3)), 0.0, 0.0, np.log(0.5)]
-    bounds = [(-6.0, 2.0)] * p + [(-4.0, 3.0)] * 2 + [(np.log(least_noise), 1.0)]
+    bounds = [(max(-6.0, np.log(max(least, 1e-9))), 2.0)] * p + [(-4.0, 3.0)] * 2 + [(np.log(least_noise), 1.0)]
     best = minimize(
         _negative_log_posterior,
         start,

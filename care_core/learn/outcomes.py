@@ -19,7 +19,16 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import Averaging, FloatArray, Mechanism, transformed
 from care_core.causal.model import OutcomeRecord, StageRecord
 from care_core.causal.nominal import Nominal
-from care_core.learn.fitting import MIN_ROWS, Effort, Fitted, Inputs, best_transform, fit, tested_on_missions_left_out
+from care_core.learn.fitting import (
+    MIN_ROWS,
+    WEAK,
+    Effort,
+    Fitted,
+    Inputs,
+    best_transform,
+    fit,
+    tested_on_missions_left_out,
+)
 from care_core.learn.knowledge import with_known
 from care_core.learn.relative import missions_of, needs
 from care_core.profile.schema import Schema
@@ -28,6 +37,9 @@ from care_core.variables import Events, Role, Variable
 MIN_CLASS = 5
 """Missions each way that a stage needs: with fewer there is nothing to learn about who fails it."""
 MOVES_TOGETHER = 0.9
+FEW_RUNS = 150
+"""Runs below which what a search has not found is not taken to be absent. On simulated robots a graph learned from 60
+runs named 36 of 80 first causes and none at all 55, from 100 runs 50 and 67, from 400 runs 77 both."""
 
 
 @dataclass(frozen=True)
@@ -60,12 +72,20 @@ def causes_of(name: str, graph: CausalGraph, schema: Schema, *, contexts: bool =
 
 def candidates(name: str, graph: CausalGraph, frame: pd.DataFrame, schema: Schema) -> list[tuple[str, ...]]:
     """Input sets to choose from: the options that the search found, those together with what people know, and those
-    with the contexts that are known to act on it."""
+    with the contexts that are known to act on it. Where runs are few, also all options: what a search has not found
+    among few runs it has not ruled out, and a regression under a sparse prior forgets what explains nothing."""
     sets = [causes_of(name, graph, schema)]
+    if len(frame) < FEW_RUNS and not schema.observational:
+        sets.append(varying_options(frame, schema))
     if schema.known:
         known = with_known(graph, frame, schema)
         sets += [causes_of(name, known, schema), causes_of(name, known, schema, contexts=True)]
     return list(dict.fromkeys(sets))
+
+
+def varying_options(frame: pd.DataFrame, schema: Schema) -> tuple[str, ...]:
+    """The options that the runs tell something about."""
+    return tuple(v.name for v in schema.options if frame[v.name].nunique() > 1)
 
 
 def inputs_of(names: Sequence[str], schema: Schema, nominal: Nominal | None = None) -> Inputs:
@@ -225,7 +245,9 @@ def fit_on(
     missions = missions_of(frame, schema)
     met = {v.name: frame[v.name].fillna(frame[v.name].median()) for v in schema.contexts if v.name in frame}
     frame = frame.assign(**met)
+    options = set(varying_options(frame, schema))
     best: Fitted | None = None
+    lowest = np.inf
     events = schema.variables[target].events if target in schema.variables else None
     for names in sets:
         inputs = inputs_of(names, schema, nominal)
@@ -238,9 +260,14 @@ def fit_on(
             continue
         groups = None if missions is None else missions[known]
         binary = set(np.unique(y)) <= {0.0, 1.0}
-        found = fit(x, y, inputs, binary=binary, rng=rng, effort=effort, groups=groups)
-        if best is None or found.loss < best.loss:
-            best, asked = found, (x, y, inputs, groups)
+        weak = len(frame) < FEW_RUNS and options <= set(names)
+        found = fit(
+            x, y, replace(inputs, least=WEAK) if weak else inputs, binary=binary, rng=rng, effort=effort, groups=groups
+        )
+        # Their relevances were chosen on the runs that they are tested on: one nat each, as Akaike counts.
+        loss = found.loss + (len(names) / len(y) if weak else 0.0)
+        if loss < lowest:
+            best, lowest, asked = found, loss, (x, y, inputs, groups)
     if best is None:
         return None
     x, y, inputs, groups = asked

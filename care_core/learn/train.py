@@ -23,7 +23,7 @@ from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME
 from care_core.learn.identification import identify, is_answered_by
 from care_core.learn.knowledge import with_known
 from care_core.learn.mediation import with_mediation
-from care_core.learn.outcomes import badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
+from care_core.learn.outcomes import FEW_RUNS, badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
 from care_core.learn.relative import of_ratios, relative
 from care_core.learn.repeats import persistence
 from care_core.learn.robustness import robustness
@@ -82,7 +82,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, report:
     outcomes = with_mediation(outcomes, mechanisms, with_known(graph, frame, schema), frame, schema)
     training = _training(frame, schema, structure, settings)
     training = training.model_copy(update={"persistence": persistence(frame, schema, outcomes, mechanisms)})
-    learned = Learned(graph, support, outcomes, mechanisms, training)
+    learned = Learned(with_weak(graph, frame, schema), support, outcomes, mechanisms, training)
     return assemble(frame, schema, learned, settings, rng, report)
 
 
@@ -203,6 +203,20 @@ def _reweighted(mechanism: Mechanism, rows: NDArray[np.int64]) -> FloatArray:
     weights = np.zeros(len(mechanism.targets))
     np.add.at(weights, chosen, solve(mechanism.kernel, mechanism.points[chosen], mechanism.targets[chosen]))
     return weights
+
+
+def with_weak(graph: CausalGraph, frame: pd.DataFrame, schema: Schema) -> CausalGraph:
+    """Where runs are few, the graph with an edge to every objective from each option that no path leads from."""
+    if len(frame) >= FEW_RUNS or schema.observational:
+        return graph
+    varying = [v.name for v in schema.options if frame[v.name].nunique() > 1]
+    weak = {
+        (option, objective.name)
+        for objective in schema.objectives
+        for option in varying
+        if option not in graph.ancestors(objective.name) and frame[objective.name].nunique() > 1
+    }
+    return CausalGraph(graph.nodes, graph.directed | weak, graph.bidirected)
 
 
 def _metric_mechanisms(

@@ -19,6 +19,7 @@ from care_core.learn.outcomes import (
     groups_that_move_together,
     met,
 )
+from care_core.learn.train import with_weak
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.variables import Role, Threshold, Variable
@@ -128,6 +129,19 @@ def test_a_run_lost_at_a_stage_that_no_option_moves_is_not_laid_to_a_later_one(p
 def test_an_objective_that_nothing_moves_has_no_outcome() -> None:
     bare = CausalGraph(tuple(SMALL.variables))
     assert fit_outcomes(missions(), SMALL, bare, np.random.default_rng(0), effort=QUICK) == ({}, {})
+
+
+def test_among_few_runs_what_the_search_did_not_find_is_not_ruled_out() -> None:
+    bare, frame = CausalGraph(tuple(SMALL.variables)), missions(100)
+    found = fit_total("error", frame, SMALL, bare, np.random.default_rng(0), effort=QUICK)
+    assert found is not None
+    low, high = found.expected(np.array([[0.1], [0.7]]))
+    assert (low, high) == (pytest.approx(0.9, abs=0.1), pytest.approx(0.3, abs=0.1))
+    weak = with_weak(bare, frame, SMALL)
+    assert weak.directed == {("gain", "success"), ("gain", "time")}
+    assert with_weak(GRAPH, frame, SMALL).directed == {*GRAPH.directed, ("gain", "time")}
+    assert with_weak(bare, missions(), SMALL) == bare
+    assert with_weak(bare, frame, replace(SMALL, observational=True)) == bare
 
 
 def test_contexts_are_read_only_where_operators_chose_by_them() -> None:
