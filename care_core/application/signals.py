@@ -22,6 +22,9 @@ Source = tuple[str, str]
 SELECTORS = ("I", "Inst", "Instance", "C")
 """Fields that say which of several sensors a value is from: no signals. The first sensor is drawn."""
 
+CLOCKS = ("GMS",)
+"""Fields that tell the time of the week, which is nobody's business who is sent a bundle."""
+
 NO_SIGNALS = {"ARM", "CMD", "ERR", "EV", "MODE", "MSG", "ORGN", "PARM", "VER", *TEXTS}
 """Records of what was done and said: there is nothing to draw."""
 
@@ -145,7 +148,7 @@ def _read_by_profile(case: Case, present: Collection[str]) -> dict[Source, tuple
         needs = find_extractor(variable.extract.kind).needs(variable.extract.args)
         for channel, fields in needs.items():
             for field in fields:
-                if channel in present and channel not in NO_SIGNALS and field not in SELECTORS:
+                if channel in present and channel not in NO_SIGNALS and field not in (*SELECTORS, *CLOCKS):
                     users.setdefault((channel, field), []).append(variable.name)
     matters = {result.variable.name for result in case.diagnosis.objectives}
     matters |= {node.name for fault in case.diagnosis.faults for cause in fault.causes for node in cause.path}

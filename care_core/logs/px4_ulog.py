@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timezone
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,7 +96,8 @@ class Px4Log:
             facts["hardware"] = str(self._info["ver_hw"])
         status = self.read({"vehicle_status": ("vehicle_type",)}).get("vehicle_status")
         if status is not None and "vehicle_type" in status.columns and len(status):
-            facts["vehicle"] = _VEHICLE_TYPES.get(int(status["vehicle_type"][-1]), "")
+            kind = float(status["vehicle_type"][-1])
+            facts["vehicle"] = _VEHICLE_TYPES.get(int(kind), "") if math.isfinite(kind) else ""
         return {key: text for key, text in facts.items() if text}
 
     @cached_property
@@ -119,12 +121,12 @@ class Px4Log:
         source = "PX4 parameters"
         known: dict[str, list[Setting]] = {}
         for name, value in ulog.initial_parameters.items():
-            if isinstance(value, (int, float)):
+            if _is_number(value):
                 default = defaults.get(name, value) if ulog.has_default_parameters else None
-                known[name] = [Setting(name, _number(value), source, None if default is None else _number(default))]
+                known[name] = [Setting(name, _number(value), source, _number(default) if _is_number(default) else None)]
         for stamp_us, name, value in ulog.changed_parameters:
             values = known.setdefault(name, [])
-            if isinstance(value, (int, float)) and (not values or values[-1].value != _number(value)):
+            if _is_number(value) and (not values or values[-1].value != _number(value)):
                 changed_s = (stamp_us - self._first_us) / 1e6 if values else None
                 values.append(Setting(name, _number(value), source, changed_at_s=changed_s))
         return {name: tuple(values) for name, values in known.items() if values}
@@ -175,6 +177,11 @@ def _stamped(ulog: Any) -> list[Any]:
 
 def _channel(data: Any) -> str:
     return f"{data.name}#{data.multi_id}" if data.multi_id else str(data.name)
+
+
+def _is_number(value: Any) -> TypeGuard[int | float]:
+    """Whether a parameter is one: a log may declare it as text, or as what no number is."""
+    return isinstance(value, (int, float)) and math.isfinite(value)
 
 
 def _number(value: float) -> float:

@@ -132,6 +132,13 @@ _DECODED = ("ros1", "cdr", "json")
 """Encodings of messages."""
 
 
+_NUMBERS = frozenset((
+    "x", "y", "z", "w", "stamp", "voltage", "current", "charge", "percentage", "level",
+    "angle_min", "angle_max", "angle_increment", "range_min", "range_max",
+))  # fmt: skip
+_LISTS = frozenset(("ranges", "transforms", "status_list", "poses"))
+
+
 class RosLog:
     """A recording of one or more files, fulfilling `care_core.logs.base.Log`.
 
@@ -247,7 +254,8 @@ class RosLog:
             decoders = self._decoders(part, wanted)
             for number, decoder in decoders.items():
                 topic = part.connections[number].topic
-                kinds.setdefault(topic, {}).update(zip(decoder.paths, decoder.is_number, strict=True))
+                found = zip(decoder.paths, decoder.is_number, strict=True)
+                kinds.setdefault(topic, {}).update((path, kind) for path, kind in found if _is_as_named(path, kind))
             for number, gathered in self._gather(part, decoders, at_most or {}).items():
                 pieces.setdefault(part.connections[number].topic, []).extend(gathered.pieces())
         return {topic: _table(kinds[topic], pieces.get(topic, []), self._low_ns) for topic in wanted if topic in kinds}
@@ -511,6 +519,13 @@ def _objects(values: Sequence[Any]) -> NDArray[Any]:
     for row, value in enumerate(values):
         column[row] = value
     return column
+
+
+def _is_as_named(path: str, is_number: bool) -> bool:
+    """Whether a field holds what its name says in all of ROS: a log brings its own definitions, and may bring broken
+    ones. A field that does not is as good as absent."""
+    leaf = path.rpartition(".")[2]
+    return is_number if leaf in _NUMBERS else not (is_number and leaf in _LISTS)
 
 
 def _table(kinds: Mapping[str, bool], pieces: Sequence[_Piece], start_ns: int) -> Table:

@@ -183,7 +183,7 @@ def _log(log: Log) -> LogEntry:
         start=log.start,
         duration_s=log.duration_s,
         bytes=size,
-        facts={name: clean(text) for name, text in log.facts.items()},
+        facts={clean(name): clean(text) for name, text in log.facts.items()},
         damage=[DamageEntry(what=clean(d.what), byte=d.byte, time_s=_finite(d.time_s)) for d in log.damage],
         read=ReadShare(to_s=log.duration_s, about_s=_about_s(log.damage, log.duration_s, size)),
     )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 from pathlib import Path
 
 import pytest
 
 from tests.conftest import Care
+from tests.ros_samples import write_db3
 
 DATA = Path(__file__).parents[1] / "data"
 FLIGHT, DRIVE = DATA / "arducopter_good.BIN", DATA / "move_base_good.bag"
@@ -73,3 +75,14 @@ def test_a_log_without_messages_is_still_looked_into(care: Care, recorded: Path)
     outcome = care("inspect", recorded / "logs" / "ros1_bag" / "no_messages.bag")
     assert outcome.code == 0
     assert "Parameters  0" in outcome.stdout
+
+
+def test_an_encoding_of_escapes_reaches_no_terminal(care: Care, tmp_path: Path) -> None:
+    path = write_db3(tmp_path / "bag")
+    database = sqlite3.connect(path)
+    with database:
+        database.execute("update topics set serialization_format = ?", ("\x1b]52;c;aGk=\x07",))
+    database.close()
+    (path.parent / "metadata.yaml").unlink(missing_ok=True)
+    for flags in ((), ("--json",)):
+        assert "\x1b" not in care("inspect", path, *flags).stdout

@@ -6,11 +6,13 @@ import os
 import re
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from rosbags.rosbag1 import Reader, Writer
 
 from care_core import limits
 from care_core.errors import CareError, LogError
@@ -157,6 +159,41 @@ def test_a_field_declared_as_what_it_is_not(is_text: bool, name: str, tmp_path: 
     assert log is not None
     examine(log)
     read_run(log, load_profile("arducopter").schema)
+
+
+def test_a_parameter_of_px4_whose_default_is_text(tmp_path: Path) -> None:
+    raw = write_ulog(tmp_path / "a").read_bytes()
+    for key in (b"char[4] MC_ROLL_P", b"float MC_ROLL_P"):
+        body = b"\x01" + bytes([len(key)]) + key + b"\xff" * 4
+        (tmp_path / "b").write_bytes(raw[:16] + _with_default(raw[16:], body))
+        log = open_log(tmp_path / "b")
+        assert all(isinstance(one.value, float) for history in log.settings().values() for one in history)
+
+
+def _with_default(records: bytes, body: bytes) -> bytes:
+    """The records of a ULog with the default of a parameter after the flags."""
+    size = 3 + int.from_bytes(records[:2], "little")
+    return records[:size] + len(body).to_bytes(2, "little") + b"Q" + body + records[size:]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [(b"float64 x", b"float64[] x"), (b"float32 voltage", b"string voltage"), (b"float64 z", b"uint8[4] z")],
+)
+def test_a_bag_whose_definitions_are_not_those_of_ros(old: bytes, new: bytes, tmp_path: Path) -> None:
+    with Reader(ROOT / "tests" / "data" / "move_base_good.bag") as bag, Writer(tmp_path / "a.bag") as made:
+        written = {
+            one.id: made.add_connection(
+                one.topic, one.msgtype, msgdef=one.msgdef.data.replace(old.decode(), new.decode()), md5sum=one.digest
+            )
+            for one in bag.connections
+        }
+        for connection, time_ns, raw in bag.messages():
+            made.write(written[connection.id], time_ns, raw)
+    log = open_log(tmp_path / "a.bag")
+    examine(log)
+    with suppress(CareError):  # there may be no mission left
+        read_run(log, load_profile("move_base").schema)
 
 
 @pytest.mark.parametrize("kind", MAKERS)
