@@ -120,7 +120,9 @@ def _candidates(profile: Profile, model: Model, rows: Sequence[Row]) -> tuple[tu
     references = {(name, value) for row in rows for name, value in row.off.items()}
     found = []
     for (name, value), _ in named.most_common():
-        option = profile.schema.variables[name]
+        option = profile.schema.variables.get(name)
+        if option is None:  # of another version of the profile, on a worker
+            continue
         is_safe = not option.safety or (name, value) in references
         if is_safe and option.accepts(value) and model.supports(name, value):
             found.append((option, value))
@@ -151,7 +153,10 @@ def _tried(
 
 def _probabilities(row: Row, model: Model, candidates: Sequence[tuple[Variable, float]]) -> Probabilities | None:
     """That a run meets every limit: unchanged, then with each candidate; None where no model can be asked."""
-    if row.asked is None:
+    # A worker may have had a profile of the same name and version that was trained on other variables.
+    if row.asked is None or any(
+        name not in row.asked.config for one in model.mechanisms.values() for name in one.inputs
+    ):
         return None
     config = row.asked.config
     changed = [{**config, option.name: value} for option, value in candidates]

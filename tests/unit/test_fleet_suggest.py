@@ -9,7 +9,7 @@ import pytest
 
 from care_core.application.case import Request
 from care_core.application.fleet import triage_one
-from care_core.fleet.rows import Explained, Row
+from care_core.fleet.rows import Explained, NamedCause, Row
 from care_core.fleet.sources import Source
 from care_core.fleet.suggest import Silence, Suggestion, suggest
 from care_core.fleet.together import together
@@ -117,10 +117,18 @@ def test_a_robot_is_helped_where_most_of_its_failures_are(failed: Row) -> None:
 
 
 def test_what_another_version_of_the_profile_judged_is_not_asked(failed: Row) -> None:
-    found = only([replace(on(name, failed), version="0") for name in "ab"])
-    assert isinstance(found, Silence)
-    assert found.best is not None
-    assert [one.why for one in found.best.outlooks] == ["no model can be asked about its runs"] * 2
+    assert failed.asked is not None
+    renamed = NamedCause("of another version", "high", 1.0, 2.0)
+    lacking = replace(failed.asked, config={option_of(failed): SLOW})
+    for strange in (
+        replace(failed, version="0"),
+        replace(failed, asked=lacking),
+        replace(failed, version="0", causes=(renamed, *failed.causes)),
+    ):
+        found = only([replace(strange, robot=name, sha256=name) for name in "ab"])
+        assert isinstance(found, Silence)
+        assert found.best is not None
+        assert [one.why for one in found.best.outlooks] == ["no model can be asked about its runs"] * 2
 
 
 def test_a_profile_that_is_not_here_or_was_learned_elsewhere_suggests_nothing(failed: Row) -> None:
