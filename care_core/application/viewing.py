@@ -175,7 +175,7 @@ def _past(triaged: Triaged) -> Past:
     causes = [cause["option"] for fault in document["faults"] for cause in fault["causes"]]
     return Past(
         at=triaged.at,
-        log=document["log"]["path"],
+        log=triaged.log_path,
         mission=triaged.mission,
         profile=profile_of(document),
         fit=fit_of(document),

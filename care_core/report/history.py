@@ -332,7 +332,7 @@ def _trend_lines(trend: TrendEntry, indent: str, width: int, ascii: bool) -> Ite
 
 
 def _span(low: float, high: float, unit: str) -> str:
-    return f"{low:.4g} to {_figure(high, unit)}"
+    return _figure(high, unit) if low == high else f"{low:.4g} to {_figure(high, unit)}"
 
 
 def _figure(value: float, unit: str) -> str:

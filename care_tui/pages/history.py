@@ -25,8 +25,9 @@ class HistoryPage(Page):
     name = "History"
     HELP = (
         "Runs that were triaged before, the newest first, with the trend of every objective up to the one under the "
-        "cursor. x marks a run; then every other is compared with it. / filters, Esc leaves."
+        "cursor. Enter opens its log. x marks a run; then every other is compared with it. / filters, Esc leaves."
     )
+    ENTER = "Its log"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"mark"})
 
     def __init__(self, screen: PanesScreen) -> None:
@@ -88,6 +89,11 @@ class HistoryPage(Page):
         if len(known) < 2:
             return ""
         return f"{sparkline(known, ascii=self.glyphs is ASCII)}  {min(known):.4g} to {max(known):.4g}"
+
+    def open(self, index: int | None) -> None:
+        runs = self._found.answer
+        if isinstance(runs, list) and index is not None:
+            self.walk.open_log(Path(runs[index].log))
 
     def mark(self) -> None:
         """Mark the run under the cursor to compare others with, or take the mark away."""

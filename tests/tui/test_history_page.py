@@ -92,3 +92,19 @@ async def test_past_runs_show_trends_and_two_are_compared() -> None:
         assert "WPNAV_SPEED" not in text(app), "options that are alike are left out"
         await settle(pilot, "k", "k", "x")
         assert title(app).startswith("History  3 runs"), "x on the marked run takes the mark away"
+
+
+async def test_enter_opens_the_log_of_a_past_run() -> None:
+    for number in (1, 2):
+        assert remember_triage(run_of(number, 140.0, 50.0)) is None
+    asked: list[Path] = []
+
+    def diagnose(request: Request, _progress: object) -> Case:
+        asked.append(request.log)
+        return Case(run_of(42, 187.0, 16.0))
+
+    app = CareApp(Request(LOG), engine=fake_engine(diagnose), settings=Settings(places=()))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "y", "j", "enter")
+        assert asked == [LOG, Path("/flights/00000001.BIN")]
+        assert "mission_time" in items(app), "the objectives of that log are shown"
