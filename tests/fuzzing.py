@@ -123,6 +123,37 @@ def read_metadata(path: Path) -> Answer:
     return f"{bool(found.files)} {len(found.settings()) > 0} {found.duration_s is not None} {len(found.notes()) > 0}"
 
 
+def read_site(path: Path) -> Answer:
+    from care_core.profile.site import load_site
+
+    site = load_site(path)
+    return str(site is not None)
+
+
+def read_campaign(path: Path) -> Answer:
+    """A campaign beside what it names."""
+    from care_core.collect.campaign import read_campaign as read
+
+    folder = path.parent / "campaign"
+    if not folder.exists():
+        from tests.campaigns import campaign_in
+
+        folder.mkdir()
+        campaign_in(folder)
+    shutil.copyfile(path, folder / "campaign.yaml")
+    return str(len(read(folder / "campaign.yaml").space.axes))
+
+
+def read_journal(path: Path) -> Answer:
+    from care_core.collect.journal import FILE, Journal
+
+    folder = path.parent / "collected"
+    folder.mkdir(exist_ok=True)
+    shutil.copyfile(path, folder / FILE)
+    with Journal.open(folder, "d") as journal:
+        return f"{len(journal.planned) > 0} {len(journal.done) > 0}"
+
+
 def _flight(folder: Path) -> Sequence[Path]:
     whole = bundled("samples", "arducopter_failed.BIN").read_bytes()
     (folder / "a").write_bytes(whole[: MOST_BYTES // 2])
@@ -226,6 +257,32 @@ def _metadata(folder: Path) -> Sequence[Path]:
     return [folder / "a"]
 
 
+def _site(folder: Path) -> Sequence[Path]:
+    (folder / "a").write_text(
+        "schema_version: 1\nlimits:\n  arducopter:\n    mission_time: {value: 150, mission: {waypoints: 5}}\n"
+        "    energy: {ratio: 1.3}\n"
+    )
+    return [folder / "a"]
+
+
+def _campaign(folder: Path) -> Sequence[Path]:
+    from tests.campaigns import campaign_in
+
+    return [campaign_in(folder, slots=2, seed=3)]
+
+
+def _journal(folder: Path) -> Sequence[Path]:
+    from care_core.collect.journal import Done, Journal
+    from care_core.collect.sampling import Planned
+
+    with Journal.open(folder, "d") as journal:
+        runs = [Planned(number, {"max_speed": 0.5}, 0) for number in range(3)]
+        journal.plan(runs)
+        journal.add(Done(1, 1, 2.5, ("a.bag",), ({"max_speed": 0.5},)))
+        journal.add(Done(2, 2, 0.5, failure="it crashed"))
+    return [folder / "journal.jsonl"]
+
+
 TARGETS: dict[str, Target] = {
     "dataflash": Target(_flight, read_log),
     "dataflash text": Target(_text, read_log),
@@ -241,6 +298,9 @@ TARGETS: dict[str, Target] = {
     "report": Target(_reports, read_report),
     "configuration": Target(_configurations, read_configuration),
     "settings": Target(_settings, read_settings),
+    "site": Target(_site, read_site),
+    "campaign": Target(_campaign, read_campaign),
+    "journal": Target(_journal, read_journal),
 }
 
 

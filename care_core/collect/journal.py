@@ -83,6 +83,8 @@ class Journal:
                 break
             lines.append(entry)
             whole += len(line)
+        if b"\n" in content[whole:].rstrip(b"\n"):  # not the last line: the runs behind it must not go with it
+            raise _damaged(path, len(lines) + 1)
         if not lines:
             if content.strip():
                 raise UsageError("This is no journal of a campaign.", hint="Choose another --out.", where=str(path))
@@ -95,11 +97,14 @@ class Journal:
                 where=str(path),
             )
         stream.truncate(whole)
-        for entry in lines[1:]:
-            for one in entry.get("plan", ()):
-                self.planned[one["number"]] = Planned(**one)
-            if "run" in entry:
-                self.done[entry["run"]] = _done(entry)
+        for number, entry in enumerate(lines[1:], start=2):
+            try:
+                for one in entry.get("plan", ()):
+                    self.planned[one["number"]] = Planned(**one)
+                if "run" in entry:
+                    self.done[entry["run"]] = _done(entry)
+            except (TypeError, LookupError, ValueError, AttributeError) as err:
+                raise _damaged(path, number) from err
 
     def plan(self, runs: Sequence[Planned]) -> None:
         """Keep what is to be run next."""
@@ -133,6 +138,14 @@ class Journal:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _damaged(path: Path, line: int) -> UsageError:
+    return UsageError(
+        f"The journal of the campaign is damaged in line {line}.",
+        hint="Take the line out, or choose another folder with --out.",
+        where=str(path),
+    )
 
 
 def _entry(line: bytes) -> Any:

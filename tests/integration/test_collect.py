@@ -294,3 +294,16 @@ def test_a_parameter_that_no_file_holds_is_found_before_the_first_run(care: Care
     assert outcome.code == ExitCode.USAGE
     assert "No file holds /courier/controller/frequency." in outcome.stderr
     assert not (tmp_path / "campaign").exists()
+
+
+def test_a_journal_that_is_damaged_inside_is_refused_and_kept(care: Care, tmp_path: Path) -> None:
+    path = campaign_in(tmp_path)
+    assert document(care, path)[0] == ExitCode.OK
+    journal = tmp_path / "campaign" / FILE
+    lines = journal.read_bytes().splitlines(keepends=True)
+    damaged = b"".join([*lines[:2], b'{"run": 1, "attem\n', *lines[2:]])
+    journal.write_bytes(damaged)
+    code, _, err = care("collect", path)
+    assert code == ExitCode.USAGE
+    assert "line 3" in err
+    assert journal.read_bytes() == damaged
