@@ -75,6 +75,16 @@ BENCHMARKS = (
     Benchmark("learning", "benchmarks.learning --shared {shared}", "120 s, 2 GB", "causal-learn's FCI"),
     Benchmark("fleet", "benchmarks.fleet", "peak grows by 15 % at most; 0.8 of a loop on one worker", "a plain loop"),
     Benchmark("ingest", "benchmarks.ingest", "1.5, 6, 3 s; 300 MB; 5 times faster", "pymavlink, rosbags, mcap"),
+    Benchmark("small_triage", "benchmarks.small_triage", "0.4 s of processor", "importing numpy"),
+    Benchmark(
+        "big_files",
+        "benchmarks.big_files",
+        "300 MB, 5 % of the bytes, twice the peer, stopped in 0.2 s",
+        "rosbags, mcap, SQLite, numpy and cat on the same file",
+    ),
+    Benchmark("many_logs", "benchmarks.many_logs", "1.8 times by the second core, memory flat", "triage in a loop"),
+    Benchmark("growth", "benchmarks.growth --picture docs/growth.svg", "2 GB", "none"),
+    Benchmark("slow_link", "benchmarks.slow_link", "no key lost, still 1 s after the release", "none"),
     Benchmark("tui", "benchmarks.tui", "0.7 s to the first frame, 50 ms a key, 2 kB", "none"),
 )
 
