@@ -82,7 +82,14 @@ for step, seconds in spent.items():
 def cpu_s(code: str, *words: str, env: Mapping[str, str]) -> float:
     """Processor seconds of one Python process."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, "-c", code, *words], stdout=subprocess.DEVNULL, check=False, env=env)
+    subprocess.run(
+        [sys.executable, "-c", code, *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        check=False,
+        env=env,
+        cwd=env["PYTHONPATH"],
+    )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
@@ -92,8 +99,9 @@ def shares(log: Path, env: Mapping[str, str], runs: int) -> dict[str, float]:
     found: dict[str, list[float]] = {}
     for _ in range(runs):
         ended = subprocess.run(
-            [sys.executable, "-c", STEPS, str(log)], stdout=subprocess.PIPE, text=True, check=True, env=env
-        )
+            [sys.executable, "-c", STEPS, str(log)],
+            stdout=subprocess.PIPE, text=True, check=True, env=env, cwd=env["PYTHONPATH"],
+        )  # fmt: skip
         for line in ended.stdout.splitlines():
             step, _, seconds = line.rpartition(" ")
             found.setdefault(step, []).append(float(seconds))
@@ -106,7 +114,9 @@ def profile(log: Path, env: Mapping[str, str], out: Path) -> None:
         raw = Path(folder) / "profile"
         code = f"import cProfile; cProfile.run({COMMAND!r}, {str(raw)!r})"
         words: Sequence[str] = (sys.executable, "-c", code, "triage", str(log))
-        subprocess.run(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False, env=env)
+        subprocess.run(
+            words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False, env=env, cwd=env["PYTHONPATH"]
+        )
         import pstats
 
         with out.open("w", encoding="utf-8") as stream:
@@ -124,7 +134,7 @@ def main() -> None:
         env = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
         env |= {"PYTHONPATH": str(args.checkout.resolve()), "OPENBLAS_NUM_THREADS": "1"}
         env |= {f"XDG_{kind}_HOME": home for kind in ("CACHE", "DATA", "CONFIG")}
-        triage = (COMMAND, "triage", str(args.log))
+        triage = (COMMAND, "triage", str(args.log.resolve()))
         cpu_s(*triage, env=env)  # compiles, and fills the cache of profiles
         pairs = [(cpu_s(*triage, env=env), cpu_s("import numpy", env=env)) for _ in range(args.runs)]
         whole, numpy_s = (statistics.median(column) for column in zip(*pairs, strict=True))
@@ -132,11 +142,11 @@ def main() -> None:
         print(f"{args.log.name}, {args.log.stat().st_size / 1e6:.1f} MB, load {os.getloadavg()[0]:.1f}")
         print(f"  care triage      {whole:.2f} s of processor")
         print(f"  import numpy     {numpy_s:.2f} s, {ratio:.1f} times as quick")
-        for step, seconds in shares(args.log, env, args.runs).items():
+        for step, seconds in shares(args.log.resolve(), env, args.runs).items():
             print(f"    {step:14} {seconds:.3f} s  {seconds / whole:4.0%}")
         print(f"  {'kept  ' if whole <= MOST_CPU_S else 'MISSED'} {whole:.2f} s of processor, at most {MOST_CPU_S:g}")
         if args.profile is not None:
-            profile(args.log, env, args.profile)
+            profile(args.log.resolve(), env, args.profile)
 
 
 if __name__ == "__main__":
