@@ -24,6 +24,12 @@ def _shown(character: str) -> str:
     return character if character.isprintable() or unicodedata.category(character) == "Zs" else ascii(character)[1:-1]
 
 
+def cell(text: str) -> str:
+    """The text as a cell of a table, made safe: a spreadsheet computes what begins as a formula does."""
+    made = clean(text)
+    return f"'{made}" if made[:1] in ("=", "+", "-", "@") else made
+
+
 def figures(value: float, digits: int = 3) -> str:
     """A measured number with as many digits as it is worth, a large one without a power of ten: 0.0123, 71800."""
     return f"{float(f'{value:.{digits}g}'):.15g}"

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import signal
 import sys
-from types import FrameType
-from typing import Any
+
+TYPE_CHECKING = False  # until an interruption is heeded nothing is imported that can wait: `typing` alone takes 10 ms
+if TYPE_CHECKING:
+    from types import FrameType
+    from typing import Any
 
 _INTERRUPTED = 128 + signal.SIGINT
 _TERMINATED = 128 + signal.SIGTERM

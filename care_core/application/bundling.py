@@ -21,7 +21,7 @@ from care_core.application.viewing import log_of, messages_of
 from care_core.errors import CareError
 from care_core.files import BUNDLE_FOLDER
 from care_core.run import Setting, Unavailable
-from care_core.text import clean, seconds
+from care_core.text import cell, clean, seconds
 
 if TYPE_CHECKING:
     import numpy as np
@@ -177,7 +177,7 @@ def _messages(case: Case, sharing: Sharing) -> str:
     except CareError:  # a log without any
         messages = []
     for message in messages[:_MOST_MESSAGES]:
-        rows.writerow((f"{message.time_s:.3f}", message.kind, clean(text(message.text))))
+        rows.writerow((f"{message.time_s:.3f}", message.kind, cell(text(message.text))))
     return stream.getvalue()
 
 

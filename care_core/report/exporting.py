@@ -8,7 +8,7 @@ from pathlib import Path
 from care_core.history.store import Triaged
 from care_core.report.history import profile_of, status_of
 from care_core.tables.rows import TableRow, write_rows
-from care_core.text import clean
+from care_core.text import cell
 
 ABOUT = (
     "at", "start", "robot", "robot_name", "log", "sha256", "mission", "profile", "profile_version", "firmware",
@@ -40,14 +40,14 @@ def _row(one: Triaged) -> TableRow:
     row: TableRow = {
         "at": one.at,
         "start": document["log"].get("start"),
-        "robot": None if one.robot is None else clean(one.robot.id),
-        "robot_name": None if one.robot is None else clean(one.robot.name),
-        "log": clean(one.log_path),
+        "robot": None if one.robot is None else cell(one.robot.id),
+        "robot_name": None if one.robot is None else cell(one.robot.name),
+        "log": cell(one.log_path),
         "sha256": document["log"]["sha256"],
         "mission": one.mission,
         "profile": profile_of(document) or None,
         "profile_version": profile["version"] or None,
-        "firmware": clean(one.firmware) or None,
+        "firmware": cell(one.firmware) or None,
         "status": status_of(document),
         "cause": causes[0] if causes else None,
         "changes": ", ".join(f"{c['option']} {c['from']:g} -> {c['to']:g}" for c in fix["changes"]) if fix else None,
