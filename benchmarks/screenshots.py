@@ -1,16 +1,21 @@
-"""Pictures of the six steps for the documentation, from the real engine on the bundled sample.
+"""Pictures of the six steps and of the HTML report for the documentation, from the real engine on the bundled sample.
 
 python -m benchmarks.screenshots [FOLDER]
+
+The report is drawn by a Chromium without a screen; where there is none, its picture is left as it is, which is said.
 """
 
 from __future__ import annotations
 
 import asyncio
 import os
+import shutil
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+import care_core
 from care_core.application.case import Request
 from care_core.files import bundled, write_atomically
 from care_tui.app import CareApp
@@ -20,6 +25,14 @@ from care_tui.widgets.step_bar import STEPS
 
 SIZE = (80, 24)
 SAMPLE = "arducopter_failed.BIN"
+PAGE = (900, 2280)
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+QUIET = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--blink-settings=preferredColorScheme=1",
+)  # fmt: skip
+"""A browser that shows no window, asks nobody and draws the light page."""
 
 
 async def draw(folder: Path) -> None:
@@ -41,12 +54,29 @@ async def draw(folder: Path) -> None:
             print(picture)
 
 
+def photograph(folder: Path) -> None:
+    """The head of the HTML report as a browser shows it."""
+    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if browser is None:
+        print(f"no report.png: none of {', '.join(BROWSERS)} is installed")
+        return
+    with tempfile.TemporaryDirectory() as name:
+        page = Path(name, "report.html")
+        write_atomically(page, care_core.triage(bundled("samples", SAMPLE)).report("html"))
+        picture = folder / "report.png"
+        command = [browser, *QUIET, f"--user-data-dir={name}/browser", f"--window-size={PAGE[0]},{PAGE[1]}",
+                   f"--screenshot={picture}", page.as_uri()]  # fmt: skip
+        subprocess.run(command, check=True, capture_output=True, timeout=120)
+    print(picture)
+
+
 def main() -> None:
     """Write the pictures to docs/screenshots or the folder that is named."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/screenshots").absolute()
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as nobody:  # neither settings nor history of whoever draws them
         os.environ |= {"XDG_CONFIG_HOME": nobody, "XDG_STATE_HOME": nobody, "CARE_HISTORY": "off"}
+        photograph(folder)
         asyncio.run(draw(folder))
 
 

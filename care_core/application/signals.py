@@ -22,8 +22,8 @@ Source = tuple[str, str]
 SELECTORS = ("I", "Inst", "Instance", "C")
 """Fields that say which of several sensors a value is from: no signals. The first sensor is drawn."""
 
-CLOCKS = ("GMS",)
-"""Fields that tell the time of the week, which is nobody's business who is sent a bundle."""
+CLOCKS = ("GMS", "GWk", "TimeUS", "time_usec", "time_boot_ms", "timestamp", "stamp", "secs", "sec", "nsecs", "nanosec")
+"""Last parts of fields that say when a message was made: no signals, and they tell the day."""
 
 NO_SIGNALS = {"ARM", "CMD", "ERR", "EV", "MODE", "MSG", "ORGN", "PARM", "VER", *TEXTS}
 """Records of what was done and said: there is nothing to draw."""
@@ -148,7 +148,8 @@ def _read_by_profile(case: Case, present: Collection[str]) -> dict[Source, tuple
         needs = find_extractor(variable.extract.kind).needs(variable.extract.args)
         for channel, fields in needs.items():
             for field in fields:
-                if channel in present and channel not in NO_SIGNALS and field not in (*SELECTORS, *CLOCKS):
+                is_signal = field not in SELECTORS and field.rsplit(".", 1)[-1] not in CLOCKS
+                if is_signal and channel in present and channel not in NO_SIGNALS:
                     users.setdefault((channel, field), []).append(variable.name)
     matters = {result.variable.name for result in case.diagnosis.objectives}
     matters |= {node.name for fault in case.diagnosis.faults for cause in fault.causes for node in cause.path}

@@ -130,7 +130,7 @@ def _facts(report: Report) -> Iterator[str]:
     mission = f"{judged.index} of {len(report.missions)}" if judged and len(report.missions) > 1 else ""
     facts = (
         ("Robot", robot),
-        ("Recorded", (log.start or "").replace("T", " ").partition(".")[0]),
+        ("Recorded (UTC)", (log.start or "")[:19].replace("T", " ")),
         ("Length of the log", seconds(log.duration_s)),
         ("Mission", mission),
         ("Profile", f"{report.profile.name} {report.profile.version}" if report.profile else ""),
@@ -265,7 +265,7 @@ def _alternative(fix: FixSet) -> str:
 
 
 def _diff_line(line: str) -> str:
-    tag = {"+": "ins", "-": "del"}.get(line[:1])
+    tag = None if line.startswith(("---", "+++")) else {"+": "ins", "-": "del"}.get(line[:1])
     return f"<{tag}>{escape(line)}</{tag}>" if tag else escape(line)
 
 

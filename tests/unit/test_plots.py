@@ -81,7 +81,7 @@ def test_a_gap_of_the_log_is_a_gap_of_the_line_and_spikes_stay() -> None:
     volt = next(plot for plot in drawn.plots if plot.source == "BAT Volt")
     assert {limit.words for limit in volt.limits} == {"BATT_LOW_VOLT", "BATT_CRT_VOLT"}
     shared = drawn_of(case, Sharing(positions=False))
-    assert not [plot for plot in shared.plots if "Lat" in plot.source or "Lng" in plot.source]
+    assert not [plot for plot in shared.plots if {"Lat", "Lng", "GMS", "GWk"} & set(plot.source.split())]
 
 
 def test_the_page_of_a_flight_draws_its_limits_and_stays_small() -> None:
