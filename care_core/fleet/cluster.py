@@ -93,6 +93,8 @@ def _local(workers: int, memory: str | None) -> Iterator[Any]:
             # On a busy machine a process takes long to begin; by default it would be given up meanwhile.
             "distributed.deploy.lost-worker-timeout": f"{_GONE_S:g}s",
             "distributed.comm.timeouts.connect": f"{_GONE_S:g}s",
+            # Dask samples where its workers are a hundred times a second and keeps an hour of it in their memory.
+            "distributed.worker.profile.enabled": False,
             # What is served over HTTP asks for no certificate.
             "distributed.scheduler.http.routes": [],
             "distributed.worker.http.routes": [],
