@@ -162,7 +162,7 @@ class CareApp(App[int], inherit_bindings=False):
     def action_help(self) -> None:
         screen = self.screen
         if isinstance(screen, CareScreen):
-            self.push_screen(HelpScreen(screen.help_text(), self._keys_of(screen)))
+            self.push_screen(HelpScreen(screen.help_text(), self._keys_of(screen), screen.help_first()))
 
     def _keys_of(self, screen: CareScreen) -> Keys:
         """Every key that works on the screen, keys of one action together, those of the page first."""

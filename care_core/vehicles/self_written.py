@@ -1,4 +1,6 @@
-"""Parameters that a vehicle writes itself: statistics, calibration, identity. They are outcomes, never choices.
+"""Parameters that a vehicle writes itself: statistics, calibration, identity, and what it only shows.
+
+They are outcomes, never choices.
 
 The list is data, and the only one: whoever compares configurations leaves these out.
 """
@@ -20,8 +22,11 @@ SELF_WRITTEN: dict[str, tuple[str, ...]] = {
     "calibration": (
         "COMPASS_DIA*", "COMPASS_ODI*", "COMPASS_MOT*", "COMPASS_SCALE*", "INS_*OFF*_[XYZ]", "INS_*OFFS_*",
         "INS_*SCAL_*", "INS_*CALTEMP", "INS_TCAL*", "BARO*_GND_PRESS", "GND_ABS_PRESS*", "GND_TEMP", "BARO_GND_TEMP",
+        "INS[0-9]_ACC*", "INS[0-9]_GYR*", "INS[0-9]_TCAL*", "TCAL*_BARO_EXP", "TCAL*_TEMP_M*",
+        "TCALBARO_EXP", "TCALTEMP_M*",
         "ARSPD*_OFFSET", "RC*_MIN", "RC*_MAX", "RC*_TRIM", "CAL_*", "TC_*", "SENS_DPRES_OFF",
     ),
+    "read only": ("SYSID_SW_*", "GPS*_CAN_NODEID*", "BARO_FIELD_ELV"),
     "identity of devices": (
         "*_DEVID", "*_DEV_ID*", "COMPASS_PRIO*_ID", "INS_*_ID", "BRD_SERIAL_NUM",
     ),

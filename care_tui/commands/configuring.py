@@ -25,7 +25,7 @@ app = typer.Typer()
 def diff(
     a: Annotated[str, typer.Argument(metavar="A", help="A configuration file, a log or a report.", show_default=False)],
     b: Annotated[str, typer.Argument(metavar="B", help="Likewise.", show_default=False)],
-    everything: Annotated[bool, typer.Option("--all", help="Calibration and statistics too.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="Calibration, statistics, what is read-only too.")] = False,
 ) -> None:
     """Compare two configurations by parameter. - only in A, + only in B, ! changed. Ends with 0 same, 1 different."""
     from care_core.application.configuring import side_of

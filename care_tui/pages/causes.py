@@ -9,6 +9,7 @@ from textual.content import Content
 from care_core.diagnose.records import Cause, Fault, Hypothesis
 from care_core.health.records import Finding
 from care_core.text import clean
+from care_core.variables import Variable
 from care_tui.pages.page import View
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.causes import cause_detail, cause_item, no_cause_rows
@@ -71,6 +72,10 @@ class CausesPage(DiagnosisPage):
 
     def works(self, action: str) -> bool:
         return super().works(action) and (action != "dismiss" or bool(self.session.causes))
+
+    def option_here(self) -> Variable | None:
+        name = self.option_at(self.screen.choices.highlighted)
+        return next((option for option in self.session.options() if option.name == name), None) if name else None
 
     def option_at(self, index: int | None) -> str | None:
         """The option of the cause at this place, None where there is none."""

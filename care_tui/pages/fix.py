@@ -108,6 +108,10 @@ class FixPage(DiagnosisPage):
 
     # What the keys do
 
+    def option_here(self) -> Variable | None:
+        index = self.screen.choices.highlighted
+        return None if index is None else self.session.options()[index]
+
     def _here(self) -> tuple[Variable, float] | None:
         """The option under the cursor and the value it has in this run."""
         index = self.screen.choices.highlighted

@@ -73,6 +73,10 @@ class Page:
     def enter(self) -> None:
         """The page comes into view."""
 
+    def help_first(self) -> list[Row]:
+        """What the help begins with: of what stands under the cursor."""
+        return []
+
     def leads_to(self) -> str:
         """Where Enter leads now."""
         return self.ENTER

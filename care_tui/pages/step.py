@@ -7,8 +7,10 @@ from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.variables import Variable
 from care_tui.pages.page import Page, View, sentence
-from care_tui.render.rows import Rows, error_rows, labelled, progress_bar
+from care_tui.render.fix import known_rows
+from care_tui.render.rows import Row, Rows, error_rows, labelled, progress_bar
 from care_tui.session import Session
 
 
@@ -27,6 +29,14 @@ class DiagnosisPage(StepPage):
     """What there is not where nothing is judged; empty for a step that has something to show all the same."""
     NEEDS_MISSION: ClassVar[bool] = False
     """Whether a flight without a mission leaves nothing to show either."""
+
+    def option_here(self) -> Variable | None:
+        """The option under the cursor."""
+        return None
+
+    def help_first(self) -> list[Row]:
+        option = self.option_here() if self.session.state == "data" else None
+        return [] if option is None else known_rows(option, self.session.diagnosis.run)
 
     def works(self, action: str) -> bool:
         return super().works(action) and self.session.state == "data" and not self._is_empty

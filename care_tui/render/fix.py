@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Fix, ObjectiveResult, Prediction
+from care_core.run import Run
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.basket import possible
@@ -15,6 +16,7 @@ from care_tui.render.rows import (
     Row,
     Rows,
     change_text,
+    heading,
     measure,
     padded,
     percent,
@@ -68,6 +70,17 @@ def option_rows(option: Variable, notes: Sequence[str], glyphs: Glyphs) -> list[
     if option.parameters and option.parameters != (option.name,):
         rows.append(Row(text(f"  sets {', '.join(option.parameters)}"), 4))
     return rows + [warning("Caveat", note) for note in notes]
+
+
+def known_rows(option: Variable, run: Run) -> list[Row]:
+    """What is known of an option's parameter, with who says so, for the help."""
+    from care_core.application.describing import known_of
+
+    rows = [heading(option.name)]
+    for one in known_of(option, run.settings, run.log.facts):
+        source = text(f"  ({one.source})", "dim") if one.source else Content()
+        rows.append(Row(Content.assemble(text(f"{one.what:<11}", "bold"), text(one.text), source), 11))
+    return [*rows, Row(Content())]
 
 
 def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs, *, is_guess: bool = False) -> Content:

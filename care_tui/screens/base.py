@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -11,6 +12,7 @@ from textual.screen import Screen
 from textual.widgets import Static
 
 from care_tui.link import Link
+from care_tui.render.rows import Row
 
 MIN_WIDTH, MIN_HEIGHT = 60, 20
 WIDE = 160
@@ -47,6 +49,10 @@ class CareScreen(Screen[None]):
     def described(self, binding: Binding) -> str:
         """What a key does here, in a word or two."""
         return binding.description
+
+    def help_first(self) -> Sequence[Row]:
+        """What the help screen begins with: what stands under the cursor."""
+        return ()
 
     @abstractmethod
     def help_text(self) -> str:

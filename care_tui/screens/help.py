@@ -26,14 +26,16 @@ class HelpScreen(ModalScreen[None]):
         Binding("escape,q,question_mark,f1,enter", "dismiss", "Close", id="help.close"),
     ]
 
-    def __init__(self, about: str, keys: Keys) -> None:
+    def __init__(self, about: str, keys: Keys, first: Iterable[Row] = ()) -> None:
+        """Args: first: what the help begins with."""
         super().__init__()
         self._about = about
+        self._first = tuple(first)
         self._keys = tuple(keys)
 
     def compose(self) -> ComposeResult:
         width = max((len(key) for key, _, _ in self._keys), default=0) + 2
-        rows = [Row(Content(self._about)), Row(Content())]
+        rows = [*self._first, Row(Content(self._about)), Row(Content())]
         rows += [
             Row(Content.assemble((f"{key:<{width}}", "bold $text-accent"), f"{does:<22}", (id, "dim")), width)
             for key, does, id in self._keys

@@ -6,7 +6,7 @@ The widgets are made once. Going to another page changes what they hold, so only
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from textual import on
@@ -19,7 +19,7 @@ from care_core.errors import CareError
 from care_tui.jobs import Job
 from care_tui.messages import Fetched
 from care_tui.pages.page import Page, View
-from care_tui.render.rows import Glyphs
+from care_tui.render.rows import Glyphs, Row
 from care_tui.screens.base import CareScreen
 from care_tui.widgets.choices import Choices
 from care_tui.widgets.filter_bar import FilterBar
@@ -63,6 +63,9 @@ class PanesScreen(CareScreen):
 
     def help_text(self) -> str:
         return self.page.HELP
+
+    def help_first(self) -> Sequence[Row]:
+        return self.page.help_first()
 
     @property
     def choices(self) -> Choices:

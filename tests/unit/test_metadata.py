@@ -1,0 +1,66 @@
+"""What is known of parameters without a log, and with one."""
+
+from __future__ import annotations
+
+import pytest
+
+from care_core.application.describing import known_of
+from care_core.metadata import ardupilot, navigation
+from care_core.run import Setting
+from care_core.variables import Role, Variable
+from care_core.vehicles import is_self_written
+
+
+def test_a_parameter_of_a_vehicle_is_told_by_release() -> None:
+    old = ardupilot.fact_of("WPNAV_SPEED", "copter", (4, 5, 4))
+    assert old is not None
+    assert (old.low, old.high, old.unit) == (20.0, 2000.0, "cm/s")
+    assert old.source.startswith("ArduPilot's parameter list, Copter")
+    assert ardupilot.Release("C", "4.8") not in ardupilot.known_in("WPNAV_SPEED")
+    assert ardupilot.known_in("SERVO16_FUNCTION")
+    assert not ardupilot.known_in("NO_SUCH_NAME")
+    receiver = ardupilot.fact_of("GPS1_TYPE", "rover")
+    assert receiver is not None
+    assert receiver.reboot
+
+
+@pytest.mark.parametrize("vehicle", list(ardupilot.RELEASES))
+def test_every_release_documents_hundreds_of_parameters(vehicle: str) -> None:
+    for version in ardupilot.RELEASES[vehicle]:
+        known = sum(ardupilot.Release(vehicle, version) in ardupilot.known_in(name) for name in ardupilot.names())
+        assert known > 500
+
+
+def test_calibration_and_what_is_read_only_are_nobody_s_choice() -> None:
+    listed = [
+        fact
+        for name in ardupilot.names()
+        for fact in ardupilot.facts_of(name)
+        if fact.read_only and not name.startswith("VTX_")
+    ]
+    assert len(listed) > 30
+    assert [fact.name for fact in listed if not is_self_written(fact.name)] == []
+
+
+def test_a_default_that_moved_under_one_name_is_told_by_distribution() -> None:
+    path = "/move_base/DWAPlannerROS/path_distance_bias"
+    kinetic, noetic = (navigation.fact_of("ros1", path, name) for name in ("kinetic", "noetic"))
+    assert kinetic is not None
+    assert noetic is not None
+    assert (kinetic.default_number, noetic.default_number) == (32.0, 0.6)
+
+
+def test_the_log_s_own_description_stands_before_the_table_and_each_bound_names_its_source() -> None:
+    path = "/move_base/DWAPlannerROS/sim_time"
+    option = Variable("sim_time", Role.OPTION, range=(0.5, 3.0), default=1.7, unit="s", parameters=(path,))
+    setting = Setting(path, 2.0, "/parameter_updates", default=1.5, low=0.1, high=4.0)
+    known = [(one.what, one.text, one.source) for one in known_of(option, {path: setting}, {})]
+    assert ("Range", "0.1 to 4", "the log's own description") in known
+    assert ("Default", "1.5", "the log") in known
+    assert ("Acceptable", "0.5 to 3 s", "profile: what may be suggested") in known
+    assert any(what == "Range" and text == "0 to any" and "noetic" in source for what, text, source in known)
+
+
+def test_what_nothing_is_known_of_is_told_by_its_profile_alone() -> None:
+    option = Variable("mine", Role.OPTION, range=(0.0, 1.0), parameters=("/somebody/mine",))
+    assert {one.what for one in known_of(option, {}, {})} == {"Parameter", "Type", "Acceptable", "Restart"}
