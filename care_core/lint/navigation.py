@@ -150,13 +150,21 @@ def _other_distribution(
             return found(
                 "renamed", severity, document, place.entry, text, f"Write {new.rpartition('.')[2]}.", STACKS[result.ros]
             )
-    if not is_told:
+    if not is_told or not _is_covered(result, place.owners[0], likely):
         return None
     known = frozenset(name for fact in facts for name in navigation.distributions(fact, result.ros))
     text = f"{place.owners[0]} reads {place.name} in {_span(known, order)}, not in {next(iter(likely))}."
     return found(
         "unknown-key", severity, document, place.entry, text, "Is the file for this distribution?", STACKS[result.ros]
     )
+
+
+def _is_covered(result: Scoped, owner: str, likely: frozenset[str]) -> bool:
+    """Whether the table holds anything that a node or plugin reads in these distributions."""
+    facts = (
+        fact for name in navigation.keys_of(result.ros, owner) for fact in navigation.known(result.ros, owner, name)
+    )
+    return any(fact.owner == owner and navigation.distributions(fact, result.ros) & likely for fact in facts)
 
 
 def _span(names: frozenset[str], order: Sequence[str]) -> str:

@@ -212,3 +212,19 @@ def test_recorded_configurations_have_the_findings_that_were_looked_at_by_hand(r
             count = sum(one.severity.value != "note" for one in linted.findings)
             expected = next((n for name, n in wanted.items() if str(path).endswith(name)), 0)
             assert count == expected, (path.name, linted.findings)
+
+
+@pytest.mark.parametrize(
+    "distribution", ["foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical", "rolling"]
+)
+def test_what_every_distribution_reads_raises_nothing_in_any(tmp_path: Path, distribution: str) -> None:
+    text = """amcl:
+  ros__parameters: {alpha1: 0.2, max_particles: 2000, laser_model_type: "likelihood_field", scan_topic: scan}
+controller_server:
+  ros__parameters: {controller_frequency: 20.0, controller_plugins: ["FollowPath"]}
+planner_server:
+  ros__parameters: {expected_planner_frequency: 20.0, planner_plugins: ["GridBased"]}
+loopback_simulator:
+  ros__parameters: {update_duration: 0.02}
+"""
+    assert told(tmp_path, "a.yaml", text, distribution) == []
