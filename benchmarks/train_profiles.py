@@ -2,7 +2,8 @@
 
     python -m benchmarks.train_profiles [--shared DIR] [--only NAME]... [--tables DIR]
 
-The platforms with recorded missions are ingested from the logs themselves; the others from published tables.
+The platforms with recorded missions are ingested from the logs themselves, the others from published tables; the
+lander's arm is simulated anew by its campaign.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from __future__ import annotations
 import argparse
 import csv
 import os
+import subprocess
+import sys
 import tarfile
 import tempfile
 import time
@@ -40,6 +43,8 @@ class Source:
     """A table with the columns `tag` and `hardware`: logs in which hardware failed teach nothing about parameters."""
     from_move_base: bool = False
     """The logs are of move_base, whatever the profile reads."""
+    simulation: str = ""
+    """A module that writes a campaign of simulated missions and drives them, in place of `paths`."""
 
 
 SOURCES = {
@@ -81,11 +86,22 @@ SOURCES = {
         ("data/care/care_husky_sim_399.csv",),
         "399 Husky missions in Gazebo from the CaRE artifact (Hossen et al. 2023, MIT license).",
     ),
+    "owlat": Source(
+        (),
+        "300 excavations of `care_samples.arm`, this project's own simulation of a lander's arm and its soil, by its "
+        "campaign (seed 1) and `care collect`.",
+        simulation="care_samples.arm",
+    ),
 }
 
 
 def runs_table(source: Source, schema: Schema, shared: Path, folder: Path) -> Path:
-    """The table of runs: the published one, or one made from the logs."""
+    """The table of runs: the published one, or one made from the logs or by a campaign."""
+    if source.simulation:
+        start, campaign = folder / schema.name, folder / schema.name / "campaign.yaml"
+        for words in ((source.simulation, "--start", start), ("care_tui", "collect", campaign)):
+            subprocess.run([sys.executable, "-m", *map(str, words)], check=True)
+        return start / "campaign" / "runs.csv"
     paths = [shared / path for path in source.paths]
     if paths[0].suffix == ".csv":
         return paths[0]
