@@ -10,7 +10,7 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check bench docs profiles screenshots man walk fuzz kills matrix sbom clean
+.PHONY: demo test check bench docs profiles screenshots man walk fuzz mutate kills matrix sbom clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
@@ -47,6 +47,10 @@ walk: $(BASE)
 
 fuzz: $(DEV)
 	$(BIN)/python -m tests.fuzzing --seconds 60
+
+# Logs of yours taken apart by their format and put together wrong: make mutate LOGS="a.BIN b.bag".
+mutate: $(DEV)
+	$(BIN)/python -m tests.mutating $(LOGS)
 
 kills: $(DEV)
 	CARE_KILLS=200 $(BIN)/pytest -q tests/integration/test_kills.py

@@ -43,3 +43,18 @@ def test_troubleshooting_quotes_what_is_really_said() -> None:
     assert len(rows) > 20
     parts = [part.strip() for row in rows for part in re.split(r"\.\.\.|\d+", row)]
     assert not [part for part in parts if len(part) > 3 and part not in said]
+
+
+def test_every_test_that_an_invariant_names_is_there() -> None:
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8").partition("## Invariants")[2].partition("\n## ")[0]
+    rows = [line.split("|")[1:3] for line in text.splitlines() if line.startswith("| ")][1:]
+    files = {path.name: path for path in (ROOT / "tests").rglob("*.py")}
+    assert len(rows) > 20
+    for invariant, guard in rows:
+        named = [f"{name}.py" for name in re.findall(r"(test_\w+)\.py", guard)]
+        assert set(named) <= files.keys(), invariant
+        assert named or re.search(r"`tests/\w+`|`lint-imports`", guard), f"nothing guards: {invariant}"
+        assert all((ROOT / folder).is_dir() for folder in re.findall(r"`(tests/\w+)`", guard)), invariant
+        said = "".join(files[name].read_text(encoding="utf-8") for name in named)
+        for part in re.findall(r"`\.\.([\w.]+?)(?:\.\.)?`", guard):
+            assert re.search(r"def test_\w*" + r"\w*".join(map(re.escape, part.split(".."))), said), part
