@@ -254,10 +254,13 @@ class RosLog:
             decoders = self._decoders(part, wanted)
             for number, decoder in decoders.items():
                 topic = part.connections[number].topic
-                found = zip(decoder.paths, decoder.is_number, strict=True)
-                kinds.setdefault(topic, {}).update((path, kind) for path, kind in found if _is_as_named(path, kind))
+                kinds.setdefault(topic, {}).update(zip(decoder.paths, decoder.is_number, strict=True))
             for number, gathered in self._gather(part, decoders, at_most or {}).items():
                 pieces.setdefault(part.connections[number].topic, []).extend(gathered.pieces())
+        for topic, found in kinds.items():
+            kinds[topic] = {
+                path: kind for path, kind in found.items() if _is_as_named(path, kind, pieces.get(topic, ()))
+            }
         return {topic: _table(kinds[topic], pieces.get(topic, []), self._low_ns) for topic in wanted if topic in kinds}
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
@@ -521,11 +524,13 @@ def _objects(values: Sequence[Any]) -> NDArray[Any]:
     return column
 
 
-def _is_as_named(path: str, is_number: bool) -> bool:
+def _is_as_named(path: str, is_number: bool, pieces: Sequence[_Piece]) -> bool:
     """Whether a field holds what its name says in all of ROS: a log brings its own definitions, and may bring broken
-    ones. A field that does not is as good as absent."""
+    ones. A field that does not is as good as absent; one inside a list of messages holds a list of what it says."""
     leaf = path.rpartition(".")[2]
-    return is_number if leaf in _NUMBERS else not (is_number and leaf in _LISTS)
+    if leaf in _NUMBERS and not is_number:
+        return all(isinstance(value, list) for piece in pieces for value in piece.columns.get(path, ()))
+    return not (is_number and leaf in _LISTS)
 
 
 def _table(kinds: Mapping[str, bool], pieces: Sequence[_Piece], start_ns: int) -> Table:
