@@ -1,13 +1,13 @@
 """Are faults really repaired? The fixes of failed missions are flown, on whatever a campaign's command starts.
 
-    python -m benchmarks.flown CAMPAIGN.yaml --profile DIR --table RUNS.csv -o DIR [--other NAME]... [--faults 30]
+    python -m benchmarks.flown CAMPAIGN.yaml --profile DIR -o DIR [--table RUNS.csv] [--other NAME]... [--faults 30]
 
 A fault is a configuration with some options off their reference, under conditions that no run of the campaign met,
 which misses an objective twice. Everything else is the command line's: `care triage` reads the log, `care apply` puts
-what is advised into the parameter file, the campaign's command runs it, `care verify` reads that log. It is run twice
-under the conditions of the fault, and once under others. `--other` is a profile trained elsewhere, asked about the same
-logs. Peers put one option back to its reference: the one that is furthest from it, and the one that a plain classifier
-of the table chooses.
+what is advised into the parameter file, the campaign's command runs it, `care verify` reads that log. It is run under
+the conditions of the fault, under others, and once more under the first, to tell chance. `--other` is a profile trained
+elsewhere, asked about the same logs. Peers put one option back to its reference, run once under each of the conditions:
+the one that is furthest from it, and the one that a plain classifier of the table chooses.
 
 Whether a mission met everything is what `truth.json` beside the folder of its logs says (`{"met": true}`), where the
 command leaves one, since a simulator knows better than a log; else what the profile reads in the log.
@@ -70,13 +70,17 @@ class Field:
     def run(self, name: str, config: Config, seed: int, parameters: Path | None = None) -> Mission:
         """Run a mission, with a parameter file that is there already or one of the configuration.
 
+        One that was over when an earlier call was ended is not run again.
+
         Raises:
             RuntimeError: the command failed in each of its tries.
         """
         place = self.folder / name
         for attempt in range(1 + self.campaign.retries):
             folder = place / str(attempt)
-            logs = folder / "logs"
+            logs, over = folder / "logs", folder / "over"
+            if over.exists():
+                return Mission(logs_below(logs)[0], self.met(folder, logs_below(logs)[0]))
             logs.mkdir(parents=True, exist_ok=True)
             params = parameters or write_parameters(self.campaign, config, folder)[0]
             slot = self._slots.get()
@@ -87,6 +91,7 @@ class Field:
                 self._slots.put(slot)
             found = logs_below(logs)
             if ended and found:
+                over.touch()
                 return Mission(found[0], self.met(folder, found[0]))
         raise RuntimeError(f"{place}: the command failed")
 
@@ -120,10 +125,9 @@ def care(*words: object) -> tuple[int, str]:
     return done.returncode, done.stdout
 
 
-def repaired(field: Field, name: str, config: Config, seed: int, parameters: Path | None = None) -> list[Mission]:
-    """A repair, run twice under the conditions of the fault and once under others."""
-    days = (seed, seed, seed + ANOTHER_DAY)
-    return [field.run(f"{name}/{k}", config, day, parameters) for k, day in enumerate(days)]
+def days(seed: int) -> tuple[int, int, int]:
+    """The seeds under which a repair is run: those of the fault, others, those of the fault again."""
+    return seed, seed + ANOTHER_DAY, seed
 
 
 def advised(field: Field, profile: str, fault: Mission, name: str, config: Config, seed: int) -> Report:
@@ -143,7 +147,8 @@ def advised(field: Field, profile: str, fault: Mission, name: str, config: Confi
     if applied != ExitCode.OK:
         return {**found, "said": said}
     changes = {change["option"]: change["to"] for change in told["fix"]["changes"]}
-    missions = repaired(field, name, {**config, **changes}, seed, fixed)
+    repaired = {**config, **changes}
+    missions = [field.run(f"{name}/{k}", repaired, day, fixed) for k, day in enumerate(days(seed))]
     found["met"] = [mission.met for mission in missions]
     found["verdicts"] = [verdict(report, profile, mission.log) for mission in missions]
     return found
@@ -184,13 +189,15 @@ def one_fault(field: Field, asked: Asked, number: int, config: Config, seed: int
     found["profiles"] = {
         word: advised(field, profile, first, f"{name}/{word}", config, seed) for word, profile in asked.profiles.items()
     }
+    found["peers"] = {}
     reference, flown = field.campaign.space.reference, dict[str, list[bool]]()
     for word, choose in asked.peers.items():
         option = choose(config)
         if option not in flown:
-            missions = repaired(field, f"{name}/reset-{option}", {**config, option: reference[option]}, seed)
-            flown[option] = [mission.met for mission in missions]
-        found.setdefault("peers", {})[word] = {"option": option, "met": flown[option]}
+            reset = {**config, option: reference[option]}
+            place = f"{name}/reset-{option}"
+            flown[option] = [field.run(f"{place}/{k}", reset, day).met for k, day in enumerate(days(seed)[:2])]
+        found["peers"][word] = {"option": option, "met": flown[option]}
     return found
 
 
@@ -266,31 +273,31 @@ def show(done: Sequence[Report]) -> None:
     print(f"{len(done)} configurations run, {n} failed twice, {sum('chance' in r for r in done)} failed once of two, "
           f"{sum('error' in r for r in done)} gave no mission")  # fmt: skip
     for word in faults[0]["profiles"] if faults else ():
-        answers = [report["profiles"][word] for report in faults]
-        flown = [answer for answer in answers if "met" in answer]
-        both = sum(answer["met"][0] and answer["met"][1] for answer in flown)
-        print(f"{word}: flagged {sum(a['code'] == ExitCode.FAULT for a in answers)} of {n}, advised {len(flown)}")
-        print(f"  of all faults repaired, both times under the same conditions  {share(both, n)}")
-        print(f"  of all faults repaired, the first time                        {share(first(flown, 0), n)}")
-        print(f"  of all faults repaired, another day                           {share(first(flown, 2), n)}")
-        print(f"  of what was advised repaired, both times                      {share(both, len(flown))}")
-        promised = [answer["fix"]["p_fixed"] for answer in flown]
-        sizes = [len(answer["fix"]["changes"]) for answer in flown]
-        right = [
-            verdict.startswith("fixed") == met
-            for answer in flown
-            for verdict, met in zip(answer["verdicts"], answer["met"], strict=True)
-        ]
-        if flown:
-            print(f"  promised {np.mean(promised):.2f} in the mean; {np.median(sizes):g} options changed in the middle")
-            print(f"  care verify says what happened in {sum(right)} of {len(right)} missions")
-    for word in faults[0].get("peers", {}) if faults else ():
+        show_profile(word, [report["profiles"][word] for report in faults])
+    for word in faults[0]["peers"] if faults else ():
         answers = [report["peers"][word] for report in faults]
-        both = sum(answer["met"][0] and answer["met"][1] for answer in answers)
-        print(f"{word}: both times {share(both, n)}, another day {share(first(answers, 2), n)}")
+        print(f"{word}: repaired {share(first(answers, 0), n)}, another day {share(first(answers, 1), n)}")
+
+
+def show_profile(word: str, answers: Sequence[Report]) -> None:
+    """Print what became of a profile's answers about each fault."""
+    n, flown = len(answers), [answer for answer in answers if "met" in answer]
+    print(f"{word}: flagged {sum(a['code'] == ExitCode.FAULT for a in answers)} of {n}, advised {len(flown)}")
+    both = sum(answer["met"][0] and answer["met"][2] for answer in flown)
+    print(f"  of all faults repaired          {share(first(flown, 0), n)}, twice {share(both, n)}")
+    print(f"  of all faults, another day      {share(first(flown, 1), n)}")
+    print(f"  of what was advised, repaired   {share(first(flown, 0), len(flown))}")
+    if flown:
+        promised = np.mean([answer["fix"]["p_fixed"] for answer in flown])
+        changed = np.median([len(answer["fix"]["changes"]) for answer in flown])
+        print(f"  promised {promised:.2f} in the mean; {changed:g} options changed in the middle")
+    checked = [pair for answer in flown for pair in zip(answer["verdicts"], answer["met"], strict=True)]
+    right = sum(verdict.startswith("fixed") == met for verdict, met in checked)
+    print(f"  care verify says what happened in {right} of {len(checked)} missions")
 
 
 def first(answers: Sequence[Report], which: int) -> int:
+    """How many repairs met everything in one of their missions, counted from 0."""
     return sum(answer["met"][which] for answer in answers)
 
 
@@ -298,7 +305,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("campaign", type=Path)
     parser.add_argument("--profile", type=Path, required=True, help="trained on the campaign's table")
-    parser.add_argument("--table", type=Path, required=True, help="the campaign's runs.csv")
+    parser.add_argument("--table", type=Path, help="the campaign's runs.csv: for the peers, without it there are none")
     parser.add_argument("--other", action="append", default=[], help="another profile, a name or a folder")
     parser.add_argument("--faults", type=int, default=30)
     parser.add_argument("--seed", type=int, default=9000, help="not the campaign's")
@@ -308,7 +315,8 @@ def main() -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     profiles = {"trained on the campaign": str(args.profile), **{name: name for name in args.other}}
     field = Field(campaign, args.profile, args.out)
-    show(measure(field, Asked(profiles, peers(campaign, args.table)), args.faults, args.seed))
+    others = peers(campaign, args.table) if args.table else {}
+    show(measure(field, Asked(profiles, others), args.faults, args.seed))
 
 
 if __name__ == "__main__":

@@ -31,7 +31,9 @@ def campaign(tmp_path: Path, care: Care, monkeypatch: pytest.MonkeyPatch) -> Cam
     return read_campaign(tmp_path / "arm" / "campaign.yaml")
 
 
-def test_a_fault_is_diagnosed_repaired_run_again_and_verified(campaign: Campaign, tmp_path: Path) -> None:
+def test_a_fault_is_diagnosed_repaired_run_again_and_verified(
+    campaign: Campaign, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     field = flown.Field(campaign, Path("owlat"), tmp_path / "flown")
     (tmp_path / "flown").mkdir()
     asked = flown.Asked({"bundled": "owlat"}, {"first": lambda config: next(iter(config))})
@@ -48,7 +50,9 @@ def test_a_fault_is_diagnosed_repaired_run_again_and_verified(campaign: Campaign
     # What is verified in the log is what was judged of the mission.
     assert [verdict.startswith("fixed") for verdict in answer["verdicts"]] == answer["met"]
     assert set(found["off"]) <= {axis.name for axis in campaign.space.axes}
-    assert len(found["peers"]["first"]["met"]) == 3
+    assert len(found["peers"]["first"]["met"]) == 2
+    flown.show([{"number": 0, "fault": False}, found])
+    assert "bundled: flagged 1 of 1, advised 1" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
