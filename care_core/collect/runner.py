@@ -21,7 +21,7 @@ from care_core.collect.sampling import Planned, one_at_a_time, points, repeats_a
 from care_core.configs.driven import parameter_value, readable
 from care_core.configs.edit import Wanted, apply_changes
 from care_core.errors import UsageError
-from care_core.tables.rows import TableRow, write_table
+from care_core.tables.rows import ABOUT, CONDITIONS, TableRow, write_rows, write_table
 
 TABLE = "runs.csv"
 
@@ -122,8 +122,18 @@ def collect(campaign: Campaign, folder: Path, *, retry_failed: bool = False, pro
                 journal.plan(_next_round(found))
         finally:
             if found.rows:
-                write_table(found.table, found.rows, campaign.schema)
+                _write(found)
     return found
+
+
+def _write(found: Collected) -> None:
+    """The table; the seed that a command takes tells which runs met the same conditions, else their date has to."""
+    schema = found.campaign.schema
+    if not any("{seed}" in word for word in found.campaign.command):
+        write_table(found.table, found.rows, schema)
+        return
+    rows = [{**row, CONDITIONS: found.planned[n].seed} for n in sorted(found.done) for row in found.done[n].rows]
+    write_rows(found.table, rows, [*ABOUT, CONDITIONS, *schema.variables])
 
 
 def _check_parameters(campaign: Campaign) -> None:

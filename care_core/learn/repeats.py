@@ -1,6 +1,6 @@
 """How much of a run's noise does the next one meet again? From training runs that repeat a configuration.
 
-Pairs of runs with equal options, told apart by whether they met the same conditions (`table.CONDITIONS`; where the
+Pairs of runs with equal options, told apart by whether they met the same conditions (`rows.CONDITIONS`; where the
 table does not say, every run is another day). Of each pair the errors left by all other runs are jointly Gaussian;
 their covariance is what is not known of the mechanism plus a share of the noise (`abduction`). The share is the mean
 under its likelihood and a uniform prior, so few pairs leave it near the middle.
@@ -17,8 +17,8 @@ import pandas as pd
 from care_core.causal.mechanisms import JITTER, LEAST, FloatArray, Mechanism, transformed
 from care_core.causal.model import UNKNOWN_PERSISTENCE, OutcomeRecord, Persistence
 from care_core.learn.outcomes import find_stages
-from care_core.learn.table import CONDITIONS
 from care_core.profile.schema import Schema
+from care_core.tables.rows import CONDITIONS
 
 SHARES = np.linspace(0.025, 0.975, 20)
 MOST_RUNS = 800

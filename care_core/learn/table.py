@@ -13,11 +13,12 @@ from scipy.stats import rankdata
 from care_core.errors import LearningError, nearest
 from care_core.profile.schema import Schema
 from care_core.tables.readiness import MIN_RUNS
+from care_core.tables.rows import CONDITIONS
 from care_core.variables import Role, Variable
 
 FloatArray = NDArray[np.float64]
 FORMATS = (".csv", ".parquet")
-CONDITIONS, STARTED = "conditions", "log_start"
+STARTED = "log_start"
 """What runs of one site and day share (any value); when the log of a run began."""
 
 

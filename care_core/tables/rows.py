@@ -16,6 +16,8 @@ from care_core.run import Run, Setting, is_known
 
 ABOUT = ("log", "mission", "log_format", "log_start", "log_sha256")
 """The columns before the variables."""
+CONDITIONS = "conditions"
+"""A column that a table may have: runs with one value in it met the same conditions, others did not."""
 INSTALL_LEARN = "Install what it needs with: pip install 'care-tui[learn]'"
 
 TableRow = dict[str, str | int | float | None]

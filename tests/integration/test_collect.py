@@ -49,6 +49,7 @@ def test_a_campaign_of_the_bundled_robot(care: Care, tmp_path: Path) -> None:
         assert float(row["mission_time"]) > 10
     assert rows[2]["max_speed"] == rows[0]["max_speed"]
     assert rows[2]["mission_time"] != rows[0]["mission_time"]  # a repeat meets conditions of its own
+    assert [row["conditions"] for row in rows] == [run["seed"] for run in plan]
     params = (tmp_path / "campaign" / "runs" / "0002" / "1" / "courier.yaml").read_text()
     assert "# m/s^2" in params  # comments stay
 

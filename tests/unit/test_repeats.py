@@ -10,7 +10,8 @@ from care_core.causal.model import OutcomeRecord
 from care_core.learn.fitting import METRIC, fit_mechanism
 from care_core.learn.outcomes import inputs_of
 from care_core.learn.repeats import persistence, repeated
-from care_core.learn.table import CONDITIONS, check_table
+from care_core.learn.table import check_table
+from care_core.tables.rows import CONDITIONS
 from tests.planted import DEFAULTS, SCHEMA, fly_many
 
 
