@@ -75,8 +75,9 @@ class Px4Log:
                 name = _channel(data)
                 if name in wanted and name in self._channels:
                     t = self._seconds(data.data["timestamp"])
-                    columns = {field: data.data[field].astype(np.float64)
-                               for field in wanted[name] if field in data.data}  # fmt: skip
+                    with np.errstate(invalid="ignore"):  # flipped bits make signalling NaNs of floats
+                        columns = {field: data.data[field].astype(np.float64)
+                                   for field in wanted[name] if field in data.data}  # fmt: skip
                     tables[name] = Table(t, columns).where(_believable(t))
         if MESSAGES in wanted and len(self._words):
             columns = {field: self._words[field] for field in wanted[MESSAGES] if field in self._words.columns}
@@ -113,7 +114,8 @@ class Px4Log:
 
     def _seconds(self, stamps_us: NDArray[Any]) -> NDArray[np.float64]:
         """Times in the log. What was said before it began and still held is stamped earlier, or 0: it gets time 0."""
-        return np.asarray(np.maximum(stamps_us.astype(np.float64) - self._first_us, 0.0) / 1e6)
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.maximum(stamps_us.astype(np.float64) - self._first_us, 0.0) / 1e6)
 
     def _history(self, ulog: Any) -> dict[str, tuple[Setting, ...]]:
         """Every parameter with its default (the log names those that differ from the value) and its changes."""
