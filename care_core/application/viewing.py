@@ -77,7 +77,7 @@ def _worded(channel: str, values: list[object], kind: Kind) -> tuple[str, str]:
         level, name, text = (*values, "", "")[:3]
         return LEVELS.get(int(float(str(level))), "?"), f"{name}: {text}"
     if channel == "logged_messages":
-        text, level = (*values, "")[:2]
+        text, level = (*values, "", "")[:2]
         return PX4_LEVELS.get(str(level).casefold(), "message"), str(text)
     if channel == "ERR":
         subsystem, code = (int(float(str(value))) for value in (*values, 0, 0)[:2])

@@ -97,7 +97,7 @@ def lint(
     out: Out = None,
     force: Force = False,
 ) -> None:
-    """Find dead keys, wrong values and contradictions in configuration files. Ends with 0 at most notes, 1 more."""
+    """Find dead keys, wrong values and contradictions in files. 1 if there are any."""
     from json import dumps
 
     from care_core.lint.linting import lint as lint_files

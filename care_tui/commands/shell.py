@@ -22,7 +22,7 @@ class Shell(str, Enum):
 
 @app.command()
 def completion(shell: Annotated[Shell, typer.Argument(metavar="bash|zsh|fish", show_default=False)]) -> None:
-    """Print what a shell needs to complete commands, options, profiles and files.
+    """Print what a shell needs to complete commands and names.
 
     bash: eval "$(care completion bash)" in ~/.bashrc. zsh: care completion zsh > _care in a folder of $fpath.
     fish: care completion fish > ~/.config/fish/completions/care.fish.

@@ -15,7 +15,8 @@ from care_core.profile.schema import Schema, read_schema
 from tests.planted import SCHEMA, fly_many
 
 BARE = CausalGraph(tuple(SCHEMA.variables))
-RUNS = fly_many(120)
+RUNS = fly_many(160)
+"""As many as let a mechanism read its causes alone (`FEW_RUNS`)."""
 QUICK = Effort(points=120, iterations=20)
 
 
