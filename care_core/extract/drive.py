@@ -14,8 +14,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.extract.registry import Args, Mission
+from care_core.extract.registry import Args, Mission, missing
 from care_core.logs.base import Table, Wanted
+from care_core.logs.plausible import APART, STAMP, is_simulated, never_moved, stamps_pace
 from care_core.run import Unavailable
 
 Floats = NDArray[np.float64]
@@ -27,6 +28,9 @@ TOLERANCE_M = 0.3
 MOVING_MPS = 0.02
 TURNING_RADPS = 0.05
 """Below these a robot stands still, and a command asks it to."""
+
+_WENT_M = 1.0
+"""Who went so far was not standing all the time."""
 
 _MAX_GAP_S = 1.0
 """A sample speaks for at most this long after it, so a gap in a topic counts as nothing."""
@@ -42,6 +46,8 @@ ODOMETRY_FIELDS = (
 COMMAND_FIELDS = ("linear.x", "angular.z")
 STAMPED_COMMAND_FIELDS = tuple(f"twist.{name}" for name in COMMAND_FIELDS)
 """Of geometry_msgs/TwistStamped, which newer ROS 2 stacks publish."""
+STAMPED_FIELDS = (STAMP,)
+"""By whose clock the messages above and below were made: what tells that a clock runs wrong."""
 BATTERY_FIELDS = ("voltage", "current", "charge")
 ROSOUT_FIELDS = ("level", "name", "msg")
 
@@ -191,6 +197,11 @@ class Odometry:
         return np.asarray((np.abs(self.speed) < MOVING_MPS) & (np.abs(self.turn) < TURNING_RADPS))
 
     @property
+    def tells_speed(self) -> bool:
+        """Whether its twist is filled in: some drivers leave it zero, while the position goes on."""
+        return not self.stands.all() or float(self.step_m.sum()) < _WENT_M
+
+    @property
     def step_m(self) -> Floats:
         """Distance from the sample before, shape (n,), 0 for the first."""
         return np.hypot(np.diff(self.x, prepend=self.x[:1]), np.diff(self.y, prepend=self.y[:1]))
@@ -216,7 +227,8 @@ class Commands:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """What extractors share. `odometry` and `commands` are None where the log lacks them."""
+    """What extractors share. `odometry` and `commands` are None where the log lacks them, odometry also where it cannot
+    be right: `doubt` says why."""
 
     legs: tuple[Leg, ...]
     timeout_s: float
@@ -224,6 +236,7 @@ class Drive:
     odometry: Odometry | None
     commands: Commands | None
     topics: Topics
+    doubt: str = ""
 
     @property
     def reached(self) -> tuple[Leg, ...]:
@@ -240,21 +253,33 @@ def analyse(mission: Mission) -> Drive:
     every = goal_server(mission.spec).legs(mission.tables, mission.spec, mission.end_s)
     legs = tuple(leg for leg in every if mission.start_s <= leg.sent_s <= mission.end_s)
     names = topics(mission.spec)
+    table = mission.table(names.odometry)
+    odometry, commands = _odometry(table, legs), _commands(mission.table(names.commands), legs)
+    doubt = _odometry_doubt(names.odometry, table, odometry, commands, legs)
     return Drive(
         legs=legs,
         timeout_s=time_limit_s(legs, mission.spec),
         goals=own_goals(legs, mission.spec),
-        odometry=_odometry(mission.table(names.odometry), legs),
-        commands=_commands(mission.table(names.commands), legs),
+        odometry=None if doubt else odometry,
+        commands=commands,
         topics=names,
+        doubt=doubt,
     )
+
+
+def no_odometry(drive: Drive) -> Unavailable:
+    """Why a drive has no odometry."""
+    if drive.doubt:
+        return Unavailable(drive.doubt, "check the odometry's source and its driver")
+    return missing(drive.topics.odometry)
 
 
 def _odometry(table: Table | None, legs: Sequence[Leg]) -> Odometry | None:
     if table is None or not has(table, ODOMETRY_FIELDS):
         return None
     leg, dt = _active(table.t, legs)
-    active = leg >= 0
+    numbers = sum(np.asarray(table[name], np.float64) for name in (*ODOMETRY_FIELDS[1:3], *ODOMETRY_FIELDS[-2:]))
+    active = (leg >= 0) & np.isfinite(numbers)
     if np.count_nonzero(active) < 2:
         return None
     return Odometry(
@@ -268,6 +293,35 @@ def _odometry(table: Table | None, legs: Sequence[Leg]) -> Odometry | None:
         leg=leg[active],
         frame=str(table["header.frame_id"][active][0]),
     )
+
+
+def _odometry_doubt(
+    topic: str, table: Table | None, odometry: Odometry | None, commands: Commands | None, legs: Sequence[Leg]
+) -> str:
+    """Why what odometry says cannot be, in words; empty where it can, and where there is none."""
+    if table is None or not has(table, ODOMETRY_FIELDS):
+        return ""
+    active = int(np.count_nonzero(_active(table.t, legs)[0] >= 0))
+    if 2 * (0 if odometry is None else len(odometry.t)) < active:
+        return f"{topic} says no numbers in most of its messages"
+    if odometry is not None and never_moved(float(odometry.step_m.sum()), len(odometry.t), _way_m(commands, legs)):
+        return f"{topic} says that the robot never moved, but it reached its goals"
+    if STAMP in table.columns and not is_simulated(table.t, table[STAMP]):
+        pace = stamps_pace(table.t, table[STAMP])
+        if pace is not None and not 1 / APART <= pace <= APART:
+            return f"the stamps of {topic} run at {pace:.2g} of the recording's clock"
+    return ""
+
+
+def _way_m(commands: Commands | None, legs: Sequence[Leg]) -> float:
+    """How far the robot must have gone, m: from reached goal to reached goal, or as it was commanded to reach them."""
+    reached = [leg for leg in legs if leg.status == Status.SUCCEEDED]
+    way_m = sum(one for a, b in pairwise(reached) if math.isfinite(one := math.dist((a.x, a.y), (b.x, b.y))))
+    if commands is None:
+        return way_m
+    ordered = np.abs(commands.speed) * commands.dt
+    under = _active(commands.t, reached)[0] >= 0
+    return max(way_m, float(ordered[under & np.isfinite(ordered)].sum()))
 
 
 def _commands(table: Table | None, legs: Sequence[Leg]) -> Commands | None:

@@ -19,6 +19,7 @@ from care_core.extract.drive import (
     ODOMETRY_FIELDS,
     ROSOUT_FIELDS,
     STAMPED_COMMAND_FIELDS,
+    STAMPED_FIELDS,
     TOLERANCE_M,
     Commands,
     Leg,
@@ -92,9 +93,9 @@ class GoalMissions(MissionKind):
         names = topics(spec)
         return {
             **goal_server(spec).needs(spec),
-            names.odometry: ODOMETRY_FIELDS,
+            names.odometry: (*ODOMETRY_FIELDS, *STAMPED_FIELDS),
             names.commands: (*COMMAND_FIELDS, *STAMPED_COMMAND_FIELDS),
-            names.battery: BATTERY_FIELDS,
+            names.battery: (*BATTERY_FIELDS, *STAMPED_FIELDS),
             **dict.fromkeys(ROSOUT, ROSOUT_FIELDS),
         }
 
@@ -190,7 +191,7 @@ def _recoveries(mission: Mission) -> Iterator[Evidence]:
 def _stuck(mission: Mission) -> Iterator[Evidence]:
     """Goals on which the robot made no way for long, and what it was commanded meanwhile."""
     drive = mission.shared(analyse)
-    if drive.odometry is None:
+    if drive.odometry is None or not drive.odometry.tells_speed:
         return
     for number, leg in enumerate(drive.legs):
         inside = drive.odometry.leg == number

@@ -13,8 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from care_core.extract.asked import Asked
-from care_core.extract.drive import TOLERANCE_M, Drive, analyse, angle_between, listed_headings
-from care_core.extract.registry import Args, Mission, extractor, missing, one_of
+from care_core.extract.drive import TOLERANCE_M, Drive, analyse, angle_between, listed_headings, no_odometry
+from care_core.extract.registry import Args, Mission, extractor, one_of
 from care_core.run import Unavailable, Value
 
 _LEAST_RAD = 0.2
@@ -54,7 +54,7 @@ def _start(drive: Drive, first: Pose) -> Pose | Unavailable:
     """
     odometry = drive.odometry
     if odometry is None:
-        return missing(drive.topics.odometry)
+        return no_odometry(drive)
     here = np.flatnonzero(odometry.leg == 0)
     if not len(here):
         return Unavailable("the odometry begins after the first goal was sent", "record the whole mission")

@@ -28,6 +28,7 @@ from care_core.extract.drive import (
     angle_between,
     goal_server,
     longest,
+    no_odometry,
     share,
 )
 from care_core.extract.goals import ROSOUT, rosout
@@ -48,13 +49,22 @@ _TOO_SHORT = Unavailable("too few messages while a goal was active", "record the
 
 
 def _odometry(drive: Drive) -> Odometry | Unavailable:
-    return missing(drive.topics.odometry) if drive.odometry is None else drive.odometry
+    return no_odometry(drive) if drive.odometry is None else drive.odometry
+
+
+def _moving(drive: Drive) -> Odometry | Unavailable:
+    """Odometry that says how fast the robot is."""
+    if drive.odometry is not None and not drive.odometry.tells_speed:
+        return Unavailable(
+            f"by its twist {drive.topics.odometry} stood, by its position it went", "have the driver fill in its twist"
+        )
+    return _odometry(drive)
 
 
 def _placed(drive: Drive) -> Odometry | Unavailable:
     """Odometry in the frame of the goals, to measure distances to them."""
     if drive.odometry is None:
-        return missing(drive.topics.odometry)
+        return no_odometry(drive)
     if any(math.isnan(leg.x) for leg in drive.legs):
         return Unavailable("the log does not say where the goals lie", "ros2 bag record /goal_pose /plan")
     frames = {leg.frame.strip("/") for leg in drive.legs} - {""}
@@ -382,7 +392,7 @@ def settling_time(drive: Drive, odometry: Odometry, args: Args) -> Value:
 
 
 @extractor("drive_speed", needs={}, parts=("goals", "odometry"), unit="m/s")
-@of_drive(_odometry)
+@of_drive(_moving)
 def drive_speed(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Mean forward speed while driving."""
     driving = np.abs(odometry.speed) >= MOVING_MPS
@@ -390,21 +400,21 @@ def drive_speed(drive: Drive, odometry: Odometry, args: Args) -> Value:
 
 
 @extractor("top_speed", needs={}, parts=("goals", "odometry"), unit="m/s")
-@of_drive(_odometry)
+@of_drive(_moving)
 def top_speed(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """95th percentile of the forward speed."""
     return float(np.percentile(np.abs(odometry.speed), 95))
 
 
 @extractor("top_turn_rate", needs={}, parts=("goals", "odometry"), unit="rad/s")
-@of_drive(_odometry)
+@of_drive(_moving)
 def top_turn_rate(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """95th percentile of the turn rate."""
     return float(np.percentile(np.abs(odometry.turn), 95))
 
 
 @extractor("drive_acceleration", needs={}, parts=("goals", "odometry"), unit="m/s^2")
-@of_drive(_odometry)
+@of_drive(_moving)
 def drive_acceleration(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """99th percentile of the change of forward speed."""
     step_s = np.diff(odometry.t)
@@ -421,7 +431,7 @@ def drive_acceleration(drive: Drive, odometry: Odometry, args: Args) -> Value:
     unit="",
     args={"of": one_of("share of the time, or longest in s; share unless given", "share", "longest")},
 )
-@of_drive(_odometry)
+@of_drive(_moving)
 def standstill(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Not moving while a goal is active: share of that time, or the longest stretch of it."""
     if args.get("of") == "longest":
@@ -430,7 +440,7 @@ def standstill(drive: Drive, odometry: Odometry, args: Args) -> Value:
 
 
 @extractor("no_way_time", needs={}, parts=("goals", "odometry"), unit="s")
-@of_drive(_odometry)
+@of_drive(_moving)
 def no_way_time(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Longest time without forward motion while a goal is active, turning on the spot included."""
     return longest(np.abs(odometry.speed) < MOVING_MPS, odometry.dt)
@@ -438,14 +448,14 @@ def no_way_time(drive: Drive, odometry: Odometry, args: Args) -> Value:
 
 @extractor("total_turn", needs={}, parts=("goals", "odometry"), unit="rad", args=_PER_METRE)
 @divided
-@of_drive(_odometry)
+@of_drive(_moving)
 def total_turn(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Sum of all turning, left and right alike."""
     return float((np.abs(odometry.turn) * odometry.dt).sum())
 
 
 @extractor("start_delay", needs={}, parts=("goals", "odometry"), unit="s")
-@of_drive(_odometry)
+@of_drive(_moving)
 def start_delay(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Mean time from sending a goal to the first motion."""
     moving = ~odometry.stands
@@ -486,7 +496,7 @@ def commanded_share(drive: Drive, commands: Commands, args: Args) -> Value:
 
 
 @extractor("blocked_share", needs={}, parts=("goals", "odometry", "commands"), unit="")
-@of_drive(_odometry)
+@of_drive(_moving)
 def blocked_share(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """Share of the time with a goal that forward motion was commanded and none came: contact, slip, a dead drive."""
     commands = _commands(drive)

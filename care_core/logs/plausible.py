@@ -33,6 +33,8 @@ JUMPS: Mapping[str, Mapping[str, float]] = {
 }
 """A step that no vehicle makes from one sample to the next and back again: away by more, and back to within half."""
 
+STAMP = "header.stamp"
+"""The time at which a ROS robot made a message, by its own clock."""
 
 MOVING: Mapping[str, tuple[str, ...]] = {"POS": ("Lat", "Lng"), "ATT": ("Roll", "Pitch")}
 """Fields of which at least one changes in any flight, by the estimator's noise alone."""
@@ -52,6 +54,13 @@ SLOWEST_S: Mapping[str, float] = {"BAT": 60.0, "POS": 30.0, "ATT": 30.0}
 
 _PACE, _GPS_STEP_S = 1.2, 60.0
 """How far the log's clock may run from the satellites': in 24 logs of four firmwares they agree to 0.3 %."""
+APART, _STAMPED_S, _QUARTERS, _MOSTLY = 1.25, 10.0, 4, 0.9
+"""By what factor stamps that a robot makes may run from the recording's clock, over so many seconds. A real clock is
+right to 0.01 %; one that was set is off in one quarter of the time, one that runs wrong in each."""
+_SIMULATED_S = 1e9
+"""A simulation's time begins at 0: stamps so far behind the recording's have a pace of their own."""
+_WAY_M, _STOOD = 1.0, 0.05
+"""Who reaches goals over such a way has moved, and by more than this share of it."""
 _ENOUGH = 20
 """Samples that must agree before a source is called dead or a clock wrong."""
 
@@ -102,7 +111,7 @@ def clock_doubt(tables: Mapping[str, Table], start_s: float, end_s: float) -> st
     pace = _satellites_pace(tables.get("GPS"), start_s, end_s)
     if not 1 / _PACE < pace < _PACE:
         return f"the log's clock goes wrong: by the satellites' time {pace:.3g} s pass in each of its seconds"
-    return ""
+    return _stamps_doubt(tables, start_s, end_s)
 
 
 def _satellites_pace(gps: Table | None, start_s: float, end_s: float) -> float:
@@ -117,6 +126,45 @@ def _satellites_pace(gps: Table | None, start_s: float, end_s: float) -> float:
     if steady.sum() < _ENOUGH or said_s[steady].sum() <= 0:
         return 1.0
     return float(true_s[steady].sum() / said_s[steady].sum())
+
+
+def _stamps_doubt(tables: Mapping[str, Table], start_s: float, end_s: float) -> str:
+    """Whether all stamps of a robot's messages say that the recording's clock runs wrong."""
+    paces = {}
+    for name, table in tables.items():
+        if STAMP in table.columns:
+            inside = table.between(start_s, end_s)
+            if not is_simulated(inside.t, inside[STAMP]) and (pace := stamps_pace(inside.t, inside[STAMP])) is not None:
+                paces[name] = pace
+    if not paces or any(1 / APART <= pace <= APART for pace in paces.values()):
+        return ""
+    pace = float(np.median(list(paces.values())))
+    names = " and ".join(sorted(paces))
+    return f"the log's clock or the robot's is wrong: by the stamps of {names} {pace:.3g} s pass in each of its seconds"
+
+
+def is_simulated(t: Floats, stamp: Floats) -> bool:
+    """Whether messages recorded at `t` were stamped, `stamp`, by the clock of a simulation, both of shape (n,) in s."""
+    behind = t - stamp
+    known = behind[np.isfinite(behind)]
+    return len(known) > 0 and float(np.median(known)) > _SIMULATED_S
+
+
+def stamps_pace(t: Floats, stamp: Floats) -> float | None:
+    """Seconds of stamps, shape (n,), in one of the recording, whose times are `t`; None where nothing tells."""
+    told = np.isfinite(stamp)
+    stamp, t = stamp[told], t[told]
+    if len(t) < _ENOUGH or t[-1] - t[0] < _STAMPED_S or np.mean(np.diff(stamp) > 0) < _MOSTLY:
+        return None
+    edges = np.searchsorted(t, np.linspace(t[0], t[-1], _QUARTERS + 1)).clip(0, len(t) - 1)
+    took, passed = np.diff(stamp[edges]), np.diff(t[edges])
+    is_slow, is_fast = np.all((took > 0) & (took < passed / APART)), np.all((passed > 0) & (took > passed * APART))
+    return float((stamp[-1] - stamp[0]) / (t[-1] - t[0])) if is_slow or is_fast else 1.0
+
+
+def never_moved(path_m: float, samples: int, way_m: float) -> bool:
+    """Whether odometry whose path is so long says that a robot stood which reached goals over a way of `way_m`."""
+    return samples >= _ENOUGH and way_m >= _WAY_M and path_m < _STOOD * way_m
 
 
 def _longest_stand(t: Floats) -> int:

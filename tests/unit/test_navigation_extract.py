@@ -233,8 +233,37 @@ def test_what_was_commanded_is_one_thing_at_a_time(speed: float, turn: float, or
 
 
 def test_a_robot_that_is_held() -> None:
-    held = drive(odom=odometry({0: 0, 100: 0}), cmd_vel=commands(0.3, [0.0]))
+    held = drive(
+        odom=odometry({0: 0, 100: 0}), cmd_vel=commands(0.3, [0.0]), move_base__result=results((20, 0, 4), (31, 1, 4))
+    )
     assert value("blocked_share", mission(held)) == pytest.approx(1)
+
+
+def with_columns(source: Table, **columns: Any) -> Table:
+    found = {name.replace("__", "."): np.broadcast_to(one, len(source)).copy() for name, one in columns.items()}
+    return Table(source.t, {**source.columns, **found})
+
+
+def test_odometry_that_cannot_be_is_not_measured_on() -> None:
+    moves = odometry({0: 0, 10: 0, 20: 2, 21: 2, 31: 4})
+    broken = {
+        "never moved": odometry({0: 0, 100: 0}),
+        "no numbers": with_columns(moves, pose__pose__position__x=np.nan),
+        "stamps of /odom run at 0.5 of": with_columns(moves, header__stamp=moves.t / 2),
+        "stamps of /odom run at 2 of": with_columns(moves, header__stamp=moves.t * 2),
+    }
+    for reason, odom in broken.items():
+        one = mission(drive(odom=odom))
+        for name in ("path_length", "drive_speed", "distance_left", "standstill", "time_per_metre"):
+            found = value(name, one)
+            assert isinstance(found, Unavailable), (reason, name, found)
+            assert reason in found.reason
+        assert value("goals_success", one) == 1
+    simulated = with_columns(moves, header__stamp=moves.t / 2 - 1.7e9)
+    assert value("path_length", mission(drive(odom=simulated))) == pytest.approx(4)
+    one = mission(drive(odom=with_columns(moves, twist__twist__linear__x=0.0)))
+    assert isinstance(value("drive_speed", one), Unavailable)
+    assert value("path_length", one) == pytest.approx(4)
 
 
 def test_messages_are_counted_and_condensed() -> None:

@@ -46,6 +46,21 @@ def test_a_dilution_of_precision_that_no_receiver_can_send_is_left_out() -> None
     np.testing.assert_array_equal(plausible(satellites)["GPS"]["HDop"], [0.8, 655.35])
 
 
+def test_stamps_tell_a_recording_whose_clock_runs_wrong() -> None:
+    t = np.arange(0.0, 60.0, 0.5)
+
+    def stamped(*paces: float) -> dict[str, Table]:
+        return {f"/{n}": Table(t, {"header.stamp": 5 + pace * t}) for n, pace in enumerate(paces)}
+
+    assert clock_doubt(stamped(0.99, 1.0), 0, 60) == ""
+    assert clock_doubt(stamped(2.0, 1.0), 0, 60) == ""  # one topic alone is wrong by itself
+    assert "2 s pass in each" in clock_doubt(stamped(2.0, 2.0), 0, 60)
+    assert "0.5 s pass in each" in clock_doubt(stamped(0.5), 0, 60)
+    assert clock_doubt({"/odom": Table(t, {"header.stamp": t / 2 - 1.7e9})}, 0, 60) == ""  # a simulation's own time
+    was_set = {"/odom": Table(t, {"header.stamp": t + 100 * (t > 20)})}
+    assert clock_doubt(was_set, 0, 60) == ""
+
+
 def test_what_a_vehicle_writes_at_once_says_nothing_of_its_clock() -> None:
     burst = Table(np.full(900, 0.5), {"Value": np.arange(900.0)})
     assert clock_doubt({"PARM": burst}, 0.0, 60.0) == ""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +13,19 @@ from care_core.health.records import Health
 from care_core.health.ros.examining import examine
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
-from tests.ros_drives import ABORTED, FAILS_AT_S, SUCCEEDED, Drive
-from tests.ros_samples import ROS2, START_NS, McapFile, cdr, imu, random_message, write_db3, write_mcap
+from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SUCCEEDED, Drive
+from tests.ros_samples import (
+    ROS2,
+    SECOND_NS,
+    START_NS,
+    McapFile,
+    cdr,
+    imu,
+    random_message,
+    stamp,
+    write_db3,
+    write_mcap,
+)
 
 WARN, ERROR, FATAL = 30, 40, 50
 
@@ -43,6 +56,52 @@ def test_a_fault_is_the_first_finding_with_its_onset(fault: str, kind: str, susp
     assert (first.kind, first.suspect) == (kind, suspect)
     assert first.onset_s == pytest.approx(FAILS_AT_S, abs=3.0)
     assert first.probability > 0.5
+
+
+def frozen(message: Any) -> None:
+    message.pose.pose.position.x = message.pose.pose.position.y = message.twist.twist.linear.x = 0.0
+
+
+def not_a_number(message: Any) -> None:
+    message.pose.pose.position.x = float("nan")
+
+
+def without_time(message: Any) -> None:
+    message.header.stamp.sec = message.header.stamp.nanosec = 0
+
+
+def half_as_fast(message: Any) -> None:
+    time_ns = message.header.stamp.sec * SECOND_NS + message.header.stamp.nanosec
+    message.header.stamp = stamp(ROS2, START_NS + (time_ns - START_NS) // 2)
+
+
+def always_the_same(message: Any) -> None:
+    message.voltage, message.current = 24.0, -2.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "title"),
+    [
+        (ODOMETRY, frozen, "never moved, but goals were reached"),
+        (ODOMETRY, not_a_number, "no numbers"),
+        (ODOMETRY, without_time, "no time"),
+        (ODOMETRY, half_as_fast, "stamps of /wheels/odom run at 0.5 of the recording's clock"),
+        (BATTERY, always_the_same, "says the same throughout"),
+    ],
+)
+def test_a_source_that_cannot_be_is_a_finding(
+    kind: str, change: Callable[[Any], None], title: str, tmp_path: Path
+) -> None:
+    class Broken(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            for topic, name, time_s, message in super().messages():
+                if name == kind:
+                    change(message)
+                yield topic, name, time_s, message
+
+    found = looked_at(Broken(), tmp_path).findings
+    assert [one for one in found if title in one.title], found
+    assert all(one.severity in ("warning", "info") for one in found)
 
 
 @pytest.mark.parametrize("outcome", [SUCCEEDED, ABORTED])

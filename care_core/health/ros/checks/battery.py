@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.health.records import Finding, Severity
+from care_core.health.ros import plan
 from care_core.health.ros.checks.drive import obeys
 from care_core.health.ros.recording import Battery, Recording
 
@@ -14,10 +15,29 @@ DROP, DROP_IN_S = 0.08, 5.0
 """Share of the voltage lost within this time, with the load's own part taken out. A charged battery, lead-acid or
 lithium, loses about a fifth from full to empty, over an hour. The largest step of 301 healthy missions: 0.1 %."""
 
+MOVED_M, FROZEN = 1.0, 20
+"""A robot that went so far drew more than one that stands, which so many messages would show."""
+
 
 def check(recording: Recording) -> Iterator[Finding]:
+    yield from _frozen(recording)
     for battery in recording.batteries:
         yield from _drops(recording, battery)
+
+
+def _frozen(recording: Recording) -> Iterator[Finding]:
+    """A battery that measures current, yet says the same throughout a drive. A voltage alone is a simple one's."""
+    moves = recording.odometry is not None and np.ptp(recording.odometry.x) + np.ptp(recording.odometry.y) > MOVED_M
+    for topic, table in recording.of(plan.BATTERY):
+        columns = [np.asarray(table[name], np.float64) for name in plan.FIELDS[plan.BATTERY] if name in table.columns]
+        if not moves or len(table) < FROZEN or len(columns) < 3 or not np.isfinite(columns[1]).all():
+            continue
+        if all(not np.isfinite(one).any() or np.ptp(one) == 0 for one in columns):
+            yield Finding(
+                "battery", "the battery says the same throughout: it measures nothing", 0.0, recording.duration_s,
+                "info", f"{columns[0][0]:.3g} V and {columns[1][0]:.3g} A in {len(table)} messages on a drive",
+                topic, probability=0.9,
+            )  # fmt: skip
 
 
 def _drops(recording: Recording, battery: Battery) -> Iterator[Finding]:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_core.health.records import Finding
 from care_core.health.ros import plan
-from care_core.health.ros.recording import Floats, Odometry, Recording
+from care_core.health.ros.recording import STREAM_MESSAGES, Floats, Odometry, Recording
+from care_core.logs.base import Table
+from care_core.logs.plausible import STAMP, never_moved
 
 JUMP_M = 0.3
 """A position that steps further than speed and time allow. The largest such step of 301 healthy missions: 0.07 m."""
@@ -28,10 +32,62 @@ _PAUSE_S = 0.6
 
 def check(recording: Recording) -> Iterator[Finding]:
     odometry = recording.odometry
+    yield from _dead(recording)
     if odometry is not None and odometry.tells_speed:
         yield from _jumps(recording, odometry)
         yield from _drift(recording, odometry)
     yield from _corrections(recording)
+
+
+def _dead(recording: Recording) -> Iterator[Finding]:
+    """Odometry that cannot be: no numbers, no movement while goals were reached, no time."""
+    tables = dict(recording.of(plan.ODOMETRY))
+    if recording.odometry is None:
+        rows = {topic: len(table) for topic, table in tables.items() if len(table) >= STREAM_MESSAGES}
+        if rows and all(_is_nothing(tables[topic]) for topic in rows):
+            topic = min(rows)
+            yield _unusable(recording, topic, "odometry says no numbers", f"{rows[topic]} messages without a position")
+        return
+    odometry = recording.odometry
+    path_m = float(np.sum(np.hypot(np.diff(odometry.x), np.diff(odometry.y))))
+    way_m = _way_of_goals(recording)
+    if never_moved(path_m, len(odometry.t), way_m):
+        yield _unusable(
+            recording, odometry.topic, "odometry never moved, but goals were reached",
+            f"{path_m:.2g} m in {len(odometry.t)} messages, goals and commands over {way_m:.1f} m",
+        )  # fmt: skip
+    stamp = np.asarray(tables[odometry.topic][STAMP], np.float64)
+    known = stamp[np.isfinite(stamp)]
+    if len(stamp) >= STREAM_MESSAGES and (not len(known) or (len(known) == len(stamp) and np.ptp(known) == 0)):
+        yield _unusable(
+            recording, odometry.topic, "odometry carries no time",
+            f"its {len(stamp)} stamps {'are the same' if len(known) else 'were never set'}; transforms need them",
+        )  # fmt: skip
+
+
+def _is_nothing(table: Table) -> bool:
+    columns = [table[name] for name in plan.FIELDS[plan.ODOMETRY][1:3] if name in table.columns]
+    return len(columns) == 2 and not np.isfinite(np.hypot(*columns)).any()
+
+
+def _unusable(recording: Recording, topic: str, title: str, evidence: str) -> Finding:
+    return Finding(
+        "localisation", title, 0.0, recording.duration_s, "warning", evidence, topic, probability=0.9
+    )  # fmt: skip
+
+
+def _way_of_goals(recording: Recording) -> float:
+    """How far the robot must have gone, m: from reached goal to reached goal, or as it was commanded on the way to
+    them."""
+    reached = [goal for goal in recording.goals if goal.outcome == "reached"]
+    apart = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(reached)]
+    way_m = sum(one for one in apart if math.isfinite(one))
+    if recording.commands is None:
+        return way_m
+    t = recording.commands.t
+    ordered = np.hypot(recording.commands.speed, recording.commands.sideways)
+    ordered = ordered * np.minimum(np.diff(t, append=t[-1:]), _PAUSE_S)
+    return max(way_m, sum(float(ordered[(t >= one.sent_s) & (t <= one.end_s)].sum()) for one in reached))
 
 
 def _steps(odometry: Odometry) -> tuple[Floats, Floats, Floats]:

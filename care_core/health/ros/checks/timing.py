@@ -11,7 +11,7 @@ from care_core.health.moments import counted
 from care_core.health.records import Finding, FindingKind, Severity
 from care_core.health.ros import plan
 from care_core.health.ros.recording import WARN, Recording
-from care_core.logs.base import Table
+from care_core.logs.plausible import APART, STAMP, is_simulated, stamps_pace
 
 SHARE = 0.1
 """Of the time, with a message a second counted as all of it: loops that miss now and then are no fault."""
@@ -34,12 +34,6 @@ _FAMILIES: tuple[tuple[re.Pattern[str], FindingKind, str], ...] = (
     (_TF, "tf", "transforms come late or not at all"),
     (_STALE, "planner", "the costmap does not get what it needs"),
 )
-
-
-SLOW, SLOW_FOR_S, SLOW_MESSAGES = 0.8, 10.0, 20
-"""Of real time, over so many seconds and messages. A real clock is right to 0.01 %; Gazebo is set to 1 as shipped."""
-QUARTERS, MOSTLY = 4, 0.9
-"""A slow simulation is slow in each quarter of its time, and its stamps move on: a clock that was set is neither."""
 
 
 def known(text: str) -> bool:
@@ -65,28 +59,28 @@ def _at_most_warning(recording: Recording, at: float) -> Severity:
 
 
 def _lags(recording: Recording) -> Iterator[Finding]:
-    """A robot whose own clock runs slower than the recorder's: a simulation that its computer cannot keep up with."""
-    rates = [rate for _, table in recording.of(*plan.STAMPED) if (rate := _pace(table)) is not None]
-    if not rates:
+    """A clock of the robot that runs otherwise than the recorder's: a simulation that its computer cannot keep up with,
+    or where both are said to be clocks of the day, one that is wrong."""
+    paces, simulated = {}, []
+    for topic, table in recording.of(*plan.STAMPED):
+        stamp = np.asarray(table.columns.get(STAMP, ()), np.float64)
+        if len(stamp) and (pace := stamps_pace(table.t, stamp)) is not None:
+            paces[topic] = pace
+            simulated += [topic] if is_simulated(table.t, stamp) else []
+    off = {topic: pace for topic, pace in paces.items() if not 1 / APART <= pace <= APART}
+    if not off:
         return
-    pace = float(np.median(rates))
+    pace = float(np.median(list(off.values())))
+    evidence = (
+        f"{counted(len(off), 'topic')} with stamps at {min(off.values()):.2f} to {max(off.values()):.2f} s a second"
+        f" (limits {1 / APART:.2f} and {APART})"
+    )
+    if simulated:
+        title = f"the robot's clock runs at {pace:.0%} of real time: a {'slow' if pace < 1 else 'fast'} simulation"
+        evidence += "; what takes long or comes seldom does so for this"
+    else:
+        title = f"stamps of {' and '.join(sorted(off))} run at {pace:.2g} of the recording's clock: one is wrong"
     yield Finding(
-        "cpu", f"the robot's clock runs at {pace:.0%} of real time: a slow simulation", 0.0, recording.duration_s,
-        "info", f"{counted(len(rates), 'topic')} with stamps at {min(rates):.2f} to {max(rates):.2f} s a second"
-        f" (limit {SLOW}); what takes long or comes seldom does so for this", "header.stamp against times of recording",
-        "world", 0.8,
+        "cpu", title, 0.0, recording.duration_s, "info" if simulated else "warning", evidence,
+        "header.stamp against times of recording", "world" if simulated else "operation", 0.8,
     )  # fmt: skip
-
-
-def _pace(table: Table) -> float | None:
-    """Seconds of a topic's stamps for a second of recording where that is slow all the time, else None."""
-    if "header.stamp" not in table.columns:
-        return None
-    stamp = np.asarray(table["header.stamp"], np.float64)
-    told = np.isfinite(stamp)
-    stamp, t = stamp[told], table.t[told]
-    if len(t) < SLOW_MESSAGES or t[-1] - t[0] < SLOW_FOR_S or np.mean(np.diff(stamp) > 0) < MOSTLY:
-        return None
-    edges = np.searchsorted(t, np.linspace(t[0], t[-1], QUARTERS + 1)).clip(0, len(t) - 1)
-    took, passed = np.diff(stamp[edges]), np.diff(t[edges])
-    return float((stamp[-1] - stamp[0]) / (t[-1] - t[0])) if np.all((took > 0) & (took < SLOW * passed)) else None
