@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from care_core.application.describing import known_of
@@ -40,6 +42,23 @@ def test_calibration_and_what_is_read_only_are_nobody_s_choice() -> None:
     ]
     assert len(listed) > 30
     assert [fact.name for fact in listed if not is_self_written(fact.name)] == []
+
+
+def test_every_line_is_of_a_parameter_that_is_known_as_its_owner_reads_it() -> None:
+    table = Path(navigation.__file__).with_name("words.tsv").read_text(encoding="utf-8")
+    rows = [tuple(line.split("\t")) for line in table.splitlines() if not line.startswith("#")]
+    read = {
+        (owner, name)
+        for ros in navigation.STACKS
+        for owner in navigation.owners(ros)
+        for name in navigation.keys_of(ros, owner)
+    }
+    known = {("ros", owner, name) for owner, name in read} | {("ros", "", name) for _, name in read}
+    known |= {("ardupilot", "", name) for name in ardupilot.names()}
+    assert [row for row in rows if row[:3] not in known] == []
+    assert [row[2] for row in rows if len(row[4]) > 72 or row[4].endswith(".")] == []
+    assert rows == sorted(rows)
+    assert len({row[:3] for row in rows}) == len(rows)
 
 
 def test_a_default_that_moved_under_one_name_is_told_by_distribution() -> None:
