@@ -64,6 +64,15 @@ def test_a_flight_whose_clock_is_broken(care: Care, tmp_path: Path, kind: str, s
     check_not_judged(*judged(care, written(tmp_path, source, CLOCKS[clock], kind)))
 
 
+def test_a_receiver_that_stands_still_is_a_finding(care: Care, tmp_path: Path) -> None:
+    (tmp_path / "a.BIN").write_bytes(restamped.dataflash_with(GOOD, "GPS", Lat=-353632610, Lng=1491652300))
+    _, out, _ = care("triage", tmp_path / "a.BIN", "--json", "--profile", "arducopter")
+    titles = [one["title"] for one in json.loads(out)["findings"]]
+    assert "the GPS position never changes" in titles
+    _, out, _ = care("triage", GOOD, "--json", "--profile", "arducopter")
+    assert "the GPS position never changes" not in [one["title"] for one in json.loads(out)["findings"]]
+
+
 @pytest.mark.parametrize("clock", ["constant", "zero", "milliseconds"])
 def test_a_drive_whose_clock_is_broken(care: Care, tmp_path: Path, clock: str) -> None:
     check_not_judged(*judged(care, written(tmp_path, DRIVE, CLOCKS[clock], "mcap"), "move_base"))

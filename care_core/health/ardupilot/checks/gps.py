@@ -22,7 +22,12 @@ READS: Wanted = {
     "GPS": ("Status", "NSats", "HDop", "Lat", "Lng", "Spd", "GCrs", "GMS"),
     "GPA": ("HAcc", "SAcc"),
     "XKF4": ("SP", "SV"),
+    "POS": ("Lat", "Lng"),
 }
+
+FROZEN_RECORDS, MOVED_M = 20, 20.0
+"""A receiver says the same position in so many records only if it is dead: while the estimate goes so far, 4 times the
+glitch radius, it must change."""
 
 JUMP_M, ACCELERATION = 5.0, 10.0
 FEWEST, FALL = 6, 3
@@ -45,6 +50,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         yield from _told(flight)
         return
     own = table.where(flight.watch(table.t))
+    yield from _frozen(flight, own)
     jumped = list(_jumps(flight, own))
     yield from jumped
     if not jumped:
@@ -54,6 +60,28 @@ def find(flight: Flight) -> Iterator[Finding]:
     if not lost:
         yield from _few(flight, own)
         yield from _inaccurate(flight)
+
+
+def _frozen(flight: Flight, table: Table) -> Iterator[Finding]:
+    """A position that stays the same to the last digit while the estimate moves: whoever estimates has it elsewhere."""
+    place = flight.one("POS", "Lat", "Lng")
+    if place is None or len(place) < 2 or not {"Lat", "Lng"} <= table.columns.keys():
+        return
+    fixed = table.where(table["Status"] >= _FIX)
+    if len(fixed) < FROZEN_RECORDS or np.ptp(fixed["Lat"]) > 0 or np.ptp(fixed["Lng"]) > 0:
+        return
+    start, end = float(fixed.t[0]), float(fixed.t[-1])
+    moved = place.between(start, end)
+    if not len(moved):
+        return
+    north_m = float(np.ptp(moved["Lat"])) * _METRES
+    east_m = float(np.ptp(moved["Lng"])) * _METRES * float(np.cos(np.radians(moved["Lat"][0])))
+    if np.hypot(north_m, east_m) > MOVED_M:
+        yield Finding(
+            "gps", "the GPS position never changes", start, end, "warning",
+            f"the same in {len(fixed)} records with a fix, while the estimate went {np.hypot(north_m, east_m):.0f} m",
+            "GPS.Lat, Lng against POS.Lat, Lng", probability=0.9,
+        )  # fmt: skip
 
 
 def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
