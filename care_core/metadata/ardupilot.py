@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from care_core.metadata.fact import Fact, number
+from care_core.metadata.families import expanded
 from care_core.metadata.words import word_of
 
 _TABLE = Path(__file__).with_name("ardupilot.tsv")
@@ -116,21 +117,9 @@ def _rows() -> Mapping[str, list[_Row]]:
         for line in lines:
             pattern, releases, *cells = line.split("\t")
             row = _Row(_releases(releases), tuple(cells))
-            for name in _expanded(pattern):
+            for name in expanded(pattern):
                 found.setdefault(name, []).append(row)
     return found
-
-
-def _expanded(pattern: str) -> Iterator[str]:
-    before, brace, rest = pattern.partition("{")
-    if not brace:
-        yield pattern
-        return
-    numbers, _, after = rest.partition("}")
-    for part in numbers.split("|"):
-        first, dots, last = part.partition("..")
-        several = map(str, range(int(first), int(last) + 1)) if dots else [part]
-        yield from (f"{before}{one}{after}" for one in several)
 
 
 @cache

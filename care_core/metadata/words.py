@@ -7,7 +7,9 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-_TABLE = Path(__file__).with_name("words.tsv")
+from care_core.metadata.families import expanded
+
+TABLE = Path(__file__).with_name("words.tsv")
 
 
 class Word(NamedTuple):
@@ -32,9 +34,10 @@ def word_of(ecosystem: str, name: str, owner: str = "") -> Word:
 
 @cache
 def _words() -> Mapping[tuple[str, str, str], Word]:
-    found = {}
-    for line in _TABLE.read_text(encoding="utf-8").splitlines():
+    found: dict[tuple[str, str, str], Word] = {}
+    for line in TABLE.read_text(encoding="utf-8").splitlines():
         if line and not line.startswith("#"):
             ecosystem, owner, name, unit, text = line.split("\t")
-            found[ecosystem, owner, name] = Word(unit, text)
+            word = Word(unit, text)
+            found |= {(ecosystem, owner, one): word for one in expanded(name)}
     return found

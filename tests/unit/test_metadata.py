@@ -8,6 +8,8 @@ import pytest
 
 from care_core.application.describing import known_of
 from care_core.metadata import ardupilot, navigation
+from care_core.metadata.families import expanded
+from care_core.metadata.words import word_of
 from care_core.run import Setting
 from care_core.variables import Role, Variable
 from care_core.vehicles import is_self_written
@@ -55,10 +57,13 @@ def test_every_line_is_of_a_parameter_that_is_known_as_its_owner_reads_it() -> N
     }
     known = {("ros", owner, name) for owner, name in read} | {("ros", "", name) for _, name in read}
     known |= {("ardupilot", "", name) for name in ardupilot.names()}
-    assert [row for row in rows if row[:3] not in known] == []
+    families = {row[:3]: [(row[0], row[1], name) for name in expanded(row[2])] for row in rows}
+    assert [row for row, names in families.items() if known.isdisjoint(names)] == []
     assert [row[2] for row in rows if len(row[4]) > 72 or row[4].endswith(".")] == []
     assert rows == sorted(rows)
-    assert len({row[:3] for row in rows}) == len(rows)
+    assert len(families) == len(rows)
+    written = [name for names in families.values() for name in names]
+    assert len(set(written)) == len(written)
 
 
 def test_a_default_that_moved_under_one_name_is_told_by_distribution() -> None:
@@ -83,3 +88,17 @@ def test_the_log_s_own_description_stands_before_the_table_and_each_bound_names_
 def test_what_nothing_is_known_of_is_told_by_its_profile_alone() -> None:
     option = Variable("mine", Role.OPTION, range=(0.0, 1.0), parameters=("/somebody/mine",))
     assert {one.what for one in known_of(option, {}, {})} == {"Parameter", "Type", "Acceptable", "Restart"}
+
+
+def test_a_family_of_names_is_written_once() -> None:
+    assert list(expanded("SERVO{1..3}_MIN")) == ["SERVO1_MIN", "SERVO2_MIN", "SERVO3_MIN"]
+    assert list(expanded("{ATC|Q_A}_RAT{|2}_P")) == ["ATC_RAT_P", "ATC_RAT2_P", "Q_A_RAT_P", "Q_A_RAT2_P"]
+    assert list(expanded("RTL_SPEED")) == ["RTL_SPEED"]
+
+
+@pytest.mark.parametrize("name", ["BATT_MONITOR", "BATT2_MONITOR", "BATT9_MONITOR", "BATTG_MONITOR"])
+def test_one_line_serves_a_numbered_family(name: str) -> None:
+    fact = ardupilot.fact_of(name, "copter")
+    assert fact is not None
+    assert fact.line == "what measures this battery; 0 nothing"
+    assert not word_of("ros", name).line
