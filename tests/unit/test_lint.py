@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Literal
 
 import jsonschema
 import pytest
@@ -11,7 +12,8 @@ import pytest
 from care_core.errors import UsageError
 from care_core.lint.linting import lint
 from care_core.lint.records import Finding
-from care_core.lint.rules import RULES
+from care_core.lint.rules import ROS1_RENAMED, ROS2_RENAMED, RULES, Renamed
+from care_core.metadata import navigation
 from care_core.report.linting import lint_document, lint_sarif, lint_schema, lint_text
 from tests.conftest import Care
 
@@ -228,3 +230,12 @@ loopback_simulator:
   ros__parameters: {update_duration: 0.02}
 """
     assert told(tmp_path, "a.yaml", text, distribution) == []
+
+
+@pytest.mark.parametrize(("ros", "renamed"), [("ros1", ROS1_RENAMED), ("ros2", ROS2_RENAMED)])
+def test_the_new_name_of_every_renamed_key_is_read_by_its_owner_since_then(
+    ros: Literal["ros1", "ros2"], renamed: tuple[Renamed, ...]
+) -> None:
+    for one in renamed:
+        facts = navigation.known(ros, one.owner, one.new)
+        assert any(one.since in navigation.distributions(fact, ros) for fact in facts), one
