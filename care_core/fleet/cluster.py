@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeVar
@@ -61,7 +61,7 @@ def connected(scheduler: str | None = None, *, workers: int = 1, memory: str | N
             yield client
         return
     try:
-        client = distributed.Client(scheduler, timeout=_CONNECT_S)
+        client = patiently(lambda: distributed.Client(scheduler, timeout=_CONNECT_S))
     except (OSError, ValueError, TypeError) as err:
         raise UsageError(
             "No scheduler answers there.", hint="Start one with 'dask scheduler'.", where=scheduler
@@ -69,6 +69,15 @@ def connected(scheduler: str | None = None, *, workers: int = 1, memory: str | N
     with client:
         _check_workers(client, scheduler)
         yield client
+
+
+def patiently(start: Callable[[], Answer]) -> Answer:
+    """Start something of Dask's, which gives the thread of its loop ten seconds to begin and else fails an assertion:
+    on a machine that is busy enough for that it is started again."""
+    for _ in range(TRIES):
+        with suppress(AssertionError):
+            return start()
+    return start()
 
 
 def _check_memory(size: str | None) -> None:
@@ -88,6 +97,18 @@ def _local(workers: int, memory: str | None) -> Iterator[Any]:
     import distributed
 
     with tempfile.TemporaryDirectory(prefix="care-fleet-") as scratch:
+        ours = {
+            "n_workers": workers,
+            "threads_per_worker": 1,
+            "processes": True,
+            "host": "127.0.0.1",
+            "dashboard_address": "127.0.0.1:0",
+            "worker_dashboard_address": "127.0.0.1:0",
+            "memory_limit": memory or "auto",
+            "security": distributed.Security.temporary(),
+            "silence_logs": logging.CRITICAL,
+            "local_directory": scratch,
+        }
         settings = {
             "distributed.scheduler.allowed-failures": 0,
             # On a busy machine a process takes long to begin; by default it would be given up meanwhile.
@@ -103,18 +124,7 @@ def _local(workers: int, memory: str | None) -> Iterator[Any]:
         with (
             dask.config.set(settings),
             _deaf(),
-            distributed.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                worker_dashboard_address="127.0.0.1:0",
-                memory_limit=memory or "auto",
-                security=distributed.Security.temporary(),
-                silence_logs=logging.CRITICAL,
-                local_directory=scratch,
-            ) as cluster,
+            patiently(lambda: distributed.LocalCluster(**ours)) as cluster,
             distributed.Client(cluster) as client,
         ):
             yield client

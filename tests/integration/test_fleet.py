@@ -16,7 +16,7 @@ from care_core.application.case import Request
 from care_core.application.fleet import Cluster, triage_all
 from care_core.errors import UsageError
 from care_core.fleet import cluster
-from care_core.fleet.cluster import TRIES, connected, each
+from care_core.fleet.cluster import TRIES, connected, each, patiently
 from care_core.fleet.sources import Source, gather
 from care_core.parallel import Failed
 from tests.conftest import Care
@@ -64,6 +64,17 @@ def test_an_item_that_hangs_is_given_up_and_the_others_go_on(client: Any, tmp_pa
     assert dict(each(client, work, [("c", tmp_path), ("d", tmp_path)], limit_s=1e6)) == {0: "c", 1: "d"}
 
 
+def test_a_start_that_the_machine_was_too_busy_for_is_tried_again() -> None:
+    tries: list[int] = []
+
+    def start() -> str:
+        tries.append(len(tries))
+        assert len(tries) > TRIES
+        return "started"
+
+    assert patiently(start) == "started"
+
+
 def test_no_more_items_are_handed_out_than_there_are_threads(client: Any, tmp_path: Path) -> None:
     answers = each(client, work, [(f"{n}", tmp_path) for n in range(20)], limit_s=1e6)
     waiting = []
@@ -95,7 +106,7 @@ def test_logs_are_triaged_by_a_scheduler_that_is_named(tmp_path: Path) -> None:
     sources = [*gather(["memory://robots"]), *broken]
     said: list[str] = []
     here = {"host": "127.0.0.1", "protocol": "tcp", "dashboard_address": "127.0.0.1:0", "processes": False}
-    with distributed.LocalCluster(n_workers=1, **here) as running:
+    with patiently(lambda: distributed.LocalCluster(n_workers=1, **here)) as running:
         named = Cluster(running.scheduler_address)
         rows = triage_all(sources, Request(Path()), named, lambda step, _share: said.append(step))
     assert [row.status for row in rows] == ["ok", "unreadable", "unreadable"]
