@@ -10,7 +10,7 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check bench docs profiles screenshots man walk fuzz mutate kills matrix sbom clean
+.PHONY: demo test check bench docs profiles screenshots man walk fuzz mutate damage kills matrix sbom clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
@@ -51,6 +51,10 @@ fuzz: $(DEV)
 # Logs of yours taken apart by their format and put together wrong: make mutate LOGS="a.BIN b.bag".
 mutate: $(DEV)
 	$(BIN)/python -m tests.mutating $(LOGS)
+
+# Each format cut at 200 places and with 200 flipped bits; the tests do with 50.
+damage: $(DEV)
+	CARE_DAMAGE=200 $(BIN)/pytest -q tests/integration/test_damage.py
 
 kills: $(DEV)
 	CARE_KILLS=200 $(BIN)/pytest -q tests/integration/test_kills.py
