@@ -41,7 +41,7 @@ def _room(frame: FrameType) -> str | None:
 
 def walked(value: Path | float, *words: str) -> dict[str, set[str]]:
     """Per room the functions that are called with the value by `care` with these words."""
-    from care_tui.cli import app
+    from care_tui.cli import command_line
 
     found: dict[str, set[str]] = {}
 
@@ -55,7 +55,7 @@ def walked(value: Path | float, *words: str) -> dict[str, set[str]]:
     sys.setprofile(note)
     try:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
-            app(list(words), prog_name="care")
+            command_line(words)(list(words), prog_name="care")
     finally:
         sys.setprofile(None)
     return found

@@ -1,5 +1,7 @@
 """The `care` command. Only what `--help` needs is imported here; each command imports its own work.
 
+Of the families of commands the one that is asked for is imported and built, all where the help or a mistake needs them.
+
 Data goes to stdout and talk to stderr (`console`); exit codes are `care_core.errors.ExitCode`.
 """
 
@@ -7,7 +9,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,27 +19,31 @@ from typer.core import TyperGroup
 
 from care_core.errors import UsageError, nearest
 from care_tui import __version__
-from care_tui.commands import (
-    asking,
-    baselining,
-    bundling,
-    collecting,
-    configuring,
-    diagnosing,
-    doctor,
-    fleet,
-    formats,
-    learning,
-    logs,
-    opening,
-    past,
-    profiles,
-    serving,
-    shell,
-    watching,
-)
-from care_tui.commands.opening import OPEN
 from care_tui.console import emit, explain
+
+HELP = "Which parameter made the run fail, along which path, and what to change. 'care LOG' opens the terminal app."
+OPEN = "open"
+"""The hidden command behind `care LOG`."""
+FAMILIES: Mapping[str, tuple[str, ...]] = {
+    "opening": (OPEN,),
+    "serving": ("serve",),
+    "diagnosing": ("triage", "demo"),
+    "fleet": ("fleet",),
+    "bundling": ("bundle",),
+    "asking": ("whatif", "verify"),
+    "baselining": ("baseline",),
+    "configuring": ("diff", "apply", "lint"),
+    "past": ("history",),
+    "watching": ("watch",),
+    "logs": ("inspect", "params", "ingest"),
+    "collecting": ("collect",),
+    "learning": ("train", "update", "evaluate"),
+    "doctor": ("doctor",),
+    "shell": ("completion", "man"),
+    "profiles": ("profiles",),
+    "formats": ("schema",),
+}
+"""Modules of `care_tui.commands` with the commands that each holds, in the order of the help."""
 
 
 class CareGroup(TyperGroup):
@@ -70,40 +77,36 @@ def route(args: list[str], commands: Iterable[str], own: Iterable[str]) -> list[
     first = args[0] if args else ""
     if first in {*commands} - {OPEN} or first in own:
         return args
-    is_path = os.sep in first or Path(first).suffix != "" or Path(first).exists()
-    if not first or first.startswith("-") or is_path:
+    if not first or first.startswith("-") or _is_path(first):
         return [OPEN, *args]
     hint = nearest(first, {*commands} - {OPEN}) or "See 'care --help', or give the path of a log."
     raise UsageError(f"There is no command '{first}'.", hint=hint)
 
 
-app = typer.Typer(
-    cls=CareGroup,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    help="Which parameter made the run fail, along which path, and what to change. 'care LOG' opens the terminal app.",
-)
-for commands in (
-    opening,
-    serving,
-    diagnosing,
-    fleet,
-    bundling,
-    asking,
-    baselining,
-    configuring,
-    past,
-    watching,
-    logs,
-    collecting,
-    learning,
-    doctor,
-    shell,
-):
-    app.add_typer(commands.app)
-app.add_typer(profiles.app, name="profiles", invoke_without_command=True)
-app.add_typer(formats.app, name="schema")
+def _is_path(word: str) -> bool:
+    return os.sep in word or Path(word).suffix != "" or Path(word).exists()
+
+
+def command_line(words: Sequence[str] | None = None) -> typer.Typer:
+    """`care` with the one family of commands that these words ask for; with all where they name none, or are None."""
+    app = typer.Typer(
+        cls=CareGroup,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+        help=HELP,
+    )
+    app.callback()(_care)
+    for family in FAMILIES if words is None else _asked(words):
+        app.add_typer(import_module(f"care_tui.commands.{family}").app)
+    return app
+
+
+def _asked(words: Sequence[str]) -> Iterable[str]:
+    """The family of the command that is named or, for a log or nothing, of the app's; else all."""
+    first = words[0] if words else ""
+    named = [family for family, commands in FAMILIES.items() if first in commands and first != OPEN]
+    return named or (("opening",) if not first or _is_path(first) else FAMILIES)
 
 
 def main() -> None:
@@ -115,7 +118,8 @@ def main() -> None:
     # Whoever closes a stream wants none of it (cron, `>&-`).
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
-    app(prog_name="care")
+    completes = "_CARE_COMPLETE" in os.environ  # the shell's words are not the command's then
+    command_line(None if completes else sys.argv[1:])(prog_name="care")
 
 
 def _print_version(wanted: bool) -> None:
@@ -124,7 +128,6 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit()
 
 
-@app.callback()
 def _care(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)

@@ -8,8 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from typer.main import get_command
+
 from care_tui import __version__
-from care_tui.commands.opening import OPEN
+from care_tui.cli import OPEN, command_line
 
 _EXIT_STATUS = (
     ("0", "all objectives are within their thresholds; the command did what it was asked"),
@@ -32,9 +34,11 @@ _FILES = (
 )
 
 
-def manual_page(context: Any) -> str:
-    """The page of a whole command line, given the context of its group, in the macros of man(7)."""
-    return "\n".join(_page(context)) + "\n"
+def manual_page() -> str:
+    """The page of the whole command line, in the macros of man(7)."""
+    group = get_command(command_line())
+    with group.make_context("care", [], resilient_parsing=True) as context:
+        return "\n".join(_page(context)) + "\n"
 
 
 def _page(context: Any) -> Iterator[str]:
@@ -90,13 +94,7 @@ def _roff(text: str) -> str:
 
 def main() -> None:
     """Write the page to the file that is named."""
-    import typer
-
-    from care_tui.cli import app
-
-    group = typer.main.get_command(app)
-    with group.make_context("care", [], resilient_parsing=True) as context:
-        Path(sys.argv[1]).write_text(manual_page(context), encoding="utf-8")
+    Path(sys.argv[1]).write_text(manual_page(), encoding="utf-8")
 
 
 if __name__ == "__main__":

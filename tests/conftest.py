@@ -84,11 +84,12 @@ def care(capsys: pytest.CaptureFixture[str]) -> Care:
     """Call the command in this process."""
 
     def call(*args: str | Path) -> Outcome:
-        from care_tui.cli import app
+        from care_tui.cli import command_line
 
+        words = [str(arg) for arg in args]
         capsys.readouterr()
         with pytest.raises(SystemExit) as ended:
-            app([str(arg) for arg in args], prog_name="care")
+            command_line(words)(words, prog_name="care")
         code = ended.value.code
         captured = capsys.readouterr()
         return Outcome(code if isinstance(code, int) else 0 if code is None else 1, captured.out, captured.err)

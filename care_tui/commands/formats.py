@@ -9,7 +9,7 @@ import typer
 
 from care_tui.console import emit
 
-app = typer.Typer(help="Published formats.", rich_markup_mode=None)
+app = typer.Typer(name="schema", help="Published formats.", rich_markup_mode=None)
 
 
 @app.callback()

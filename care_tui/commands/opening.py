@@ -29,15 +29,11 @@ from care_tui.places import files_of, logs_in, written_s
 
 app = typer.Typer()
 
-OPEN = "open"
-"""The hidden command behind `care LOG`."""
-
-
 QUIET_S, LOOK_S = 5.0, 0.5
 """A log that was written to more recently may still be growing: it is looked at for so long."""
 
 
-@app.command(OPEN, hidden=True)
+@app.command("open", hidden=True)
 def open_app(
     log: Annotated[Path | None, typer.Argument(metavar="[LOG]", show_default=False)] = None,
     profile: ProfileName = None,

@@ -16,7 +16,12 @@ if TYPE_CHECKING:
     from care_core.profile.store import Profile
     from care_core.variables import Variable
 
-app = typer.Typer(help="What is installed, and whether it is sound.", rich_markup_mode=None)
+app = typer.Typer(
+    name="profiles",
+    help="What is installed, and whether it is sound.",
+    invoke_without_command=True,
+    rich_markup_mode=None,
+)
 
 
 @app.callback()

@@ -33,8 +33,8 @@ def completion(shell: Annotated[Shell, typer.Argument(metavar="bash|zsh|fish", s
 
 
 @app.command()
-def man(context: typer.Context) -> None:
+def man() -> None:
     """Print the manual page. It is made from the help; read it with: care man | man -l -"""
     from care_tui.manual import manual_page
 
-    emit(manual_page(context.find_root()))
+    emit(manual_page())

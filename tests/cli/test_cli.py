@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.core import TyperGroup
+from typer.main import get_command
 
 from care_core.application import api
 from care_core.application.case import Case, Request
@@ -21,7 +23,7 @@ from care_core.health.records import NOTHING_SEEN
 from care_core.profile.store import load_profile
 from care_core.tables.rows import ABOUT
 from care_tui import __version__, console
-from care_tui.cli import route
+from care_tui.cli import FAMILIES, command_line, route
 from care_tui.commands.opening import newest_log
 from tests.conftest import Care
 from tests.made import HEALTH, made_diagnosis
@@ -63,6 +65,14 @@ def test_version_and_help(care: Care) -> None:
     assert listing.code == 0
     assert all(f"\n  {command}" in listing.stdout for command in COMMANDS)
     assert "\n  open" not in listing.stdout
+
+
+@pytest.mark.parametrize(("family", "commands"), FAMILIES.items())
+def test_a_command_is_built_with_its_own_family_alone(family: str, commands: tuple[str, ...]) -> None:
+    words = [] if family == "opening" else [commands[0]]
+    group = get_command(command_line(words))
+    assert isinstance(group, TyperGroup)
+    assert tuple(group.commands) == commands
 
 
 @pytest.mark.parametrize("command", COMMANDS)
