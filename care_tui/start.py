@@ -35,7 +35,15 @@ def main() -> None:
 
 
 def _leave(_number: int, _frame: FrameType | None) -> None:
-    """End as on an error, so that temporary files go: the system's own way leaves them."""
+    """End as on an error, so that temporary files go: the system's own way leaves them.
+
+    Whoever ends a whole group sends several signals. Another exception while the first unwinds would break what
+    unwinds (a lock is waited for, and then released unheld), so who is ending already is told no more.
+    """
+    if isinstance(sys.exc_info()[1], KeyboardInterrupt):
+        return
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     raise SystemExit(_TERMINATED)
 
 

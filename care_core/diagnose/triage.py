@@ -317,7 +317,8 @@ def _fixes(case: _Case, options: set[str]) -> list[Fix]:
     others += [detour[smallest_good(detour)]] if detour else []
     useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
     ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
-    return [to_fix(case.world, *settled(case.world, assignment)) for assignment, _probability in ranked]
+    fixes = [to_fix(case.world, *settled(case.world, assignment)) for assignment, _probability in ranked]
+    return [fix for i, fix in enumerate(fixes) if fix.changes not in [earlier.changes for earlier in fixes[:i]]]
 
 
 def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]) -> bool:

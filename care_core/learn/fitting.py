@@ -28,7 +28,7 @@ class Effort:
     points: int
     iterations: int
     folds: int = 0
-    """Parts of the missions that are left out in turn to learn how far off a mechanism is on a mission it never saw."""
+    """Parts of the runs that are left out in turn to learn how far off a mechanism is on what it never saw."""
 
 
 OUTCOME = Effort(points=600, iterations=60, folds=5)
@@ -50,7 +50,7 @@ MIN_ROWS = 20
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A mechanism, and how badly it predicts runs of missions that it does not know: mean negative log likelihood."""
+    """A mechanism, and how badly it predicts runs that it does not know: mean negative log likelihood."""
 
     mechanism: Mechanism
     loss: float
@@ -105,8 +105,8 @@ def fit(
         x: shape (n, p), inputs in their own units. y: shape (n,), 0 or 1 when `binary`. No NaN.
         rng: only used to thin tables of more than `effort.points` rows.
         transform: the scale of the target, `best_transform` when None.
-        groups: shape (n,), runs of one mission have one number. Errors are those of a model that knows no run of the
-            same number, since it will be asked about other missions; each run is its own when None.
+        groups: shape (n,), runs that are left out together have one number (`relative.left_out_together`). Errors are
+            those of a model that knows no run of the same number; each run is its own when None.
 
     Raises:
         LearningError: too few rows.
@@ -158,7 +158,7 @@ def fit(
     return Fitted(mechanism, _loss(mechanism, errors, error_sd))
 
 
-def tested_on_missions_left_out(
+def tested_on_runs_left_out(
     mechanism: Mechanism,
     x: FloatArray,
     y: FloatArray,
@@ -168,20 +168,20 @@ def tested_on_missions_left_out(
     effort: Effort,
     groups: NDArray[np.int64],
 ) -> Mechanism:
-    """The mechanism with the errors of mechanisms that were fitted without the missions they are tested on.
+    """The mechanism with the errors of mechanisms that were fitted without the runs they are tested on.
 
-    `left_out` keeps the relevances and the noise that all missions together chose, which flatters: intervals of 80 %
-    held 72 % of the times of missions that are new altogether. Cross-conformal levels (Vovk 2015; Barber et al. 2021,
-    CV+) hold what they promise as far as the next mission is one like these.
+    `left_out` keeps the relevances and the noise that all runs together chose, which flatters: intervals of 80 % held
+    72 % of the times of missions that are new altogether, and 59 % of those of new configurations in a campaign of 191
+    flights of one mission; these hold 74 % there. Cross-conformal levels (Vovk 2015; Barber et al. 2021, CV+) hold what
+    they promise as far as the next run is one like these.
 
     Args:
         x, y, inputs, groups: as for `fit`; `mechanism` is what it made of them.
     """
-    missions = np.unique(groups)
-    if mechanism.binary or effort.folds < 2 or len(missions) < 2 * effort.folds:
+    numbers, place = np.unique(groups, return_inverse=True)
+    if mechanism.binary or effort.folds < 2 or len(numbers) < 2 * effort.folds:
         return mechanism
-    part = dict(zip(missions.tolist(), rng.permutation(len(missions)) % effort.folds, strict=True))
-    fold = np.array([part[group] for group in groups.tolist()])
+    fold = (rng.permutation(len(numbers)) % effort.folds)[place.ravel()]
     if len(y) - np.bincount(fold).max() < MIN_ROWS:
         return mechanism
     read = np.zeros(len(inputs.names), dtype=bool)

@@ -1,8 +1,8 @@
 """Which metrics carry an objective, by the graph, and how much of its errors they show.
 
 Where the graph has a path option -> metric -> objective, the metric's error in a run is part of the objective's. Errors
-are those of mechanisms that do not know the run (its mission left out). How they go together is estimated over the
-training runs that have all of them, and kept only where it predicts runs of other missions better.
+are those of mechanisms that do not know the run (nor its mission, nor its repeats). How they go together is estimated
+over the training runs that have all of them, and kept only where it predicts other runs better.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import LEAST, FloatArray, Mechanism, transformed
 from care_core.causal.model import Mediation, OutcomeRecord
 from care_core.learn.fitting import left_out
-from care_core.learn.relative import missions_of
+from care_core.learn.relative import left_out_together
 from care_core.profile.schema import Schema
 from care_core.variables import Role
 
@@ -36,7 +36,7 @@ EXPLAINED = 0.95
 def mediation(
     objective: str, mechanisms: Mapping[str, Mechanism], graph: CausalGraph, frame: pd.DataFrame, schema: Schema
 ) -> Mediation | None:
-    """The metrics that carry an objective; None where the graph names none or they tell nothing of other missions."""
+    """The metrics that carry an objective; None where the graph names none or they tell nothing of other runs."""
     metrics = [
         name
         for name in graph.parents(objective)
@@ -49,8 +49,7 @@ def mediation(
     own, theirs = errors[known, 0], errors[known, 1:]
     strongest = np.sort(np.argsort(-np.abs(_correlation(theirs, own)), kind="stable")[:MOST])
     theirs = theirs[:, strongest]
-    missions = missions_of(frame, schema)
-    gain = _gain(theirs, own, np.arange(len(own)) if missions is None else missions[known])
+    gain = _gain(theirs, own, left_out_together(frame, schema)[known])
     if gain.sum() <= gain.std() * np.sqrt(len(gain)):
         return None
     weights, among = _weights(theirs, own)
@@ -79,25 +78,24 @@ def with_mediation(
 
 
 def _errors(name: str, mechanisms: Mapping[str, Mechanism], frame: pd.DataFrame, schema: Schema) -> FloatArray:
-    """Errors of the runs in standard deviations, each by a mechanism that does not know its mission; NaN where a run
-    has no value; shape (n,)."""
-    mechanism, values, missions = mechanisms[name], frame[name].to_numpy(dtype=float), missions_of(frame, schema)
+    """Errors of the runs in standard deviations, each by a mechanism that does not know it; NaN where a run has no
+    value; shape (n,)."""
+    mechanism, values = mechanisms[name], frame[name].to_numpy(dtype=float)
     met = {v.name: frame[v.name].fillna(frame[v.name].median()) for v in schema.contexts if v.name in frame}
     inputs = frame.assign(**met)[list(mechanism.inputs)].to_numpy(dtype=float)
     rows = np.isfinite(values) & (values > LEAST[mechanism.transform]) & np.isfinite(inputs).all(axis=1)
     x = inputs[rows]
     targets = transformed(values[rows], mechanism.transform) - mechanism.known(x) - mechanism.mean
-    errors, sd = left_out(
-        mechanism.kernel, mechanism.scaled(x), targets / mechanism.scale, None if missions is None else missions[rows]
-    )
+    groups = left_out_together(frame, schema)[rows]
+    errors, sd = left_out(mechanism.kernel, mechanism.scaled(x), targets / mechanism.scale, groups)
     standard = np.full(len(values), np.nan)
     standard[rows] = np.clip(errors / sd, -FARTHEST, FARTHEST)
     return standard
 
 
-def _gain(theirs: FloatArray, own: FloatArray, missions: NDArray[np.int64]) -> FloatArray:
-    """Log likelihood of each run's error by what the metrics of runs of other missions say, over that without them."""
-    numbers, place = np.unique(missions, return_inverse=True)
+def _gain(theirs: FloatArray, own: FloatArray, parts: NDArray[np.int64]) -> FloatArray:
+    """Log likelihood of each run's error by what the metrics of runs of other parts say, over that without them."""
+    numbers, place = np.unique(parts, return_inverse=True)
     fold = (np.random.default_rng(0).permutation(len(numbers)) % FOLDS)[place]
     gain = np.zeros(len(own))
     for k in range(FOLDS):

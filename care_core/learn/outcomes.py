@@ -27,10 +27,10 @@ from care_core.learn.fitting import (
     Inputs,
     best_transform,
     fit,
-    tested_on_missions_left_out,
+    tested_on_runs_left_out,
 )
 from care_core.learn.knowledge import with_known
-from care_core.learn.relative import missions_of, needs
+from care_core.learn.relative import left_out_together, needs
 from care_core.profile.schema import Schema
 from care_core.variables import Events, Role, Variable
 
@@ -242,7 +242,7 @@ def fit_on(
     A context that a run does not have is taken to be at its median, as where the mechanism is asked.
     """
     nominal = schema.nominal_of(target) if target in schema.variables else None
-    missions = missions_of(frame, schema)
+    together = left_out_together(frame, schema)
     met = {v.name: frame[v.name].fillna(frame[v.name].median()) for v in schema.contexts if v.name in frame}
     frame = frame.assign(**met)
     options = set(varying_options(frame, schema))
@@ -258,7 +258,7 @@ def fit_on(
         y = frame.loc[known, target].to_numpy(dtype=float)
         if len(y) < MIN_ROWS or np.ptp(y) == 0:
             continue
-        groups = None if missions is None else missions[known]
+        groups = together[known]
         binary = set(np.unique(y)) <= {0.0, 1.0}
         weak = len(frame) < FEW_RUNS and options <= set(names)
         found = fit(
@@ -271,9 +271,7 @@ def fit_on(
     if best is None:
         return None
     x, y, inputs, groups = asked
-    mechanism = best.mechanism
-    if groups is not None:
-        mechanism = tested_on_missions_left_out(mechanism, x, y, inputs, rng=rng, effort=effort, groups=groups)
+    mechanism = tested_on_runs_left_out(best.mechanism, x, y, inputs, rng=rng, effort=effort, groups=groups)
     return mechanism if events is None else replace(mechanism, averaging=averaging(mechanism, events, target, frame))
 
 

@@ -16,6 +16,9 @@ from care_core.causal.mechanisms import FloatArray
 from care_core.profile.schema import Schema
 from care_core.variables import Role, Variable
 
+ENOUGH_PARTS = 10
+"""Thirty runs of three missions let a regression learn the missions by heart: energies were off by 20 %, not by 5 %."""
+
 
 def relative(frame: pd.DataFrame, schema: Schema) -> pd.DataFrame:
     """The schema's variables, each that has a nominal divided by it, all options at their reference."""
@@ -49,13 +52,39 @@ def needs(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArra
 
 def missions_of(frame: pd.DataFrame, schema: Schema) -> NDArray[np.int64] | None:
     """A number for each run, the same for runs of which the same was asked, shape (n,); None where nothing tells, or
-    where all were asked the same: then each is a witness for the others."""
+    where all that tell were asked the same. A run that does not tell, one that never began, has a number of its own."""
     names = [context.name for context in schema.asked]
     if not names:
         return None
     rounded = frame[names].to_numpy(dtype=float).round(1)
-    numbers = np.asarray(np.unique(rounded, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
-    return numbers if numbers.any() else None
+    told = np.isfinite(rounded).any(axis=1)
+    if len(np.unique(rounded[told], axis=0)) < 2:
+        return None
+    return np.asarray(np.unique(rounded, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
+
+
+def left_out_together(frame: pd.DataFrame, schema: Schema) -> NDArray[np.int64]:
+    """A number for each run, shape (n,): those of one number are left out together where errors are measured.
+
+    They are the runs of one mission where missions enough differ, for the model will be asked about others; else those
+    of one configuration, which vouch for each other; else each run alone. A part that holds nearly all runs is no test:
+    without it nothing is known, and what nothing is known of is never far off. So parts are counted by their weight
+    (inverse Simpson index).
+    """
+    asked = [context.name for context in schema.asked]
+    options = [option.name for option in schema.options if option.name in frame]
+    alike = frame[[*options, *asked]].round(dict.fromkeys(asked, 1))
+    configurations = alike.groupby(list(alike), dropna=False, sort=False).ngroup().to_numpy(dtype=np.int64)
+    for parts in (missions_of(frame, schema), configurations):
+        if parts is not None and _count(parts) >= ENOUGH_PARTS:
+            return parts
+    return np.arange(len(frame))
+
+
+def _count(parts: NDArray[np.int64]) -> float:
+    """How many parts of equal size say as much as these."""
+    sizes = np.unique(parts, return_counts=True)[1].astype(float)
+    return float(sizes.sum() ** 2 / (sizes**2).sum()) if len(sizes) else 0.0
 
 
 def _is_reference(frame: pd.DataFrame, schema: Schema) -> NDArray[np.bool_]:

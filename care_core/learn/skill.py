@@ -17,7 +17,7 @@ from care_core.causal.mechanisms import FloatArray
 from care_core.causal.model import Model, SkillRecord, Training
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
-from care_core.learn.relative import missions_of, relative
+from care_core.learn.relative import left_out_together, relative
 from care_core.profile.schema import Schema
 
 BINS = 10
@@ -69,12 +69,10 @@ def held_out_probabilities(
 
 
 def _folds(frame: pd.DataFrame, schema: Schema, rng: np.random.Generator, folds: int) -> NDArray[np.int64]:
-    """The part that each run is in, shape (n,). Where missions differ, a mission is left out whole."""
-    missions = missions_of(frame, schema)
-    count = 0 if missions is None else int(missions.max()) + 1
-    if missions is None or count < 2 * folds:
-        return np.asarray(rng.permutation(len(frame)) % folds)
-    return np.asarray((rng.permutation(count) % folds)[missions])
+    """The part that each run is in, shape (n,). Where missions differ, a mission is left out whole; the repeats of a
+    configuration are left out with it."""
+    numbers, together = np.unique(left_out_together(frame, schema), return_inverse=True)
+    return np.asarray((rng.permutation(len(numbers)) % folds)[together.ravel()])
 
 
 def all_met(frame: pd.DataFrame, schema: Schema) -> FloatArray:

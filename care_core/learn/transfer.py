@@ -26,7 +26,7 @@ from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.completion import complete
 from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, Effort, Fitted, Inputs, fit, left_out, logistic
 from care_core.learn.outcomes import causes_of, find_stages, groups_that_move_together, inputs_of
-from care_core.learn.relative import missions_of, relative
+from care_core.learn.relative import ENOUGH_PARTS, missions_of, relative
 from care_core.learn.screening import screen_options
 from care_core.learn.train import Learned, TrainSettings, assemble
 from care_core.profile.schema import Schema
@@ -36,8 +36,6 @@ TRUST = 10.0
 """Target runs that the source's own scale (a share of 1) and its own noise count as."""
 FEWEST = 3
 """Fewer runs say nothing of what they have in common."""
-ENOUGH_MISSIONS = 10
-"""Thirty runs of three missions let a regression learn the missions by heart: energies were off by 20 %, not by 5 %."""
 ENOUGH_FOR_EFFECTS = 100
 """With fewer runs the graph and the effects stay the source's: a profile has some hundred variables."""
 
@@ -222,7 +220,7 @@ def started_from(
         keep = np.sort(rng.choice(len(y), effort.points, replace=False))
         x, y, groups = x[keep], y[keep], groups[keep]
     moved = _moved(source, x, y, inputs, groups)
-    if len(y) < MIN_ROWS or len(np.unique(groups)) < ENOUGH_MISSIONS or np.ptp(y) == 0:
+    if len(y) < MIN_ROWS or len(np.unique(groups)) < ENOUGH_PARTS or np.ptp(y) == 0:
         return moved.mechanism
     beside = _with_regression(source, x, y, inputs, groups, rng, effort)
     return moved.mechanism if moved.loss <= beside.loss else beside.mechanism

@@ -11,7 +11,7 @@ import pytest
 from care_core.causal.mechanisms import FloatArray
 from care_core.learn.fitting import Effort, Inputs, fit, left_out
 from care_core.learn.outcomes import fit_total, inputs_of, met
-from care_core.learn.relative import missions_of, needs, relative
+from care_core.learn.relative import left_out_together, missions_of, needs, relative
 from care_core.learn.structure import learn_structure
 from care_core.profile.schema import Schema, parse_schema
 
@@ -144,3 +144,43 @@ def test_a_profile_says_what_is_wrong_with_it(change: str, says: str) -> None:
 
     with pytest.raises(ProfileError):
         parse_schema(TEXT.replace(change, says), Path("climber.yaml"))
+
+
+def test_nine_runs_that_never_began_make_no_missions_of_a_campaign() -> None:
+    """Else nearly all runs would be left out together, and errors held against what is known without any."""
+    frame = climbs(missions=1)
+    frame.loc[20:28, ["takeoff_height", "takeoff_time"]] = np.nan
+    assert missions_of(frame, SCHEMA) is None
+    assert len(np.unique(left_out_together(frame, SCHEMA))) == len(frame)
+
+
+def test_repeats_of_a_configuration_are_left_out_with_it() -> None:
+    frame = climbs(missions=1)
+    frame.loc[50:59, ["speed_up", "gain"]] = frame.loc[60:69, ["speed_up", "gain"]].to_numpy()
+    together = left_out_together(frame, SCHEMA)
+    assert (together[50:60] == together[60:70]).all()
+    assert len(np.unique(together)) == len(frame) - 10
+
+
+def test_parts_of_which_one_holds_nearly_all_runs_are_no_test() -> None:
+    frame = climbs()
+    frame.loc[20:, "takeoff_height"] = 5.0  # one mission of many runs beside nineteen of one
+    missions = missions_of(frame, SCHEMA)
+    assert missions is not None
+    assert len(np.unique(missions)) == 20
+    assert len(np.unique(left_out_together(frame, SCHEMA))) == len(frame)
+
+
+def test_intervals_of_a_campaign_with_one_mission_hold_what_they_promise() -> None:
+    """Of new configurations, eight of ten fall inside the 80 % interval, though some training runs never began."""
+    frame = climbs(460, missions=1)
+    campaign, new = frame[:160].copy(), frame[160:]
+    campaign.loc[20:28, ["takeoff_height", "takeoff_time"]] = np.nan
+    graph = learn_structure(campaign, SCHEMA, rng=np.random.default_rng(0)).graph
+    effort = Effort(points=200, iterations=25, folds=5)
+    m = fit_total("takeoff_time", campaign, SCHEMA, graph, np.random.default_rng(0), effort=effort)
+    assert m is not None
+    x = new[list(m.inputs)].to_numpy()
+    z = (np.log(new["takeoff_time"].to_numpy()) - m.latent(x)) / np.hypot(m.latent_sd(x), m.noise_at(x))
+    inside = (z > m.error_quantile(0.1)) & (z < m.error_quantile(0.9))
+    assert 0.72 < inside.mean() < 0.88
