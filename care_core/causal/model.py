@@ -60,6 +60,20 @@ class EffectRecord(Record):
     strongest: float | None = None
     """Observational tables: share of the objective that the strongest other recorded cause explains."""
 
+    @property
+    def doubtful(self) -> float:
+        """Observational tables: share of the effect, 0 to 1, that a hidden cause as strong as the strongest recorded
+        one could be behind; all of it where the runs were too few to say.
+
+        The bias of one that explains a share R of option and objective goes with R / sqrt(1 - R) (Cinelli and Hazlett
+        2020); at the robustness value it is the whole effect.
+        """
+        if self.robustness is None or self.strongest is None:
+            return 1.0
+        shares = (min(share, 0.99) for share in (self.strongest, self.robustness))
+        hidden, needed = (share / (1.0 - share) ** 0.5 for share in shares)
+        return 1.0 if hidden >= needed else hidden / needed
+
 
 class PathRecord(Record):
     """A ranked path (Eq. 2) with its bootstrap interval, which way it moves the objective, and each edge's support."""

@@ -25,12 +25,18 @@ MET = "what this run met"
 
 
 def tell_more(
-    world: World, faults: Sequence[Fault], run: Run, unranked: Mapping[str, Sequence[Suspect]]
+    world: World,
+    faults: Sequence[Fault],
+    run: Run,
+    unranked: Mapping[str, Sequence[Suspect]],
+    *,
+    observational: bool = False,
 ) -> tuple[str, ...]:
     """Sentences for an operator, the most useful first; empty where nothing would help.
 
     Args:
         unranked: per objective the options whose effect the training runs cannot tell, the likeliest first.
+        observational: operators chose the options of the training runs.
     """
     advice = list(_unrecorded(faults, run))
     for fault in faults:
@@ -43,7 +49,7 @@ def tell_more(
         advice += [
             f"{_change_back(world, name)} and run again: a change that nobody chose for a reason would settle whether "
             f"{name} causes it"
-            for name in _chosen(world, fault)
+            for name in (_first(fault) if observational else ())
             if name not in world.kept
         ]
         found = experiment(world, fault)
@@ -61,11 +67,9 @@ def _change_back(world: World, name: str) -> str:
     return f"change only {name} to {world.variables[name].show(world.reference[name])}"
 
 
-def _chosen(world: World, fault: Fault) -> list[str]:
-    """The first cause, where operators chose its value in training."""
-    first = [cause.option.name for cause in fault.causes if not cause.is_lead][:1]
-    effects = (world.model.effects.get((name, fault.objective.variable.name)) for name in first)
-    return [effect.option for effect in effects if effect is not None and effect.robustness is not None]
+def _first(fault: Fault) -> list[str]:
+    """The option that is named first, if any."""
+    return [cause.option.name for cause in fault.causes if not cause.is_lead][:1]
 
 
 def _unrecorded(faults: Sequence[Fault], run: Run) -> Iterator[str]:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from care_core.causal.counterfactual import World
+from care_core.causal.model import EffectRecord
 from care_core.diagnose import provenance
 from care_core.diagnose.advice import believed, falls_short, nearest, outweighed, untried
 from care_core.diagnose.circumstances import circumstances, unusual
@@ -163,10 +164,12 @@ def diagnose(
         fix=None if abstained else fixes[0],
         alternatives=() if abstained else tuple(fixes[1:]),
         abstained=abstained,
-        notes=_notes(case, broken),
+        notes=_notes(case, broken, None if abstained else fixes[0]),
         missions=judged.missions,
         rivals=circumstances(run, world, schema) if unsure else (),
-        tell_more=tell_more(world, faults, run, unranked) if unsure and not out_of_reach else (),
+        tell_more=tell_more(world, faults, run, unranked, observational=schema.observational)
+        if unsure and not out_of_reach
+        else (),
         health=health,
         hypotheses=hypotheses,
     )
@@ -265,10 +268,9 @@ def _confidence(case: _Case, result: ObjectiveResult, suspect: Suspect, in_suppo
         return "low"
     if not in_support or support < LOW_SUPPORT or contribution < UNSURE:
         return "medium" if suspect.option in case.run.refused_by else "low"
-    effect = suspect.effect
-    if effect is not None and effect.robustness is not None and effect.strongest is not None:
+    if case.profile.schema.observational:
         # Operators chose the options: no table can rule a hidden reason out.
-        return "medium" if effect.robustness >= effect.strongest else "low"
+        return "low" if suspect.effect is None or suspect.effect.doubtful == 1.0 else "medium"
     is_rivalled = bool(case.unranked[suspect.path.nodes[-1]])
     if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled and result.is_sure:
         return "high"
@@ -288,18 +290,22 @@ def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float
         notes.append(Note(f"outside the training support ({summary.low:g} to {summary.high:g})", "outside_training"))
     if suspect.effect is not None and support < LOW_SUPPORT:
         notes.append(Note(f"a path to {suspect.path.nodes[-1]} was found in only {support:.0%} of resamples"))
-    effect = suspect.effect
-    if effect is not None and effect.robustness is not None and effect.strongest is not None:
-        text = (
-            f"operators chose it: a hidden cause that explains {effect.robustness:.0%} of it and of "
-            f"{effect.objective} would do as well (the strongest recorded one explains {effect.strongest:.0%})"
-        )
-        notes.append(Note(text))
+    if case.profile.schema.observational:
+        notes.append(Note(_chosen_by_operators(suspect.effect)))
     if suspect.option in case.world.kept:
         notes.append(Note("pinned by --keep: not changed"))
     notes += map(Note, change_notes(case.profile.schema.variables[suspect.option]))
     notes += [Note(str(evidence), "in_the_log") for evidence in case.run.evidence if suspect.option in evidence.options]
     return tuple(notes)
+
+
+def _chosen_by_operators(effect: EffectRecord | None) -> str:
+    if effect is None or effect.robustness is None or effect.strongest is None:
+        return "operators chose it, and the training runs are too few to say how strong a hidden cause would have to be"
+    return (
+        f"operators chose it: a hidden cause that explains {effect.robustness:.0%} of it and of "
+        f"{effect.objective} would do as well (the strongest recorded one explains {effect.strongest:.0%})"
+    )
 
 
 def _fixes(case: _Case, options: set[str]) -> list[Fix]:
@@ -422,7 +428,20 @@ def _reference(judged: Judged) -> str:
     return f"judged against {judged.reference.source}: {count}"
 
 
-def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
+def _if_hidden(case: _Case, fix: Fix) -> str:
+    """What is left of a fix's promise where something unrecorded moved options and objectives together."""
+    now = float(case.world.probability([case.world.config])[0])
+    names = {change.option.name for change in fix.changes}
+    effects = [effect for (option, _), effect in case.world.model.effects.items() if option in names]
+    doubt = max((effect.doubtful for effect in effects), default=1.0)
+    left = min(fix.p_fixed, now + (1.0 - doubt) * (fix.p_fixed - now))
+    return (
+        f"operators chose the options of the training runs: the fix has {fix.p_fixed:.0%} if nothing unrecorded made "
+        f"them choose so, {left:.0%} if something as strong as the strongest recorded cause did"
+    )
+
+
+def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None) -> tuple[str, ...]:
     notes = list(case.choice.fit.reasons)
     notes.append(case.reference)
     for name in (result.variable.name for result in broken):
@@ -434,6 +453,8 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult]) -> tuple[str, ...]:
         for name, rate in case.world.base_rates().items()
     ]
     notes.append(_promise(case.world, [result.variable.name for result in broken]))
+    if fix is not None and case.profile.schema.observational:
+        notes.append(_if_hidden(case, fix))
     if not case.run.mission.fits and case.run.mission.mismatch not in notes:
         notes.append(case.run.mission.mismatch)
     unread = [name for name in unread_options(case.profile.schema, case.run) if name in _off(case)]

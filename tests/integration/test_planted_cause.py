@@ -16,7 +16,18 @@ from care_core.learn.train import train
 from care_core.profile.model import write_model
 from care_core.profile.store import Profile
 from care_core.run import ProfileChoice, Run, Unavailable
-from tests.planted import CALM, DEFAULTS, OPTIONS, SCHEMA, SETTINGS, fly, fly_many, planted_run, with_variable
+from tests.planted import (
+    CALM,
+    DEFAULTS,
+    OPTIONS,
+    SCHEMA,
+    SETTINGS,
+    fly,
+    fly_many,
+    planted_run,
+    planted_world,
+    with_variable,
+)
 
 CHOICE = ProfileChoice("planted", "1", "Simulated robot", "named by the test")
 BY_NAME = {option.name: option for option in OPTIONS}
@@ -74,6 +85,41 @@ def test_what_the_training_runs_cannot_tell_is_said_and_never_ranked(planted: Pr
         assert (cause.option.name, cause.confidence) == ("planner", confidence)
     assert told in rivalled.notes
     assert told not in seen.notes
+
+
+@pytest.mark.parametrize(
+    ("robustness", "strongest", "confidence", "share"),
+    [(0.6, 0.2, "medium", 1 - (0.2 / 0.8**0.5) / (0.6 / 0.4**0.5)), (0.1, 0.2, "low", 0.0), (None, None, "low", 0.0)],
+)
+def test_where_operators_chose_no_cause_is_sure_and_the_promise_says_what_it_rests_on(
+    planted: Profile,
+    tmp_path: Path,
+    robustness: float | None,
+    strongest: float | None,
+    confidence: str,
+    share: float,
+) -> None:
+    effects = {
+        pair: effect.model_copy(update={"robustness": robustness, "strongest": strongest})
+        for pair, effect in planted.model.effects.items()
+    }
+    write_model(replace(planted.model, effects=effects), tmp_path)
+    run = planted_run(speed=1.5)
+    diagnosis = diagnosed(run, Profile(tmp_path, replace(planted.schema, observational=True)))
+    (cause, *_) = diagnosis.faults[0].causes
+    assert (cause.option.name, cause.confidence) == ("speed", confidence)
+    assert any(note.text.startswith("operators chose it") for note in cause.notes)
+    assert diagnosis.fix is not None
+    now = float(planted_world(planted, speed=1.5).probability([run.config])[0])
+    left = now + share * (diagnosis.fix.p_fixed - now)
+    told = [note for note in diagnosis.notes if note.startswith("operators chose the options")]
+    assert len(told) == 1
+    assert f"the fix has {diagnosis.fix.p_fixed:.0%} if" in told[0]
+    assert f", {left:.0%} if something" in told[0]
+    assert any("a change that nobody chose for a reason" in advice for advice in diagnosis.tell_more)
+    drawn = diagnosed(run, planted)
+    assert drawn.faults[0].causes[0].confidence == "high"
+    assert not any("operators chose" in note for note in drawn.notes)
 
 
 @pytest.mark.parametrize(("option", "value", "objective"), CASES)
