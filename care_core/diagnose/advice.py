@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from care_core.diagnose.hypotheses import LATE_S, set_wrong
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult
+from care_core.health.records import Finding
 
 ENOUGH = 0.5
 """A change less likely than this to repair the run is no advice."""
@@ -20,12 +23,24 @@ def believed(fixes: Sequence[Fix], hypotheses: Sequence[Hypothesis]) -> tuple[Fi
     return tuple(replace(fix, p_fixed=fix.p_fixed * (1.0 - broken)) for fix in fixes)
 
 
-def outweighed(hypotheses: Sequence[Hypothesis]) -> str | None:
-    """Why no parameter is to be changed, where something else explains the failure better than all of them together."""
+def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = ()) -> str | None:
+    """Why no parameter is to be changed, where something else explains the failure better than all of them together.
+
+    A part that failed well after the robot was failing by how it was set may be what that led to: motors at their limit
+    for an oscillation have too little thrust. Then it is not what to look at first.
+    """
     rival = next((one for one in hypotheses if one.what in ("hardware", "world") and one.name), None)
     parameters = sum(one.probability for one in hypotheses if one.what == "parameter")
     if rival is None or rival.probability <= parameters:
         return None
+    since_s = min((one.onset_s for one in findings if one.title == rival.name), default=-math.inf)
+    sooner = [one for one in findings if set_wrong(one) and one.onset_s + LATE_S < since_s]
+    if sooner:
+        earliest = min(sooner, key=lambda one: one.onset_s)
+        return (
+            f"{earliest.title} from {earliest.onset_s:.0f} s on, before {rival.name}: that speaks of how the robot is "
+            "set, and training does not tell which option does it"
+        )
     return f"{rival.name}, which explains this failure better than any parameter: look at it first"
 
 

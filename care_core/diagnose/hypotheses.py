@@ -114,12 +114,12 @@ def weigh(
     for what in ("hardware", "world"):
         weights[what, ""] = UNSEEN * (1.0 if verdict == "fits" else 3.0)
     seen = [finding for finding in findings if not finding.after_impact and finding.severity != "info"]
-    set_wrong = [finding for finding in seen if finding.suspect == "parameter"]
-    for option, share in _raised(options, set_wrong).items():
+    by_setting = [finding for finding in seen if set_wrong(finding)]
+    for option, share in _raised(options, by_setting).items():
         if share * trust > 0:
             weights["parameter", option] = share * trust
     other = 1.0 - (1.0 - min(1.0, sum(options.values()))) * (1.0 - chance)
-    failing_s = min((one.onset_s for one in set_wrong), default=math.inf)
+    failing_s = min((one.onset_s for one in by_setting), default=math.inf)
     for finding in seen:
         if finding.suspect in _WHAT:
             key = _WHAT[finding.suspect], finding.title
@@ -128,10 +128,15 @@ def weigh(
     return _normalised(weights)
 
 
-def _raised(options: Mapping[str, float], set_wrong: Sequence[Finding]) -> dict[str, float]:
+def set_wrong(finding: Finding) -> bool:
+    """Whether a finding speaks of how the robot was set, while it still explains anything."""
+    return finding.suspect == "parameter" and not finding.after_impact and finding.severity != "info"
+
+
+def _raised(options: Mapping[str, float], by_setting: Sequence[Finding]) -> dict[str, float]:
     """What the options add, raised to what the findings say that speak of how the robot was set."""
     total = sum(options.values())
-    said = max((one.probability * MISSION_LOST[one.severity] for one in set_wrong), default=0.0)
+    said = max((one.probability * MISSION_LOST[one.severity] for one in by_setting), default=0.0)
     factor = min(max(1.0, said / total), MOST_POINTED) if total >= POINTED else 1.0
     return {name: min(1.0, factor * share) for name, share in options.items()}
 

@@ -64,7 +64,8 @@ def suspects(
     The contribution is a Shapley value (Shapley 1953) over these options: how much the probability of keeping the
     threshold rise when the option goes back to its reference, averaged over the orders in which the others may go back,
     so an interaction is shared by those who take part in it and the contributions add up to the whole change. What they
-    leave unexplained, much where training runs were few, is laid to the options that this run's symptoms point at.
+    leave unexplained, much where training runs were few, is laid to the options that this run's symptoms point at. Of
+    options with the same share, the one goes first whose reset alone meets every objective.
 
     Options whose effect is not identified are among them, to be told and not to be ranked (`is_identified`): theirs is
     an association.
@@ -93,7 +94,11 @@ def suspects(
         )
         for name in names
     ]
-    return tuple(sorted(found, key=lambda s: (-s.weight, -s.total_effect, s.option)))
+    alone = world.probability([_reset(world, frozenset((name,))) for name in names]) if names else ()
+    repairs = dict(zip(names, map(float, alone), strict=True))
+    return tuple(
+        sorted(found, key=lambda s: (-round(s.weight, 2), -round(repairs[s.option], 2), -s.total_effect, s.option))
+    )
 
 
 def _acting_where_it_failed(world: World, objective: str, names: Sequence[str], said: Sequence[Evidence]) -> list[str]:

@@ -149,7 +149,7 @@ def diagnose(
     report("searching for a fix", 0.85)
     fixes = believed(_fixes(case, {s.option for group in found.values() for s in group}), hypotheses)
     out_of_reach = next(filter(None, unheard.values()), None)
-    abstained = out_of_reach or outweighed(hypotheses) or _abstains(case, faults, fixes)
+    abstained = out_of_reach or outweighed(hypotheses, health.findings) or _abstains(case, faults, fixes)
     if abstained is None:
         abstained = falls_short(fixes[0], broken) or untried(fixes[0], schema.learned_elsewhere)
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)

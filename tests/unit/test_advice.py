@@ -8,6 +8,7 @@ import pytest
 
 from care_core.diagnose.advice import believed, falls_short, nearest, outweighed
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
+from care_core.health.records import Finding
 from care_core.variables import Threshold
 from tests.made import LAND_SPEED, TIME, made_diagnosis
 
@@ -43,6 +44,17 @@ def test_no_parameter_is_advised_where_a_part_explains_more() -> None:
     said = "motor 2 lost thrust, which explains this failure better than any parameter: look at it first"
     assert outweighed(motor(0.7)) == said
     assert outweighed(motor(0.3)) is None
+
+
+def test_a_part_that_failed_well_after_a_sign_of_how_it_was_set_is_not_what_to_look_at_first() -> None:
+    shaking = Finding("tuning", "roll oscillates", 35.2, 265.8, "warning", "", "RATE", "parameter")
+    part = Finding("motor", "motor 2 lost thrust", 52.0, 246.9, "critical", "", "RCOU")
+    said = outweighed(motor(0.7), (part, shaking))
+    assert said is not None
+    assert said.startswith("roll oscillates from 35 s on, before motor 2 lost thrust")
+    sooner = replace(shaking, onset_s=51.0)
+    assert outweighed(motor(0.7), (part, sooner)) == outweighed(motor(0.7), (part,))
+    assert outweighed(motor(0.3), (part, shaking)) is None
 
 
 def test_a_part_that_left_no_trace_stops_no_advice() -> None:

@@ -22,7 +22,8 @@ from care_core.diagnose.ranking import (
 )
 from care_core.diagnose.reference import profile_config
 from care_core.profile.store import Profile
-from tests.planted import DEFAULTS, OPTIONS, SCHEMA, planted_run, planted_world, with_variable
+from care_core.variables import Threshold
+from tests.planted import BOUNDS, DEFAULTS, OPTIONS, SCHEMA, planted_run, planted_world, with_variable, world_of
 
 GAMES = st.integers(1, 6).flatmap(
     lambda n: st.tuples(st.just(n), st.lists(st.floats(0, 1), min_size=2**n, max_size=2**n))
@@ -54,6 +55,15 @@ def test_contributions_add_up_to_what_a_full_reset_would_bring(planted: Profile)
     before, after = here.predict("time", [here.config, {**here.config, **DEFAULTS}]).p_ok
     assert sum(s.contribution for s in found) == pytest.approx(after - before)
     assert [s.contribution for s in found] == sorted((s.contribution for s in found), reverse=True)
+
+
+def test_of_equal_shares_the_one_goes_first_that_repairs_the_run_alone(planted: Profile) -> None:
+    """Either alone brings the time back, yet at its reference the speed costs too much energy."""
+    bounds = {**BOUNDS, "time": Threshold("<=", 197), "energy": Threshold("<=", 15)}
+    here = world_of(planted, planted_run(speed=3.2, planner=2), bounds=bounds)
+    found = suspects(here, "time")
+    assert found[0].contribution == pytest.approx(found[1].contribution, abs=0.01)
+    assert [s.option for s in found[:2]] == ["planner", "speed"]
 
 
 def test_only_options_off_their_reference_with_a_path_are_suspects(planted: Profile) -> None:
