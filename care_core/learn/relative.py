@@ -63,6 +63,15 @@ def missions_of(frame: pd.DataFrame, schema: Schema) -> NDArray[np.int64] | None
     return np.asarray(np.unique(rounded, axis=0, return_inverse=True)[1].ravel(), dtype=np.int64)
 
 
+def configurations_of(frame: pd.DataFrame, schema: Schema) -> NDArray[np.int64]:
+    """A number for each run, the same for runs of one configuration on one mission, shape (n,). What was asked is told
+    apart as by `missions_of`: a robot never starts from quite the same place."""
+    asked = [context.name for context in schema.asked]
+    options = [option.name for option in schema.options if option.name in frame]
+    alike = frame[[*options, *asked]].round(dict.fromkeys(asked, 1))
+    return np.asarray(alike.groupby(list(alike), dropna=False, sort=False).ngroup(), dtype=np.int64)
+
+
 def left_out_together(frame: pd.DataFrame, schema: Schema) -> NDArray[np.int64]:
     """A number for each run, shape (n,): those of one number are left out together where errors are measured.
 
@@ -71,11 +80,7 @@ def left_out_together(frame: pd.DataFrame, schema: Schema) -> NDArray[np.int64]:
     without it nothing is known, and what nothing is known of is never far off. So parts are counted by their weight
     (inverse Simpson index).
     """
-    asked = [context.name for context in schema.asked]
-    options = [option.name for option in schema.options if option.name in frame]
-    alike = frame[[*options, *asked]].round(dict.fromkeys(asked, 1))
-    configurations = alike.groupby(list(alike), dropna=False, sort=False).ngroup().to_numpy(dtype=np.int64)
-    for parts in (missions_of(frame, schema), configurations):
+    for parts in (missions_of(frame, schema), configurations_of(frame, schema)):
         if parts is not None and _count(parts) >= ENOUGH_PARTS:
             return parts
     return np.arange(len(frame))

@@ -17,6 +17,7 @@ import pandas as pd
 from care_core.causal.mechanisms import JITTER, LEAST, FloatArray, Mechanism, transformed
 from care_core.causal.model import UNKNOWN_PERSISTENCE, OutcomeRecord, Persistence
 from care_core.learn.outcomes import find_stages
+from care_core.learn.relative import configurations_of
 from care_core.profile.schema import Schema
 from care_core.tables.rows import CONDITIONS
 
@@ -53,9 +54,7 @@ def repeated(frame: pd.DataFrame, schema: Schema) -> tuple[Pairs, Pairs]:
     """Rows of one configuration, each with the next one: under the same conditions, and on another day."""
     met = frame[CONDITIONS].to_numpy() if CONDITIONS in frame else np.full(len(frame), np.nan)
     pairs: tuple[list[tuple[int, int]], list[tuple[int, int]]] = ([], [])
-    # A configuration on another mission is no repeat.
-    alike = [variable.name for variable in (*schema.options, *schema.asked)]
-    for rows in frame.groupby(alike, sort=True).indices.values():
+    for rows in frame.groupby(configurations_of(frame, schema)).indices.values():
         for a, b in pairwise(rows):
             is_same = not pd.isna(met[a]) and met[a] == met[b]
             pairs[0 if is_same else 1].append((int(a), int(b)))

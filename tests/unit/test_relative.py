@@ -12,6 +12,7 @@ from care_core.causal.mechanisms import FloatArray
 from care_core.learn.fitting import Effort, Inputs, fit, left_out
 from care_core.learn.outcomes import fit_total, inputs_of, met
 from care_core.learn.relative import left_out_together, missions_of, needs, relative
+from care_core.learn.repeats import repeated
 from care_core.learn.structure import learn_structure
 from care_core.profile.schema import Schema, parse_schema
 
@@ -160,6 +161,17 @@ def test_repeats_of_a_configuration_are_left_out_with_it() -> None:
     together = left_out_together(frame, SCHEMA)
     assert (together[50:60] == together[60:70]).all()
     assert len(np.unique(together)) == len(frame) - 10
+
+
+def test_a_robot_that_starts_a_little_beside_its_place_repeats_its_configuration_all_the_same() -> None:
+    frame = climbs(missions=1)
+    frame.loc[50:59, ["speed_up", "gain"]] = frame.loc[60:69, ["speed_up", "gain"]].to_numpy()
+    frame["takeoff_height"] += np.linspace(-0.02, 0.02, len(frame))
+    same, another = repeated(frame, SCHEMA)
+    assert not same
+    assert another == [(50 + i, 60 + i) for i in range(10)]
+    frame.loc[50:59, "takeoff_height"] = 80.0  # on another mission a configuration is no repeat
+    assert repeated(frame, SCHEMA) == ([], [])
 
 
 def test_parts_of_which_one_holds_nearly_all_runs_are_no_test() -> None:
