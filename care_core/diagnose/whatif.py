@@ -92,6 +92,11 @@ class Question:
             found.append(f"outside the training runs ({summary.low:g} to {summary.high:g}): a guess")
         if not any(name in mechanism.inputs for mechanism in self.world.model.mechanisms.values()):
             found.append("no effect was seen in training")
+        untold = [pair[1] for pair, one in self.world.model.effects.items() if pair[0] == name and not one.identified]
+        if untold:
+            found.append(f"the training runs cannot tell what it does to {', '.join(untold)}")
+        elif self.schema.observational:
+            found.append("operators chose it in training: what made them choose may have done what is put down to it")
         if name in self.world.assumed:
             found.append("no source holds its value: it is assumed to be at its reference")
         return (*found, *change_notes(option))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -59,6 +60,16 @@ def test_what_speaks_against_a_value_is_said_beside_it(slow: Question) -> None:
     line = next(line for line in whatif_text(slow, answer).splitlines() if line.startswith("speed"))
     assert "outside the acceptable values" in line
     assert whatif_document(slow, answer).changes[0].notes
+
+
+def test_what_the_training_runs_cannot_tell_is_said_beside_a_value(slow: Question) -> None:
+    chosen = replace(slow, schema=replace(slow.schema, observational=True))
+    assert slow.warnings("speed", 5.0) == ()
+    assert any(text.startswith("operators chose it in training") for text in chosen.warnings("speed", 5.0))
+    effects = dict(slow.world.model.effects)
+    effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
+    blind = replace(slow, world=replace(slow.world, model=replace(slow.world.model, effects=effects)))
+    assert blind.warnings("speed", 5.0) == ("the training runs cannot tell what it does to time",)
 
 
 def test_a_run_without_a_fault_can_be_asked(planted: Profile) -> None:
