@@ -8,15 +8,17 @@ operations: nothing here loops over messages.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core import limits
 from care_core.errors import LogError
 from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, shortest, wall_clock
 from care_core.logs.base import Channel, Kind, LogFormat, Table, Wanted
@@ -70,36 +72,78 @@ class Format:
         return found if found is not None and self.fields[found[0]].kind == "number" else None
 
 
-class _RecordColumns(Mapping[str, NDArray[Any]]):
-    """Columns of records of one layout. Numbers are decoded each time they are asked for: a log holds more than is
-    looked at. Text is slow to decode and rare, so it is kept."""
+class _Values:
+    """Fields of all records of a declaration as they are stored. Those that were asked for last are held, up to
+    `limits.VALUES_BYTES`: every check reads what it looks at, and a walk through a large log is long."""
 
-    def __init__(self, data: FileArray, fields: Mapping[str, RecordField], offsets: Offsets) -> None:
-        self._data, self._fields, self._offsets = data, fields, offsets
+    def __init__(self, data: FileArray) -> None:
+        self._data = data
+        self._held: dict[tuple[int, int, int], NDArray[Any]] = {}
+        self._lock = Lock()  # the app's threads share a log
+
+    def of(self, form: Format, offsets: Offsets, name: str, among: Iterable[str] = ()) -> NDArray[Any]:
+        """The field of the records at `offsets`, shape (n,); those `among` which it is come by the same walk."""
+        wanted = {(form.type, form.byte, form.fields[one].offset): form.fields[one] for one in (name, *among)}
+        asked = next(iter(wanted))
+        with self._lock:
+            if asked not in self._held:
+                missing = {key: field for key, field in wanted.items() if key not in self._held}
+                if len(offsets) * sum(field.dtype.itemsize for field in missing.values()) > limits.VALUES_BYTES:
+                    missing = {asked: wanted[asked]}
+                read = self._data.fields(offsets, [(field.offset, field.dtype) for field in missing.values()])
+                self._held |= zip(missing, read, strict=True)
+            found = self._held[asked] = self._held.pop(asked)  # what was asked for last goes last
+            while len(self._held) > 1 and sum(column.nbytes for column in self._held.values()) > limits.VALUES_BYTES:
+                del self._held[next(iter(self._held))]
+        return found
+
+
+class _RecordColumns(Mapping[str, NDArray[Any]]):
+    """Columns of records of one layout. Numbers are made of what is stored each time they are asked for. Text is slow
+    to decode and rare, so it is kept."""
+
+    def __init__(
+        self,
+        values: _Values,
+        form: Format,
+        offsets: Offsets,
+        names: Sequence[str],
+        rows: slice | NDArray[np.intp] = slice(None),
+    ) -> None:
+        self._values, self._form, self._offsets, self._names, self._rows = values, form, offsets, names, rows
         self._texts: dict[str, NDArray[Any]] = {}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name in self._texts:
             return self._texts[name]
-        column = _decode(self._data, self._offsets, self._fields[name])
-        if self._fields[name].dtype.kind == "S":
+        if name not in self:
+            raise KeyError(name)
+        field = self._form.fields[name]
+        column = _decoded(self._values.of(self._form, self._offsets, name, self._names)[self._rows], field)
+        if field.dtype.kind == "S":
             self._texts[name] = column
         return column
 
     def __contains__(self, name: object) -> bool:
-        return name in self._fields  # the inherited way would decode the column
+        return name in self._names  # the inherited way would decode the column
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._fields)
+        return iter(self._names)
 
     def __len__(self) -> int:
-        return len(self._fields)
+        return len(self._names)
 
     def kind(self, name: str) -> Kind:
-        return self._fields[name].kind
+        return self._form.fields[name].kind
 
     def where(self, mask: NDArray[np.bool_] | slice) -> _RecordColumns:
-        part = _RecordColumns(self._data, self._fields, self._offsets[mask])
+        rows: slice | NDArray[np.intp]
+        if isinstance(self._rows, slice) and isinstance(mask, slice):
+            left = range(len(self._offsets))[self._rows][mask]
+            rows = slice(left.start, left.stop, left.step)
+        else:
+            rows = np.arange(len(self._offsets))[self._rows][mask]
+        part = _RecordColumns(self._values, self._form, self._offsets, self._names, rows)
         part._texts = {name: column[mask] for name, column in self._texts.items()}
         return part
 
@@ -132,6 +176,7 @@ class DataFlashLog:
         formats, redefined = _read_formats(data, starts)
         starts, gaps = _follow_records(data, starts, formats)
         self._formats = {found[-1].name: found for found in _by_name(formats)}
+        self._values = _Values(data)
         self._clock, starts, untimely = self._keep_time(data, starts)
         types = data.at(starts + 2)
         self._offsets = {
@@ -202,7 +247,7 @@ class DataFlashLog:
         known = [field for field in fields if any(field in form.fields for form, _ in parts)]
         if len(parts) == 1:
             form, offsets = parts[0]
-            return _RecordColumns(data, {field: form.fields[field] for field in known}, offsets)
+            return _RecordColumns(self._values, form, offsets, known)
         return {
             field: np.concatenate([
                 _decode(data, offsets, form.fields[field]) if field in form.fields else np.full(len(offsets), np.nan)
@@ -216,7 +261,12 @@ class DataFlashLog:
         pieces = []
         for form, all_offsets in self._parts(name):
             offsets = all_offsets[[0, -1]] if ends_only else all_offsets
-            if form.time_field is not None:
+            if form.time_field is not None and not ends_only:
+                name_of_time, ticks = form.time_field
+                stored = self._values.of(form, offsets, name_of_time)
+                stamps = _decoded(stored, form.fields[name_of_time]) / ticks
+                pieces.append(self._clock.seconds(stamps, offsets))
+            elif form.time_field is not None:
                 pieces.append(self._clock.seconds(_stamps(data, offsets, form), offsets))
             elif form.type == _FMT:
                 pieces.append(np.full(len(offsets), np.nan))
@@ -245,9 +295,9 @@ class DataFlashLog:
         timed[list(form_of)] = True
         places, types = starts[timed[types]], types[timed[types]]
         stamps = np.empty(len(places))
-        for number, form in form_of.items():
-            own = types == number
-            stamps[own] = _stamps(data, places[own], form)
+        for alike in _alike(form_of.values()):  # nearly always one group: a walk through a large log is long
+            own = np.isin(types, [form.type for form in alike])
+            stamps[own] = _stamps(data, places[own], alike[0])
         return places, stamps
 
     def _keep_time(self, data: FileArray, starts: Offsets) -> tuple[Clock, Offsets, tuple[Damage, ...]]:
@@ -378,7 +428,11 @@ def _gap_text(low: int, high: int, size: int) -> str:
 
 def _decode(data: FileArray, offsets: Offsets, field: RecordField) -> NDArray[Any]:
     """One field of the records at `offsets`: float64, or object for text and arrays."""
-    values = data.at(offsets + field.offset, field.dtype)
+    return _decoded(data.at(offsets + field.offset, field.dtype), field)
+
+
+def _decoded(values: NDArray[Any], field: RecordField) -> NDArray[Any]:
+    """What is stored as float64, or as objects for text and arrays."""
     if field.dtype.kind == "S":
         return np.array([_text(value) for value in values.tolist()], dtype=object)
     if field.dtype.shape:
@@ -394,6 +448,16 @@ def _stamps(data: FileArray, offsets: Offsets, form: Format) -> NDArray[np.float
     assert form.time_field is not None
     name, ticks = form.time_field
     return np.asarray(_decode(data, offsets, form.fields[name]) / ticks, dtype=np.float64)
+
+
+def _alike(forms: Iterable[Format]) -> list[list[Format]]:
+    """Declarations with a timestamp, those together that keep it at the same place in the same way."""
+    found: dict[tuple[RecordField, float], list[Format]] = {}
+    for form in forms:
+        if form.time_field is not None:
+            name, ticks = form.time_field
+            found.setdefault((form.fields[name], ticks), []).append(form)
+    return list(found.values())
 
 
 def _text(raw: bytes) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import SEEK_END, BytesIO, FileIO
@@ -143,15 +143,21 @@ class FileArray:
 
     def at(self, places: Offsets, dtype: DTypeLike = np.uint8) -> NDArray[Any]:
         """What is stored at places, shape (n,) and that of the type; past the end of the file are zeros."""
-        kind = np.dtype(dtype)
-        shape, inner = kind.shape, (kind.base.itemsize,) if kind.shape else ()
-        found = np.empty((len(places), *shape), kind.base)
-        for first, last, low, piece in self.windows(places, kind.itemsize):
-            # A view of the type at every byte, from which indexing copies only the wanted.
-            everywhere: NDArray[Any] = np.ndarray(
-                (len(piece) - kind.itemsize + 1, *shape), kind.base, piece.data, 0, (1, *inner)
-            )
-            found[first:last] = everywhere[places[first:last] - low]
+        return self.fields(places, [(0, np.dtype(dtype))])[0]
+
+    def fields(self, places: Offsets, kinds: Sequence[tuple[int, np.dtype[Any]]]) -> list[NDArray[Any]]:
+        """As `at`, of values that lie so many bytes behind the places: all from one walk through the file."""
+        found = [np.empty((len(places), *kind.shape), kind.base) for _, kind in kinds]
+        size = max(offset + kind.itemsize for offset, kind in kinds)
+        for first, last, low, piece in self.windows(places, size):
+            near = places[first:last] - low
+            for column, (offset, kind) in zip(found, kinds, strict=True):
+                inner = (kind.base.itemsize,) if kind.shape else ()
+                # A view of the type at every byte, from which indexing copies only the wanted.
+                everywhere: NDArray[Any] = np.ndarray(
+                    (len(piece) - size + 1, *kind.shape), kind.base, piece.data, offset, (1, *inner)
+                )
+                column[first:last] = everywhere[near]
         return found
 
     def parts(self, lows: Offsets, highs: Offsets) -> list[bytes]:
