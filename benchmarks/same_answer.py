@@ -47,6 +47,7 @@ def answers(source: Path, logs: Sequence[Path]) -> dict[str, list[str]]:
             stdout=subprocess.PIPE,
             text=True,
             check=True,
+            cwd=source,  # what is imported is looked for here first
             env={**os.environ, **private, "PYTHONPATH": str(source.resolve())},
         )
     return dict(json.loads(line) for line in ended.stdout.splitlines())

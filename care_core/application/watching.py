@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from functools import partial
 from pathlib import Path
@@ -168,7 +168,7 @@ class Watcher:
         if past is None:
             return None
         entry = judged_entry(self._next(), _now(), past.document, past.robot, is_new=False)
-        return entry.model_copy(update={"log": str(sight.path)})
+        return replace(entry, log=str(sight.path))
 
     def _unread(self, sight: Sight, reason: str, sha256: str | None) -> WatchEntry:
         self._handled[sight.path] = sight.stamp

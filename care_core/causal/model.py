@@ -1,16 +1,15 @@
 """What was learned of a platform: graph, effects, mechanisms, and what the training runs held.
 
-pydantic checks the shape of these records where a file is read; nothing else here knows of files.
+Files hold these records as they are (`care_core.records`); nothing here knows of files.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from pydantic import AliasChoices, BaseModel, ConfigDict, Field, model_validator
 
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
@@ -18,11 +17,8 @@ from care_core.causal.mechanisms import TAIL, Mechanism, columns
 from care_core.variables import Threshold
 
 
-class Record(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class EdgeRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class EdgeRecord:
     """An edge with the share of bootstrap resamples that hold it, and its effect (Eq. 1, scaled) with its interval."""
 
     source: str
@@ -40,7 +36,8 @@ class EdgeRecord(Record):
         return -self.effect if self.direction == "decreasing" else self.effect
 
 
-class EffectRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class EffectRecord:
     """Total effect of an option on an objective: identification and Eq. 1 with its bootstrap interval."""
 
     option: str
@@ -75,7 +72,8 @@ class EffectRecord(Record):
         return 1.0 if hidden >= needed else hidden / needed
 
 
-class PathRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class PathRecord:
     """A ranked path (Eq. 2) with its bootstrap interval, which way it moves the objective, and each edge's support."""
 
     objective: str
@@ -87,13 +85,18 @@ class PathRecord(Record):
     edge_support: tuple[float, ...] = ()
 
 
-class Summary(Record):
+@dataclass(frozen=True, kw_only=True)
+class Summary:
     """What the training runs held of one variable: `quantiles` at 0, 5, ... 100 %; `sd` is "spread" in the file."""
 
     count: int
     mean: float
-    sd: float = Field(validation_alias=AliasChoices("spread", "sd"), serialization_alias="spread")
-    quantiles: tuple[float, ...] = Field(min_length=2)
+    sd: float = field(metadata={"alias": "spread"})
+    quantiles: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.quantiles) < 2:
+            raise ValueError("quantiles should be two at least")
 
     @property
     def low(self) -> float:
@@ -118,40 +121,37 @@ class Summary(Record):
         """The same with its ends drawn out to a few more values."""
         known = [value for value in values if np.isfinite(value)]
         low, high = min((self.low, *known)), max((self.high, *known))
-        return self.model_copy(update={"quantiles": (low, *self.quantiles[1:-1], high)})
+        return replace(self, quantiles=(low, *self.quantiles[1:-1], high))
 
     def times(self, factor: float) -> Summary:
         """The same in another unit."""
-        return self.model_copy(
-            update={
-                "mean": self.mean * factor,
-                "sd": self.sd * factor,
-                "quantiles": tuple(q * factor for q in self.quantiles),
-            }
-        )
+        quantiles = tuple(q * factor for q in self.quantiles)
+        return replace(self, mean=self.mean * factor, sd=self.sd * factor, quantiles=quantiles)
 
     def quantile(self, share: float) -> float:
         """The value that this share of the training runs stays below."""
         return float(np.interp(share, np.linspace(0, 1, len(self.quantiles)), self.quantiles))
 
 
-class Mediation(Record):
+@dataclass(frozen=True, kw_only=True)
+class Mediation:
     """Metrics whose errors in a run are part of an objective's, all in standard deviations around the predictions."""
 
-    metrics: tuple[str, ...] = Field(min_length=1)
+    metrics: tuple[str, ...]
     weights: tuple[float, ...]
     """Of each metric's error in the objective's."""
     among: tuple[tuple[float, ...], ...]
     """Correlations of the metrics' errors."""
 
-    @model_validator(mode="after")
-    def _fits(self) -> Mediation:
+    def __post_init__(self) -> None:
+        if not self.metrics:
+            raise ValueError("no metric mediates")
         if {len(self.metrics)} != {len(self.weights), len(self.among), *map(len, self.among)}:
             raise ValueError("metrics, weights and correlations differ in number")
-        return self
 
 
-class StageRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class StageRecord:
     """One condition on the way to a functional objective: the mission passes when `variable` equals `passes`."""
 
     variable: str
@@ -159,7 +159,8 @@ class StageRecord(Record):
     mechanism: str
 
 
-class OutcomeRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class OutcomeRecord:
     """How an objective is predicted: `stages` for a functional one (all must pass, in order), else one mechanism."""
 
     objective: str
@@ -169,7 +170,8 @@ class OutcomeRecord(Record):
     """Of the one mechanism."""
 
 
-class SkillRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class SkillRecord:
     """How well the predicted probabilities of an objective fit runs that were held out."""
 
     runs: int
@@ -183,7 +185,8 @@ class SkillRecord(Record):
     """Calibration: mean predicted probability, share that met the threshold, runs; a row a tenth that has runs."""
 
 
-class Persistence(Record):
+@dataclass(frozen=True, kw_only=True)
+class Persistence:
     """Share of an objective's noise variance that a run of the same configuration meets again.
 
     `same`: under the same conditions. `another`: on another day. `pairs`: of repeated training runs that say so, for
@@ -199,7 +202,8 @@ UNKNOWN_PERSISTENCE = Persistence(same=0.5, another=0.25)
 """Where no configuration was run twice: the middle of what is possible, on another day of none to that."""
 
 
-class Training(Record):
+@dataclass(frozen=True, kw_only=True)
+class Training:
     """Where the model came from."""
 
     origin: str
@@ -212,7 +216,7 @@ class Training(Record):
     """Option -> objective edges that the metrics do not explain, with the p-value that kept them."""
     moves_together: tuple[tuple[str, ...], ...] = ()
     """Groups of non-functional objectives that rise and fall together (rank correlation above 0.9)."""
-    persistence: Mapping[str, Persistence] = {}
+    persistence: Mapping[str, Persistence] = field(default_factory=dict)
     """Per objective, where training runs were repeated."""
     notes: tuple[str, ...] = ()
 

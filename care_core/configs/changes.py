@@ -6,14 +6,14 @@ import difflib
 from collections.abc import Iterable, Sequence
 
 from care_core.configs.driven import option_value, parameter_value, readable
-from care_core.configs.formats import MODULES, ConfigFormat, format_for
+from care_core.configs.formats import ConfigFormat, format_for, module_of
 from care_core.run import Run
 from care_core.variables import Change, Variable
 
 
 def unified_diff(run: Run, changes: Sequence[Change]) -> str:
     """The configuration as driven against the changes, in the ecosystem's own format; only keys that change."""
-    line_of = MODULES[format_for(run.log.format, run.settings)].line_of
+    line_of = module_of(format_for(run.log.format, run.settings)).line_of
     driven, fixed = {}, {}
     for option, parameter, suggested in _assignments(changes):
         change = next(change for change in changes if change.option is option)
@@ -36,7 +36,7 @@ def unified_diff(run: Run, changes: Sequence[Change]) -> str:
 
 def apply_commands(changes: Iterable[Change], format: ConfigFormat) -> list[str]:
     """Shell or ground station commands that make the changes."""
-    commands: list[str] = MODULES[format].commands(_assignments(changes))
+    commands: list[str] = module_of(format).commands(_assignments(changes))
     return commands
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from care_core.configs import yaml_tree
 from care_core.run import Setting, shown
 from care_core.text import clean, clock
 from care_core.variables import Variable
@@ -24,7 +23,9 @@ def same_value(a: float | str | None, b: float | str | None) -> bool:
         return a is b
     one, other = _as_number(a), _as_number(b)
     if one is None or other is None:
-        return bool(yaml_tree.plain(str(a).strip()) == yaml_tree.plain(str(b).strip()))  # lists, however quoted
+        from care_core.configs.yaml_tree import plain  # YAML's parser, which few logs need
+
+        return bool(plain(str(a).strip()) == plain(str(b).strip()))  # lists, however quoted
     return math.isclose(one, other, rel_tol=SEVEN_DIGITS, abs_tol=1e-12) or (math.isnan(one) and math.isnan(other))
 
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from enum import Enum
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from care_core.configs import ardupilot_param, qgc_params, ros1_yaml, ros2_yaml
+from care_core.configs import qgc_params
 from care_core.run import Setting
 from care_core.variables import Variable
 
@@ -26,12 +27,6 @@ class ConfigFormat(str, Enum):
     ROS2_YAML = "ros2-yaml"
 
 
-MODULES: dict[ConfigFormat, ModuleType] = {
-    ConfigFormat.ARDUPILOT_PARAM: ardupilot_param,
-    ConfigFormat.QGC_PARAMS: qgc_params,
-    ConfigFormat.ROS1_YAML: ros1_yaml,
-    ConfigFormat.ROS2_YAML: ros2_yaml,
-}
 _OF_LOG = {
     "ros1": ConfigFormat.ROS1_YAML,
     "ros2": ConfigFormat.ROS2_YAML,
@@ -43,7 +38,12 @@ _OF_LOG = {
 _YAML_SUFFIXES = (".yaml", ".yml")
 _PARAMETER_LINE = re.compile(r"[A-Z][A-Z0-9_]*(\s*,\s*|\s+)[-+.\w]+(\s|$)")
 _YAML_LINE = re.compile(r"---|[%&!{]|[^\s,#]+\s*:(\s|$)")
-_ROS2_KEY = re.compile(rf"^[^#\n]*\b{ros2_yaml.PARAMETERS}['\"]?\s*:", re.MULTILINE)
+_ROS2_KEY = re.compile(r"^[^#\n]*\bros__parameters['\"]?\s*:", re.MULTILINE)
+
+
+def module_of(format: ConfigFormat) -> ModuleType:
+    """The module of a format, imported when it is first asked for: those of YAML take a while."""
+    return import_module(f"care_core.configs.{format.value.replace('-', '_')}")
 
 
 def format_for(log_format: str, parameters: Iterable[str] = ()) -> ConfigFormat:
@@ -72,7 +72,7 @@ def format_of(text: str, path: Path) -> ConfigFormat:
 
 def text_for(format: ConfigFormat, option: Variable, value: float) -> str:
     """An option's value as a file of that format has it."""
-    text: str = MODULES[format].text_of(option, value)
+    text: str = module_of(format).text_of(option, value)
     return text
 
 
@@ -80,5 +80,5 @@ def write_params(
     settings: Mapping[str, Setting], format: ConfigFormat, remarks: Mapping[str, str] | None = None
 ) -> str:
     """The settings as a configuration file of that format, with `remarks` by name as comments."""
-    text: str = MODULES[format].write(settings, remarks)
+    text: str = module_of(format).write(settings, remarks)
     return text

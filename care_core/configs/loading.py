@@ -9,8 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from care_core.configs import ros1_yaml
-from care_core.configs.formats import MODULES, ConfigFormat, format_of
+from care_core.configs.formats import ConfigFormat, format_of, module_of
 from care_core.errors import ConfigError
 from care_core.run import Find, Setting
 
@@ -52,8 +51,8 @@ def read_text(text: str, path: Path, namespace: str = "") -> ConfigFile:
         )
     with _no_collector():
         if not namespace:
-            return ConfigFile(str(path), format, MODULES[format].read(text, path))
-        return ConfigFile(f"{namespace}={path}", format, MODULES[format].read(text, path, namespace), namespace)
+            return ConfigFile(str(path), format, module_of(format).read(text, path))
+        return ConfigFile(f"{namespace}={path}", format, module_of(format).read(text, path, namespace), namespace)
 
 
 @contextmanager
@@ -108,7 +107,7 @@ def resolve(files: Sequence[ConfigFile], parameters: Iterable[str]) -> dict[str,
     loaded: dict[ConfigFormat, list[Mapping[str, Setting]]] = {}
     for file in files:
         loaded.setdefault(file.format, []).append(file.settings)
-    finders: list[Find] = [MODULES[format].finder(settings) for format, settings in loaded.items()]
+    finders: list[Find] = [module_of(format).finder(settings) for format, settings in loaded.items()]
     found: dict[str, Setting] = {}
     for parameter in parameters:
         for find in finders:
@@ -123,6 +122,8 @@ def guesses(files: Sequence[ConfigFile], found: Mapping[str, Setting]) -> dict[s
     named: dict[str, list[str]] = {}
     for file in files:
         if file.format is ConfigFormat.ROS1_YAML:
+            from care_core.configs import ros1_yaml
+
             own = [p for p, s in found.items() if file.settings.get(s.name) is s and ros1_yaml.is_guess(s.name, p)]
             if own:
                 named[file.path] = own

@@ -8,6 +8,7 @@ over the training runs that have all of them, and kept only where it predicts ot
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -72,7 +73,7 @@ def with_mediation(
     return {
         name: outcome
         if outcome.stages
-        else outcome.model_copy(update={"mediation": mediation(name, mechanisms, graph, frame, schema)})
+        else replace(outcome, mediation=mediation(name, mechanisms, graph, frame, schema))
         for name, outcome in outcomes.items()
     }
 

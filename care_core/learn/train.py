@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, report:
     mechanisms |= _metric_mechanisms(frame, schema, graph, settings)
     outcomes = with_mediation(outcomes, mechanisms, with_known(graph, frame, schema), frame, schema)
     training = _training(frame, schema, structure, settings)
-    training = training.model_copy(update={"persistence": persistence(frame, schema, outcomes, mechanisms)})
+    training = replace(training, persistence=persistence(frame, schema, outcomes, mechanisms))
     learned = Learned(with_weak(graph, frame, schema), support, outcomes, mechanisms, training)
     return assemble(frame, schema, learned, settings, rng, report)
 

@@ -84,9 +84,8 @@ def _shifted_only(source: Model, schema: Schema, frame: pd.DataFrame, settings: 
         f"Carried over from a model of {source.training.runs} runs: graph, effects and skill are that model's.",
         *(f"{option}." for option in out_of_support(source, schema, frame)),
     )
-    training = source.training.model_copy(
-        update={"origin": _origin(source, settings), "runs": source.training.runs + len(frame), "notes": notes}
-    )
+    runs = source.training.runs + len(frame)
+    training = dataclasses.replace(source.training, origin=_origin(source, settings), runs=runs, notes=notes)
     summaries = {name: summary.with_values(ratios[name]) for name, summary in source.summaries.items()}
     return dataclasses.replace(
         source,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from care_core.configs.driven import option_value, readable
-from care_core.configs.formats import MODULES, ConfigFormat
+from care_core.configs.formats import ConfigFormat, module_of
 from care_core.configs.loading import split_name
 from care_core.errors import UsageError, nearest
 from care_core.lint import ardupilot, contradictions, generic, navigation
@@ -83,7 +83,7 @@ def _of_profile(document: Document, schema: Schema) -> Iterator[Finding]:
     """Values outside what a profile holds acceptable."""
     entries = {_setting_name(document, entry): entry for entry in document.entries}
     settings = {name: Setting(name, entry.value, "") for name, entry in entries.items()}
-    find = MODULES[document.format].finder([settings])
+    find = module_of(document.format).finder([settings])
     for option in schema.options:
         for parameter in readable(option):
             setting = find(parameter)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread
 from typing import BinaryIO
 
 from care_core import limits
+from care_core.errors import LogError
 from care_core.logs.opening import cannot_open
 
 Sha256 = Callable[[], str]
@@ -66,8 +66,25 @@ def _samples(stream: BinaryIO, size: int) -> Iterator[bytes]:
 def hashing(path: str | Path) -> Iterator[Sha256]:
     """The log's digest from a thread: hashing leaves the interpreter lock."""
     stopped = Event()
-    with ThreadPoolExecutor(max_workers=1) as pool:
+    found: list[str | LogError] = []
+
+    def work() -> None:
         try:
-            yield pool.submit(log_digest, path, stopped).result
-        finally:
-            stopped.set()
+            found.append(log_digest(path, stopped))
+        except LogError as err:
+            found.append(err)
+
+    def digest() -> str:
+        worker.join()
+        (answer,) = found
+        if isinstance(answer, LogError):
+            raise answer
+        return answer
+
+    worker = Thread(target=work)
+    worker.start()
+    try:
+        yield digest
+    finally:
+        stopped.set()
+        worker.join()

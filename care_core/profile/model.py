@@ -9,12 +9,12 @@ import math
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError
 
 from care_core import limits
 from care_core.causal.graph import CausalGraph
@@ -25,7 +25,6 @@ from care_core.causal.model import (
     Model,
     OutcomeRecord,
     PathRecord,
-    Record,
     SkillRecord,
     Summary,
     Training,
@@ -33,6 +32,7 @@ from care_core.causal.model import (
 from care_core.causal.nominal import FORMULAS, Nominal
 from care_core.errors import ProfileError
 from care_core.files import replace_file, sync_folder
+from care_core.records import UnfitError, plain, read
 
 ARCHIVE = b"PK\x03\x04"
 _DAMAGED = (ValueError, TypeError, KeyError, EOFError, OverflowError, RuntimeError)
@@ -42,19 +42,26 @@ PRIOR = "prior:"
 """Begins the key of a mechanism that belongs to the platform a profile was carried over from."""
 
 
-class _NominalRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class _NominalRecord:
     kind: str
     inputs: tuple[str, ...]
     scales: tuple[float, ...]
 
 
-class _AveragingRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class _AveragingRecord:
     count: str
-    usual: float = Field(gt=0)
-    share: float = Field(ge=0, le=1)
+    usual: float
+    share: float
+
+    def __post_init__(self) -> None:
+        if self.usual <= 0 or not 0 <= self.share <= 1:
+            raise ValueError("usual should be above 0, share from 0 to 1")
 
 
-class _MechanismRecord(Record):
+@dataclass(frozen=True, kw_only=True)
+class _MechanismRecord:
     target: str
     inputs: tuple[str, ...]
     reads: tuple[str, ...] | None = None
@@ -67,7 +74,8 @@ class _MechanismRecord(Record):
     """Key of the mechanism of another platform that this one starts from."""
 
 
-class _ModelFile(Record):
+@dataclass(frozen=True, kw_only=True)
+class _ModelFile:
     model_version: Literal[1]
     schema_digest: str
     nodes: tuple[str, ...]
@@ -76,7 +84,7 @@ class _ModelFile(Record):
     paths: tuple[PathRecord, ...]
     outcomes: tuple[OutcomeRecord, ...]
     summaries: dict[str, Summary]
-    witnesses: dict[str, dict[str, float]] = Field(default_factory=dict)
+    witnesses: dict[str, dict[str, float]] = field(default_factory=dict)
     skill: dict[str, SkillRecord]
     training: Training
     mechanisms: dict[str, _MechanismRecord]
@@ -108,7 +116,7 @@ def write_model(model: Model, folder: Path) -> None:
         mechanisms={key: _mechanism_record(key, m) for key, m in stored.items()},
         arrays_sha256=hashlib.sha256(arrays).hexdigest(),
     )
-    text = json.dumps(_rounded(record.model_dump(mode="json", by_alias=True)), indent=1, ensure_ascii=False) + "\n"
+    text = json.dumps(_rounded(plain(record)), indent=1, ensure_ascii=False, default=lambda one: one.item()) + "\n"
     replace_file(folder / _NEXT_ARRAYS, arrays)
     replace_file(folder / "model.json", text.encode())
     (folder / _NEXT_ARRAYS).replace(folder / _ARRAYS)
@@ -179,7 +187,7 @@ def read_model(folder: Path) -> Model:
     """
     path = folder / "model.json"
     try:
-        record = _ModelFile.model_validate_json(_content(path))
+        record = read(_ModelFile, json.loads(_content(path)))
         mechanisms = _mechanisms(record.mechanisms, _read_arrays(folder, record.arrays_sha256))
         graph = CausalGraph(
             record.nodes,
@@ -193,12 +201,8 @@ def read_model(folder: Path) -> Model:
             hint="Train it with 'care train', or choose another with --profile.",
             where=str(folder),
         ) from err
-    except ValidationError as err:
-        first = err.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise ProfileError(
-            f"'{key}': {first['msg']}.", hint="Train the profile again with 'care train'.", where=str(path)
-        ) from err
+    except UnfitError as err:
+        raise ProfileError(f"{err}.", hint="Train the profile again with 'care train'.", where=str(path)) from err
     except (*_DAMAGED, zipfile.BadZipFile, zlib.error) as err:
         raise ProfileError(
             f"The model is damaged: {str(err).rstrip('.')}.",
@@ -233,16 +237,22 @@ def _content(path: Path) -> bytes:
 
 def _array(name: str, stored: bytes) -> FloatArray:
     """The numbers of a `.npy` file. numpy's own reader makes room for what the header claims before it looks."""
-    stream = io.BytesIO(stored)
-    version = np.lib.format.read_magic(stream)
-    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, by_column, dtype = read(stream)
+    begin = 10 + int.from_bytes(stored[8:10], "little")
+    if not stored.startswith(b"\x93NUMPY\x01\x00") or len(stored) < begin:
+        raise ValueError(f"{name} is no array")
+    shape, by_column, dtype = _header(stored[:begin])
     if dtype.hasobject:  # objects are never unpacked
         raise ValueError(f"{name} holds no numbers")
-    if stream.tell() + math.prod(shape) * dtype.itemsize != len(stored):
+    if begin + math.prod(shape) * dtype.itemsize != len(stored):
         raise ValueError(f"{name} is not of the size that its header says")
-    numbers = np.frombuffer(stored, dtype, offset=stream.tell())
+    numbers = np.frombuffer(stored, dtype, offset=begin)
     return numbers.reshape(shape, order="F" if by_column else "C").astype(np.float64)
+
+
+@cache
+def _header(stored: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, whether columns come first, and type, of the first bytes of a `.npy` file; many are alike in a model."""
+    return np.lib.format.read_array_header_1_0(io.BytesIO(stored[8:]))
 
 
 def _check_references(record: _ModelFile) -> None:

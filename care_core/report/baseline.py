@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from pydantic import ConfigDict, Field
-
 from care_core.diagnose.baseline import Baseline, Proposal, Refused, over
 from care_core.diagnose.tolerance import CONFIDENCE, CONTENT
-from care_core.report.document import ProfileEntry, Strict, profile_entry
+from care_core.report.document import ProfileEntry, profile_entry
 from care_core.report.happened import FitEntry, fit_entry
+from care_core.report.published import Strict
 from care_core.report.wording import fit_text
 from care_core.text import clean, wrapped
 from care_core.variables import Op
@@ -20,6 +20,7 @@ SCHEMA_ID: Final = "care.baseline/1"
 OPTIONS_SHOWN = 6
 
 
+@dataclass(frozen=True, kw_only=True)
 class RefusedEntry(Strict):
     """A run that says nothing of good runs; `mission` is null where the whole log does not, or holds one."""
 
@@ -28,6 +29,7 @@ class RefusedEntry(Strict):
     reason: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class OverEntry(Strict):
     """A run that counts, and the limits of the profile that it breaks."""
 
@@ -36,6 +38,7 @@ class OverEntry(Strict):
     limits: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class SeenEntry(Strict):
     """What the runs had: how many, and the least, middle and most of them."""
 
@@ -45,6 +48,7 @@ class SeenEntry(Strict):
     high: float
 
 
+@dataclass(frozen=True, kw_only=True)
 class QuantileEntry(Strict):
     """Where what 95 % of such runs stay within lies, with 90 %."""
 
@@ -53,6 +57,7 @@ class QuantileEntry(Strict):
     method: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class ProposalEntry(Strict):
     """A limit: `ratio` times what the reference configuration needs, or a `value` in the unit that belongs to
     `mission`; both null with a `reason` where none is proposed. `seen` and `quantile` are ratios where it is one."""
@@ -69,14 +74,11 @@ class ProposalEntry(Strict):
     reason: str | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class BaselineDocument(Strict):
     """Limits proposed from good runs, as `care baseline --json` prints them."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.baseline/1"] = Field(
-        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
-    )
+    schema_: Literal["care.baseline/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
     profile: ProfileEntry
     fit: FitEntry
     logs: int
@@ -92,7 +94,7 @@ class BaselineDocument(Strict):
 
 def baseline_schema() -> dict[str, Any]:
     """The JSON Schema of the baseline document."""
-    return BaselineDocument.model_json_schema(by_alias=True, mode="serialization")
+    return BaselineDocument.json_schema()
 
 
 def baseline_document(found: Baseline) -> BaselineDocument:
@@ -148,7 +150,7 @@ def _short(value: float) -> float:
 
 def baseline_json(found: Baseline) -> str:
     """The document, one object."""
-    return baseline_document(found).model_dump_json(by_alias=True, indent=2) + "\n"
+    return baseline_document(found).to_json()
 
 
 def baseline_text(found: Baseline) -> str:

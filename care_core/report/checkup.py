@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
-from pydantic import ConfigDict, Field
-
-from care_core.report.document import Strict
+from care_core.report.published import Strict
 from care_core.text import clean, wrapped
 
 SCHEMA_ID: Final = "care.doctor/1"
 _WIDTH = 16
 
 
+@dataclass(frozen=True, kw_only=True)
 class CheckEntry(Strict):
     """`do` is empty where nothing is to be done."""
 
@@ -23,14 +23,11 @@ class CheckEntry(Strict):
     do: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class DoctorDocument(Strict):
     """What `care doctor --json` prints; `status` is the worst of the checks."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.doctor/1"] = Field(
-        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
-    )
+    schema_: Literal["care.doctor/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
     version: str
     status: Literal["ok", "warn", "fail"]
     checks: list[CheckEntry]
@@ -38,7 +35,7 @@ class DoctorDocument(Strict):
 
 def doctor_schema() -> dict[str, Any]:
     """The JSON Schema of the check-up."""
-    return DoctorDocument.model_json_schema(by_alias=True, mode="serialization")
+    return DoctorDocument.json_schema()
 
 
 def doctor_document(version: str, checks: Sequence[CheckEntry]) -> DoctorDocument:
@@ -50,7 +47,7 @@ def doctor_document(version: str, checks: Sequence[CheckEntry]) -> DoctorDocumen
 
 def doctor_json(document: DoctorDocument) -> str:
     """The document, one object."""
-    return document.model_dump_json(by_alias=True, indent=2) + "\n"
+    return document.to_json()
 
 
 def doctor_text(document: DoctorDocument) -> str:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
-from pydantic import ConfigDict, Field
-
-from care_core.report.document import Strict
+from care_core.report.published import Strict
 from care_core.text import clean, wrapped
 
 SCHEMA_ID: Final = "care.collect/1"
@@ -15,6 +14,7 @@ SCHEMA_ID: Final = "care.collect/1"
 _MOST_FAILURES = 10
 
 
+@dataclass(frozen=True, kw_only=True)
 class VariedOption(Strict):
     option: str
     low: float
@@ -22,11 +22,13 @@ class VariedOption(Strict):
     reference: float
 
 
+@dataclass(frozen=True, kw_only=True)
 class LeftOutOption(Strict):
     option: str
     reason: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class CollectedRun(Strict):
     run: int
     repeats: int | None
@@ -43,14 +45,11 @@ class CollectedRun(Strict):
     """Options that the log says were driven otherwise than asked."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class CollectDocument(Strict):
     """A campaign as it stands, as `care collect --json` prints it."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.collect/1"] = Field(
-        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
-    )
+    schema_: Literal["care.collect/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
     campaign: str
     profile: str
     sampling: str
@@ -74,12 +73,12 @@ class CollectDocument(Strict):
 
 def collect_schema() -> dict[str, Any]:
     """The JSON Schema of a campaign's document."""
-    return CollectDocument.model_json_schema(by_alias=True, mode="serialization")
+    return CollectDocument.json_schema()
 
 
 def collect_json(document: CollectDocument) -> str:
     """The document, one object."""
-    return document.model_dump_json(by_alias=True, indent=2) + "\n"
+    return document.to_json()
 
 
 def collect_text(document: CollectDocument) -> str:

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal
-
-from pydantic import BaseModel, ConfigDict, Field
 
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.driven import parameter_value
@@ -36,6 +35,7 @@ from care_core.report.happened import (
     fit_entry,
     hypothesis_entries,
 )
+from care_core.report.published import Strict
 from care_core.run import Evidence, ProfileChoice, Value, is_known
 from care_core.text import clean
 from care_core.variables import ASSUMED, Change, Kind, Op
@@ -43,24 +43,21 @@ from care_core.variables import ASSUMED, Change, Kind, Op
 SCHEMA_ID: Final = "care.triage/1"
 
 
-class Strict(BaseModel):
-    """The frame of every published document: nothing unknown, no number that JSON does not have."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
-
-
+@dataclass(frozen=True, kw_only=True)
 class ProfileEntry(Strict):
     name: str
     version: str
     platform: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class DamageEntry(Strict):
     what: str
     byte: int | None
     time_s: float | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class LogEntry(Strict):
     path: str
     format: str
@@ -70,11 +67,13 @@ class LogEntry(Strict):
     sha256: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class ThresholdEntry(Strict):
     op: Op
     value: float
 
 
+@dataclass(frozen=True, kw_only=True)
 class NeedEntry(Strict):
     """What the reference configuration would need for this mission, with its 80 % interval."""
 
@@ -83,6 +82,7 @@ class NeedEntry(Strict):
     high: float
 
 
+@dataclass(frozen=True, kw_only=True)
 class ObjectiveEntry(Strict):
     name: str
     value: float | None
@@ -96,16 +96,19 @@ class ObjectiveEntry(Strict):
     reason: str | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class PredictedValue(Strict):
     value: float
     low: float
     high: float
 
 
+@dataclass(frozen=True, kw_only=True)
 class PredictedObjective(PredictedValue):
     status: Status
 
 
+@dataclass(frozen=True, kw_only=True)
 class CauseEntry(Strict):
     rank: int
     option: str
@@ -124,15 +127,17 @@ class CauseEntry(Strict):
     notes: list[str]
 
 
+@dataclass(frozen=True, kw_only=True)
 class FaultEntry(Strict):
     objective: str
     causes: list[CauseEntry]
 
 
+@dataclass(frozen=True, kw_only=True)
 class ChangeEntry(Strict):
     option: str
     parameter: str | list[str]
-    from_: int | float = Field(validation_alias="from", serialization_alias="from")
+    from_: int | float = field(metadata={"alias": "from"})
     to: int | float
     assumed: bool = False
     """Whether no source holds `from`."""
@@ -144,6 +149,7 @@ class ChangeEntry(Strict):
         return f"from {self.from_:g}{ASSUMED if self.assumed else ''} to {self.to:g}"
 
 
+@dataclass(frozen=True, kw_only=True)
 class FixSet(Strict):
     changes: list[ChangeEntry]
     p_fixed: float
@@ -152,17 +158,20 @@ class FixSet(Strict):
     predicted: dict[str, PredictedObjective]
 
 
+@dataclass(frozen=True, kw_only=True)
 class FixEntry(FixSet):
     alternatives: list[FixSet]
 
 
+@dataclass(frozen=True, kw_only=True)
 class ParameterChangeEntry(Strict):
     parameter: str
     option: str | None
-    from_: float | str | None = Field(validation_alias="from", serialization_alias="from")
+    from_: float | str | None = field(metadata={"alias": "from"})
     to: float | str | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class SinceEntry(Strict):
     """What changed since a good run; `warnings` say what is odd about that log."""
 
@@ -171,6 +180,7 @@ class SinceEntry(Strict):
     changes: list[ParameterChangeEntry]
 
 
+@dataclass(frozen=True, kw_only=True)
 class EvidenceEntry(Strict):
     """A message of the log that speaks about the failure."""
 
@@ -181,6 +191,7 @@ class EvidenceEntry(Strict):
     says: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class CircumstanceEntry(Strict):
     """What the run met and no option set; `low` to `high` is where 95 % of the training runs lie."""
 
@@ -193,6 +204,7 @@ class CircumstanceEntry(Strict):
     text: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class DismissedEntry(Strict):
     """A cause that the operator has set aside."""
 
@@ -200,6 +212,7 @@ class DismissedEntry(Strict):
     reason: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class MissionEntry(Strict):
     """A mission of the log with what became of it; `judged` is the one that the document is about."""
 
@@ -212,15 +225,12 @@ class MissionEntry(Strict):
     judged: bool
 
 
+@dataclass(frozen=True, kw_only=True)
 class TriageDocument(Strict):
     """The answer for one run, as `care triage --json` prints it."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.triage/1"] = Field(
-        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
-    )
-    fit: FitEntry = FitEntry(verdict="fits", reasons=[])
+    schema_: Literal["care.triage/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    fit: FitEntry = field(default_factory=lambda: FitEntry(verdict="fits", reasons=[]))
     profile: ProfileEntry | None
     """None where no profile fits the log."""
     log: LogEntry
@@ -231,26 +241,27 @@ class TriageDocument(Strict):
     faults: list[FaultEntry]
     fix: FixEntry | None
     abstained: str | None
-    account: list[MomentEntry] = Field(default_factory=list)
+    account: list[MomentEntry] = field(default_factory=list)
     """What happened, in order of time."""
-    findings: list[FindingEntry] = Field(default_factory=list)
+    findings: list[FindingEntry] = field(default_factory=list)
     """In the order told, the first cause first."""
-    hypotheses: list[HypothesisEntry] = Field(default_factory=list)
+    hypotheses: list[HypothesisEntry] = field(default_factory=list)
     """What explains the failure, the likeliest first; empty where nothing failed."""
-    notes: list[str] = []
+    notes: list[str] = field(default_factory=list)
     """What the operator should know of the log, the configuration and the profile."""
-    sources: dict[str, str] = {}
+    sources: dict[str, str] = field(default_factory=dict)
     """Where the value of each option came from: a record or topic of the log, or file:line."""
     since: SinceEntry | None = None
     """Only with `--since`."""
-    missions: list[MissionEntry] = Field(default_factory=list)
+    missions: list[MissionEntry] = field(default_factory=list)
     """Every mission of the log."""
-    evidence: list[EvidenceEntry] = Field(default_factory=list)
-    rivals: list[CircumstanceEntry] = Field(default_factory=list)
-    tell_more: list[str] = Field(default_factory=list)
-    dismissed: list[DismissedEntry] = Field(default_factory=list)
+    evidence: list[EvidenceEntry] = field(default_factory=list)
+    rivals: list[CircumstanceEntry] = field(default_factory=list)
+    tell_more: list[str] = field(default_factory=list)
+    dismissed: list[DismissedEntry] = field(default_factory=list)
 
 
+@dataclass(frozen=True, kw_only=True)
 class Report(TriageDocument):
     """The document with the diff and the commands that apply it."""
 
@@ -260,7 +271,7 @@ class Report(TriageDocument):
 
 def json_schema() -> dict[str, Any]:
     """The JSON Schema of the triage document."""
-    return TriageDocument.model_json_schema(by_alias=True, mode="serialization")
+    return TriageDocument.json_schema()
 
 
 def build_document(diagnosis: Diagnosis) -> Report:
@@ -439,7 +450,11 @@ def _predicted(prediction: Prediction) -> PredictedValue | None:
 def predicted_objective(prediction: Prediction) -> PredictedObjective | None:
     """A prediction with what it means for the threshold, None where it has no finite value."""
     value = _predicted(prediction)
-    return None if value is None else PredictedObjective(**value.model_dump(), status=prediction.status())
+    return (
+        None
+        if value is None
+        else PredictedObjective(value=value.value, low=value.low, high=value.high, status=prediction.status())
+    )
 
 
 def _fix(fix: Fix, alternatives: tuple[Fix, ...]) -> FixEntry:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import datetime
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, Literal
-
-from pydantic import ConfigDict, Field
 
 from care_core.diagnose.records import Confidence, Status, What
 from care_core.errors import UsageError
@@ -19,7 +18,8 @@ from care_core.fleet.sources import INSTALL
 from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
 from care_core.fleet.together import Fleet
 from care_core.health.records import FindingKind, Severity
-from care_core.report.document import Strict, plain_number
+from care_core.report.document import plain_number
+from care_core.report.published import Strict
 from care_core.run import FitVerdict
 from care_core.text import clean, wrapped
 
@@ -33,6 +33,7 @@ _SHORT = 30
 """Letters in brackets that stand on one line with the name before them."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class ExplainedEntry(Strict):
     what: What
     name: str
@@ -40,6 +41,7 @@ class ExplainedEntry(Strict):
     kind: FindingKind | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class CauseEntry(Strict):
     option: str
     confidence: Confidence
@@ -47,12 +49,14 @@ class CauseEntry(Strict):
     suggested: int | float | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class SeenEntry(Strict):
     kind: FindingKind
     title: str
     severity: Severity
 
 
+@dataclass(frozen=True, kw_only=True)
 class RowEntry(Strict):
     """One log. `robot` is null where the log names none, `called` is what people call it; `copy_of` names the log whose
     copy it is; `off` holds the options that are off their reference, with what they are."""
@@ -83,6 +87,7 @@ class RowEntry(Strict):
     off: dict[str, int | float]
 
 
+@dataclass(frozen=True, kw_only=True)
 class TraitEntry(Strict):
     """What all affected have; of the `others` so many have it too. `chance`: that some trait of the `compared` sets so
     many apart by chance."""
@@ -96,6 +101,7 @@ class TraitEntry(Strict):
     compared: int
 
 
+@dataclass(frozen=True, kw_only=True)
 class SinceEntry(Strict):
     """`earlier` runs before `start` were without it, of the `later` ones so many had it. `chance`: that all runs
     without it come first if the order says nothing."""
@@ -107,6 +113,7 @@ class SinceEntry(Strict):
     chance: float
 
 
+@dataclass(frozen=True, kw_only=True)
 class PatternEntry(Strict):
     kind: Kind
     what: str
@@ -123,6 +130,7 @@ class PatternEntry(Strict):
     traits: list[TraitEntry]
 
 
+@dataclass(frozen=True, kw_only=True)
 class OutlookEntry(Strict):
     name: str
     effect: Effect
@@ -132,6 +140,7 @@ class OutlookEntry(Strict):
     why: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class ChangeEntry(Strict):
     option: str
     parameter: str | list[str]
@@ -140,6 +149,7 @@ class ChangeEntry(Strict):
     outlooks: list[OutlookEntry]
 
 
+@dataclass(frozen=True, kw_only=True)
 class SuggestionEntry(Strict):
     """`change` is null where none is suggested, and `reason` says why; `best` is the best that was found then."""
 
@@ -149,12 +159,11 @@ class SuggestionEntry(Strict):
     best: ChangeEntry | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class FleetDocument(Strict):
     """What `care fleet --json` prints."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.fleet/1"] = Field(default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema")
+    schema_: Literal["care.fleet/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
     rows: list[RowEntry]
     shared: list[PatternEntry]
     suggestions: list[SuggestionEntry]
@@ -162,7 +171,7 @@ class FleetDocument(Strict):
 
 def fleet_schema() -> dict[str, Any]:
     """The JSON Schema of the fleet."""
-    return FleetDocument.model_json_schema(by_alias=True, mode="serialization")
+    return FleetDocument.json_schema()
 
 
 def fleet_document(fleet: Fleet) -> FleetDocument:
@@ -176,7 +185,7 @@ def fleet_document(fleet: Fleet) -> FleetDocument:
 
 def fleet_json(fleet: Fleet) -> str:
     """The document, one object."""
-    return fleet_document(fleet).model_dump_json(by_alias=True, indent=2) + "\n"
+    return fleet_document(fleet).to_json()
 
 
 def _row_entries(rows: Sequence[Row]) -> list[RowEntry]:
@@ -330,9 +339,12 @@ def write_parquet(path: Path, fleet: Fleet) -> None:
         ) from err
 
 
+_NESTED = {"objectives", "explained", "causes", "findings", "change", "off"}
+
+
 def _flat(entry: RowEntry, row: Row) -> dict[str, Any]:
     main = row.main
-    flat = entry.model_dump(exclude={"objectives", "explained", "causes", "findings", "change", "off"})
+    flat = {key: value for key, value in entry.plain().items() if key not in _NESTED}
     config = {} if row.asked is None else row.asked.config
     return {
         **flat,

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
-
-from pydantic import BaseModel, ConfigDict
 
 from care_core.diagnose.records import Hypothesis, What
 from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
+from care_core.report.published import Strict
 from care_core.report.wording import SEVERITY_WORDS, hypothesis_text, noted
 from care_core.run import Fit, FitVerdict
 from care_core.text import clean, seconds, wrapped
@@ -26,18 +26,16 @@ HYPOTHESES_SHOWN = 4
 M = TypeVar("M", bound="Moment | MomentEntry")
 
 
-class _Entry(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class FitEntry(_Entry):
+@dataclass(frozen=True, kw_only=True)
+class FitEntry(Strict):
     """How well the profile fits the log; `reasons` say what is missing or differs."""
 
     verdict: FitVerdict
     reasons: list[str]
 
 
-class MomentEntry(_Entry):
+@dataclass(frozen=True, kw_only=True)
+class MomentEntry(Strict):
     """A line of the account; `time_s` counts from the start of the log, null where its source has no time."""
 
     time_s: float | None
@@ -46,7 +44,8 @@ class MomentEntry(_Entry):
     source: str
 
 
-class ConsequenceEntry(_Entry):
+@dataclass(frozen=True, kw_only=True)
+class ConsequenceEntry(Strict):
     """A later finding that an earlier one explains."""
 
     kind: FindingKind
@@ -55,7 +54,8 @@ class ConsequenceEntry(_Entry):
     severity: Severity
 
 
-class FindingEntry(_Entry):
+@dataclass(frozen=True, kw_only=True)
+class FindingEntry(Strict):
     """Something that was not as it should be; what it explains is folded under it."""
 
     kind: FindingKind
@@ -69,7 +69,8 @@ class FindingEntry(_Entry):
     consequences: list[ConsequenceEntry]
 
 
-class HypothesisEntry(_Entry):
+@dataclass(frozen=True, kw_only=True)
+class HypothesisEntry(Strict):
     """One explanation of the failure; their probabilities add up to 1. A parameter is named by its option."""
 
     what: What

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
-
-from pydantic import ConfigDict, Field
 
 from care_core.diagnose.records import Status, overall
 from care_core.history.store import HistoryError, Triaged, Verified
 from care_core.history.track_record import TrackRecord, sparkline, track_record, trends
 from care_core.history.trends import LEAST_RUNS, Direction, RobotRuns, Trend, by_robot
-from care_core.report.document import Strict
+from care_core.report.published import Strict
 from care_core.report.wording import fit_words
 from care_core.run import FitVerdict, Robot
 from care_core.text import clean, wrapped
@@ -24,6 +23,7 @@ _CHANGES = 4
 """Most parameters that are named of those that changed at a run."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class RobotEntry(Strict):
     """`is_sure`: it tells this robot from others of its kind."""
 
@@ -33,6 +33,7 @@ class RobotEntry(Strict):
     is_sure: bool
 
 
+@dataclass(frozen=True, kw_only=True)
 class PastTriage(Strict):
     """`profile` is empty where none fitted, `fit` says how well it did; `verdict` says in words how the run went;
     `options` are those that the suggested fix changes, none without a fix."""
@@ -49,6 +50,7 @@ class PastTriage(Strict):
     p_fixed: float | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class PromiseBin(Strict):
     low: float
     high: float
@@ -57,6 +59,7 @@ class PromiseBin(Strict):
     worked: int
 
 
+@dataclass(frozen=True, kw_only=True)
 class PromiseRecord(Strict):
     """Of `count` fixes that were made and verified, `worked` did; by the promises `expected` should have."""
 
@@ -66,14 +69,16 @@ class PromiseRecord(Strict):
     bins: list[PromiseBin]
 
 
+@dataclass(frozen=True, kw_only=True)
 class ChangedEntry(Strict):
     """A parameter, or the firmware, that differs from the run before."""
 
     name: str
-    from_: float | str = Field(validation_alias="from", serialization_alias="from")
+    from_: float | str = field(metadata={"alias": "from"})
     to: float | str
 
 
+@dataclass(frozen=True, kw_only=True)
 class SinceEntry(Strict):
     """The run from which on an objective is different, and what changed at it."""
 
@@ -85,6 +90,7 @@ class SinceEntry(Strict):
     changed: list[ChangedEntry]
 
 
+@dataclass(frozen=True, kw_only=True)
 class TrendEntry(Strict):
     """How an objective went, oldest first; `unit` "x": a multiple of what the reference configuration needs. `p` is
     corrected for how many tests were made."""
@@ -98,6 +104,7 @@ class TrendEntry(Strict):
     since: SinceEntry | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class MissionRunsEntry(Strict):
     """Runs that were asked the same, judged by one profile (empty: none fitted)."""
 
@@ -106,6 +113,7 @@ class MissionRunsEntry(Strict):
     trends: list[TrendEntry]
 
 
+@dataclass(frozen=True, kw_only=True)
 class RobotRunsEntry(Strict):
     """`robot` is None for runs of which nothing says whose they are; `faults` is the trend of having a fault."""
 
@@ -116,23 +124,20 @@ class RobotRunsEntry(Strict):
     missions: list[MissionRunsEntry]
 
 
+@dataclass(frozen=True, kw_only=True)
 class HistoryDocument(Strict):
     """What `care history --json` prints; trends run from the oldest to the newest."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.history/1"] = Field(
-        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
-    )
+    schema_: Literal["care.history/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
     triages: list[PastTriage]
     trends: dict[str, list[float]]
-    robots: list[RobotRunsEntry] = Field(default_factory=list)
+    robots: list[RobotRunsEntry] = field(default_factory=list)
     verified: PromiseRecord
 
 
 def history_schema() -> dict[str, Any]:
     """The JSON Schema of the history."""
-    return HistoryDocument.model_json_schema(by_alias=True, mode="serialization")
+    return HistoryDocument.json_schema()
 
 
 def history_document(
@@ -258,7 +263,7 @@ def _record(record: TrackRecord) -> PromiseRecord:
 
 def history_json(document: HistoryDocument) -> str:
     """The document, one object."""
-    return document.model_dump_json(by_alias=True, indent=2) + "\n"
+    return document.to_json()
 
 
 def history_text(document: HistoryDocument, *, ascii: bool = False) -> str:

@@ -6,10 +6,9 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Final, Literal
-
-from pydantic import BaseModel, ConfigDict, Field
 
 from care_core.extract.coverage import Missed, Trial
 from care_core.health.records import Health
@@ -24,6 +23,7 @@ from care_core.report.happened import (
     finding_lines,
     fit_entry,
 )
+from care_core.report.published import Strict
 from care_core.report.wording import fit_text
 from care_core.run import Damage, MissionInfo, ProfileChoice
 from care_core.text import WIDTH, clean, clock, wrapped
@@ -36,24 +36,23 @@ MOST_DAMAGE, MOST_CHANGED = 8, 10
 _NUMBER = re.compile(r"\d+")
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class DamageEntry(_Model):
+@dataclass(frozen=True, kw_only=True)
+class DamageEntry(Strict):
     what: str
     byte: int | None
     time_s: float | None
 
 
-class ReadShare(_Model):
+@dataclass(frozen=True, kw_only=True)
+class ReadShare(Strict):
     """Seconds of the log that could be read, and about how many it had, null where nothing tells."""
 
     to_s: float
     about_s: float | None
 
 
-class LogEntry(_Model):
+@dataclass(frozen=True, kw_only=True)
+class LogEntry(Strict):
     path: str
     format: str
     start: str | None
@@ -64,14 +63,16 @@ class LogEntry(_Model):
     read: ReadShare
 
 
-class ChannelEntry(_Model):
+@dataclass(frozen=True, kw_only=True)
+class ChannelEntry(Strict):
     name: str
     type: str
     count: int
     rate_hz: float | None
 
 
-class ChangeEntry(_Model):
+@dataclass(frozen=True, kw_only=True)
+class ChangeEntry(Strict):
     """A parameter that was changed while the log was recorded."""
 
     name: str
@@ -80,13 +81,15 @@ class ChangeEntry(_Model):
     time_s: float
 
 
-class ParameterEntry(_Model):
+@dataclass(frozen=True, kw_only=True)
+class ParameterEntry(Strict):
     count: int
     sources: dict[str, int]
     changed: list[ChangeEntry]
 
 
-class MissionEntry(_Model):
+@dataclass(frozen=True, kw_only=True)
+class MissionEntry(Strict):
     """A mission; its times are null where the log stamps nothing around it."""
 
     index: int
@@ -97,14 +100,16 @@ class MissionEntry(_Model):
     mismatch: str | None
 
 
-class MissedEntry(_Model):
+@dataclass(frozen=True, kw_only=True)
+class MissedEntry(Strict):
     name: str
     role: Literal["option", "context", "metric", "objective"]
     reason: str
     hint: str
 
 
-class ProfileEntry(_Model):
+@dataclass(frozen=True, kw_only=True)
+class ProfileEntry(Strict):
     """An installed profile: whether it can use the log, what of it is there, and what it would miss."""
 
     name: str
@@ -120,8 +125,9 @@ class ProfileEntry(_Model):
     missed: list[MissedEntry]
 
 
-class InspectDocument(_Model):
-    id: Literal["care.inspect/1"] = Field(default=INSPECT_ID, alias="schema")
+@dataclass(frozen=True, kw_only=True)
+class InspectDocument(Strict):
+    schema_: Literal["care.inspect/1"] = field(default=INSPECT_ID, metadata={"alias": "schema"})
     fit: FitEntry
     """How well the profile fits that fits best."""
     account: list[MomentEntry]
@@ -166,12 +172,12 @@ def build_inspection(log: Log, trials: Sequence[Trial], choice: ProfileChoice, h
 
 def inspection_json(document: InspectDocument) -> str:
     """One object."""
-    return document.model_dump_json(by_alias=True, indent=2) + "\n"
+    return document.to_json()
 
 
 def inspection_schema() -> dict[str, Any]:
     """The JSON Schema of `care.inspect/1`."""
-    return {**InspectDocument.model_json_schema(by_alias=True), "title": INSPECT_ID}
+    return InspectDocument.json_schema()
 
 
 def _log(log: Log) -> LogEntry:

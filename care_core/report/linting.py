@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal
-
-from pydantic import ConfigDict, Field
 
 from care_core.lint.linting import Linted
 from care_core.lint.records import Finding, Severity
 from care_core.lint.rules import RULES
-from care_core.report.document import Strict
+from care_core.report.published import Strict
 from care_core.text import clean, wrapped
 
 SCHEMA_ID: Final = "care.lint/1"
@@ -18,6 +17,7 @@ _SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 _INDENT = "    "
 
 
+@dataclass(frozen=True, kw_only=True)
 class FindingEntry(Strict):
     """Something wrong at one place of a file; line and column from 1."""
 
@@ -32,6 +32,7 @@ class FindingEntry(Strict):
     source: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class FileEntry(Strict):
     """A file that was read, with how many values it has."""
 
@@ -40,12 +41,11 @@ class FileEntry(Strict):
     values: int
 
 
+@dataclass(frozen=True, kw_only=True)
 class LintDocument(Strict):
     """What is wrong with configuration files, as `care lint --json` prints it."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.lint/1"] = Field(default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema")
+    schema_: Literal["care.lint/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
     target: str
     files: list[FileEntry]
     findings: list[FindingEntry]
@@ -53,7 +53,7 @@ class LintDocument(Strict):
 
 def lint_schema() -> dict[str, Any]:
     """The JSON Schema of the lint document."""
-    return LintDocument.model_json_schema(by_alias=True, mode="serialization")
+    return LintDocument.json_schema()
 
 
 def lint_document(linted: Sequence[Linted], target: str) -> LintDocument:

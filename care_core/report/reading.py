@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from care_core import plain_yaml
 from care_core.errors import ConfigError, UsageError
+from care_core.records import UnfitError, key_of, read
 from care_core.report.document import SCHEMA_ID, ProfileEntry, TriageDocument
 from care_core.text import clean
 
@@ -30,16 +30,13 @@ def read_report(path: str | Path) -> TriageDocument:
             hint="Write one with 'care triage LOG --yaml --out FILE'.",
             where=str(path),
         )
-    known = {field.serialization_alias or name for name, field in TriageDocument.model_fields.items()}
+    known = {key_of(field) for field in fields(TriageDocument)}
     try:
         # A later version of this program may add keys; what this one knows must be sound.
-        return TriageDocument.model_validate({key: value for key, value in data.items() if key in known})
-    except ValidationError as err:
-        first = err.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise ConfigError(
-            f"The report is damaged: {key}: {first['msg']}.", hint="Write it again from the log.", where=str(path)
-        ) from err
+        return read(TriageDocument, {key: value for key, value in data.items() if key in known})
+    except UnfitError as err:
+        hint = "Write it again from the log."
+        raise ConfigError(f"The report is damaged: {err}.", hint=hint, where=str(path)) from err
 
 
 def profile_of(report: TriageDocument) -> ProfileEntry:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
-
-from pydantic import ConfigDict, Field
 
 from care_core.diagnose.verify import (
     Before,
@@ -23,11 +22,11 @@ from care_core.errors import ExitCode, UsageError
 from care_core.report.document import (
     ObjectiveEntry,
     ProfileEntry,
-    Strict,
     TriageDocument,
     objective_entry,
     plain_number,
 )
+from care_core.report.published import Strict
 from care_core.report.reading import profile_of
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import Run
@@ -52,34 +51,39 @@ _MADE_WORDS: Mapping[Made, str] = {
 }
 
 
+@dataclass(frozen=True, kw_only=True)
 class VerifiedLog(Strict):
     path: str
     sha256: str
     start: str | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class CheckedChange(Strict):
     """`driven` is the next run's value, null where the log does not hold it."""
 
     option: str
-    from_: int | float = Field(validation_alias="from", serialization_alias="from")
+    from_: int | float = field(metadata={"alias": "from"})
     to: int | float
     driven: int | float | None
     made: Made
     note: str
 
 
+@dataclass(frozen=True, kw_only=True)
 class OtherChangeEntry(Strict):
     option: str
-    from_: int | float = Field(validation_alias="from", serialization_alias="from")
+    from_: int | float = field(metadata={"alias": "from"})
     to: int | float
 
 
+@dataclass(frozen=True, kw_only=True)
 class Interval(Strict):
     low: float
     high: float
 
 
+@dataclass(frozen=True, kw_only=True)
 class CheckedObjective(Strict):
     """An objective in both runs; `inside` says whether the outcome lies in the promised 80 % interval."""
 
@@ -90,14 +94,11 @@ class CheckedObjective(Strict):
     inside: bool | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class VerifyDocument(Strict):
     """Whether the fix of a report did what it promised, as `care verify --json` prints it."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.verify/1"] = Field(
-        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
-    )
+    schema_: Literal["care.verify/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
     profile: ProfileEntry
     report_log: VerifiedLog
     log: VerifiedLog
@@ -116,7 +117,7 @@ class VerifyDocument(Strict):
 
 def verify_schema() -> dict[str, Any]:
     """The JSON Schema of the verification."""
-    return VerifyDocument.model_json_schema(by_alias=True, mode="serialization")
+    return VerifyDocument.json_schema()
 
 
 def promise_of(report: TriageDocument) -> Promise:
@@ -192,7 +193,7 @@ def _objective(check: ObjectiveCheck, before: ObjectiveEntry) -> CheckedObjectiv
 
 def verify_json(document: VerifyDocument) -> str:
     """The verification as one JSON object."""
-    return document.model_dump_json(by_alias=True, indent=2) + "\n"
+    return document.to_json()
 
 
 def verify_text(document: VerifyDocument) -> str:

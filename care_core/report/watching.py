@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from pydantic import ConfigDict, Field
-
-from care_core.report.document import Strict
 from care_core.report.happened import HypothesisEntry
 from care_core.report.history import RobotEntry, profile_of, robot_entry, status_of, verdict_of
+from care_core.report.published import Strict
 from care_core.report.wording import hypothesis_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import FitVerdict, Robot
@@ -27,13 +26,12 @@ _ROBOT_SHARE, _LOG_SHARE = 0.18, 0.27
 """Of the columns of a line; the cause takes what is left."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class WatchEntry(Strict):
     """One log. `says` is the likeliest cause, or why nothing is judged; `unfinished` why it was judged though nobody
     closed it; `is_new` is false where another watcher judged it, or an earlier call of `care`."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.watch/1"] = Field(default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema")
+    schema_: Literal["care.watch/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
     number: int
     at: str
     log: str
@@ -51,7 +49,7 @@ class WatchEntry(Strict):
 
 def watch_schema() -> dict[str, Any]:
     """The JSON Schema of a line."""
-    return WatchEntry.model_json_schema(by_alias=True, mode="serialization")
+    return WatchEntry.json_schema()
 
 
 def judged_entry(
@@ -100,7 +98,7 @@ def _says(document: Mapping[str, Any]) -> str:
 
 def entry_json(entry: WatchEntry) -> str:
     """The entry on one line."""
-    return entry.model_dump_json(by_alias=True) + "\n"
+    return entry.to_json(indent=None)
 
 
 def entry_line(entry: WatchEntry, clock: str, width: int | None, *, ascii: bool = False) -> str:

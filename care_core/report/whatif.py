@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
-
-from pydantic import ConfigDict, Field
 
 from care_core.diagnose.whatif import Answer, Outlook, Question
 from care_core.report.document import (
     ObjectiveEntry,
     PredictedObjective,
     ProfileEntry,
-    Strict,
     objective_entry,
     plain_number,
     predicted_objective,
     profile_entry,
 )
 from care_core.report.happened import FitEntry, fit_entry
+from care_core.report.published import Strict
 from care_core.report.wording import chance, fit_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, wrapped
@@ -27,15 +26,17 @@ from care_core.text import clean, wrapped
 SCHEMA_ID: Final = "care.whatif/1"
 
 
+@dataclass(frozen=True, kw_only=True)
 class AskedChange(Strict):
     option: str
-    from_: int | float = Field(validation_alias="from", serialization_alias="from")
+    from_: int | float = field(metadata={"alias": "from"})
     to: int | float
     assumed: bool
     """Whether no source holds `from`."""
     notes: list[str]
 
 
+@dataclass(frozen=True, kw_only=True)
 class OutlookEntry(Strict):
     objective: ObjectiveEntry
     predicted: PredictedObjective | None
@@ -43,14 +44,11 @@ class OutlookEntry(Strict):
     p_ok_unchanged: float | None
 
 
+@dataclass(frozen=True, kw_only=True)
 class WhatIfDocument(Strict):
     """The predicted outcome of this run under changed options, as `care whatif --json` prints it."""
 
-    model_config = ConfigDict(title=SCHEMA_ID)
-
-    schema_: Literal["care.whatif/1"] = Field(
-        default=SCHEMA_ID, validation_alias="schema", serialization_alias="schema"
-    )
+    schema_: Literal["care.whatif/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
     fit: FitEntry
     profile: ProfileEntry
     log: str
@@ -64,7 +62,7 @@ class WhatIfDocument(Strict):
 
 def whatif_schema() -> dict[str, Any]:
     """The JSON Schema of the what-if document."""
-    return WhatIfDocument.model_json_schema(by_alias=True, mode="serialization")
+    return WhatIfDocument.json_schema()
 
 
 def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
@@ -100,7 +98,7 @@ def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
 
 def whatif_json(question: Question, answer: Answer) -> str:
     """The document, one object."""
-    return whatif_document(question, answer).model_dump_json(by_alias=True, indent=2) + "\n"
+    return whatif_document(question, answer).to_json()
 
 
 def whatif_text(question: Question, answer: Answer) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from io import StringIO
 from typing import Any
 
@@ -10,27 +11,28 @@ from ruamel.yaml.scalarstring import LiteralScalarString
 
 from care_core.diagnose.records import Status, overall
 from care_core.report.document import Report, TriageDocument
+from care_core.report.published import to_json as written
 from care_core.report.wording import fit_text, said_without_profile
 
 STATUS_WORDS = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
 
-_PUBLISHED = set(TriageDocument.model_fields)
+_UNPUBLISHED = {own.name for own in fields(Report)} - {own.name for own in fields(TriageDocument)}
 _YAML_WIDTH = 100
 
 
 def to_json(report: Report) -> str:
     """The document `care.triage/1`, one object."""
-    return report.model_dump_json(by_alias=True, include=_PUBLISHED, indent=2) + "\n"
+    return written(published(report))
 
 
 def published(report: Report) -> dict[str, Any]:
     """The document `care.triage/1` as plain values."""
-    return report.model_dump(by_alias=True, include=_PUBLISHED, mode="json")
+    return {key: value for key, value in report.plain().items() if key not in _UNPUBLISHED}
 
 
 def to_yaml(report: Report) -> str:
     """The document with the unified diff and the commands that apply it, below how well the profile fits."""
-    data = report.model_dump(by_alias=True)
+    data = report.plain()
     if report.diff:
         data["diff"] = LiteralScalarString(report.diff)
     yaml = YAML()

@@ -78,7 +78,7 @@ def verify(
         progress("reading the log", 0.0)
         document = care_core.verify(report, log, profile, mission)
     if not no_history:
-        verified = document.model_dump(by_alias=True, mode="json")
+        verified = document.plain()
         mention(remember(lambda history: history.add_verification(verified)))
     emit((verify_json if json or is_json(out) else verify_text)(document), out, force=force)
     raise typer.Exit(EXIT_CODES[document.verdict])

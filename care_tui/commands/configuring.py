@@ -115,7 +115,7 @@ def lint(
     if sarif:
         emit(dumps(lint_sarif(found, __version__), indent=2) + "\n", out, force=force)
     elif as_json or is_json(out):
-        emit(lint_document(found, target).model_dump_json(indent=2, by_alias=True) + "\n", out, force=force)
+        emit(lint_document(found, target).to_json(), out, force=force)
     else:
         emit(lint_text(found), out, force=force)
     say(counted(found))

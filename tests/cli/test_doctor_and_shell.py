@@ -12,6 +12,7 @@ import jsonschema
 import pytest
 
 from care_core.application import checkup
+from care_core.records import read
 from care_core.report.checkup import DoctorDocument, doctor_schema, doctor_text
 from tests.conftest import Care
 
@@ -29,7 +30,7 @@ def test_where_all_is_well_the_doctor_says_so(care: Care) -> None:
     found = statuses(outcome.stdout)
     assert found["profiles"] == found["history"] == found["folder of settings"] == "ok"
     assert found["terminal"] == "warn", "the tests have none"
-    text = doctor_text(DoctorDocument.model_validate_json(outcome.stdout))
+    text = doctor_text(read(DoctorDocument, json.loads(outcome.stdout)))
     assert all(len(line) <= 80 for line in text.splitlines())
     assert "works here" in text
 

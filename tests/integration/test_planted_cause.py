@@ -56,7 +56,7 @@ def repaired(diagnosis: Diagnosis, noise: Mapping[str, float] = CALM) -> bool:
 
 def test_a_way_to_fail_that_training_never_met_has_no_answer(planted: Profile, tmp_path: Path) -> None:
     summaries = dict(planted.model.summaries)
-    summaries["armed"] = summaries["armed"].model_copy(update={"quantiles": (1.0, 1.0)})
+    summaries["armed"] = replace(summaries["armed"], quantiles=(1.0, 1.0))
     write_model(replace(planted.model, summaries=summaries), tmp_path)
     diagnosis = diagnosed(planted_run(min_sats=13), Profile(tmp_path, planted.schema))
     assert diagnosis.abstained is not None
@@ -66,7 +66,7 @@ def test_a_way_to_fail_that_training_never_met_has_no_answer(planted: Profile, t
 
 def test_what_the_training_runs_cannot_tell_is_said_and_never_ranked(planted: Profile, tmp_path: Path) -> None:
     effects = dict(planted.model.effects)
-    effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
+    effects["speed", "time"] = replace(effects["speed", "time"], identified=False)
     write_model(replace(planted.model, effects=effects), tmp_path)
     blind = Profile(tmp_path, planted.schema)
     told = "not ranked, as the training runs cannot tell their effect on time: speed"

@@ -41,13 +41,12 @@ def test_what_the_model_cannot_say_is_said(planted: Profile) -> None:
     model = planted.model
     outcomes = {name: outcome for name, outcome in model.outcomes.items() if name != "energy"}
     effects = dict(model.effects)
-    effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False, "functional": ""})
-    training = model.training.model_copy(
-        update={
-            "screened_out": ("inert",),
-            "direct_edges": (("planner", "time", 1e-5),),
-            "notes": ("'filter' never varies in the table.",),
-        }
+    effects["speed", "time"] = replace(effects["speed", "time"], identified=False, functional="")
+    training = replace(
+        model.training,
+        screened_out=("inert",),
+        direct_edges=(("planner", "time", 1e-5),),
+        notes=("'filter' never varies in the table.",),
     )
     bare = replace(
         model,

@@ -149,7 +149,7 @@ def test_without_a_threshold_there_are_no_probability(planted: Profile) -> None:
 
 
 def test_objectives_that_move_together_count_once(planted: Profile) -> None:
-    training = planted.model.training.model_copy(update={"moves_together": (("time", "energy"),)})
+    training = replace(planted.model.training, moves_together=(("time", "energy"),))
     model = replace(planted.model, training=training)
     bounds = {"time": BOUNDS["time"], "energy": BOUNDS["energy"]}
     config = [{**DEFAULTS, "speed": 3.0, "accel": 2.2}]

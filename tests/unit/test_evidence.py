@@ -156,7 +156,7 @@ def test_a_circumstance_says_how_many_runs_met_more(planted: Profile, side: Side
     ("support", "confidence"), [(0.45, "low"), (0.55, "medium"), (0.75, "medium"), (0.85, "high")], ids=str
 )
 def test_confidence_follows_how_many_resamples_have_a_path(planted: Profile, support: float, confidence: str) -> None:
-    effects = {key: effect.model_copy(update={"support": support}) for key, effect in planted.model.effects.items()}
+    effects = {key: replace(effect, support=support) for key, effect in planted.model.effects.items()}
     profile = Profile(planted.path, SCHEMA)
     profile.__dict__["model"] = replace(planted.model, effects=effects)
     judged = judge(planted_run(speed=1.5), SCHEMA, planted.model)

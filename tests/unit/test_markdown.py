@@ -34,7 +34,7 @@ def test_a_text_of_a_log_calls_nobody_and_links_nowhere() -> None:
 
 
 def test_a_difference_with_fences_in_it_stays_a_code_block() -> None:
-    report = build_document(made_diagnosis()).model_copy(update={"diff": "--- a\n-````\n+x\n"})
+    report = replace(build_document(made_diagnosis()), diff="--- a\n-````\n+x\n")
     text = to_markdown(report)
     assert "`````diff\n--- a\n-````\n+x\n`````" in text
 

@@ -30,7 +30,7 @@ def test_edited_effects_are_noticed(planted: Profile) -> None:
     edges = dict(planted.model.edges)
     path = next(path for paths in planted.model.paths.values() for path in paths)
     edge = path.nodes[0], path.nodes[1]
-    edges[edge] = edges[edge].model_copy(update={"effect": edges[edge].effect + 1})
+    edges[edge] = replace(edges[edge], effect=edges[edge].effect + 1)
     found = problems(with_model(planted, replace(planted.model, edges=edges)))
     assert any(" -> ".join(path.nodes) in sentence and "its edges give" in sentence for sentence in found)
 
@@ -45,7 +45,7 @@ def test_edited_weights_are_noticed(planted: Profile) -> None:
 
 def test_an_edge_into_an_option_is_noticed(planted: Profile) -> None:
     edge = next(iter(planted.model.edges.values()))
-    wrong = edge.model_copy(update={"source": "time", "target": "speed"})
+    wrong = replace(edge, source="time", target="speed")
     found = problems(
         with_model(planted, replace(planted.model, edges={**planted.model.edges, ("time", "speed"): wrong}))
     )

@@ -81,7 +81,7 @@ def test_only_options_off_their_reference_with_a_path_are_suspects(planted: Prof
 
 def test_an_effect_that_is_not_identified_is_not_ranked(planted: Profile) -> None:
     effects = dict(planted.model.effects)
-    effects["speed", "time"] = effects["speed", "time"].model_copy(update={"identified": False})
+    effects["speed", "time"] = replace(effects["speed", "time"], identified=False)
     here = planted_world(planted, speed=1.4, planner=2)
     found = suspects(replace(here, model=replace(planted.model, effects=effects)), "time")
     assert [s.option for s in found if not s.is_identified] == ["speed"]
@@ -145,7 +145,7 @@ def test_a_path_is_not_led_over_an_edge_that_carries_nothing(planted: Profile) -
     some = next(iter(edges.values()))
 
     def edge(pair: tuple[str, str], effect: float) -> EdgeRecord:
-        return some.model_copy(update={"source": pair[0], "target": pair[1], "effect": effect, "support": 1.0})
+        return replace(some, source=pair[0], target=pair[1], effect=effect, support=1.0)
 
     strong_last = ("tracking_error", "time")
     made = {around[0]: 0.3, around[1]: 0.3, ("speed", "tracking_error"): 0.0, strong_last: 1.5}

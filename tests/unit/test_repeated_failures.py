@@ -55,7 +55,7 @@ def test_a_promise_says_what_is_known_of_how_runs_resemble_each_other(
     planted: Profile, pairs: tuple[int, int], said: str
 ) -> None:
     seen = {"time": Persistence(same=0.6, another=0.3, pairs=pairs)}
-    training = planted.model.training.model_copy(update={"persistence": seen})
+    training = replace(planted.model.training, persistence=seen)
     profile = Profile(planted.path, planted.schema)
     vars(profile)["model"] = replace(planted.model, training=training)  # as if it had been read
     run = judged(profile, "a", outcome(260.0), reserve=40.0)

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from hashlib import sha256
 from multiprocessing import get_context
 from pathlib import Path
@@ -262,7 +263,7 @@ def test_two_watchers_on_one_history_lose_nothing_and_judge_each_log_once(tmp_pa
 
 def entry_of(name: str = "a.BIN", **changes: Any) -> WatchEntry:
     document = {**DOCUMENT, "log": {**DOCUMENT["log"], "path": f"/logs/{name}"}}
-    return judged_entry(1, "2024-01-01T00:00:00+00:00", document, ROBOT).model_copy(update=changes)
+    return replace(judged_entry(1, "2024-01-01T00:00:00+00:00", document, ROBOT), **changes)
 
 
 @pytest.mark.parametrize(
