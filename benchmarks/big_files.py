@@ -7,10 +7,11 @@ a mission of move_base among two cameras (raw pictures), a lidar (point clouds),
 db3 of the same sensors; a DataFlash log. Bags and MCAP files also without the index at their end, or cut in the middle.
 
 `read` counts the bytes that the process asks the system for (`rchar` of /proc), less those of a triage of the small
-sample, which are Python's own; mapped pages do not count. The peer reads the index and every message of the topics that
-triage reads, with rosbags or mcap, and decodes none; of a file without its index the peer is `cat`. `stopped` is how
-long a triage takes to end after Ctrl+C in the middle of its work. Every process is cold, the file in the cache where
-it fits.
+sample, which are Python's own. Of packed chunks as much may be read as lies in chunks that hold something wanted: all,
+where each holds a little of everything, since nobody unpacks the middle of a chunk. The peer reads the index and every
+message of the topics that triage reads, with rosbags or mcap, and decodes none; of a file without its index the peer is
+`cat`. `stopped` is how long a triage takes to end after Ctrl+C in the middle of its work. Every process is cold, the
+file in the cache where it fits.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -293,6 +294,26 @@ def topics_of(path: Path) -> list[str]:
     return list(found)
 
 
+def packed_share(path: Path, topics: Collection[str]) -> float:
+    """Share of an indexed file's bytes in packed chunks that hold a message of these topics: nobody unpacks the middle
+    of a chunk, so what leads to the last of them has to be read. 0 where chunks are not packed."""
+    if path.suffix == ".bag":
+        from rosbags.rosbag1 import Reader
+
+        with Reader(path) as bag:
+            numbers = {one.id for one in bag.connections if one.topic in topics}
+            held = [one.pos for one in bag.chunk_infos if numbers & one.connection_counts.keys()]
+            return sum(bag.chunks[pos].datasize for pos in held) / path.stat().st_size
+    from mcap.reader import make_reader
+
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+        assert summary is not None
+        wanted = {number for number, channel in summary.channels.items() if channel.topic in topics}
+        chunks = [one for one in summary.chunk_indexes if wanted & one.message_index_offsets.keys()]
+        return sum(one.compressed_size for one in chunks) / path.stat().st_size
+
+
 def report(case: Case, path: Path, runs: int, start: Cost) -> None:
     """The table of one file, and which bars it keeps."""
     topics = topics_of(path) if path.suffix in (".bag", ".mcap", ".db3") and case.peer[0] != "cat" else []
@@ -314,7 +335,10 @@ def report(case: Case, path: Path, runs: int, start: Cost) -> None:
         (f"stopped in {stopped:.2f} s, at most {MOST_STOP_S:g}", stopped <= MOST_STOP_S),
     ]
     if case.is_indexed:
-        bars.append((f"{share:.2%} of its bytes read, at most {MOST_SHARE:.0%}", share <= MOST_SHARE))
+        is_packed = any(packing in case.name for packing in ("lz4", "zstd"))
+        most = max(MOST_SHARE, packed_share(path, topics) if is_packed else 0.0)
+        why = " (the packed chunks that hold what is wanted)" if most > MOST_SHARE else ""
+        bars.append((f"{share:.2%} of its bytes read, at most {most:.0%}{why}", round(share, 2) <= round(most, 2)))
     for bar, is_kept in bars:
         print(f"  {'kept  ' if is_kept else 'MISSED'} {bar}", flush=True)
 

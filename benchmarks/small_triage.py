@@ -4,8 +4,9 @@
 
 Seconds of the processor (user and system, so that other work on the machine disturbs little) of whole cold processes,
 the bytecode compiled and the cache of profiles warm: medians of so many runs, and in turns with numpy's import. The
-shares come from one process that takes the time between the steps: importing (by modules that are not there yet),
-reading (open, choose a profile, what happened, the run), judging, diagnosing, printing. `--profile` writes what
+shares come from the same command in a process that takes the time between the steps: Python's start, importing (by
+modules that are not there yet), reading (choose a profile, what happened, the run), judging, diagnosing, printing (with
+the entry in the history), and the command's own work: its line, opening the log and its digest. `--profile` writes what
 cProfile sees, `--checkout` measures another checkout with the same clock.
 """
 
@@ -27,29 +28,32 @@ MOST_CPU_S = 0.4
 
 COMMAND = "from care_tui.cli import main; main()"
 STEPS = """
-import builtins, importlib, sys, time
+import builtins, importlib, os, sys, time
 spent, inside = {"importing": 0.0}, [0]
-original = builtins.__import__
-def timed(*args, **kwargs):
-    if inside[0]:
-        return original(*args, **kwargs)
-    inside[0], began = 1, time.process_time()
-    try:
-        return original(*args, **kwargs)
-    finally:
-        inside[0] = 0
-        spent["importing"] += time.process_time() - began
-builtins.__import__ = timed
+def counted(original):
+    def timed(*args, **kwargs):
+        if inside[0]:
+            return original(*args, **kwargs)
+        inside[0], began = 1, time.process_time()
+        try:
+            return original(*args, **kwargs)
+        finally:
+            inside[0] = 0
+            spent["importing"] += time.process_time() - began
+    return timed
+builtins.__import__, importlib.import_module = counted(builtins.__import__), counted(importlib.import_module)
 began_all = time.process_time()
 import care_tui.cli
-from pathlib import Path
 from care_core.application import case as cases
-from care_core.application.remembering import remember_triage
-names = {"reading": [(cases, "opened"), (cases, "choose"), (cases, "_read")], "diagnosing": [(cases, "_diagnose")]}
-import care_core.health.examine as examining
 import care_core.diagnose.judging as judging
-names["reading"].append((examining, "examine"))
-names["judging"] = [(judging, "judge")]
+import care_core.health.examine as examining
+import care_tui.commands.diagnosing as diagnosing
+names = {
+    "reading": [(cases, "choose"), (cases, "_read"), (examining, "examine")],
+    "judging": [(judging, "judge")],
+    "diagnosing": [(cases, "_diagnose")],
+    "printing": [(cases, "report_of"), (diagnosing, "remember_triage")],
+}
 stack = []
 def clocked(step, function):
     def call(*args, **kwargs):
@@ -65,15 +69,15 @@ def clocked(step, function):
     return call
 for step, found in names.items():
     for module, name in found:
-        if name != "opened" and hasattr(module, name):
-            setattr(module, name, clocked(step, getattr(module, name)))
-case = cases.open_case(cases.Request(Path(sys.argv[1])), lambda step, share: None)
-def show():
-    text = case.report("text")
-    remember_triage(case.diagnosis)
-    return text
-clocked("printing", show)()
-spent["the rest"] = time.process_time() - began_all - sum(spent.values())
+        setattr(module, name, clocked(step, getattr(module, name)))
+sys.argv, shown = ["care", "triage", sys.argv[1]], sys.stdout
+sys.stdout = sys.stderr = open(os.devnull, "w")
+try:
+    care_tui.cli.main()
+except SystemExit:
+    sys.stdout = shown
+spent["the command"] = time.process_time() - began_all - sum(spent.values())
+spent["Python's start"] = began_all
 for step, seconds in spent.items():
     print(step, seconds)
 """
@@ -143,7 +147,7 @@ def main() -> None:
         print(f"  care triage      {whole:.2f} s of processor")
         print(f"  import numpy     {numpy_s:.2f} s, {ratio:.1f} times as quick")
         for step, seconds in shares(args.log.resolve(), env, args.runs).items():
-            print(f"    {step:14} {seconds:.3f} s  {seconds / whole:4.0%}")
+            print(f"    {step:16} {seconds:.3f} s  {seconds / whole:4.0%}")
         print(f"  {'kept  ' if whole <= MOST_CPU_S else 'MISSED'} {whole:.2f} s of processor, at most {MOST_CPU_S:g}")
         if args.profile is not None:
             profile(args.log.resolve(), env, args.profile)

@@ -16,6 +16,8 @@ def spelled(schema: Schema, log: Log) -> Schema:
 
     A log that holds a parameter under none of its names leaves the option as it is.
     """
+    if log.format.value not in schema.logs:
+        return schema
     held = log.settings()
     kind = vehicle_of(log.facts, held).kind
     if kind in ("unknown", "px4") or all(name in held for option in schema.options for name in option.parameters):
@@ -33,4 +35,6 @@ def _spelled(option: Variable, held: Mapping[str, object], kind: Kind) -> Variab
         return option
     names = tuple(spelling.name for spelling in found if spelling is not None)
     scales = {spelling.scale for spelling in found if spelling is not None}
-    return option if len(scales) > 1 else replace(option, parameters=names, scale=scales.pop())
+    if len(scales) > 1 or (names == option.parameters and scales == {option.scale}):
+        return option
+    return replace(option, parameters=names, scale=scales.pop())

@@ -19,6 +19,9 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _BLOCK = 1 << 14
 """Packed bytes taken at a time: small, since a hostile block unpacks to thousands of times its size."""
 
+_AT_ONCE = 1 << 20
+"""Bytes unpacked at a time of what is slow to unpack: some 50 ms."""
+
 _DISK_MARGIN = 64 << 20
 
 
@@ -164,7 +167,14 @@ def _unpacking(compression: str) -> Callable[[bytes], bytes]:
 
 
 def _unpack_bz2(data: bytes, limit: int) -> bytes:
-    return bz2.BZ2Decompressor().decompress(data, limit)
+    """In pieces, between which an interruption is heeded: the largest chunk takes seconds."""
+    blocks, plain = bz2.BZ2Decompressor(), bytearray()
+    while len(plain) < limit and not blocks.eof:
+        piece = blocks.decompress(b"" if plain else data, min(_AT_ONCE, limit - len(plain)))
+        if not piece:
+            break
+        plain += piece
+    return bytes(plain)
 
 
 def _unpack_lz4(data: bytes, limit: int) -> bytes:

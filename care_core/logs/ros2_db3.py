@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,6 +24,8 @@ from care_core.logs.ros_metadata import Metadata, parse_metadata
 from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, StoredRow, is_blob, is_text, promised_size
 
 _WHAT = "a SQLite file"
+_STEPS = 100_000
+"""Of SQLite, which walks a whole table by itself, between two chances to be interrupted: some ms."""
 _NOT_SOUND = (sqlite3.Error, UnicodeDecodeError)
 """What the sqlite3 module raises for a damaged file; names in a broken schema need not be text."""
 _SMALLEST_ROW, _SHARED = 8, 2
@@ -176,7 +178,7 @@ class _Database:
             raise sqlite3.DatabaseError("it is cut short")
 
     def contents(self) -> _Contents:
-        with closing(self._connect()) as database:
+        with self._connected() as database:
             columns = {
                 name: [column for _, column, *_ in database.execute(f"PRAGMA table_info({name})")]
                 for name in ("topics", "messages", "message_definitions", "metadata", "schema")
@@ -204,7 +206,7 @@ class _Database:
 
     def rows(self, numbers: frozenset[int]) -> Iterator[_DataRow]:
         places = ", ".join(str(number) for number in sorted(numbers))
-        with closing(self._connect()) as database:
+        with self._connected() as database:
             yield from self._bounded(
                 database.execute(
                     f"SELECT id, topic_id, timestamp, data FROM messages WHERE topic_id IN ({places})"
@@ -230,12 +232,19 @@ class _Database:
                 raise sqlite3.DatabaseError("its tree runs in circles")
             yield row
 
-    def _connect(self) -> sqlite3.Connection:
+    @contextmanager
+    def _connected(self) -> Iterator[sqlite3.Connection]:
         mode = "" if self.is_own else "?mode=ro&immutable=1"
-        database = sqlite3.connect(f"{self.path.resolve().as_uri()}{mode}", uri=True)
-        database.set_authorizer(_authorised)
-        database.text_factory = lambda raw: raw.decode("utf-8", "replace")
-        return database
+        with closing(sqlite3.connect(f"{self.path.resolve().as_uri()}{mode}", uri=True)) as database:
+            database.set_authorizer(_authorised)
+            database.text_factory = lambda raw: raw.decode("utf-8", "replace")
+            database.set_progress_handler(lambda: 0, _STEPS)
+            try:
+                yield database
+            except sqlite3.OperationalError as err:
+                if str(err) == "interrupted":  # all that SQLite says of what the handler met
+                    raise KeyboardInterrupt from err
+                raise
 
 
 def _authorised(action: int, what: str | None, name: str | None, _database: str | None, inside: str | None) -> int:

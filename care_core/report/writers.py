@@ -6,9 +6,6 @@ from dataclasses import fields
 from io import StringIO
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.scalarstring import LiteralScalarString
-
 from care_core.diagnose.records import Status, overall
 from care_core.report.document import Report, TriageDocument
 from care_core.report.published import to_json as written
@@ -32,6 +29,9 @@ def published(report: Report) -> dict[str, Any]:
 
 def to_yaml(report: Report) -> str:
     """The document with the unified diff and the commands that apply it, below how well the profile fits."""
+    from ruamel.yaml import YAML
+    from ruamel.yaml.scalarstring import LiteralScalarString
+
     data = report.plain()
     if report.diff:
         data["diff"] = LiteralScalarString(report.diff)

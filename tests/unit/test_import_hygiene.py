@@ -36,8 +36,8 @@ def test_help_and_version_import_nothing_heavy(word: str) -> None:
     assert not imported_by(code) & (HEAVY | LEARNING)
 
 
-def test_diagnosis_imports_neither_learning_nor_a_terminal() -> None:
-    assert not imported_by(f"import {DIAGNOSIS}") & (LEARNING | TERMINAL)
+def test_diagnosis_imports_neither_learning_nor_a_terminal_nor_what_checks_files_of_people() -> None:
+    assert not imported_by(f"import {DIAGNOSIS}") & (LEARNING | TERMINAL | {"pydantic", "ruamel"})
 
 
 def test_the_core_is_light_until_it_is_used() -> None:

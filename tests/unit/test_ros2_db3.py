@@ -19,6 +19,7 @@ from care_core.errors import LogError
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import log_digest
 from care_core.logs.opening import open_log
+from care_core.logs.ros2_db3 import _Database
 from tests.ros_samples import IMU, MESSAGES, ROS2, SECOND_NS, START_NS, TEXT, WANTED, make, recording, stamp, write_db3
 
 
@@ -223,3 +224,13 @@ def test_a_schema_that_is_no_text(tmp_path: Path) -> None:
     log = open_log(file)
     assert len(log.read(WANTED)["/note"]) == MESSAGES
     assert "damaged" in log.damage[0].what
+
+
+def test_an_interruption_that_meets_sqlite_is_no_damage(tmp_path: Path) -> None:
+    def read() -> None:
+        with _Database(write_db3(tmp_path / "bag"))._connected() as database:
+            database.set_progress_handler(lambda: 1, 1)  # as one that an interruption met
+            database.execute("SELECT id FROM messages")
+
+    with pytest.raises(KeyboardInterrupt):
+        read()

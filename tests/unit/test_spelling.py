@@ -12,7 +12,7 @@ from care_core.configs.changes import apply_commands
 from care_core.configs.driven import configuration
 from care_core.configs.formats import ConfigFormat
 from care_core.extract.spelling import spelled
-from care_core.logs.base import Log
+from care_core.logs.base import Log, LogFormat
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
 from care_core.run import Setting
@@ -28,6 +28,7 @@ class Flown:
 
     held: Mapping[str, float]
     facts: Mapping[str, str] = field(default_factory=lambda: {"firmware": "ArduCopter V4.7.0"})
+    format: LogFormat = LogFormat.DATAFLASH_BIN
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
         return {name: (Setting(name, value, "PARM"),) for name, value in self.held.items()}
