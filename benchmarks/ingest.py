@@ -45,7 +45,7 @@ SAMPLE = bundled("samples", "arducopter_failed.BIN")
 INSTALLED = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
 """The environment: an installed package is compiled, a checkout that may not be is slower to start."""
 
-TRIAGE = [sys.executable, "-c", "from care_tui.cli import main; main()", "triage", "--json"]
+TRIAGE = [sys.executable, "-c", "from care_tui.start import main; main()", "triage", "--json"]
 READ = """
 import sys, time
 from pathlib import Path

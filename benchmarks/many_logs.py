@@ -22,7 +22,7 @@ from typing import NamedTuple
 from benchmarks.ingest import INSTALLED, SAMPLE, TRIAGE
 
 LEAST_GAIN, MOST_GROWTH = 1.8, 1.1
-INGEST = (sys.executable, "-c", "from care_tui.cli import main; main()", "ingest")
+INGEST = (sys.executable, "-c", "from care_tui.start import main; main()", "ingest")
 
 
 class Cost(NamedTuple):

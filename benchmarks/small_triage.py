@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[1]
 SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"
 MOST_CPU_S = 0.4
 
-COMMAND = "from care_tui.cli import main; main()"
+COMMAND = "from care_tui.start import main; main()"
 STEPS = """
 import builtins, importlib, os, sys, time
 spent, inside = {"importing": 0.0}, [0]
@@ -43,7 +43,7 @@ def counted(original):
     return timed
 builtins.__import__, importlib.import_module = counted(builtins.__import__), counted(importlib.import_module)
 began_all = time.process_time()
-import care_tui.cli
+import care_tui.start, care_tui.cli
 from care_core.application import case as cases
 import care_core.diagnose.judging as judging
 import care_core.health.examine as examining
@@ -73,7 +73,7 @@ for step, found in names.items():
 sys.argv, shown = ["care", "triage", sys.argv[1]], sys.stdout
 sys.stdout = sys.stderr = open(os.devnull, "w")
 try:
-    care_tui.cli.main()
+    care_tui.start.main()
 except SystemExit:
     sys.stdout = shown
 spent["the command"] = time.process_time() - began_all - sum(spent.values())

@@ -150,7 +150,7 @@ class Terminal:
 
 def first_frame(log: Path) -> tuple[float, float]:
     """Seconds from the start of the process to a step bar that answers keys, and seconds of processor it took."""
-    command = [sys.executable, "-c", "from care_tui.cli import main; main()", str(log)]
+    command = [sys.executable, "-c", "from care_tui.start import main; main()", str(log)]
     terminal = Terminal.start(command, 80, 24)
     seen = b""
     while b"Objectives" not in seen:
