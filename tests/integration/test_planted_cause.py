@@ -100,7 +100,7 @@ def test_where_operators_chose_no_cause_is_sure_and_the_promise_says_what_it_res
     share: float,
 ) -> None:
     effects = {
-        pair: effect.model_copy(update={"robustness": robustness, "strongest": strongest})
+        pair: replace(effect, robustness=robustness, strongest=strongest)
         for pair, effect in planted.model.effects.items()
     }
     write_model(replace(planted.model, effects=effects), tmp_path)
