@@ -20,7 +20,7 @@ _BLOCK = 1 << 14
 """Packed bytes taken at a time: small, since a hostile block unpacks to thousands of times its size."""
 
 _AT_ONCE = 1 << 20
-"""Bytes unpacked at a time of what is slow to unpack: some 50 ms."""
+"""Bytes unpacked at a time of what is slow to unpack: 46 ms of bz2."""
 
 _DISK_MARGIN = 64 << 20
 
