@@ -191,7 +191,7 @@ def _clutter(
         half = rng.uniform(0.12, 0.25)
         x, y = rng.uniform(area[0], area[2]), rng.uniform(area[1], area[3])
         box = (x - half, y - half, x + half, y + half)
-        keep_free = [goal[:2] for goal in goals] + [(gap.x, gap.y) for gap in passages]
+        keep_free = [(0.0, 0.0), *(goal[:2] for goal in goals), *((gap.x, gap.y) for gap in passages)]
         if min(_apart(box, (gx, gy, gx, gy)) for gx, gy in keep_free) < 0.85:
             continue
         if min(_apart(box, other) for other in (*walls, *placed)) < _FREE_M and not _hugs(box, walls, placed):
