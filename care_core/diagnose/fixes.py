@@ -22,6 +22,8 @@ DISTANCE_COST = 0.02
 """Probability given up for leaving a value where it is rather than moving it across its whole range."""
 NEARLY = 0.02
 """Probabilities this close are the same: the surer set is taken, or the value nearer to the run's."""
+GIVEN_UP = 0.1
+"""Share of what a change gains that a nearer value may give up."""
 MAX_ALTERNATIVES = 3
 
 Assignment = Mapping[str, float]
@@ -78,10 +80,14 @@ def settled(world: World, assignment: Assignment) -> tuple[Assignment, float]:
     """The same options with values as near to the run's as is safe, and the probability of that.
 
     A nearer value than the reference is taken only where the value one step nearer still would do nearly as well: the
-    edge of what works, and of what was flown in training, is not known to a step.
+    edge of what works, and of what was flown in training, is not known to a step. Where the change gains next to
+    nothing by the model, the model cannot tell its values apart, and the reference is what is known to work.
     """
     chosen = dict(assignment)
-    floor = float(world.probability([{**world.config, **chosen}])[0]) - NEARLY
+    here, reset = map(float, world.probability([world.config, {**world.config, **chosen}]))
+    if reset - here < NEARLY:
+        return chosen, reset
+    floor = reset - min(NEARLY, GIVEN_UP * (reset - here))
     for name in assignment:
         if not _is_unordered(world.variables[name]):
             values = candidate_values(world, name)

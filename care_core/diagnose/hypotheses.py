@@ -13,7 +13,6 @@ Where two would each have done alone, both are told; the weights are brought to 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import replace
 
@@ -21,7 +20,9 @@ from care_core.causal.counterfactual import World
 from care_core.diagnose.ranking import Suspect as Option
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.health.records import Finding, Severity, Suspect
-from care_core.run import FitVerdict
+from care_core.health.telling import LIKELY
+from care_core.profile.schema import Schema
+from care_core.run import Evidence, FitVerdict
 
 MISSION_LOST: Mapping[Severity, float] = {"critical": 0.95, "warning": 0.6, "info": 0.05}
 """Probability that a mission fails with what a finding shows, by how severe it is."""
@@ -35,11 +36,23 @@ LATE, LATE_S = 0.1, 5.0
 """Share of its weight that a part keeps which failed so many seconds after the run was failing already, by a finding
 that speaks of how it was set."""
 POINTED, MOST_POINTED = 0.05, 4.0
-"""A finding that speaks of how the robot was set speaks for options that add this much together, and raises them by
-this factor at most: which option it is it does not say."""
+"""A finding that speaks of how the robot was set, and not of which option, speaks for options that add this much
+together, and raises them by this factor at most."""
 LEAST = 0.005
 """Hypotheses less likely than this are told together with chance."""
 _WHAT: Mapping[Suspect, str] = {"hardware": "hardware", "world": "world", "operation": "world"}
+
+
+def speaking(findings: Iterable[Finding], schema: Schema, config: Mapping[str, float]) -> dict[str, Evidence]:
+    """By its title, what each finding that speaks of how the robot was set says of the options that the profile's rules
+    read out of it; those of which they read none are left out."""
+    said = {
+        finding.title: schema.pointed(Evidence(finding.onset_s, f"{finding.title}: {finding.evidence}", kind), config)
+        for finding in findings
+        if set_wrong(finding)
+        for kind in ("found" if finding.severity == "critical" else "noticed",)
+    }
+    return {title: evidence for title, evidence in said.items() if evidence.options}
 
 
 def explain(
@@ -47,7 +60,8 @@ def explain(
     broken: Sequence[ObjectiveResult],
     found: Mapping[str, Sequence[Option]],
     refused: Container[str],
-    findings: Iterable[Finding],
+    findings: Sequence[Finding],
+    shown: Mapping[str, Evidence],
     verdict: FitVerdict,
 ) -> tuple[Hypothesis, ...]:
     """What explains the broken objectives of a run.
@@ -59,6 +73,7 @@ def explain(
     Args:
         found: per objective the options that may have moved it, with their weights.
         refused: options that the check reads which refused this mission: they explain it whole.
+        shown: by title, the findings that say which options they speak of (`speaking`).
     """
     before = replace(world, observed={})
     options: dict[str, float] = {}
@@ -69,6 +84,10 @@ def explain(
         total = sum(max(0.0, suspect.weight) for suspect in found[name])
         for suspect in found[name] if total else ():
             options[suspect.option] = max(options.get(suspect.option, 0.0), excess * suspect.weight / max(total, 1.0))
+    for finding in findings:
+        if finding.title in shown:
+            for option, share in _named_by(finding, shown[finding.title].options, found).items():
+                options[option] = max(options.get(option, 0.0), share)
     options.update({suspect.option: 1.0 for group in found.values() for suspect in group if suspect.option in refused})
     return weigh(options, min(chance, default=0.0), findings, verdict)
 
@@ -79,6 +98,16 @@ def without_parameters(findings: Sequence[Finding], *, failed: bool = False) -> 
     if not failed and all(finding.severity != "critical" for finding in findings):
         return ()
     return weigh({}, 0.0, findings, "no")
+
+
+def _named_by(finding: Finding, names: Container[str], found: Mapping[str, Sequence[Option]]) -> dict[str, float]:
+    """The weight of a finding, shared by the suspects that it names as their own weights are."""
+    weight: dict[str, float] = {}
+    for suspect in (one for group in found.values() for one in group if one.option in names):
+        weight[suspect.option] = max(weight.get(suspect.option, 0.0), suspect.weight)
+    total = sum(weight.values())
+    whole = finding.probability * MISSION_LOST[finding.severity]
+    return {option: whole * share / total for option, share in weight.items() if total}
 
 
 def _added(before: World, objective: str) -> tuple[float, float]:
@@ -119,18 +148,23 @@ def weigh(
         if share * trust > 0:
             weights["parameter", option] = share * trust
     other = 1.0 - (1.0 - min(1.0, sum(options.values()))) * (1.0 - chance)
-    failing_s = min((one.onset_s for one in by_setting), default=math.inf)
     for finding in seen:
         if finding.suspect in _WHAT:
             key = _WHAT[finding.suspect], finding.title
-            late = LATE if finding.onset_s > failing_s + LATE_S else 1.0
-            weights[key] = max(weights.get(key, 0.0), late * _lost_by(finding, other))
+            share = LATE if _is_late(finding, by_setting) else 1.0
+            weights[key] = max(weights.get(key, 0.0), share * _lost_by(finding, other))
     return _normalised(weights)
 
 
 def set_wrong(finding: Finding) -> bool:
     """Whether a finding speaks of how the robot was set, while it still explains anything."""
     return finding.suspect == "parameter" and not finding.after_impact and finding.severity != "info"
+
+
+def _is_late(finding: Finding, by_setting: Iterable[Finding]) -> bool:
+    """Whether the run was failing already, by a sign about as sure as this one."""
+    sure = min(finding.probability, LIKELY)
+    return any(one.onset_s + LATE_S < finding.onset_s and one.probability >= sure for one in by_setting)
 
 
 def _raised(options: Mapping[str, float], by_setting: Sequence[Finding]) -> dict[str, float]:

@@ -20,8 +20,10 @@ from care_core.run import Evidence
 
 UNLEARNED = 0.02
 """Effect of a known cause over its whole range, in standard deviations of the metric, where no run shows more."""
-SAID, REFUSED = 1.0, 10.0
-"""Standard deviations that a message naming an option counts for; a refusing check leaves no room for others."""
+SAID = 1.0
+_SAID: Mapping[str, float] = {"refusal": 10.0, "found": 5.0}
+"""Standard deviations that a message naming an option counts for, by its kind: a refusing check leaves no room for
+others, and what was found to have lost the mission little."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,7 @@ def pointers(
     spoken = dict.fromkeys(names, 0.0)
     for message in said if world.variables[objective].kind == "functional" else ():
         for name in spoken.keys() & set(message.options):
-            spoken[name] += (REFUSED if message.kind == "refusal" else SAID) / len(message.options)
+            spoken[name] += _SAID.get(message.kind, SAID) / len(message.options)
     total = {name: spoken[name] + sum(shown[name].values()) for name in names}
     whole = sum(total.values()) or 1.0
     return {

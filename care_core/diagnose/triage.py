@@ -26,7 +26,7 @@ from care_core.diagnose.fixes import (
     smallest_good,
     to_fix,
 )
-from care_core.diagnose.hypotheses import explain, without_parameters
+from care_core.diagnose.hypotheses import explain, speaking, without_parameters
 from care_core.diagnose.judging import Judged, check_wishes, unread_options, world_of
 from care_core.diagnose.ranking import (
     Suspect,
@@ -47,6 +47,8 @@ MIN_CONTRIBUTION = 0.02
 """Probability an option must cost before it is called a cause of this run."""
 MIN_PROBABILITY = 0.2
 """Best probability below which the engine abstains: a confident wrong answer costs a field day."""
+GAIN = 0.1
+"""Probability that a change must add to what the run as it is has by chance: it is something an operator has to do."""
 CONVINCING, LEADS = 0.5, 3
 """A cause that costs less than this leaves room for others: up to so many options are then named in all."""
 SURE, UNSURE = 0.4, 0.1
@@ -115,7 +117,9 @@ def diagnose(
 ) -> Diagnosis:
     """Causes and fix of a run that has been judged; the arguments are those of `triage`."""
     report = progress or (lambda _step, _share: None)
-    schema, run, broken = profile.schema, judged.run, judged.broken
+    schema, broken = profile.schema, judged.broken
+    shown = speaking(health.findings, schema, judged.run.config)
+    run = replace(judged.run, evidence=(*judged.run.evidence, *shown.values()))
     objectives = (*judged.results, *judged.checks)
     choice = replace(choice, fit=choice.fit.but(*unusual(run, profile)))
     if not broken:
@@ -145,7 +149,7 @@ def diagnose(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
         for name, result in ((result.variable.name, result) for result in broken)
     )
-    hypotheses = explain(world, broken, weighed, run.refused_by, health.findings, choice.fit.verdict)
+    hypotheses = explain(world, broken, weighed, run.refused_by, health.findings, shown, choice.fit.verdict)
     report("searching for a fix", 0.85)
     fixes = believed(_fixes(case, {s.option for group in found.values() for s in group}), hypotheses)
     out_of_reach = next(filter(None, unheard.values()), None)
@@ -348,10 +352,14 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
         if rival is not None and rival.weight > max((cause.contribution for cause in fault.causes), default=0.0):
             return f"'{rival.option}' is as likely a cause, and the training runs cannot tell what it does"
     now = float(case.world.probability([case.world.config])[0])
-    enough = max(MIN_PROBABILITY, now + MIN_CONTRIBUTION)
+    enough = max(MIN_PROBABILITY, now + GAIN)
     has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
     if has_cause and fixes and fixes[0].p_fixed >= enough:
         return None
+    shown = next((one for one in case.run.evidence if one.kind == "found"), None)
+    if shown is not None:
+        back = " or ".join(f"{name} to {case.world.reference[name]:g}" for name in shown.options)
+        return f"training says little of it, but this run shows it ({shown.text.partition(':')[0]}): bring {back} first"
     unsafe = needs_unsafe(case.world, enough)
     if unsafe is not None:
         return f"only '{unsafe}' past its default is likely to help, and a safety option is never made looser"

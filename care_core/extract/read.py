@@ -29,7 +29,7 @@ from care_core.logs.digest import Sha256, hashing
 from care_core.logs.plausible import clock_doubt, dead_sources
 from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
-from care_core.run import Check, Evidence, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
+from care_core.run import Check, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable
 
 
@@ -182,7 +182,7 @@ class _Source:
                 mismatch=mismatch,
                 asked=tuple((name, value) for name, value in context.items() if is_known(value) and self._asks(name)),
             ),
-            evidence=tuple(_pointed(evidence, self.schema, config) for evidence in self.kind.evidence(mission)),
+            evidence=tuple(self.schema.pointed(evidence, config) for evidence in self.kind.evidence(mission)),
             changes=_changes(self.settings, mission),
             checks=() if self.doubts[index] else self._checks(mission),
             modes=self.kind.modes(mission),
@@ -231,18 +231,6 @@ def _extract(variable: Variable, mission: Mission) -> Value:
     if variable.extract is None:
         return Unavailable("the profile does not say how to read it from a log", f"add 'extract' to {variable.name}")
     return find_extractor(variable.extract.kind).compute(mission, variable.extract.args)
-
-
-def _pointed(evidence: Evidence, schema: Schema, config: Mapping[str, float]) -> Evidence:
-    """The evidence with what the profile's rules read out of its text."""
-    rules = [rule for rule in schema.evidence if rule.pattern.search(evidence.text)]
-    named = [option for rule in rules for option in rule.points_at(schema.variables, config)]
-    return replace(
-        evidence,
-        options=tuple(dict.fromkeys((*evidence.options, *named))),
-        says=next((rule.says for rule in rules if rule.says), evidence.says),
-        circumstance=next((rule.circumstance for rule in rules if rule.circumstance), evidence.circumstance),
-    )
 
 
 def _cut_short(mission: Mission, log: LogInfo) -> bool:

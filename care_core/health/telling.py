@@ -30,7 +30,7 @@ def told(findings: Iterable[Finding], leads: Leads, impact_s: float | None = Non
 
     Args:
         leads: which kind can bring about which.
-        impact_s: when the vehicle hit the ground, None where it did not.
+        impact_s: when the vehicle was down against its will, None where it was not.
     """
     marked = [replace(f, after_impact=impact_s is not None and f.onset_s > impact_s) for f in findings]
     reach = _closure(leads)
@@ -68,8 +68,13 @@ def _explains(cause: Finding, finding: Finding, reach: Leads) -> bool:
         not (finding.severity == "info" and finding.suspect == "parameter")  # it was set so before anything failed
         and finding.kind in reach.get(cause.kind, frozenset())
         and cause.onset_s <= finding.onset_s + SLACK_S
-        and (cause.probability >= LIKELY or finding.probability < LIKELY)
+        and (finding.probability < LIKELY or (cause.probability >= LIKELY and not _only_set(cause, finding)))
     )
+
+
+def _only_set(cause: Finding, finding: Finding) -> bool:
+    """Whether a setting is to have broken a part that surely failed: both are told."""
+    return cause.suspect == "parameter" and finding.suspect == "hardware"
 
 
 def _closure(leads: Leads) -> dict[FindingKind, frozenset[FindingKind]]:

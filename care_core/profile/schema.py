@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from care_core.causal.nominal import Nominal, nominal
 from care_core.configs.driven import same_value
 from care_core.errors import ProfileError
+from care_core.run import Evidence
 from care_core.variables import Role, Threshold, Variable
 
 Side = Literal["low", "high"]
@@ -112,6 +113,17 @@ class Schema:
     def learned_elsewhere(self) -> str:
         """Why no log is of what a carried-over profile was learned from; empty for any other."""
         return f"the profile was learned from {self.carried_over}" if self.carried_over else ""
+
+    def pointed(self, evidence: Evidence, config: Mapping[str, float]) -> Evidence:
+        """What a run says, with what the rules read out of its text."""
+        rules = [rule for rule in self.evidence if rule.pattern.search(evidence.text)]
+        named = [option for rule in rules for option in rule.points_at(self.variables, config)]
+        return replace(
+            evidence,
+            options=tuple(dict.fromkeys((*evidence.options, *named))),
+            says=next((rule.says for rule in rules if rule.says), evidence.says),
+            circumstance=next((rule.circumstance for rule in rules if rule.circumstance), evidence.circumstance),
+        )
 
     def nominal_of(self, name: str) -> Nominal | None:
         """What physics says a variable is, None where the profile names no formula for it."""

@@ -43,4 +43,4 @@ def find(of: flight.Flight) -> tuple[Finding, ...]:
     """Findings of a flight in the order told: the first cause first, its consequences under it."""
     with np.errstate(all="ignore"):
         found = [finding for check in CHECKS for finding in check.find(of)]
-    return told(found, LEADS, of.impact_s)
+    return told(found, LEADS, of.down_s)

@@ -54,6 +54,8 @@ _AIRBORNE_M = 1.0
 _REFUSED_S = 30.0
 """The firmware repeats its complaints at least as often (AP_Arming: every 30 s)."""
 _GROUND_M = 2.0
+_STRIVING, _STRANDED_S = 0.5, 10.0
+"""Throttle that lifts any vehicle that can fly, and how long it may take to do so."""
 _STRUCK_S = 1.0
 """A blow so shortly before control was lost is what took it."""
 _SHOCK = 30.0
@@ -214,6 +216,18 @@ class Flight:
             spans += runs(t, up & (t >= start) & (t <= end), gap_s=3.0)
         return tuple((a, b) for a, b in spans if b - a >= 1.0)
 
+    @cached_property
+    def stranded(self) -> Span | None:
+        """The first span on the ground, after it had flown, in which it wants up with all its might and does not rise;
+        None where there is none."""
+        table = self.one("CTUN", "Alt", "DAlt", "ThO")
+        if table is None or not self.is_copter or not self.airborne:
+            return None
+        t = table.t
+        wants = (table["DAlt"] - table["Alt"] > _GROUND_M) & (table["ThO"] > _STRIVING) & self.during(self.armed, t)
+        down = (t > self.airborne[0][1]) & ~self.during(self.airborne, t)
+        return first(runs(t, wants & down, gap_s=1.0), lambda span: span[1] - span[0] >= _STRANDED_S)
+
     def during(self, spans: Iterable[Span], t: Floats) -> Mask:
         """Which of these times lie within one of the spans."""
         inside = np.zeros(len(t), dtype=bool)
@@ -251,14 +265,24 @@ class Flight:
         held = (error < _HELD_DEG) & flying
         back = runs(t, held, gap_s=0.5)
         for start, end in runs(t, off & matters & self._is_driven(t)):
-            stays = off[(t >= start) & (t <= start + _CRASH_CHECK_S)].mean() > 0.6  # else it swings
-            if not stays or (end - start < 0.5 and end < t[-1] - 2.0 and end < self.armed[-1][1] - 2.0):
+            fell_s = self._fell_from(start)
+            until = start + _CRASH_CHECK_S if fell_s is None else fell_s
+            stays = off[(t >= start) & (t <= until)].mean() > 0.6  # else it swings
+            brief = end - start < 0.5 and end < t[-1] - 2.0 and end < self.armed[-1][1] - 2.0
+            if not stays or (brief and fell_s is None):
                 continue
             rest = held[flying & (t > end)]
             flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
             if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
                 return start
         return None
+
+    def _fell_from(self, start: float) -> float | None:
+        """When it was down, if it came down from a height sooner than the firmware's check takes to call it a crash:
+        what the attitude does on the ground says nothing."""
+        if self.height is None or float(np.interp(start, *self.height)) < _GROUND_M:
+            return None
+        return next((b for a, b in self.airborne if a <= start <= b < start + _CRASH_CHECK_S), None)
 
     def _is_driven(self, t: Floats) -> Mask:
         """Where the motors were to lift it, in a mode in which not every attitude is meant."""
@@ -288,6 +312,12 @@ class Flight:
         if ground is not None:
             candidates.append(ground)
         return min(candidates, default=None)
+
+    @cached_property
+    def down_s(self) -> float | None:
+        """When the flight was over against its will: it hit something, or came down and could not rise again."""
+        strandings = () if self.stranded is None else (self.stranded[0],)
+        return min((t for t in (self.impact_s, *strandings) if t is not None), default=None)
 
     def shock_after(self, first: float) -> float | None:
         """When it was first shaken beyond what flight does, from a time on; None where it was not."""

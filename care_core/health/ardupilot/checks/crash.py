@@ -20,14 +20,14 @@ _STICK_LOW = 1150.0
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """One finding: tipped over before it had flown, or crashed."""
+    """One finding: tipped over before it had flown, crashed, or came down."""
     told = min((t for t, code in flight.errors(_ERR_CRASH) if code > 0), default=None)
     said = min((t for t, text in flight.messages if text.startswith(("Crash: ", "Crash!"))), default=None)
     lost, impact = flight.lost_control_s, flight.impact_s
     begin = min((t for t in (told, said, lost) if t is not None), default=None)
     if begin is None:
-        return
-    if _tipped(flight, lost if lost is not None else begin):
+        yield from _stranded(flight)
+    elif _tipped(flight, lost if lost is not None else begin):
         start = lost if lost is not None else begin
         yield Finding(
             "takeoff", "it tipped over at take-off", start, told or start, "critical",
@@ -46,6 +46,16 @@ def find(flight: Flight) -> Iterator[Finding]:
             + (f"; {steered}" if steered else "")
             + ("; a blow came before control was lost" if flight.was_struck else ""),
             "ERR 12, MSG, ATT, IMU", suspect="operation" if steered else "hardware", probability=0.1,
+        )  # fmt: skip
+
+
+def _stranded(flight: Flight) -> Iterator[Finding]:
+    if flight.stranded is not None:
+        start, end = flight.stranded
+        yield Finding(
+            "crash", "it came down and could not rise again", start, end, "critical",
+            f"on the ground for {end - start:.0f} s with the motors up and a height wanted that it does not reach",
+            "CTUN", probability=0.0,  # it says that the run failed, and nothing of why
         )  # fmt: skip
 
 

@@ -185,9 +185,10 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     pitch = float(np.mean((table["Pitch"] - table["DesPitch"])[rows]))
     if np.hypot(roll, pitch) < 10.0:
         return
-    asked = (outputs.t >= lost - 0.2) & (outputs.t <= lost + 0.8)
-    if asked.sum() < 3:
-        asked = (outputs.t >= lost - 3.0) & (outputs.t <= lost + 2.0)
+    down = flight.impact_s if flight.impact_s is not None else lost + 2.0
+    windows = ((lost - 0.2, lost + 0.8), (lost - 1.0, max(lost, min(lost + 2.0, down))), (lost - 3.0, lost + 2.0))
+    near = [(outputs.t >= start) & (outputs.t <= end) for start, end in windows]
+    asked = next((rows for rows in near if rows.sum() >= 3), near[-1])
     if not asked.any():
         return
     share = np.median(outputs.share[:, asked], axis=1)
@@ -206,7 +207,7 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         outputs.motors[n], "gave no thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0, "critical",
         f"asked for {100 * share[n]:.0f} % (others {100 * np.median(others):.0f} %), yet the vehicle fell towards it: "
         f"{roll:+.0f} degrees of roll and {pitch:+.0f} of pitch off the demand",
-        f"{_SOURCE}, and ATT", 0.85 if asked.sum() > 3 else 0.6,
+        f"{_SOURCE}, and ATT", 0.85 if near[0].sum() > 3 else 0.6,
     )  # fmt: skip
 
 

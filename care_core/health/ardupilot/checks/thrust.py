@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from care_core.health.ardupilot.flight import Flight
+from care_core.health.ardupilot.flight import Flight, Span
 from care_core.health.ardupilot.measure import lasting, smooth
 from care_core.health.records import Finding, Severity, Suspect
 from care_core.logs.base import Wanted
@@ -39,7 +39,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     level = smooth(t, throttle, 4.0)
     high = lasting(t, flown & (level > HOVER_MOST), _LASTS_S, gap_s=5.0)
-    full = lasting(t, flown & (throttle > FULL), _FULL_LASTS_S, gap_s=1.0)
+    full = saturated(flight)
     if full:
         start, end = full[0][0], full[-1][1]
         below = _below(flight, start, end)
@@ -65,6 +65,15 @@ def find(flight: Flight) -> Iterator[Finding]:
             f"mean throttle {100 * share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %){why}",
             "CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875", suspect=suspect, probability=_PROBABILITY[suspect],
         )  # fmt: skip
+
+
+def saturated(flight: Flight) -> list[Span]:
+    """When the motors give all that they have."""
+    if flight.throttle is None:
+        return []
+    t, throttle = flight.throttle
+    flown = flight.during(flight.flown or flight.watched, t)
+    return lasting(t, flown & (throttle > FULL), _FULL_LASTS_S, gap_s=1.0)
 
 
 def _by_option(flight: Flight) -> tuple[Suspect, str]:
