@@ -46,12 +46,11 @@ _WHAT: Mapping[Suspect, str] = {"hardware": "hardware", "world": "world", "opera
 def speaking(findings: Iterable[Finding], schema: Schema, config: Mapping[str, float]) -> dict[str, Evidence]:
     """By its title, what each finding that speaks of how the robot was set says of the options that the profile's rules
     read out of it; those of which they read none are left out."""
-    said = {
-        finding.title: schema.pointed(Evidence(finding.onset_s, f"{finding.title}: {finding.evidence}", kind), config)
-        for finding in findings
-        if set_wrong(finding)
-        for kind in ("found" if finding.severity == "critical" else "noticed",)
-    }
+    said = {}
+    for finding in filter(set_wrong, findings):
+        kind = "found" if finding.severity == "critical" else "noticed"
+        evidence = Evidence(finding.onset_s, f"{finding.title}: {finding.evidence}", kind)
+        said[finding.title] = schema.pointed(evidence, config)
     return {title: evidence for title, evidence in said.items() if evidence.options}
 
 

@@ -17,3 +17,10 @@ def test_the_fix_and_the_causes_suggest_the_same_value(recorded: Path) -> None:
                 assert cause.suggested == changes[cause.option.name], (log.name, cause.option.name)
         fixed += len(changes) > 1
     assert fixed, "fixes of several changes are among them"
+
+
+def test_a_finding_that_names_its_options_leads_to_them(recorded: Path) -> None:
+    diagnosis = care_core.triage(recorded / "data" / "varied" / "faults" / "h45_12_02.BIN").diagnosis
+    assert diagnosis.hypotheses[0].name == diagnosis.faults[0].causes[0].option.name == "ATC_RAT_PIT_D"
+    assert any("pitch oscillates" in note.text for note in diagnosis.faults[0].causes[0].notes)
+    assert "bring ATC_RAT_PIT_D to 0.0036 first" in (diagnosis.abstained or "")

@@ -14,7 +14,7 @@ from care_core.health.ardupilot.signals import expanded, instances
 from care_core.health.records import Finding
 from care_core.logs.base import Table
 from care_core.run import Setting
-from tests.flights import ARMED_S, DOWN_S, END_S, UP_S, Made
+from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, UP_S, Made
 
 RATES = (0.5, 1.0, 2.5, 10.0, 50.0)
 FAILS_S = 50.0
@@ -355,6 +355,71 @@ def test_an_oscillation_is_a_parameter() -> None:
     made.table["RATE"] = {"R": swing, "P": made.noise(1), "RDes": made.noise(2), "PDes": made.noise(2)}
     finding = first(made)
     assert (finding.kind, finding.title, finding.suspect) == ("tuning", "roll oscillates", "parameter")
+
+
+def oscillating(made: Made, start: float = 30.0, end: float = 90.0) -> None:
+    swing = np.where(made.after(start, end), 120 * np.sin(2 * np.pi * 3.1 * made.t), 0.0)
+    made.table["RATE"] = {"R": made.noise(1), "P": swing, "RDes": made.noise(2), "PDes": made.noise(2)}
+
+
+def test_an_oscillation_that_takes_all_the_thrust_leads_what_it_brings_about() -> None:
+    made = Made()
+    oscillating(made)
+    made.table["CTUN"]["ThO"][made.after(50.0, 80.0)] = 0.98
+    finding = first(made)
+    assert (finding.title, finding.severity) == ("pitch oscillates", "critical")
+    assert "at their limit for 30 s" in finding.evidence
+    assert [one.title for one in finding.consequences] == ["too little thrust"]
+
+
+def test_motors_at_their_limit_before_it_swings_are_not_the_oscillations_doing() -> None:
+    made = Made()
+    oscillating(made, start=60.0)
+    made.table["CTUN"]["ThO"][made.after(30.0, 80.0)] = 0.98
+    found = {one.title: one for root in made.find() for one in (root, *root.consequences)}
+    assert found["pitch oscillates"].severity == "warning"
+    assert first(made).title == "too little thrust"
+
+
+def test_a_log_too_slow_to_show_each_swing_shows_that_they_come_out_even() -> None:
+    made = Made(rate_hz=2.0)
+    slow = np.where(made.after(30.0, 42.0), 60 * np.sin(2 * np.pi * (made.t - 30.0) / 9.0), 0.0)
+    made.table["RATE"] = {"R": slow, "P": made.noise(1), "RDes": made.noise(1), "PDes": made.noise(1)}
+    assert first(made).title == "roll oscillates"
+    made.table["RATE"]["R"] = np.abs(slow)
+    assert made.find() == ()
+
+
+def test_coming_down_and_staying_there_is_told() -> None:
+    made = Made()
+    down = made.after(FAILS_S)
+    made.table["POS"]["RelHomeAlt"][down] = made.table["CTUN"]["Alt"][down] = 0.0
+    made.table["CTUN"]["ThO"][down] = 0.7
+    made.table["CTUN"]["DAlt"][down] = 12.0
+    found = {one.title: one for one in made.find()}
+    stranded = found["it came down and could not rise again"]
+    assert (stranded.severity, stranded.onset_s) == ("critical", pytest.approx(FAILS_S, abs=0.5))
+    assert made.flight().down_s == stranded.onset_s
+
+
+def test_a_fall_that_lasts_a_second_is_a_loss_of_control_and_names_the_motor_in_a_slow_log() -> None:
+    made = Made(rate_hz=2.5)
+    fall, after = made.after(FAILS_S, FAILS_S + 1.0), made.after(FAILS_S + 1.0)
+    made.table["ATT"]["Roll"][fall], made.table["ATT"]["Pitch"][fall] = -70.0, 40.0  # to the rear left
+    made.table["RCOU"]["C2"][fall], made.table["RCOU"]["C1"][fall] = 1950, 1100
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[name][field][fall] = np.linspace(HEIGHT_M, 1.5, int(fall.sum()))
+        made.table[name][field][after] = 0.0
+    for field in ("Roll", "Pitch", "DesRoll", "DesPitch"):
+        made.table["ATT"][field][after] = 0.0
+    assert made.flight().lost_control_s == pytest.approx(FAILS_S, abs=0.5)
+    assert first(made).title == "motor 2 (rear left) gave no thrust"
+
+
+def test_a_lurch_at_touch_down_is_no_loss_of_control() -> None:
+    made = Made()
+    made.table["ATT"]["Roll"][made.after(DOWN_S - 1.0, DOWN_S - 0.5)] = 45.0
+    assert made.flight().lost_control_s is None
 
 
 def test_an_attitude_that_does_not_follow() -> None:

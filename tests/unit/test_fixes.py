@@ -129,6 +129,11 @@ def test_a_nearer_value_than_the_reference_has_a_step_of_margin(planted: Profile
         assert here.probability([beyond])[0] >= floor
 
 
+def test_an_option_that_the_model_sees_nothing_of_goes_back_to_its_reference(planted: Profile) -> None:
+    chosen, _ = settled(planted_world(planted, inert=0.95, reserve=58), {"inert": DEFAULTS["inert"]})
+    assert chosen == {"inert": DEFAULTS["inert"]}
+
+
 def test_the_best_value_alone(planted: Profile) -> None:
     here = planted_world(planted, reserve=58)
     best = best_alone(here, "reserve")

@@ -63,6 +63,11 @@ def test_a_part_that_failed_after_the_run_was_failing_explains_little() -> None:
     assert lead(weigh({"occdist_scale": 0.6}, 0.3, [sooner, finding(0.98)], "fits"))[0] == "hardware"
 
 
+def test_a_doubtful_sign_of_how_it_was_set_takes_nothing_from_a_part_that_surely_failed() -> None:
+    swings = Finding("tuning", "pitch oscillates", 20.0, 70.0, "warning", "", "", "parameter", 0.2)
+    assert lead(weigh({"a": 0.3}, 0.1, [swings, finding(0.85)], "fits"))[0] == "hardware"
+
+
 def test_a_finding_that_speaks_of_how_it_was_set_raises_the_options() -> None:
     stuck = Finding("planner", "the planner makes no way", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
     assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, [], "fits"))[0] == "chance"

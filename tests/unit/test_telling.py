@@ -46,6 +46,14 @@ def test_what_is_likely_is_told_before_suspicions_and_is_no_consequence_of_one()
     assert [one.kind for one in told([suspected, likely], LEADS)] == ["planner", "laser"]
 
 
+def test_a_part_that_surely_failed_is_not_what_a_setting_led_to() -> None:
+    by_setting = replace(finding("laser", 1.0), probability=0.8, suspect="parameter")
+    part = replace(finding("planner", 5.0), probability=0.6)
+    assert [one.kind for one in told([by_setting, part], LEADS)] == ["laser", "planner"]
+    (root,) = told([by_setting, replace(part, probability=0.3)], LEADS)
+    assert root.kind == "laser"
+
+
 def test_a_symptom_is_told_after_a_cause_of_its_weight() -> None:
     assert [one.kind for one in told([finding("attitude", 1.0), finding("battery", 9.0)], {})] == [
         "battery",
