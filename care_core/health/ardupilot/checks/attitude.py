@@ -129,8 +129,11 @@ def _to_and_fro(error: Floats) -> bool:
 
 
 def _came_down(flight: Flight, swings: list[Span]) -> bool:
-    """Whether it was on the ground and could not rise when, or soon after, it swung."""
-    return flight.stranded is not None and swings[0][0] < flight.stranded[0] <= swings[-1][1] + _SWING_S
+    """Whether it was on the ground and could not rise when, or soon after, it swung, and did not fall at once: that is
+    a part that broke."""
+    if flight.stranded is None or flight.lost_control_s is not None:
+        return False
+    return swings[0][0] < flight.stranded[0] <= swings[-1][1] + _SWING_S
 
 
 def _spent(flight: Flight, swings: list[Span]) -> float:
