@@ -9,6 +9,7 @@ from dataclasses import replace
 from care_core.diagnose.hypotheses import LATE_S, set_wrong
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult
 from care_core.health.records import Finding
+from care_core.health.telling import LIKELY
 
 ENOUGH = 0.5
 """A change less likely than this to repair the run is no advice."""
@@ -26,14 +27,15 @@ def believed(fixes: Sequence[Fix], hypotheses: Sequence[Hypothesis]) -> tuple[Fi
 def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = ()) -> str | None:
     """Why no parameter is to be changed, where something else explains the failure better than all of them together.
 
-    A part that failed well after the robot was failing by how it was set may be what that led to: motors at their limit
-    for an oscillation have too little thrust. Then it is not what to look at first.
+    A part that, by no sure sign, failed well after the robot was failing by how it was set may be what that led to:
+    motors at their limit for an oscillation have too little thrust. Then it is not what to look at first.
     """
     rival = next((one for one in hypotheses if one.what in ("hardware", "world") and one.name), None)
     parameters = sum(one.probability for one in hypotheses if one.what == "parameter")
     if rival is None or rival.probability <= parameters:
         return None
-    since_s = min((one.onset_s for one in findings if one.title == rival.name), default=-math.inf)
+    doubtful = (one for one in findings if one.title == rival.name and one.probability < LIKELY)
+    since_s = min((one.onset_s for one in doubtful), default=-math.inf)
     sooner = [one for one in findings if set_wrong(one) and one.onset_s + LATE_S < since_s]
     if sooner:
         earliest = min(sooner, key=lambda one: one.onset_s)

@@ -48,7 +48,7 @@ def test_no_parameter_is_advised_where_a_part_explains_more() -> None:
 
 def test_a_part_that_failed_well_after_a_sign_of_how_it_was_set_is_not_what_to_look_at_first() -> None:
     shaking = Finding("tuning", "roll oscillates", 35.2, 265.8, "warning", "", "RATE", "parameter")
-    part = Finding("motor", "motor 2 lost thrust", 52.0, 246.9, "critical", "", "RCOU")
+    part = Finding("motor", "motor 2 lost thrust", 52.0, 246.9, "critical", "", "RCOU", probability=0.3)
     said = outweighed(motor(0.7), (part, shaking))
     assert said is not None
     assert said.startswith("roll oscillates from 35 s on, before motor 2 lost thrust")
