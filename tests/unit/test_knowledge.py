@@ -10,13 +10,13 @@ from care_core.causal.graph import CausalGraph
 from care_core.errors import ProfileError
 from care_core.learn.fitting import Effort
 from care_core.learn.knowledge import with_known
-from care_core.learn.outcomes import fit_total
+from care_core.learn.outcomes import FEW_RUNS, fit_total
 from care_core.profile.schema import Schema, read_schema
 from tests.planted import SCHEMA, fly_many
 
 BARE = CausalGraph(tuple(SCHEMA.variables))
-RUNS = fly_many(160)
-"""As many as let a mechanism read its causes alone (`FEW_RUNS`)."""
+RUNS = fly_many(FEW_RUNS)
+"""As many as let a mechanism read its causes alone."""
 QUICK = Effort(points=120, iterations=20)
 
 

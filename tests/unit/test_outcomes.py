@@ -11,6 +11,7 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.model import Model
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import (
+    FEW_RUNS,
     causes_of,
     find_stages,
     fit_on,
@@ -49,7 +50,7 @@ GRAPH = CausalGraph(
 )
 
 
-def missions(n: int = 160) -> pd.DataFrame:
+def missions(n: int = FEW_RUNS) -> pd.DataFrame:
     """Refused where the gain is high; lost at random, whatever the gain; else failed where the gain is low."""
     rng = np.random.default_rng(0)
     gain = rng.uniform(size=n)
