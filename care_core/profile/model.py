@@ -156,8 +156,10 @@ def _mechanism_record(key: str, m: Mechanism) -> _MechanismRecord:
 
 
 def _rounded(value: Any) -> Any:
-    """Six significant digits: a model file is read in reviews."""
+    """Six significant digits: a model file is read in reviews. Raises ValueError for a number that is not finite."""
     if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError("a number of the model is not finite")
         return float(f"{value:.6g}")
     if isinstance(value, dict):
         return {key: _rounded(part) for key, part in value.items()}
