@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from care_core.health.records import Health
+from care_core.health.ros.checks.messages import gist
 from care_core.health.ros.examining import examine
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
@@ -62,6 +63,10 @@ def frozen(message: Any) -> None:
     message.pose.pose.position.x = message.pose.pose.position.y = message.twist.twist.linear.x = 0.0
 
 
+def without_position(message: Any) -> None:
+    message.pose.pose.position.x = message.pose.pose.position.y = 0.0
+
+
 def not_a_number(message: Any) -> None:
     message.pose.pose.position.x = float("nan")
 
@@ -83,6 +88,7 @@ def always_the_same(message: Any) -> None:
     ("kind", "change", "title"),
     [
         (ODOMETRY, frozen, "never moved, but goals were reached"),
+        (ODOMETRY, without_position, "tells no position"),
         (ODOMETRY, not_a_number, "no numbers"),
         (ODOMETRY, without_time, "no time"),
         (ODOMETRY, half_as_fast, "stamps of /wheels/odom run at 0.5 of the recording's clock"),
@@ -102,6 +108,16 @@ def test_a_source_that_cannot_be_is_a_finding(
     found = looked_at(Broken(), tmp_path).findings
     assert [one for one in found if title in one.title], found
     assert all(one.severity in ("warning", "info") for one in found)
+
+
+def test_the_gist_of_a_traceback_is_what_was_raised_and_where() -> None:
+    text = "bad callback: <bound method Pursuit.on_fix of <__main__.Pursuit object at 0x7f>>\n" + (
+        'Traceback (most recent call last):\n  File "/opt/ros/rospy/topics.py", line 750, in _invoke\n    cb(msg)\n'
+        '  File "/home/me/src/pursuit.py", line 176, in on_fix\n    steer = int(angle)\n'
+        "ValueError: cannot convert float NaN to integer\n"
+    )
+    assert gist(text) == "ValueError: cannot convert float NaN to integer (pursuit.py line 176, on_fix)"
+    assert gist("laser is gone " * 20) == ("laser is gone " * 20)[:80]
 
 
 @pytest.mark.parametrize("outcome", [SUCCEEDED, ABORTED])

@@ -217,7 +217,10 @@ def _motion(recording: Recording) -> Iterator[Moment]:
             yield Moment(float(odometry.t[-1]), "motion", "the robot never moved", odometry.topic)
         else:
             went = recording.moved_between(float(odometry.t[0]), float(odometry.t[-1]))
-            yield Moment(float(odometry.t[rows[0]]), "motion", "the robot moves for the first time", odometry.topic)
+            began_s = max(0.0, float(odometry.t[rows[0]]))  # by its own stamp, which may lie before the recording
+            yield Moment(began_s, "motion", "the robot moves for the first time", odometry.topic)
+            if odometry.stands_still:
+                went = odometry.way_m
             words = f"drove {went:.1f} m in all, {np.percentile(np.abs(odometry.speed), 99):.2f} m/s at most"
             yield Moment(float(odometry.t[-1]), "motion", words, odometry.topic)
     for battery in recording.batteries:

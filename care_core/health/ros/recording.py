@@ -44,6 +44,10 @@ PUNCTUAL_S, MOSTLY = 0.25, 0.6
 """Where this share of messages is recorded so soon after it was made, both clocks run alike."""
 
 
+_STILL_M = 2.0
+"""Way by its speed that no noise of a speed makes while a position stays the same to the last digit."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Odometry:
     """What odometry says: s, m, rad, m/s, rad/s, each of shape (n,), in order of time."""
@@ -64,6 +68,16 @@ class Odometry:
     def tells_speed(self) -> bool:
         """Whether its twist is filled in: some drivers leave it zero."""
         return bool(np.any(np.abs(self.speed) > 0.01) or np.any(np.abs(self.turn) > 0.01))
+
+    @property
+    def way_m(self) -> float:
+        """How far it went by its speed."""
+        return float(np.sum(np.hypot(self.speed, self.sideways) * self.dt))
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether its position is not filled in: the same to the last digit while its speed makes metres of way."""
+        return not np.ptp(self.x) and not np.ptp(self.y) and self.way_m > _STILL_M
 
 
 @dataclass(frozen=True, slots=True, eq=False)

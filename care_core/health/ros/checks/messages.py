@@ -26,6 +26,8 @@ _ABOUT: tuple[tuple[re.Pattern[str], FindingKind], ...] = (
     (re.compile(r"\bcpu\b|memory|temperature|load", re.IGNORECASE), "cpu"),
     (re.compile(r"camera|topic|frequency|rate", re.IGNORECASE), "topics"),
 )
+_TRACEBACK = "Traceback (most recent call last)"
+_RAISED = re.compile(r'File "(?:.*/)?([^/"]+)", line (\d+), in (\w+)')
 NUMBERS = re.compile(r"-?\d+(\.\d+)?")
 
 
@@ -41,15 +43,20 @@ def about(text: str) -> FindingKind:
 
 def _diagnostics(recording: Recording) -> Iterator[Finding]:
     worst: dict[str, list[Report]] = {}
+    last: dict[str, Report] = {}
     for one in reports(recording):
+        last[one.name] = one
         if one.level >= 2:  # ERROR or STALE
             worst.setdefault(one.name, []).append(one)
     for name, own in sorted(worst.items(), key=lambda one: one[1][0].time_s)[:MOST]:
         first = own[0]
+        stays = last[name].level >= 2
+        until_s = recording.duration_s if stays else last[name].time_s
+        again = (f", {len(own)} times" if len(own) > 1 else "") + (", and so to the end" if stays else "")
         severity: Severity = recording.severity(first.time_s, "critical" if first.level == 2 else "warning")
         yield Finding(
             about(f"{name} {first.message}"), f"diagnostics: {name}: {first.message or 'error'}", first.time_s,
-            own[-1].time_s, severity, f'{first.word} "{first.message}", {len(own)} reports', first.topic,
+            until_s, severity, f'{first.word} "{first.message}"{again}', first.topic,
             probability=0.7,
         )  # fmt: skip
 
@@ -70,8 +77,18 @@ def _errors(recording: Recording) -> Iterator[Finding]:
         otherwise: Severity = "critical" if downed else "warning"
         times = f", {len(own)} times" if len(own) > 1 else ""
         yield Finding(
-            about(f"{first.node} {first.text}"), ": ".join(filter(None, (first.node, first.text[:80]))), first.time_s,
+            about(f"{first.node} {first.text}"), ": ".join(filter(None, (first.node, gist(first.text)))), first.time_s,
             own[-1].time_s,
             recording.severity(first.time_s, otherwise) if downed else "warning" if not recording.goals else "info",
-            f'{"FATAL" if is_fatal else "ERROR"} "{first.text[:160]}"{times}', "/rosout", "hardware", 0.5,
+            f'{"FATAL" if is_fatal else "ERROR"} "{gist(first.text, 160)}"{times}', "/rosout", "hardware", 0.5,
         )  # fmt: skip
+
+
+def gist(text: str, most: int = 80) -> str:
+    """What an error says in a line: of a Python traceback the exception and where its own code raised it."""
+    if _TRACEBACK not in text:
+        return text[:most]
+    lines = [line.strip() for line in text.strip().splitlines() if line.strip()]
+    raised = [match for line in lines if (match := _RAISED.match(line))]
+    place = f" ({raised[-1][1]} line {raised[-1][2]}, {raised[-1][3]})" if raised else ""
+    return f"{lines[-1][:most]}{place}"

@@ -33,7 +33,7 @@ _PAUSE_S = 0.6
 def check(recording: Recording) -> Iterator[Finding]:
     odometry = recording.odometry
     yield from _dead(recording)
-    if odometry is not None and odometry.tells_speed:
+    if odometry is not None and odometry.tells_speed and not odometry.stands_still:
         yield from _jumps(recording, odometry)
         yield from _drift(recording, odometry)
     yield from _corrections(recording)
@@ -51,7 +51,12 @@ def _dead(recording: Recording) -> Iterator[Finding]:
     odometry = recording.odometry
     path_m = float(np.sum(np.hypot(np.diff(odometry.x), np.diff(odometry.y))))
     way_m = _way_of_goals(recording)
-    if never_moved(path_m, len(odometry.t), way_m):
+    if odometry.stands_still:
+        yield _unusable(
+            recording, odometry.topic, "odometry tells no position",
+            f"the same in all {len(odometry.t)} messages, while its own speed makes {odometry.way_m:.1f} m",
+        )  # fmt: skip
+    elif never_moved(path_m, len(odometry.t), way_m):
         yield _unusable(
             recording, odometry.topic, "odometry never moved, but goals were reached",
             f"{path_m:.2g} m in {len(odometry.t)} messages, goals and commands over {way_m:.1f} m",
@@ -180,10 +185,11 @@ def _corrections(recording: Recording) -> Iterator[Finding]:
         # The first corrections find the robot on the map, from wherever it was said to be.
         rows = rows[t[rows + 1] > t[0] + 5.0]
         if len(rows):
-            at, far = float(t[rows[0] + 1]), float(steps[rows[0]])
+            at, far, most = float(t[rows[0] + 1]), float(steps[rows[0]]), float(steps[rows].max())
+            more = f", {len(rows)} such steps of up to {most:.2f} m" if len(rows) > 1 else ""
             yield Finding(
-                "localisation", f"localisation jumps by {far:.1f} m", at, float(t[rows[-1] + 1]),
-                recording.severity(at), f"map -> odom steps by {far:.2f} m, {len(rows)} such steps", topic,
+                "localisation", f"localisation jumps by {'up to ' * (most > far)}{most:.1f} m", at,
+                float(t[rows[-1] + 1]), recording.severity(at), f"map -> odom steps by {far:.2f} m{more}", topic,
                 probability=0.7,
             )  # fmt: skip
             return
