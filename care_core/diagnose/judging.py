@@ -19,10 +19,14 @@ from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.run import Check, Run, Setting, Unavailable, Value, is_known
+from care_core.text import figures
 from care_core.variables import Role, Threshold, Variable
 
 _YES = Threshold("==", 1.0)
 _FEW = 10
+UNLIKE, TINY = 0.5, 4.0
+"""A measure of the mission may leave the range that training saw by this share of it, and be so many times smaller than
+the least: as far as that the mechanisms are believed, where the profile fits in part only."""
 """As many names can be listed in a sentence."""
 
 
@@ -170,15 +174,20 @@ def judge(
         variables=schema.variables,
     )
     needs: dict[str, Need] = {}
+    unlike: dict[str, Value] = {}
     for objective in schema.objectives:
         if objective.relative is None or objective.name in bounds or not _has_inputs(objective, run, schema):
+            continue
+        if another := beyond_training(run, schema, model):
+            hint = f"give this mission's bound with --threshold {objective.name}=VALUE"
+            unlike[objective.name] = Unavailable(f"no mission of the training is like this one: {another}", hint)
             continue
         need = need_of(objective.name, world)
         if need is not None:
             needs[objective.name] = need
             bounds[objective.name] = objective.relative.for_need(need.value)
     past = _past_their_limits(run, so_far, schema, bounds, needs)
-    run = replace(run, objectives={**run.objectives, **past})
+    run = replace(run, objectives={**run.objectives, **past, **unlike})
     results = (
         _judge_one(
             objective,
@@ -233,6 +242,21 @@ def _has_inputs(objective: Variable, run: Run, schema: Schema) -> bool:
     nominal = schema.nominal_of(objective.name)
     needed = () if nominal is None else nominal.inputs
     return all(is_known(run.context.get(name)) for name in needed if schema.variables[name].role is Role.CONTEXT)
+
+
+def beyond_training(run: Run, schema: Schema, model: Model) -> str:
+    """In what this mission is so unlike all that were trained on that what the reference needs for it is not known;
+    empty where it is like them."""
+    for variable in schema.contexts:
+        value, summary = run.context.get(variable.name), model.summaries.get(variable.name)
+        if variable.about != "mission" or summary is None or not is_known(value):
+            continue
+        margin = UNLIKE * (summary.high - summary.low)
+        is_tiny = 0 <= value < summary.low / TINY
+        if margin > 0 and (is_tiny or not summary.low - margin <= value <= summary.high + margin):
+            seen = f"{figures(summary.low)} to {figures(summary.high)}"
+            return f"{variable.doc or variable.name} {figures(value)} {variable.unit}".rstrip() + f", {seen} there"
+    return ""
 
 
 def _past_their_limits(

@@ -144,7 +144,8 @@ def diagnose(
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
     case = _Case(profile, choice, run, world, _reference(judged), unranked)
-    unheard = {result.variable.name: _out_of_reach(case, result) for result in broken}
+    refused = _refused_by_operator(case, health)
+    unheard = {result.variable.name: refused or _out_of_reach(case, result) for result in broken}
     faults = tuple(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
         for name, result in ((result.variable.name, result) for result in broken)
@@ -401,6 +402,14 @@ def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
     return (
         f"no run of the profile's training met {name} {bound}{unit} (the best: {best:g}{unit}): no option explains it"
     )
+
+
+def _refused_by_operator(case: _Case, health: Health) -> str | None:
+    """Said where the run ended at a refusal to arm for what an operator has to do: no option is read by that check."""
+    if case.run.refused_by:
+        return None
+    said = next((one for one in health.findings if one.kind == "prearm" and one.suspect == "operation"), None)
+    return said and f"{said.title}: that check reads no option of the profile, so none explains it"
 
 
 def _new_way_to_fail(case: _Case) -> str | None:
