@@ -32,7 +32,7 @@ from care_core.extract.registry import (
 from care_core.logs.base import Table, Wanted
 from care_core.logs.plausible import is_alive, plausible
 from care_core.run import Check, Evidence, Unavailable, Value, is_known
-from care_core.vehicles import error_kind, error_words, flies, mode_name, motor_outputs
+from care_core.vehicles import FAILSAFE, error_kind, error_words, flies, mode_name, motor_outputs
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +48,9 @@ _DRIVES = frozenset(("rover",))
 _GLIDES = frozenset(("plane", "quadplane"))
 """What lands where it finds room: its last height says little."""
 _MOVED_M = 5.0
+_TOUCHED_S, _SWITCHED_OFF_S = 5.0, 0.05
+_BARELY_M = 0.5
+"""Rise below which a vehicle never left the ground: barometers drift by less in a flight's time."""
 """A receiver that stands still wanders by its accuracy, 2 to 3 m."""
 PHASE_ARGS = {
     "phase": one_of(
@@ -64,7 +67,7 @@ HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
 
 _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
     (re.compile(r"crash", re.IGNORECASE), "crash"),
-    (re.compile(r"failsafe|battery .* is (low|critical)", re.IGNORECASE), "failsafe"),
+    (re.compile(rf"{FAILSAFE.pattern}|battery .* is (low|critical)", re.IGNORECASE), "failsafe"),
     (re.compile(r"EKF variance|lane switch|emergency yaw reset|GPS Glitch", re.IGNORECASE), "ekf"),
     (re.compile(r"thrust loss", re.IGNORECASE), "thrust"),
     (re.compile(r"vibration compensation", re.IGNORECASE), "vibration"),
@@ -326,6 +329,8 @@ def _took_off(mission: Mission, *, failed: bool) -> Value:
     flew = (len(heights) and bool(heights.max() > AIRBORNE_M)) or _detected(mission, _TOOK_OFF)
     if flew or failed:
         return float(flew)
+    if len(heights) and heights.max() > _BARELY_M:
+        return Unavailable(f"it rose no higher than {heights.max():.1f} m: too little to tell a flight by")
     return Unavailable("it never left the ground" if len(heights) else "the log holds no height")
 
 
@@ -336,6 +341,7 @@ def _landed(mission: Mission) -> Value:
         return _CUT
     heights = _heights(mission)
     low = bool(heights[-1] <= AIRBORNE_M) if len(heights) else _detected(mission, _LANDED)
+    low = low or _touched_down(mission)
     if not low and kind_flown(mission) in _GLIDES:
         return Unavailable(f"it was disarmed {heights[-1]:.0f} m above home" if len(heights) else "nothing says so")
     return float(low)
@@ -351,6 +357,16 @@ def _heights(mission: Mission) -> Floats:
                 if len(heights) and np.ptp(heights) > 0:
                     return np.asarray(heights - (0.0 if channel == "POS" else heights[0]), dtype=np.float64)
     return np.empty(0)
+
+
+def _touched_down(mission: Mission) -> bool:
+    """Whether the land detector found the ground just before it was disarmed, whatever a barometer that drifted says:
+    disarming itself sets the detector as well, so that record does not count."""
+    table = mission.table("EV")
+    if not has(table, "Id"):
+        return False
+    said = table.t[np.isin(table["Id"], _LANDED)]
+    return bool(((said > mission.end_s - _TOUCHED_S) & (said < mission.end_s - _SWITCHED_OFF_S)).any())
 
 
 def _detected(mission: Mission, events: tuple[int, ...]) -> bool:

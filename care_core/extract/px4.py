@@ -16,6 +16,9 @@ from care_core.run import Check, Evidence, Unavailable, Value
 from care_core.vehicles import mode_name, way_of
 from care_core.vehicles.modes import Way
 
+_BARELY_M = 0.5
+"""Rise below which a vehicle never left the ground."""
+
 STATUS, LANDED, RESULT, FLAGS = "vehicle_status", "vehicle_land_detected", "mission_result", "failsafe_flags"
 POSITION = "vehicle_local_position"
 _ARMED = 2
@@ -96,7 +99,9 @@ def _took_off(mission: Mission) -> Value:
     position = mission.table(POSITION)
     heights = position["z"][np.isfinite(position["z"])] if has(position, "z") else np.empty(0)
     if len(heights):
-        return 1.0 if heights[0] - heights.min() > AIRBORNE_M else Unavailable("it never left the ground")
+        rose = float(heights[0] - heights.min())
+        barely = f"it rose no higher than {rose:.1f} m" if rose > _BARELY_M else "it never left the ground"
+        return 1.0 if rose > AIRBORNE_M else Unavailable(barely)
     if not has(mission.table(LANDED), "landed"):
         return Unavailable("the log does not say when it was on the ground", f"record {LANDED}", LANDED)
     flew = _ever(mission, LANDED, "landed", 0)

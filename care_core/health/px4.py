@@ -278,8 +278,11 @@ def _states(flight: Px4Flight) -> Iterator[tuple[Moment, Finding | None]]:
 def _state(
     flight: Px4Flight, t: Floats, bad: NDArray[np.bool_], flag: Flag, source: str, at_least_s: float = 0.0
 ) -> Iterator[tuple[Moment, Finding | None]]:
-    """A state that began while the vehicle was armed; one that held before, it was armed with."""
-    spans = [span for span in _runs(t, bad) if span[1] - span[0] >= at_least_s and _began(flight, span[0])]
+    """A state that began while the vehicle was armed; one that held before, or from its first record on, it was armed
+    with: flown by a ground station alone it never had a radio to lose."""
+    spans = [
+        span for span in _runs(t, bad) if span[1] - span[0] >= at_least_s and span[0] > t[0] and _began(flight, span[0])
+    ]
     if not spans:
         return
     start, end = spans[0]

@@ -4,7 +4,7 @@ Facts of ArduPilot's and PX4's source, as tables. Knows nothing of logs.
 """
 
 from care_core.vehicles.arming import method_words
-from care_core.vehicles.errors import error_kind, error_words, is_over
+from care_core.vehicles.errors import FAILSAFE, error_kind, error_words, is_over
 from care_core.vehicles.events import event_words
 from care_core.vehicles.modes import Way, mode_name, mode_number, reason_words, way_of
 from care_core.vehicles.motors import Motor, is_skid_steered, motor_outputs, motors_of
@@ -13,6 +13,7 @@ from care_core.vehicles.self_written import is_self_written
 from care_core.vehicles.vehicle import UNLIKE_ROVERS, Kind, Vehicle, flies, vehicle_of
 
 __all__ = [
+    "FAILSAFE",
     "UNLIKE_ROVERS",
     "Kind",
     "Motor",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -9,6 +10,10 @@ from care_core.vehicles.modes import mode_name
 from care_core.vehicles.vehicle import Kind
 
 _FLIGHT_MODE, _EKF_PRIMARY, _FENCE = 10, 24, 9
+FAILSAFE = re.compile(
+    r"(?<!PrecLand: )failsafe(?!s? (measures|off|over|cleared|disabled)\b|\W+(short|long) event off)", re.IGNORECASE
+)
+"""Texts that say that a failsafe acts, not that one is over or, in a landing on a target, what is done without it."""
 _FENCES = ((1, "upper altitude"), (2, "circle"), (4, "polygon"), (8, "lower altitude"))
 
 

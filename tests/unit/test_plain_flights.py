@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from care_core.diagnose.judging import judge, unread_options, verdict
+from care_core.causal.model import Model
+from care_core.diagnose.judging import beyond_training, judge, unread_options, verdict
 from care_core.extract.modes import mode_names
 from care_core.extract.registry import Mission
+from care_core.logs.base import Table
 from care_core.profile.schema import read_schema
 from care_core.report.terminal import to_text
 from care_core.run import Check, MissionInfo, Unavailable, Value, is_known
@@ -191,3 +194,43 @@ def test_several_missions_are_listed_with_their_verdicts() -> None:
     assert "   1  OK, 100 to 150 s: no mission was flown  <- this report" in shown
     assert "   2  FAULT, 200 to 250 s: no_crash" in shown
     assert "Missions of this log" not in to_text(made_diagnosis())
+
+
+@pytest.mark.parametrize(
+    ("text", "acts"),
+    [
+        ("Battery 1 is low 9.80V used 500 mAh", True),
+        ("Radio Failsafe", True),
+        ("EKF Failsafe: changed to LAND Mode", True),
+        ("Failsafe. Short event on: type=1/reason=3", True),
+        ("PrecLand: Failsafe Measures", False),
+        ("Throttle failsafe off", False),
+        ("EKF Failsafe Cleared", False),
+    ],
+)
+def test_what_is_over_or_a_landing_without_its_target_is_no_failsafe(text: str, *, acts: bool) -> None:
+    said = table([(40.0, text)], "Message")
+    assert checks(flown(mode=0, MSG=said))["no_failsafe"] == 1.0 - acts
+
+
+def test_a_land_detector_is_believed_over_a_barometer_that_drifted() -> None:
+    high = flown(mode=0)
+    channel, column = "POS", "RelHomeAlt"
+    drifted = high.tables[channel]
+    columns = {**drifted.columns, column: drifted[column] + 5.0}
+    tables = {**high.tables, channel: Table(drifted.t, columns), "EV": table([(0.0, 99)], "Id")}
+    assert checks(replace(high, tables=tables))["landed"] == 0.0
+    tables["EV"] = table([(high.end_s - 1.0, 18)], "Id")
+    assert checks(replace(high, tables=tables))["landed"] == 1.0
+    tables["EV"] = table([(high.end_s, 18)], "Id")  # disarming says so itself
+    assert checks(replace(high, tables=tables))["landed"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("length_m", "is_unlike"),
+    [(201.0, False), (500.0, False), (1100.0, False), (1200.0, True), (60.0, False), (3, True)],
+)
+def test_what_a_mission_unlike_all_of_the_training_may_need_is_not_known(length_m: float, *, is_unlike: bool) -> None:
+    model = cast("Model", SimpleNamespace(summaries={"path_length": SimpleNamespace(low=201.0, high=810.0)}))
+    run = replace(made_run(), context={"path_length": length_m})
+    assert bool(beyond_training(run, read_schema(PROFILE), model)) == is_unlike

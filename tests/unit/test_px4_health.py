@@ -94,6 +94,14 @@ def test_flags_raised_in_flight_are_findings_and_those_before_arming_are_not() -
     assert not any("ground station" in text for text in texts(health))
 
 
+def test_a_flight_that_never_had_a_radio_has_lost_none() -> None:
+    flown = states(arming_state=[(0, 2), (40, 1)], nav_state=[(0, 17)])
+    health = examine(
+        MadeLog({"vehicle_status": flown, "failsafe_flags": states(manual_control_signal_lost=[(0.3, 1)])})
+    )
+    assert "radio" not in [one.kind for one in health.findings]
+
+
 def test_a_sensor_that_the_estimator_rejects_is_found_after_a_second_of_it() -> None:
     ratios = states(vel_test_ratio=[(0, 0.1), (30, 1.4), (30.3, 0.2)], mag_test_ratio=[(0, 0.1), (30, 1.4), (36, 0.2)])
     health = examine(MadeLog({"vehicle_status": FLOWN, "estimator_status": ratios}))

@@ -33,6 +33,7 @@ from care_core.health.records import Moment
 from care_core.logs.base import Wanted
 from care_core.run import Damage
 from care_core.vehicles import (
+    FAILSAFE,
     Vehicle,
     error_kind,
     error_words,
@@ -124,6 +125,9 @@ def _arming(flight: Flight) -> Iterator[Moment]:
             lasted = f", armed for {t - armed_at:.0f} s" if armed_at is not None else ""
             yield Moment(t, "arming", " ".join(filter(None, ("disarmed", how))) + lasted, "ARM")
             armed_at = None
+    if not flight.arm_changes and flight.armed:
+        how = "it is written while armed only (LOG_DISARMED 0)" if flight.is_written_armed else "by its throttle"
+        yield Moment(flight.armed[0][0], "arming", f"armed: the log tells of no arming, {how}", "the log")
     yield from _refusals(flight)
 
 
@@ -314,7 +318,7 @@ def _texts(flight: Flight) -> Iterator[Moment]:
         if item is not None:
             items.append((t, *item))
         elif not is_routine(text) and not _is_recorded(text, t, flight):
-            kind = "crash" if "crash" in text.casefold() else "failsafe" if "failsafe" in text.casefold() else "message"
+            kind = "crash" if "crash" in text.casefold() else "failsafe" if FAILSAFE.search(text) else "message"
             told.append(Moment(t, kind, text, "MSG"))
     yield from repeats(told)
     yield from _mission(flight, items)
