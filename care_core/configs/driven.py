@@ -8,10 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from care_core.run import Setting, shown
 from care_core.text import clean, clock
 from care_core.variables import Variable
-from care_core.vehicles.self_written import is_self_written
-
-SIMULATOR_PREFIX = "SIM_"
-"""Parameters of a simulated world: a real vehicle has none, so they are never options."""
+from care_core.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 
 SEVEN_DIGITS = 1e-6
 """Vehicles hold parameters in 32 bits (24 of mantissa: 6e-8 of a value), files and reports in seven digits (5e-7)."""

@@ -33,7 +33,9 @@ _TELLING = re.compile(
     re.IGNORECASE,
 )
 _CHANGES_NAMED = 4
-_TELEMETRY_RATE = re.compile(r"SR\d_|MAV\d*_\w*RATE")
+_TELEMETRY_RATE = re.compile(
+    r"SR\d+_|MAV\d*_(\w*RATE|RAW_SENS|EXT_STAT|RC_CHAN|RAW_CTRL|POSITION|EXTRA\d|PARAMS|ADSB)\b"
+)
 """Rates that ground stations set by themselves when they connect."""
 _PAUSE_S, _GAP_MEDIANS, _IDLE_S = 2.0, 20.0, 60.0
 _SWITCHED_WITHIN_S = 2.0

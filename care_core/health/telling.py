@@ -17,6 +17,8 @@ SLACK_S = 1.5
 """Onsets are told this exactly: a consequence may be seen so much before its cause is."""
 LIKELY = 0.5
 """A finding at least this probable is told before suspicions of the same severity, and is no consequence of one."""
+OVER_S = 60.0
+"""What was over for so long before something began did not bring it about."""
 SYMPTOMS: frozenset[FindingKind] = frozenset(("attitude", "crash", "estimator", "log"))
 """What shows that something is wrong, not what: told after causes of the same weight."""
 _SEVERITY = {"critical": 0, "warning": 1, "info": 2}
@@ -68,6 +70,7 @@ def _explains(cause: Finding, finding: Finding, reach: Leads) -> bool:
         not (finding.severity == "info" and finding.suspect == "parameter")  # it was set so before anything failed
         and finding.kind in reach.get(cause.kind, frozenset())
         and cause.onset_s <= finding.onset_s + SLACK_S
+        and cause.end_s >= finding.onset_s - OVER_S
         and (finding.probability < LIKELY or (cause.probability >= LIKELY and not _only_set(cause, finding)))
     )
 

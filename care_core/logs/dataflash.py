@@ -350,6 +350,8 @@ def _read_formats(data: FileArray, starts: Offsets) -> tuple[list[Format], list[
         known = formats.get(form.type)
         if known is not None and (known.name, known.length, known.fields) == (form.name, form.length, form.fields):
             continue
+        if known is not None and form.type == _FMT and form.length == _FMT_LENGTH:
+            continue  # firmware before 3.2 names one column fewer of its own declarations: the same bytes
         if known is not None:
             redefined.append(Damage(f"message type {form.type} ({known.name}) is declared again as {name}", byte))
         formats[form.type] = form

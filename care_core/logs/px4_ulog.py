@@ -145,7 +145,7 @@ class Px4Log:
     def _damage(self, ulog: Any) -> tuple[Damage, ...]:
         times = self._seconds(np.array([one.timestamp for one in ulog.dropouts]))
         dropouts = [Damage(f"{one.duration} ms were not recorded (dropout)", None, t)
-                    for one, t in zip(ulog.dropouts, times.tolist(), strict=True)]  # fmt: skip
+                    for one, t in zip(ulog.dropouts, times.tolist(), strict=True) if one.duration > 0]  # fmt: skip
         broken = _first_break(self.path, self.duration_s)
         if broken is None and ulog.file_corruption:
             broken = Damage("records that fit no declaration")

@@ -10,6 +10,9 @@ from __future__ import annotations
 import re
 from fnmatch import translate
 
+SIMULATOR_PREFIX = "SIM_"
+"""Parameters of ArduPilot's simulated world: only its builds have any, so they are never options."""
+
 SELF_WRITTEN: dict[str, tuple[str, ...]] = {
     "statistics and counters": (
         "STAT_*", "MIS_TOTAL", "FENCE_TOTAL", "RALLY_TOTAL", "LOG_LASTFILE", "SYS_NUM_RESETS", "FORMAT_VERSION",

@@ -22,6 +22,8 @@ _KINDS: Mapping[str, Kind] = {
 }  # fmt: skip
 _VERSION = re.compile(r"[Vv](\d+)\.(\d+)(?:\.(\d+))?")
 _HELI_CLASSES = frozenset((6, 11, 13))
+_HELI_ONLY = "H_SV1_POS", "H_SV_1_POS", "H_SWASH_TYPE", "H_SW_TYPE", "H_COL_MIN"
+"""Parameters of the swash plate: only the firmware built for helicopters has any (AP_MotorsHeli, of every age)."""
 _ROVER_CLASSES = {2: "boat", 3: "balance bot"}
 UNLIKE_ROVERS = frozenset(_ROVER_CLASSES.values())
 """What Rover's firmware drives as well."""
@@ -82,7 +84,11 @@ def _kind(firmware: str, facts: Mapping[str, str], settings: Driven) -> Kind:
         return "px4"
     match = _FIRMWARE.match(firmware)
     kind = _KINDS[match[1].casefold()] if match else "unknown"
-    if kind == "copter" and (facts.get("vehicle") == "helicopter" or code(settings, "FRAME_CLASS") in _HELI_CLASSES):
+    if kind == "copter" and (
+        facts.get("vehicle") == "helicopter"
+        or code(settings, "FRAME_CLASS") in _HELI_CLASSES
+        or any(name in settings for name in _HELI_ONLY)
+    ):
         return "heli"
     if kind == "plane" and (facts.get("vehicle") == "VTOL" or code(settings, "Q_ENABLE") in (1, 2)):
         return "quadplane"

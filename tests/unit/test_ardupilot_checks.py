@@ -544,3 +544,93 @@ def test_a_barometer_that_drifts_from_the_range_finder_on_the_ground_is_noted(dr
     found = made.find()
     assert [one.kind for one in found] == kinds
     assert all(one.severity == "info" for one in found)
+
+
+def test_gyros_that_turn_fast_differ_by_their_scale_and_are_not_noisy() -> None:
+    made = Made()
+    flips = made.after(FAILS_S, FAILS_S + 30)
+    for axis, period in zip("XYZ", (3.0, 4.0, 5.0), strict=True):
+        turn = np.radians(300 * np.sin(2 * np.pi * made.t / period))[flips]
+        made.table["IMU"][f"Gyr{axis}"][flips] += turn
+        made.table["IMU#2"][f"Gyr{axis}"][flips] += 0.97 * turn
+    assert not [one for one in made.find() if one.kind == "imu"]
+
+
+def test_a_log_that_is_written_while_armed_only_tells_of_no_arming() -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    assert made.flight().armed == ()
+    made.settings["LOG_DISARMED"] = 0
+    assert made.flight().armed == ((0.0, END_S),)
+    made.rows["MSG"] = [(5.0, {"Message": "PreArm: Need 3D Fix"})]  # a refusal opens a log as well
+    assert made.flight().armed == ()
+
+
+def test_a_planes_throttle_is_in_percent() -> None:
+    (table,) = instances({"CTUN": Table(np.arange(3.0), {"ThO": np.array([0.0, 15.0, 40.0])})}, "CTUN")
+    assert table["ThO"].tolist() == pytest.approx([0.0, 0.15, 0.4])
+
+
+def test_a_log_whose_last_record_is_the_disarming_does_not_end_in_the_air() -> None:
+    made = Made()
+    made.rows["ARM"][-1] = (70.0, {"ArmState": 0.0, "Forced": 0.0})
+    tables = {name: table.between(0.0, 70.0) for name, table in made.tables().items()}
+    flight = made.flight()
+    assert find(Flight(tables, flight.settings, flight.facts, 70.0)) == ()
+
+
+def test_what_is_not_recorded_between_two_flights_is_no_hole() -> None:
+    made = Made()
+    made.rows["ARM"] += [(40.0, {"ArmState": 0.0, "Forced": 0.0}), (60.0, {"ArmState": 1.0, "Forced": 0.0})]
+    tables = {name: table.where((table.t <= 40.2) | (table.t >= 59.9)) for name, table in made.tables().items()}
+    flight = made.flight()
+    assert not [one for one in find(Flight(tables, flight.settings, flight.facts, END_S)) if one.kind == "log"]
+
+
+@pytest.mark.parametrize(
+    ("text", "suspect"),
+    [
+        ("PreArm: RC not calibrated", "operation"),
+        ("Arm: RTL mode not armable", "operation"),
+        ("Arm: Throttle too high", "operation"),
+        ("PreArm: Check ANGLE_MAX", "parameter"),
+        ("PreArm: Need Position Estimate", "parameter"),
+    ],
+)
+def test_a_refusal_for_what_an_operator_has_to_do_is_no_parameters(text: str, suspect: str) -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    made.rows["MSG"] = [(20.0, {"Message": text}), (50.0, {"Message": text})]
+    (finding,) = [one for one in made.find() if one.kind == "prearm"]
+    assert finding.suspect == suspect
+    assert (finding.probability > 0.9) == (suspect == "operation")
+
+
+def test_the_throttle_of_a_helicopter_is_its_collective_pitch() -> None:
+    made = Made()
+    made.table["CTUN"]["ThO"][made.after(UP_S, DOWN_S)] = 0.75
+    assert [one.kind for one in made.find()] == ["thrust"]
+    made.settings["H_COL_MIN"] = 1250  # firmware before 3.5 names no frame class
+    assert made.flight().vehicle.kind == "heli"
+    assert "thrust" not in [one.kind for one in made.find()]
+
+
+def test_a_simulated_battery_and_computer_are_nobodys_business() -> None:
+    made = Made()
+    made.settings["SIM_BATT_VOLTAGE"] = 12.6
+    made.table["BAT"]["Volt"][:] = 12.6
+    made.table["PM"]["NLon"][made.after(FAILS_S)] = 1500
+    assert made.find() == ()
+
+
+def test_a_receiver_that_starts_has_not_lost_its_satellites() -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    made.rows["MSG"] = [(20.0, {"Message": "Arm: RTL mode not armable"})]
+    starts = made.after(0.0, 8.0)
+    made.table["GPS"]["Status"][starts] = 1
+    made.table["GPS"]["NSats"][starts] = 0
+    assert [one.kind for one in made.find()] == ["prearm"]

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.health.records import Finding, FindingKind, Severity
-from care_core.health.telling import SLACK_S, Leads, told
+from care_core.health.telling import OVER_S, SLACK_S, Leads, told
 
 LEADS: Leads = {"laser": frozenset({"planner"}), "planner": frozenset({"control"}), "battery": frozenset({"drive"})}
 KINDS: tuple[FindingKind, ...] = ("laser", "planner", "control", "battery", "drive")
@@ -31,6 +31,12 @@ def test_a_cause_seen_just_after_its_consequence_still_leads_it() -> None:
         "planner",
         "laser",
     ]
+
+
+def test_what_was_over_long_before_brings_nothing_about() -> None:
+    soon, late = finding("planner", 2.0 + OVER_S), finding("planner", 2.1 + OVER_S)
+    assert len(told([finding("laser", 1.0), soon], LEADS)) == 1
+    assert len(told([finding("laser", 1.0), late], LEADS)) == 2
 
 
 def test_a_lesser_finding_explains_no_worse_one() -> None:

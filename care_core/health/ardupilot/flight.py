@@ -19,6 +19,7 @@ from care_core.health.ardupilot.signals import Floats, instances
 from care_core.logs.base import Table, Wanted
 from care_core.run import Setting
 from care_core.vehicles import Vehicle, vehicle_of
+from care_core.vehicles.self_written import SIMULATOR_PREFIX
 
 Mask = NDArray[np.bool_]
 Span = tuple[float, float]
@@ -108,6 +109,11 @@ class Flight:
         return None if motors is None else sum(name.startswith("Mot") for name in motors.columns)
 
     @property
+    def is_simulated(self) -> bool:
+        """Whether ArduPilot's simulator wrote the log: only its builds have parameters of the simulation."""
+        return any(name.startswith(SIMULATOR_PREFIX) for name in self.settings)
+
+    @property
     def is_copter(self) -> bool:
         """Whether rotors alone lift it; a log that does not say is told by what only copters have."""
         kind = self.vehicle.kind
@@ -147,11 +153,11 @@ class Flight:
 
     @cached_property
     def armed(self) -> tuple[Span, ...]:
-        """Spans armed. A log whose first word is a disarming was armed from its start; one that tells of no arming
-        at all is taken as armed where its throttle is up."""
-        changes = self._arm_changes()
+        """Spans armed. A log whose first word is a disarming was armed from its start; so was one that tells of none
+        and is written while armed only; any other that tells of none is taken as armed where its throttle is up."""
+        changes = self.arm_changes
         if not changes:
-            return self._driven()
+            return ((0.0, self.end_s),) if self.is_written_armed else self._driven()
         spans: list[Span] = []
         start: float | None = 0.0 if not changes[0][1] else None
         for t, is_armed in changes:
@@ -164,12 +170,21 @@ class Flight:
             spans.append((start, self.end_s))
         return tuple(span for span in spans if span[1] > span[0])
 
-    def _arm_changes(self) -> list[tuple[float, bool]]:
+    @cached_property
+    def arm_changes(self) -> tuple[tuple[float, bool], ...]:
+        """When it was armed and disarmed, as the log says it."""
         table = self.one("ARM", "ArmState")
         if table is not None:
-            return [(t, state > 0) for t, state in zip(table.t.tolist(), table["ArmState"].tolist(), strict=True)]
+            return tuple((t, state > 0) for t, state in zip(table.t.tolist(), table["ArmState"].tolist(), strict=True))
         changes = [(t, True) for t in self.events(_EV_ARMED)] + [(t, False) for t in self.events(_EV_DISARMED)]
-        return sorted(changes)
+        return tuple(sorted(changes))
+
+    @property
+    def is_written_armed(self) -> bool:
+        """Whether the log is one that is written while armed only: LOG_DISARMED is 0, and no refused arming kept it
+        open (AP_Logger: log_while_disarmed)."""
+        is_refused = any(text.startswith(("Arm: ", "PreArm: ")) for _, text in self.messages)
+        return not self.is_telemetry and self.setting("LOG_DISARMED") == 0 and not is_refused
 
     def _driven(self) -> tuple[Span, ...]:
         throttle = self.throttle

@@ -15,7 +15,7 @@ LEADS: Mapping[FindingKind, frozenset[FindingKind]] = {
         ("thrust", "tuning", "vibration", "estimator", "battery", "gps", "compass", "barometer", *_FALL)
     ),
     "thrust": frozenset(("battery", *_FALL)),
-    "battery": frozenset(("thrust", "motor", "log", "attitude", "crash", "cpu")),
+    "battery": frozenset(("thrust", "motor", "log", "attitude", "crash")),
     "gps": frozenset(("estimator", "attitude", "crash", "prearm")),
     "compass": frozenset(("estimator", "gps", "prearm", *_FALL)),
     "barometer": frozenset(("estimator", "thrust", "crash", "prearm")),

@@ -53,7 +53,9 @@ _FORMER: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 _CENTIVOLTS = 200.0
 """A pack reads more than this only where it is recorded in hundredths of a volt (CURR before 3.3)."""
 _FULL_SCALE = 2.0
-"""Throttle above this is in thousandths (before 3.4), at most 1 since."""
+"""Throttle of a copter is in thousandths before 3.4, at most 1 since."""
+_PERCENT = 100.0
+"""A plane's throttle is in percent (ArduPlane/Log.cpp: CTUN.ThO), so more than `_FULL_SCALE` under today's name is."""
 
 
 def expanded(reads: Wanted) -> dict[str, tuple[str, ...]]:
@@ -93,7 +95,7 @@ def _renamed(name: str, table: Table) -> Table:
     if name == "CTUN":
         for field in ("ThO", "ThI"):
             if field in columns and _top(columns[field]) > _FULL_SCALE:
-                columns[field] = columns[field] / 1000
+                columns[field] = columns[field] / (_PERCENT if field in table.columns else 1000)
         if "Alt" not in columns and "BAlt" in columns:
             columns["Alt"] = columns["BAlt"]
     keep = np.isfinite(table.t)

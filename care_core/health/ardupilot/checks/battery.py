@@ -128,7 +128,7 @@ def _load(table: Table, start: float, end: float) -> str:
 def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
     """Numbers that no battery gives: a voltage that does not move while motors work, or none at all."""
     loaded = flight.during(flight.flown, table.t)
-    if loaded.sum() < 20 or not flight.setting("BATT_MONITOR"):
+    if loaded.sum() < 20 or not flight.setting("BATT_MONITOR") or flight.is_simulated:
         return
     volts = table["Volt"][loaded]
     if not np.isfinite(volts).any():

@@ -169,6 +169,8 @@ def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
 
 def _few(flight: Flight, table: Table) -> Iterator[Finding]:
     """Few satellites, or far fewer than before; a poor HDop."""
+    if not flight.armed and (table["Status"] >= _FIX).any():
+        table = table.where(slice(int(np.argmax(table["Status"] >= _FIX)), None))  # before it a receiver starts
     t, sats = table.t, table["NSats"]
     if len(t) < 3 or not (table["Status"] >= _FIX).any():
         return

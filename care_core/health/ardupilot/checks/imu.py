@@ -30,6 +30,9 @@ OFFSET_ACC = 3.0
 """m/s^2: four times what arming allows, since arms flex and rotation moves sensors apart."""
 _DPS_PER_VIBE = 0.15
 """What vibration may add, degrees/s a m/s^2."""
+_OF_RATE, _FAST_DPS = 0.06, 30.0
+"""Two gyros of 3 % scale each differ by this share of a rate (MPU-6000 datasheet: sensitivity tolerance +-3 %); below
+this mean rate that is nothing beside their noise."""
 _USUAL_VIBE = 15.0
 _SHAKEN_DPS = 20.0
 _OFFSET_OVER_S = 15.0
@@ -73,7 +76,7 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     noise = np.min([smooth(t, np.abs(axis - smooth(t, axis, 5.0)), 8.0) for axis in apart], axis=0)
     offset = np.max([np.abs(smooth(t, axis, _OFFSET_OVER_S)) for axis in apart], axis=0)
     vibration = _vibration(flight, t)
-    limit = NOISE_DPS + _DPS_PER_VIBE * vibration
+    limit = NOISE_DPS + _DPS_PER_VIBE * vibration + _turning(sensors[0])
     over = np.maximum(noise / limit, np.where(_shaken(sensors[0]), 0.0, offset / OFFSET_DPS))
     spans = lasting(t, over > 1.0, _LASTS_S, gap_s=3.0)
     if not spans:
@@ -91,6 +94,12 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
         if is_noise else f"gyros 1 and 2 differ by {size:.1f} degrees/s (limit {OFFSET_DPS:g})",
         "IMU.GyrX, GyrY, GyrZ of both; AP_Arming allows 5 degrees/s at rest", probability=likely(ratio, _CALIBRATION),
     )  # fmt: skip
+
+
+def _turning(table: Table) -> Floats:
+    """What turning fast adds, degrees/s: a flip, a roll or a tumble shows the scale and delay of each sensor."""
+    rate = smooth(table.t, np.degrees(length(table[axis] for axis in GYROS)), 8.0)
+    return _OF_RATE * np.maximum(rate - _FAST_DPS, 0.0)
 
 
 def _beginning(t: Floats, over: Floats, span: Span) -> float:

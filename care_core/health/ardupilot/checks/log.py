@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.health.ardupilot.flight import Flight
+from care_core.health.ardupilot.flight import Flight, Mask
+from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding
 from care_core.logs.base import Wanted
 
@@ -14,6 +15,7 @@ READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "POWR": ("Vcc",)}
 
 _STEADY = ("ATT", "RCOU", "CTUN", "IMU")
 _HOLE_S, _TIMES = 2.0, 20.0
+_SWITCHED_S = 1.0
 _HIGH_M = 2.0
 _FALLS_V = 0.3
 """Twice the swing that ArduPilot's page on brown-outs calls normal."""
@@ -32,8 +34,7 @@ def _holes(flight: Flight) -> Iterator[Finding]:
     t = np.sort(np.concatenate(streams))
     steps = np.diff(t)
     limit = max(_HOLE_S, _TIMES * float(np.median(np.diff(streams[0]))))
-    armed = flight.during(flight.armed, t[:-1]) & flight.during(flight.armed, t[1:])
-    holes = np.flatnonzero((steps > limit) & armed)
+    holes = np.flatnonzero((steps > limit) & _inside(flight, t[:-1], t[1:]))
     if len(holes):
         total = float(steps[holes].sum())
         if flight.is_telemetry:
@@ -50,10 +51,21 @@ def _holes(flight: Flight) -> Iterator[Finding]:
         )  # fmt: skip
 
 
+def _inside(flight: Flight, start: Floats, end: Floats) -> Mask:
+    """Which steps lie within one span armed and clear of its ends: there loggers are opened and closed."""
+    inside = np.zeros(len(start), dtype=bool)
+    for begin, over in flight.armed:
+        is_open = begin > 0.0
+        inside |= (start >= begin + _SWITCHED_S * is_open) & (end <= over) & (start <= over - _SWITCHED_S)
+    return inside
+
+
 def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
     """Armed and lifting at the last record: power was lost, or the recording was stopped."""
     if not flight.armed or flight.armed[-1][1] < flight.end_s or flight.impact_s is not None:
         return
+    if flight.arm_changes and not flight.arm_changes[-1][1]:
+        return  # it was disarmed with its last record
     high = flight.height is not None and float(np.median(flight.height[1][-3:])) > _HIGH_M
     up = flight.throttle is not None and float(np.median(flight.throttle[1][-3:])) > 0.2
     if not (flight.is_copter and high and (up or flight.throttle is None)):

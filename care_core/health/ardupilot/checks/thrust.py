@@ -31,8 +31,8 @@ hence more than that where no option keeps the motors down."""
 
 def find(flight: Flight) -> Iterator[Finding]:
     """Saturation first, for it says more than a high hover throttle."""
-    if not flight.is_copter or flight.throttle is None:
-        return
+    if not flight.is_copter or flight.vehicle.kind == "heli" or flight.throttle is None:
+        return  # what a helicopter records as throttle is its collective pitch
     t, throttle = flight.throttle
     flown = flight.during(flight.flown or flight.watched, t) & (throttle > 0.05)
     if flown.sum() < 5:
