@@ -409,7 +409,7 @@ def _refused_by_operator(case: _Case, health: Health) -> str | None:
     if case.run.refused_by:
         return None
     said = next((one for one in health.findings if one.kind == "prearm" and one.suspect == "operation"), None)
-    return said and f"{said.title}: that check reads no option of the profile, so none explains it"
+    return f"{said.title}: that check reads no option of the profile, so none explains it" if said else None
 
 
 def _new_way_to_fail(case: _Case) -> str | None:

@@ -563,6 +563,11 @@ def test_a_log_that_is_written_while_armed_only_tells_of_no_arming() -> None:
     assert made.flight().armed == ()
     made.settings["LOG_DISARMED"] = 0
     assert made.flight().armed == ((0.0, END_S),)
+    outputs = {name: made.table["RCOU"][name].copy() for name in ("C1", "C2", "C3", "C4")}
+    for name in outputs:
+        made.table["RCOU"][name][:] = 1000.0
+    assert made.flight().armed == ()  # a log was forced open on the ground
+    made.table["RCOU"].update(outputs)
     made.rows["MSG"] = [(5.0, {"Message": "PreArm: Need 3D Fix"})]  # a refusal opens a log as well
     assert made.flight().armed == ()
 

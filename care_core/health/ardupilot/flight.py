@@ -51,6 +51,10 @@ _OVER_DEG = 70.0
 """No copter leans this far in any mode but acro, sport and flip: ANGLE_MAX is at most 80, 30 to 45 as shipped."""
 _LIFTING = 0.2
 """Throttle above which a copter is about to lift; MOT_SPIN_MIN and what armed motors idle at is below."""
+_MOTORS = frozenset((*range(33, 41), *range(82, 86), 70, 73, 74))
+"""SERVOn_FUNCTION of motors and throttles (SRV_Channel.h)."""
+_LEAST_PWM, _WORKS_PWM = 1000.0, 150.0
+"""Microseconds; so far above the least of an output is more than idling (MOT_SPIN_ARM 0.1 of 1000)."""
 _AIRBORNE_M = 1.0
 _REFUSED_S = 30.0
 """The firmware repeats its complaints at least as often (AP_Arming: every 30 s)."""
@@ -181,10 +185,22 @@ class Flight:
 
     @property
     def is_written_armed(self) -> bool:
-        """Whether the log is one that is written while armed only: LOG_DISARMED is 0, and no refused arming kept it
-        open (AP_Logger: log_while_disarmed)."""
+        """Whether the log is one that is written while armed only: LOG_DISARMED is 0, no refused arming kept it open
+        (AP_Logger: log_while_disarmed), and its motors work."""
         is_refused = any(text.startswith(("Arm: ", "PreArm: ")) for _, text in self.messages)
-        return not self.is_telemetry and self.setting("LOG_DISARMED") == 0 and not is_refused
+        is_only = not self.is_telemetry and self.setting("LOG_DISARMED") == 0 and not is_refused
+        return is_only and (bool(self._driven()) or self._motors_work)
+
+    @property
+    def _motors_work(self) -> bool:
+        """Whether an output that drives a motor ever left its least."""
+        table = self.one("RCOU")
+        outputs = [n for n in range(1, 15) if self.setting(f"SERVO{n}_FUNCTION") in _MOTORS] if table else []
+        return table is not None and any(
+            f"C{n}" in table.columns
+            and np.nanmax(table[f"C{n}"]) > (self.setting(f"SERVO{n}_MIN") or _LEAST_PWM) + _WORKS_PWM
+            for n in outputs
+        )
 
     def _driven(self) -> tuple[Span, ...]:
         throttle = self.throttle
