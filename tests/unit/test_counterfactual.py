@@ -172,7 +172,7 @@ def test_a_bound_outside_what_the_target_can_be(planted: Profile, op: str, proba
 
 
 def test_the_interval_of_a_new_mission_holds_four_in_five(planted: Profile) -> None:
-    flown = fly_many(150, seed=7)
+    flown = fly_many(600, seed=7)
     flown = flown[flown["time"].notna()]
     configs = flown[list(DEFAULTS)].to_dict("records")
     for name in ("time", "energy"):
