@@ -476,7 +476,9 @@ def db3(path: Path, rng: Rng) -> Broken:
                     database.execute(f"update topics set {column} = ? where id = ?", (value, topic))
                     what += f" {column} {value!r}"
                 elif kind == 2:
-                    rows = database.execute("select id, timestamp from messages").fetchall()
+                    rows = database.execute(
+                        "select id, timestamp from messages where typeof(timestamp) = 'integer'"
+                    ).fetchall()
                     wrapped = [((change(t // 1000) * 1000 + (1 << 63)) % (1 << 64) - (1 << 63), row) for row, t in rows]
                     database.executemany("update messages set timestamp = ? where id = ?", wrapped)
                     what += f" {name}"

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from care_core.health.records import Health
+from care_core.health.ros.checks import odometry
 from care_core.health.ros.checks.messages import gist
 from care_core.health.ros.examining import examine
 from care_core.logs.opening import open_log
@@ -256,3 +258,20 @@ def test_whatever_messages_hold_a_look_at_them_succeeds(seed: int, tmp_path: Pat
     health = examine(open_log(tmp_path / "random.mcap"))
     assert all(one.title and one.evidence for one in health.findings)
     assert len(health.account) <= 60
+
+
+@pytest.mark.parametrize("wrong", [{"parent": 7}, {"x": "far"}, {"child": None}])
+def test_a_transform_whose_fields_are_declared_as_what_they_are_not_says_nothing(wrong: dict[str, object]) -> None:
+    good: dict[str, object] = {"parent": "/map", "child": "odom", "x": 1.0, "y": 2.0}
+
+    def columns(*ones: dict[str, object]) -> list[NDArray[np.object_]]:
+        made = [np.empty(len(ones), dtype=object) for _ in good]
+        for column, name in zip(made, good, strict=True):
+            column[:] = [[one[name]] for one in ones]
+        return made
+
+    t = np.array([0.0, 1.0])
+    assert odometry._map_to_odom(t, *columns(good, good)).tolist() == [[0.0, 1.0, 2.0], [1.0, 1.0, 2.0]]
+    assert len(odometry._map_to_odom(t, *columns(good, good | wrong))) == 1
+    scalars = [np.array([7, 7], dtype=object)] * 4
+    assert len(odometry._map_to_odom(t, *scalars)) == 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from itertools import pairwise
 
 import numpy as np
@@ -196,10 +196,17 @@ def _corrections(recording: Recording) -> Iterator[Finding]:
 
 
 def _map_to_odom(t: Floats, *columns: Floats) -> Floats:
-    """Time, x and y of each map -> odom transform, shape (n, 3)."""
+    """Time, x and y of each map -> odom transform, shape (n, 3). The log itself says of what type its fields are: names
+    that are no text name nothing."""
     rows = []
-    for time_s, parents, children, xs, ys in zip(t.tolist(), *columns, strict=True):
-        for parent, child, x, y in zip(parents, children, xs, ys, strict=True):
-            if parent.strip("/") == "map" and child.strip("/").endswith("odom"):
+    for time_s, *fields in zip(t.tolist(), *columns, strict=True):
+        if not all(isinstance(field, Sized) for field in fields):
+            continue
+        for parent, child, x, y in zip(*fields, strict=False):
+            if str(parent).strip("/") == "map" and str(child).strip("/").endswith("odom") and _is_number(x, y):
                 rows.append((time_s, x, y))
     return np.array(rows, np.float64).reshape(-1, 3)
+
+
+def _is_number(*values: object) -> bool:
+    return all(isinstance(value, (int, float, np.number)) for value in values)
