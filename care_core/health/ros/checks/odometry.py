@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sized
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -195,7 +196,7 @@ def _corrections(recording: Recording) -> Iterator[Finding]:
             return
 
 
-def _map_to_odom(t: Floats, *columns: Floats) -> Floats:
+def _map_to_odom(t: Floats, *columns: NDArray[Any]) -> Floats:
     """Time, x and y of each map -> odom transform, shape (n, 3). The log itself says of what type its fields are: names
     that are no text name nothing."""
     rows = []
