@@ -20,6 +20,7 @@ _TERMINATED = 128 + signal.SIGTERM
 
 def main() -> None:
     """Entry point of the console script."""
+    usual = gc.get_threshold()
     gc.set_threshold(_CONTAINERS)
     is_listening = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN  # a shell's background job is not
     if is_listening:
@@ -35,6 +36,7 @@ def main() -> None:
     except KeyboardInterrupt:  # typer builds its commands before it handles any
         raise SystemExit(_INTERRUPTED) from None
     finally:
+        gc.set_threshold(*usual)
         if is_listening:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 

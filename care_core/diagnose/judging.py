@@ -24,10 +24,10 @@ from care_core.variables import Role, Threshold, Variable
 
 _YES = Threshold("==", 1.0)
 _FEW = 10
-UNLIKE, TINY = 0.5, 4.0
-"""A measure of the mission may leave the range that training saw by this share of it, and be so many times smaller than
-the least: as far as that the mechanisms are believed, where the profile fits in part only."""
 """As many names can be listed in a sentence."""
+UNLIKE = 4.0
+"""A length that the mission asks for may be so many times larger or smaller than any that training saw: as far as that
+what physics says of the rest is believed, where the profile fits in part only."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -249,11 +249,9 @@ def beyond_training(run: Run, schema: Schema, model: Model) -> str:
     empty where it is like them."""
     for variable in schema.contexts:
         value, summary = run.context.get(variable.name), model.summaries.get(variable.name)
-        if variable.about != "mission" or summary is None or not is_known(value):
+        if variable.about != "mission" or variable.unit != "m" or summary is None or not is_known(value):
             continue
-        margin = UNLIKE * (summary.high - summary.low)
-        is_tiny = 0 <= value < summary.low / TINY
-        if margin > 0 and (is_tiny or not summary.low - margin <= value <= summary.high + margin):
+        if not summary.low / UNLIKE <= value <= summary.high * UNLIKE:
             seen = f"{figures(summary.low)} to {figures(summary.high)}"
             return f"{variable.doc or variable.name} {figures(value)} {variable.unit}".rstrip() + f", {seen} there"
     return ""

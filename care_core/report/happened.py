@@ -121,7 +121,7 @@ def _finite(value: float) -> float | None:
 
 def finding_sentence(finding: FindingEntry) -> str:
     """A finding of a document with its numbers and what it led to."""
-    late = ", after the impact" if finding.after_impact else ""
+    late = ", after it was down" if finding.after_impact else ""
     led = f" Led to: {'; '.join(one.title for one in finding.consequences)}." if finding.consequences else ""
     return f"{finding.title}, at {seconds(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
 
@@ -165,7 +165,7 @@ def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
         return
     yield "Findings" if len(shown) == 1 else "Findings, the first cause first"
     for finding in shown:
-        late = ", after the impact" if finding.after_impact else ""
+        late = ", after it was down" if finding.after_impact else ""
         head = f"  {SEVERITY_WORDS[finding.severity]:<8}  "
         yield from wrapped(f"{finding.title}, at {seconds(finding.onset_s)}{late}", head)
         if finding.evidence:

@@ -163,7 +163,7 @@ def _findings(report: Report) -> Iterator[str]:
 
 def _finding(one: FindingEntry) -> Iterator[str]:
     style = _SEVERITY_CLASSES[one.severity]
-    late = ", after the impact" if one.after_impact else ""
+    late = ", after it was down" if one.after_impact else ""
     yield f'<li class="{style}"><p><span class="status {style}">{SEVERITY_WORDS[one.severity]}</span> '
     yield f"<strong>{escape(one.title)}</strong>, at {seconds(one.onset_s)}{late}</p>"
     if one.evidence:

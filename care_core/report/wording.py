@@ -57,7 +57,7 @@ WORST_NAMED = 2
 
 
 def critical(health: Health) -> list[Finding]:
-    """Findings that would stop a mission, those after the impact left out."""
+    """Findings that would stop a mission, those after it was down left out."""
     return [one for one in health.findings if one.severity == "critical" and not one.after_impact]
 
 

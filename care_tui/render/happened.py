@@ -51,7 +51,7 @@ def told_item(one: Told, glyphs: Glyphs) -> Content:
     time = f"{seconds(one.time_s):>{TIME_WIDTH}}  "
     if isinstance(one.what, Moment):
         return Content.assemble("  ", padded(one.what.kind, KIND_WIDTH), time, text(one.what.text))
-    late = "  (after the impact)" if one.what.after_impact else ""
+    late = "  (after it was down)" if one.what.after_impact else ""
     if one.cause is not None:
         return Content.assemble(f"  {glyphs.to} ", padded("led to", KIND_WIDTH - 2), time, text(one.what.title + late))
     sign = {"critical": glyphs.fault, "warning": "!", "info": " "}[one.what.severity]
@@ -71,7 +71,7 @@ def finding_rows(finding: Finding, cause: Finding | None = None) -> list[Row]:
     span = seconds(finding.onset_s)
     if finding.end_s > finding.onset_s:
         span += f" to {seconds(finding.end_s)}"
-    rows = [heading(finding.title), labelled("When", span + (", after the impact" if finding.after_impact else ""))]
+    rows = [heading(finding.title), labelled("When", span + (", after it was down" if finding.after_impact else ""))]
     rows += [labelled("Seen by", finding.evidence)] if finding.evidence else []
     rows += [labelled("From", finding.source)] if finding.source else []
     if cause is not None:

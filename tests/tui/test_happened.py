@@ -36,7 +36,7 @@ async def test_the_first_step_tells_what_happened_the_first_cause_first(make_app
             ["!", "WARNING", "3.0", "s"],
         ]
         assert [line[0] for line in lines[4:]] == ["vehicle", "arming", "mode", "error"]
-        assert "after the impact" in items(app)
+        assert "after it was down" in items(app)
         for fact in ("91.3 s to 110.1 s", "output 1950 us", "SERVO2_MAX", "roll does not follow", "This run"):
             assert fact in text(app)
         await settle(pilot, "j")

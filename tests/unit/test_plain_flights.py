@@ -228,7 +228,7 @@ def test_a_land_detector_is_believed_over_a_barometer_that_drifted() -> None:
 
 @pytest.mark.parametrize(
     ("length_m", "is_unlike"),
-    [(201.0, False), (500.0, False), (1100.0, False), (1200.0, True), (60.0, False), (3, True)],
+    [(201.0, False), (500.0, False), (1200.0, False), (3300.0, True), (60.0, False), (3, True)],
 )
 def test_what_a_mission_unlike_all_of_the_training_may_need_is_not_known(length_m: float, *, is_unlike: bool) -> None:
     model = cast("Model", SimpleNamespace(summaries={"path_length": SimpleNamespace(low=201.0, high=810.0)}))
