@@ -398,7 +398,8 @@ def test_coming_down_and_staying_there_is_told() -> None:
     made.table["CTUN"]["DAlt"][down] = 12.0
     found = {one.title: one for one in made.find()}
     stranded = found["it came down and could not rise again"]
-    assert (stranded.severity, stranded.onset_s) == ("critical", pytest.approx(FAILS_S, abs=0.5))
+    assert stranded.severity == "critical"
+    assert stranded.onset_s == pytest.approx(FAILS_S, abs=0.5)
     assert made.flight().down_s == stranded.onset_s
 
 
@@ -414,6 +415,17 @@ def test_a_fall_that_lasts_a_second_is_a_loss_of_control_and_names_the_motor_in_
         made.table["ATT"][field][after] = 0.0
     assert made.flight().lost_control_s == pytest.approx(FAILS_S, abs=0.5)
     assert first(made).title == "motor 2 (rear left) gave no thrust"
+
+
+@pytest.mark.parametrize(("mode", "lost_s"), [(5.0, FAILS_S), (0.0, None)])
+def test_a_plane_that_turns_over_where_it_is_levelled_has_lost_control(mode: float, lost_s: float | None) -> None:
+    made = Made()
+    made.facts = {"firmware": "ArduPlane V4.5.4", "vehicle": "plane"}
+    made.rows["MODE"] = [(0.0, {"ModeNum": mode})]
+    over = made.after(FAILS_S, FAILS_S + 20)
+    made.table["ATT"]["Roll"][over] = (200.0 * (made.t[over] - FAILS_S) + 180) % 360 - 180
+    made.table["ATT"]["Roll"][made.after(FAILS_S + 20)] = 170.0
+    assert made.flight().lost_control_s == (None if lost_s is None else pytest.approx(lost_s, abs=0.5))
 
 
 def test_a_lurch_at_touch_down_is_no_loss_of_control() -> None:

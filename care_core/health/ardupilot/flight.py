@@ -65,6 +65,11 @@ _STRUCK_S = 1.0
 """A blow so shortly before control was lost is what took it."""
 _SHOCK = 30.0
 """m/s^2: three times gravity is no flight."""
+_WINGED = frozenset(("plane", "quadplane"))
+_TUMBLING_DEG, _UPSIDE_DOWN_DEG, _TUMBLES_S = 45.0, 100.0, 2.0
+"""No plane is told to bank as far as the second by a mode that levels it: ROLL_LIMIT_DEG is at most 90."""
+_ROLLS = frozenset((None, 0, 3, 4, 23))
+"""Plane modes in which the pilot may roll it over: manual, training, acro, QAcro; None where the log does not say."""
 _ACRO = frozenset((1, 13, 14))
 """Copter modes in which any attitude is meant: acro, sport, flip."""
 
@@ -285,6 +290,8 @@ class Flight:
     def lost_control_s(self) -> float | None:
         """When a copter in the air, or about to lift, stopped following its attitude demand for good: it never came
         back within limits before the end, the ground, or the disarming."""
+        if self.vehicle.kind in _WINGED:
+            return self._tumbled_s
         if not self.is_copter or self.lean_error is None or self.tilt is None:
             return None
         t, error = self.lean_error
@@ -305,6 +312,21 @@ class Flight:
             rest = held[flying & (t > end)]
             flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
             if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
+                return start
+        return None
+
+    @cached_property
+    def _tumbled_s(self) -> float | None:
+        """When a plane left its demand for good, to turn over, in a mode that levels it."""
+        table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+        if table is None or self.lean_error is None:
+            return None
+        t, error = self.lean_error
+        levels = np.array([self.mode_at(at) not in _ROLLS for at in t.tolist()], dtype=bool)
+        off = (error > _TUMBLING_DEG) & levels & self.during(self.armed, t)
+        over = t[(np.abs(table["Roll"]) > _UPSIDE_DOWN_DEG) & off]
+        for start, end in runs(t, off, gap_s=1.0):
+            if end - start >= _TUMBLES_S and ((over >= start) & (over <= end)).any():
                 return start
         return None
 

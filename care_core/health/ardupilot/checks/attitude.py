@@ -36,13 +36,13 @@ filter lowered."""
 
 def find(flight: Flight) -> Iterator[Finding]:
     """Swings of the rates first: then the attitude's error is theirs."""
+    if flight.lost_control_s is not None:
+        yield from _lost(flight, flight.lost_control_s)
     if not flight.is_copter:
         return
     swings = list(_swings(flight))
     yield from swings
-    if flight.lost_control_s is not None:
-        yield from _lost(flight, flight.lost_control_s)
-    elif not swings:
+    if flight.lost_control_s is None and not swings:
         yield from _far(flight)
     yield from _yaw(flight)
 

@@ -8,6 +8,7 @@ axis.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -33,6 +34,8 @@ _DPS_PER_VIBE = 0.15
 _OF_RATE, _FAST_DPS = 0.06, 30.0
 """Two gyros of 3 % scale each differ by this share of a rate (MPU-6000 datasheet: sensitivity tolerance +-3 %); below
 this mean rate that is nothing beside their noise."""
+_TURNS_OVER_S = 3.0
+"""Before it is lost a vehicle turns faster than two sensors can be compared for so long."""
 _USUAL_VIBE = 15.0
 _SHAKEN_DPS = 20.0
 _OFFSET_OVER_S = 15.0
@@ -44,7 +47,8 @@ noisiest healthy one has 0.07 degrees/s on its quietest axis."""
 
 def find(flight: Flight) -> Iterator[Finding]:
     """What is wrong with the inertial sensors before anything was lost."""
-    sensors = [table.where(flight.watch(table.t)) for table in flight.all("IMU", *GYROS)]
+    lost = math.inf if flight.lost_control_s is None else flight.lost_control_s - _TURNS_OVER_S
+    sensors = [table.where(flight.watch(table.t) & (table.t < lost)) for table in flight.all("IMU", *GYROS)]
     sensors = [table for table in sensors if len(table) >= 5]
     if not sensors:
         return
