@@ -1,9 +1,8 @@
 """The robot as a command.
 
-python -m nav2_robot --params FILE --logs DIR [--seed N]     one mission, recorded as DIR/drive.mcap
-python -m nav2_robot --start DIR                             the parameter file to begin with
-
-A stand-in drives, without ROS 2: see `nav2_robot.standin`.
+python -m nav2_robot --params FILE --logs DIR [--seed N]     one mission with Nav2, which it starts with this file
+python -m nav2_robot ... --stand-in                          the same recording without ROS 2; nothing to learn from
+python -m nav2_robot --start DIR                             the files to begin with
 
 A mission that fails is a mission: the command ends with 0, and with 2 only where it could not drive.
 """
@@ -12,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -19,16 +19,19 @@ from typing import Any
 from care_samples.parameters import write_start
 from nav2_robot import parameters
 from nav2_robot.failures import Failure
+from nav2_robot.parameters import Parameters
 from nav2_robot.recorder import Recorder
 from nav2_robot.robot import Robot
 from nav2_robot.standin import StandIn
 from nav2_robot.world import WORLDS, Conditions, described
 
-_FILES = ("nav2.yaml",)
+_CONTROLLER_HZ = 20.0
+"""Nav2's, where the file does not say."""
+_FILES = ("nav2.yaml", "campaign.yaml")
 
 
 def main(words: list[str]) -> int:
-    """Drive, or write the file to begin with; the exit code."""
+    """Drive, or write the files to begin with; the exit code."""
     asked = _arguments(words)
     if asked.start is not None:
         here = Path(__file__).parent / "start"
@@ -41,14 +44,48 @@ def main(words: list[str]) -> int:
         print(f"nav2_robot: {asked.params}: {err}", file=sys.stderr)
         return 2
     conditions = Conditions.of(asked.seed, asked.world)
-    robot = Robot(conditions, asked.fail, asked.skid)
-    with Recorder(asked.logs / "drive.mcap") as recorder:
-        reached = StandIn(robot, settings, recorder).run()
+    robots: list[Robot] = []
+
+    def make() -> Robot:
+        robots.append(Robot(conditions, asked.fail, asked.skid))
+        return robots[-1]
+
+    path = asked.logs / "drive.mcap"
+    told = _stand_in(path, make(), settings) if asked.stand_in else _nav2(path, make, settings, asked)
+    if told is None:
+        path.unlink(missing_ok=True)
+        return 2
     if asked.truth is not None:
-        told = {"reached": reached, "recorded_s": robot.now_s, **_truth(robot)}
-        asked.truth.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
-    print(f"{reached} of {len(conditions.world.goals)} goals, {robot.now_s:.0f} s")
+        asked.truth.write_text(json.dumps({**told, **_truth(robots[-1])}, indent=1) + "\n", encoding="utf-8")
+    print(f"{told['reached']} of {len(conditions.world.goals)} goals, {told['mission_s']:.0f} s")
     return 0
+
+
+def _stand_in(path: Path, robot: Robot, settings: Parameters) -> dict[str, Any]:
+    with Recorder(path) as recorder:
+        reached = StandIn(robot, settings, recorder).run()
+    return {"reached": reached, "mission_s": robot.now_s}
+
+
+def _nav2(path: Path, make: Any, settings: Parameters, asked: argparse.Namespace) -> dict[str, Any] | None:
+    try:
+        from nav2_robot.node import Drive, NavigationError
+        from nav2_robot.servers import Servers
+
+        os.environ["ROS_DOMAIN_ID"] = str(asked.domain)
+        hz = parameters.number(settings, "/controller_server", "controller_frequency", _CONTROLLER_HZ)
+        outputs = asked.outputs or asked.logs
+        outputs.mkdir(parents=True, exist_ok=True)
+        with Servers(asked.params, outputs) as servers, Recorder(path) as recorder:
+            drive = Drive(make, recorder, hz, asked.speedup)
+            try:
+                told = drive.run(servers)
+            finally:
+                drive.close()
+    except (ImportError, FileNotFoundError, NavigationError) as err:
+        print(f"nav2_robot: {err}", file=sys.stderr)
+        return None
+    return {**vars(told), "reached": told.reached}
 
 
 def _truth(robot: Robot) -> dict[str, Any]:
@@ -70,8 +107,12 @@ def _arguments(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--world", choices=sorted(WORLDS), default="", help="this world, whatever the seed says")
     parser.add_argument("--skid", action="store_true", help="skid steering in place of two driven wheels")
     parser.add_argument("--fail", type=_failure, metavar="KIND:AT:SIZE", help="what fails, s after the first command")
+    parser.add_argument("--stand-in", action="store_true", help="drive without ROS 2, to try the files")
+    parser.add_argument("--domain", type=int, default=42, help="ROS domain; another for each drive at a time")
+    parser.add_argument("--speedup", type=float, default=1.0, help="simulated time to real time, at most")
+    parser.add_argument("--outputs", type=Path, metavar="DIR", help="where the servers' outputs go; beside the log")
     parser.add_argument("--truth", type=Path, metavar="FILE", help="what the simulator knows of the run, as JSON")
-    parser.add_argument("--start", type=Path, metavar="DIR", help="write the parameter file to begin with")
+    parser.add_argument("--start", type=Path, metavar="DIR", help="write the files to begin with")
     asked = parser.parse_args(words)
     if asked.start is None and (asked.params is None or asked.logs is None):
         parser.error("--params and --logs belong together")

@@ -1,9 +1,10 @@
-"""The robot that Nav2 drives: its world, body, laser, battery, failures and recording, all without ROS 2."""
+"""The robot that Nav2 drives: its world, body, laser, battery, failures, clock and recording, without ROS 2."""
 
 from __future__ import annotations
 
 import ast
 import math
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +14,13 @@ from hypothesis import strategies as st
 
 from care_core.application.case import Request, open_case
 from care_core.logs.opening import open_log
-from nav2_robot import laser, parameters
+from nav2_robot import clock, laser, parameters
 from nav2_robot.__main__ import main
 from nav2_robot.battery import Battery
 from nav2_robot.failures import KINDS, Failure
 from nav2_robot.recorder import FEEDBACK, STATUS, Recorder
 from nav2_robot.robot import HALF_LENGTH, STEP_S, Robot
+from nav2_robot.servers import installed
 from nav2_robot.standin import StandIn, plan
 from nav2_robot.world import CELL_M, Conditions, Passage, World
 
@@ -223,9 +225,55 @@ def test_the_command_drives_and_says_what_it_cannot(tmp_path: Path, capsys: pyte
     assert "none.yaml" in capsys.readouterr().err
 
 
-def test_the_robot_is_a_stranger_to_the_program_and_needs_no_ros() -> None:
+def test_where_nav2_is_not_the_command_says_so_and_leaves_no_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    monkeypatch.setenv("ROS_DOMAIN_ID", "0")
+    assert main(["--params", str(START), "--logs", str(tmp_path)]) == 2
+    assert "no nav2_controller controller_server" in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.mcap"))
+
+
+def test_a_server_is_found_in_the_first_prefix_that_has_it(tmp_path: Path) -> None:
+    program = tmp_path / "b" / "lib" / "nav2_planner" / "planner_server"
+    program.parent.mkdir(parents=True)
+    program.touch()
+    assert installed(f"{tmp_path / 'a'}:{tmp_path / 'b'}", "nav2_planner", "planner_server") == program
+
+
+def test_the_clock_waits_for_a_command_that_is_due_and_no_longer_than_its_limit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    answers, reminded = clock.Answers(0.1), threading.Event()
+    answers.wait(5.0, reminded.set)
+    assert not reminded.is_set()
+    answers.driving(True)
+    answers.commanded(5.0)
+    answers.wait(5.05, reminded.set)
+    assert not reminded.is_set()
+
+    def answer() -> None:
+        reminded.wait(5.0)
+        answers.commanded(5.1)
+
+    late = threading.Thread(target=answer)
+    late.start()
+    answers.wait(5.1, reminded.set)
+    late.join()
+    assert reminded.is_set()
+    assert answers.waited_s > 0.0
+    assert answers.late == 0
+    monkeypatch.setattr(clock, "LIMIT_S", 0.1)
+    answers.planning(True)
+    answers.wait(5.11, lambda: None)
+    assert answers.late == 1
+
+
+def test_the_robot_is_a_stranger_to_the_program_and_only_its_node_needs_ros() -> None:
     for path in START.parents[1].glob("*.py"):
         for line in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             named = [line.module or ""] if isinstance(line, ast.ImportFrom) else []
             named += [one.name for one in line.names] if isinstance(line, ast.Import) else []
-            assert not {name.partition(".")[0] for name in named} & {"care_core", "care_tui", "rclpy"}, path
+            strange = {"care_core", "care_tui"} | ({"rclpy"} if path.name != "node.py" else set())
+            assert not {name.partition(".")[0] for name in named} & strange, path
