@@ -10,6 +10,7 @@ them work, and nothing listens for browsers.
 
 from __future__ import annotations
 
+import gc
 import logging
 import signal
 import sys
@@ -73,10 +74,16 @@ def connected(scheduler: str | None = None, *, workers: int = 1, memory: str | N
 
 def patiently(start: Callable[[], Answer]) -> Answer:
     """Start something of Dask's, which gives the thread of its loop ten seconds to begin and else fails an assertion:
-    on a machine that is busy enough for that it is started again."""
+    on a machine that is busy enough for that it is started again.
+
+    What failed to start closes itself when it is collected. Where that happens while another starts, Dask waits for
+    itself for ever: so it is collected before.
+    """
     for _ in range(TRIES):
+        gc.collect()
         with suppress(AssertionError):
             return start()
+    gc.collect()
     return start()
 
 
