@@ -17,7 +17,8 @@ STEPS = 5
 BEAM = 8
 """Sets kept at each size."""
 GAIN_FOR_ONE_MORE = 0.1
-"""Probability that one more change must add: each change is something an operator has to do and to believe."""
+"""Probability that one more change, the first included, must add: each is something an operator has to do and to
+believe."""
 DISTANCE_COST = 0.02
 """Probability given up for leaving a value where it is rather than moving it across its whole range."""
 NEARLY = 0.02

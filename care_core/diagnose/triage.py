@@ -15,6 +15,7 @@ from care_core.diagnose import provenance
 from care_core.diagnose.advice import believed, falls_short, nearest, outweighed, untried
 from care_core.diagnose.circumstances import circumstances, unusual
 from care_core.diagnose.fixes import (
+    GAIN_FOR_ONE_MORE,
     MAX_ALTERNATIVES,
     Assignment,
     best_alone,
@@ -47,8 +48,6 @@ MIN_CONTRIBUTION = 0.02
 """Probability an option must cost before it is called a cause of this run."""
 MIN_PROBABILITY = 0.2
 """Best probability below which the engine abstains: a confident wrong answer costs a field day."""
-GAIN = 0.1
-"""Probability that a change must add to what the run as it is has by chance: it is something an operator has to do."""
 CONVINCING, LEADS = 0.5, 3
 """A cause that costs less than this leaves room for others: up to so many options are then named in all."""
 SURE, UNSURE = 0.4, 0.1
@@ -353,7 +352,7 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
         if rival is not None and rival.weight > max((cause.contribution for cause in fault.causes), default=0.0):
             return f"'{rival.option}' is as likely a cause, and the training runs cannot tell what it does"
     now = float(case.world.probability([case.world.config])[0])
-    enough = max(MIN_PROBABILITY, now + GAIN)
+    enough = max(MIN_PROBABILITY, now + GAIN_FOR_ONE_MORE)
     has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
     if has_cause and fixes and fixes[0].p_fixed >= enough:
         return None

@@ -68,8 +68,10 @@ _SHOCK = 30.0
 _WINGED = frozenset(("plane", "quadplane"))
 _TUMBLING_DEG, _UPSIDE_DOWN_DEG, _TUMBLES_S = 45.0, 100.0, 2.0
 """No plane is told to bank as far as the second by a mode that levels it: ROLL_LIMIT_DEG is at most 90."""
-_ROLLS = frozenset((None, 0, 3, 4, 23))
-"""Plane modes in which the pilot may roll it over: manual, training, acro, QAcro; None where the log does not say."""
+UNTOLD = -1
+"""The mode where the log does not say."""
+_ROLLS = frozenset((UNTOLD, 0, 3, 4, 23))
+"""Plane modes in which the pilot may roll it over: manual, training, acro, QAcro; any where the log does not say."""
 _ACRO = frozenset((1, 13, 14))
 """Copter modes in which any attitude is meant: acro, sport, flip."""
 
@@ -159,6 +161,11 @@ class Flight:
         """The number of the mode at a time, None where the log does not say."""
         before = [mode for at, mode in self.modes if at <= t]
         return before[-1] if before else None
+
+    def modes_at(self, t: Floats) -> NDArray[np.int64]:
+        """The number of the mode at each of these times, `UNTOLD` where the log does not say."""
+        codes = np.array([UNTOLD, *(mode for _, mode in self.modes)], dtype=np.int64)
+        return codes[np.searchsorted([start for start, _ in self.modes], t, side="right")]
 
     @cached_property
     def armed(self) -> tuple[Span, ...]:
@@ -322,7 +329,7 @@ class Flight:
         if table is None or self.lean_error is None:
             return None
         t, error = self.lean_error
-        levels = np.array([self.mode_at(at) not in _ROLLS for at in t.tolist()], dtype=bool)
+        levels = ~np.isin(self.modes_at(t), tuple(_ROLLS))
         off = (error > _TUMBLING_DEG) & levels & self.during(self.armed, t)
         over = t[(np.abs(table["Roll"]) > _UPSIDE_DOWN_DEG) & off]
         for start, end in runs(t, off, gap_s=1.0):
@@ -342,11 +349,7 @@ class Flight:
         driven = self.during(self.armed, t)
         if self.throttle is not None:
             driven &= np.interp(t, *self.throttle) > _LIFTING
-        if self.modes:
-            codes = np.array([mode for _, mode in self.modes])
-            at = np.searchsorted([start for start, _ in self.modes], t, side="right") - 1
-            driven &= ~(np.isin(codes[np.maximum(at, 0)], tuple(_ACRO)) & (at >= 0))
-        return driven
+        return np.asarray(driven & ~np.isin(self.modes_at(t), tuple(_ACRO)))
 
     @cached_property
     def impact_s(self) -> float | None:

@@ -29,9 +29,9 @@ SWING_DPS, OVER_DEMAND = 30.0, 3.0
 """degrees/s; how many times the demand's own movement."""
 _SWING_S, _ENOUGH = 5.0, 10
 _SPENT = 0.85
-"""Probability that a swing which takes all that the motors have is what fails the mission. 29 of the 32 training
-flights that swing and then run out of thrust fail; all 98 that swing have a gain of that axis raised or the gyros'
-filter lowered."""
+"""Probability that a swing which takes all that the motors have is what fails the mission. 31 of the 34 training
+flights that swing and then run out of thrust or fall fail; all 104 that swing have a gain of that axis raised or the
+gyros' filter lowered."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:

@@ -49,9 +49,5 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def _drives_itself(flight: Flight, t: Floats) -> Mask:
     """Which of these times lie in an armed span and a mode that drives without a pilot."""
-    entered = np.array([at for at, _ in flight.modes])
-    automatic = np.array([way_of("rover", mode) in _BY_ITSELF for _, mode in flight.modes], dtype=bool)
-    if not len(entered):
-        return np.zeros(len(t), dtype=bool)
-    place = np.searchsorted(entered, t, side="right") - 1
-    return np.asarray(flight.during(flight.armed, t) & (place >= 0) & automatic[np.maximum(place, 0)])
+    driven = np.isin(flight.modes_at(t), [mode for _, mode in flight.modes if way_of("rover", mode) in _BY_ITSELF])
+    return np.asarray(flight.during(flight.armed, t) & driven)
