@@ -38,7 +38,7 @@ METRIC = Effort(points=300, iterations=30)
 RELEVANCE_SCALE = 0.1
 """Relevance below which an input counts as unused in the penalty."""
 UNUSED = 0.02
-"""Relevance below which an input is left out: six standard deviations of it move nothing by 1 %."""
+"""An input is left out where one standard deviation of it moves the target by less, in standard deviations."""
 WEAK = 0.2
 """Least relevance of any option where runs are few: the slope it may have before runs show one."""
 NOISE, BINARY_NOISE = 0.02, 0.3
@@ -133,7 +133,7 @@ def fit(
     mean, scale = float(coded.mean()), float(coded.std()) or 1.0
     targets = ((coded - mean) / scale).astype(np.float32).astype(float)
     kernel = _fit_kernel(points, targets, effort.iterations, BINARY_NOISE if binary else NOISE, inputs.least)
-    used = kernel.relevance > UNUSED
+    used = _slopes(kernel) > UNUSED
     kernel = replace(kernel, relevance=kernel.relevance[used], idle=int((~used).sum()))
     points = points[:, used]
     errors, error_sd = left_out(kernel, points, targets, groups)
@@ -242,6 +242,14 @@ def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_
     )
     theta = np.exp(best.x)
     return Kernel(theta[:p], float(theta[p]), float(theta[p + 1]), float(theta[p + 2]))
+
+
+def _slopes(kernel: Kernel) -> FloatArray:
+    """What one standard deviation of each input moves the target by, as the kernel expects it before any run, shape
+    (p,). A relevance alone does not say: with a large amplitude a small one is a straight line."""
+    p = max(1, len(kernel.relevance))
+    slopes: FloatArray = np.hypot(kernel.additive / np.sqrt(p), kernel.joint) * kernel.relevance
+    return slopes
 
 
 @lru_cache(maxsize=2)

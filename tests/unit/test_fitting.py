@@ -43,6 +43,16 @@ def test_recovers_a_known_function_from_clean_data() -> None:
     assert relevance.get(3, 0.0) < 0.2 * min(relevance[i] for i in range(3))
 
 
+def test_a_straight_line_keeps_its_small_slopes_and_loses_what_moves_nothing() -> None:
+    rng = np.random.default_rng(0)
+    x = rng.normal(size=(200, 4))
+    y = x[:, 0] + 0.1 * x[:, 1] + 0.1 * x[:, 2] + 0.1 * rng.normal(size=200)
+    mechanism = fitted(x, y)
+    assert mechanism.reads.tolist() == [0, 1, 2]
+    near, far = np.zeros((1, 4)), np.array([[0.0, 1.0, 0.0, 0.0]])
+    assert mechanism.latent(far)[0] - mechanism.latent(near)[0] == pytest.approx(0.1, abs=0.03)
+
+
 def test_knows_less_away_from_the_data() -> None:
     x = RNG(0).uniform(0, 1, (80, 2))
     m = fitted(x, x[:, 0] + 0.1 * RNG(1).normal(size=80))
