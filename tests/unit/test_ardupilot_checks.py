@@ -103,6 +103,17 @@ def test_an_impact_is_after_the_loss_of_control_and_what_follows_it_is_marked() 
     assert all(one.after_impact for one in made.find() if one.onset_s > flight.impact_s)
 
 
+def test_what_climbs_on_after_a_low_pass_did_not_crash() -> None:
+    made = Made()
+    falling(made, -60.0, 40.0)
+    del made.rows["ERR"]
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[name][field][made.after(FAILS_S + 4)] = 80.0
+    flight = made.flight()
+    assert flight.lost_control_s is not None
+    assert flight.impact_s is None
+
+
 def test_a_blow_before_control_is_lost_blames_no_motor() -> None:
     made = Made()
     falling(made, -60.0, 40.0)
@@ -141,6 +152,15 @@ def test_vibration_that_upsets_the_estimator_is_critical() -> None:
     finding = first(made)
     assert (finding.kind, finding.severity) == ("vibration", "critical")
     assert [one.kind for one in finding.consequences] == ["estimator"]
+
+
+def test_vibration_that_was_there_from_the_take_off_on_did_not_rise() -> None:
+    made = Made()
+    made.table["VIBE"]["VibeZ"][made.after(UP_S, DOWN_S)] = 25.0
+    (finding,) = made.find()
+    assert finding.severity == "info"
+    assert "(acceptable below 30)" in finding.evidence
+    assert "from" not in finding.evidence
 
 
 def test_clipping() -> None:
@@ -197,6 +217,17 @@ def test_a_compass_that_goes_off(rate_hz: float) -> None:
     finding = first(made)
     assert (finding.kind, finding.title, finding.severity) == ("compass", "compass 1 is disturbed", "critical")
     assert finding.onset_s == pytest.approx(FAILS_S, abs=3.0)
+
+
+def test_compasses_that_differ_in_flips_alone_are_sound() -> None:
+    made = Made()
+    turns = made.after(FAILS_S, FAILS_S + 10)
+    made.rows["MODE"].append((FAILS_S - 1, {"ModeNum": 1.0}))  # acro
+    made.rows["MODE"].append((FAILS_S + 11, {"ModeNum": 5.0}))
+    for demand in ("", "Des"):
+        made.table["ATT"][f"{demand}Roll"][turns] = 170.0
+    made.table["MAG#2"]["MagX"][turns] += 260
+    assert not [one for one in made.find() if one.kind == "compass"]
 
 
 def test_a_compass_that_is_not_used_is_nobodys_business() -> None:

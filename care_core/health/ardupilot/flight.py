@@ -61,6 +61,8 @@ _REFUSED_S = 30.0
 _GROUND_M = 2.0
 _STRIVING, _STRANDED_S = 0.5, 10.0
 """Throttle that lifts any vehicle that can fly, and how long it may take to do so."""
+_CLIMBS_M = 20.0
+"""What is down does not climb so far, whatever its estimator makes of the blow."""
 _STRUCK_S = 1.0
 """A blow so shortly before control was lost is what took it."""
 _SHOCK = 30.0
@@ -367,7 +369,15 @@ class Flight:
         ground = self._ground_after(first)
         if ground is not None:
             candidates.append(ground)
-        return min(candidates, default=None)
+        return min((at for at in candidates if not self._flies_on(at)), default=None)
+
+    def _flies_on(self, at: float) -> bool:
+        """Whether it still climbs well after: what shook it, or brought it low, was not the end of the flight."""
+        if self.height is None:
+            return False
+        t, height = self.height
+        after = height[t >= at + _BACK_S]
+        return len(after) > 0 and float(after.max()) - float(np.interp(at, t, height)) > _CLIMBS_M
 
     @cached_property
     def down_s(self) -> float | None:

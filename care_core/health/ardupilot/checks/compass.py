@@ -25,6 +25,8 @@ APART = 200.0
 MOVED = 140.0
 """mGauss by which the difference of two compasses may change in flight: 70 % of what arming allows, since turning alone
 moves it where their calibrations differ."""
+_LEANS_DEG = 60.0
+"""Further over, as in a flip, the calibrations' difference changes its sign and no longer cancels."""
 GREY, TOO_MUCH = 0.3, 0.6
 _SHORTEST, _LONGEST = 185.0, 875.0
 _LASTS_S, _SILENT_S = 3.0, 1.0
@@ -95,6 +97,8 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
         moved = smooth(t, length(apart - early[:, None]), 2.0)
         level = smooth(t, np.hypot(apart[0], apart[1]), 2.0)
         over = np.maximum(level / APART, moved / MOVED)
+        if flight.tilt is not None:
+            over = np.where(np.interp(t, *flight.tilt) < _LEANS_DEG, over, 0.0)
         spans = lasting(t, over > 1.0, _LASTS_S)
         if not spans:
             continue

@@ -55,7 +55,8 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
         return None
     level = np.maximum(np.maximum(table["VibeX"], table["VibeY"]), table["VibeZ"])[calm]
     level = smooth(t, np.where(np.isfinite(level), level, 0.0), 2.0)
-    before = float(np.quantile(level, 0.05))
+    aloft = flight.during(flight.flown, t)  # on the ground its motors idle, which says nothing of what it was
+    before = float(np.quantile(level[aloft] if aloft.any() else level, 0.05))
     upset = _upset(flight)
     limit = ROSE if before < ROSE / _TIMES or upset else FELT
     spans = lasting(t, level > limit, _LASTS_S)
@@ -66,6 +67,7 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
     peak = top(level[(t >= start) & (t <= end)], 0.9)
     severity = _severity(flight, peak, clips, any(at >= start - 1 for at in upset), before < peak / _TIMES)
     rose = f", from {before:.1f}" if before < peak / _TIMES else ""
+    lasted = sum(b - a for a, b in spans) if spans else end - start
     clipping = f"; {clips:.0f} clips of the accelerometer's range" if clips else ""
     return Finding(
         "vibration",
@@ -73,10 +75,15 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
         start,
         end,
         severity,
-        f"VIBE of IMU {number + 1} at {peak:.0f} m/s^2{rose} for {end - start:.0f} s (limit 30){clipping}",
+        f"VIBE of IMU {number + 1} at {peak:.0f} m/s^2{rose} for {lasted:.0f} s ({_against(peak)}){clipping}",
         _SOURCE,
         probability=likely(max(peak / HIGH, 1.0 if clips >= _CLIPS else 0.0), _CALIBRATION),
     )
+
+
+def _against(peak: float) -> str:
+    """What the documentation says of such a level."""
+    return f"limit {HIGH:.0f}" if peak > HIGH else f"acceptable below {HIGH:.0f}"
 
 
 def _clipped(table: Table, calm: np.ndarray) -> float:
