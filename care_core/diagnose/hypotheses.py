@@ -35,6 +35,9 @@ UNKNOWN = 0.3
 LATE, LATE_S = 0.1, 5.0
 """Share of its weight that a part keeps which failed so many seconds after the run was failing already, by a finding
 that speaks of how it was set."""
+SENSED = frozenset(("barometer", "compass", "gps", "vibration"))
+"""Kinds that no setting brings about: on the training flights all 10 that came as critical after a sign of how the
+vehicle was set have that part failing."""
 POINTED, MOST_POINTED = 0.05, 4.0
 """A finding that speaks of how the robot was set, and not of which option, speaks for options that add this much
 together, and raises them by this factor at most."""
@@ -161,7 +164,9 @@ def set_wrong(finding: Finding) -> bool:
 
 
 def _is_late(finding: Finding, by_setting: Iterable[Finding]) -> bool:
-    """Whether the run was failing already, by a sign about as sure as this one."""
+    """Whether the run was failing already, by a sign about as sure as this one. What senses does not fail of that."""
+    if finding.kind in SENSED:
+        return False
     sure = min(finding.probability, LIKELY)
     return any(one.onset_s + LATE_S < finding.onset_s and one.probability >= sure for one in by_setting)
 

@@ -393,6 +393,15 @@ def oscillating(made: Made, start: float = 30.0, end: float = 90.0) -> None:
     made.table["RATE"] = {"R": made.noise(1), "P": swing, "RDes": made.noise(2), "PDes": made.noise(2)}
 
 
+def test_a_controller_that_asks_for_all_the_motors_have_oscillates_though_its_demand_swings_too() -> None:
+    made = Made()
+    oscillating(made)
+    made.table["RATE"]["PDes"] = 0.6 * np.roll(made.table["RATE"]["P"], 3)
+    assert made.find() == ()
+    made.table["RATE"] |= {"ROut": made.noise(0.02), "POut": -made.table["RATE"]["P"] / 50}
+    assert first(made).title == "pitch oscillates"
+
+
 def test_an_oscillation_that_takes_all_the_thrust_leads_what_it_brings_about() -> None:
     made = Made()
     oscillating(made)

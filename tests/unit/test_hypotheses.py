@@ -63,6 +63,14 @@ def test_a_part_that_failed_after_the_run_was_failing_explains_little() -> None:
     assert lead(weigh({"occdist_scale": 0.6}, 0.3, [sooner, finding(0.98)], "fits"))[0] == "hardware"
 
 
+def test_a_sensor_that_failed_after_the_run_was_failing_keeps_its_weight() -> None:
+    swings = Finding("tuning", "roll oscillates", 20.0, 70.0, "critical", "", "", "parameter", 0.85)
+    late = replace(finding(0.97), onset_s=60.0)
+    share = {kind: weigh({"D": 0.6}, 0.05, [swings, replace(late, kind=kind)], "fits") for kind in ("motor", "compass")}
+    of_part = {kind: next(one.probability for one in found if one.what == "hardware") for kind, found in share.items()}
+    assert of_part["compass"] > 5 * of_part["motor"]
+
+
 def test_a_doubtful_sign_of_how_it_was_set_takes_nothing_from_a_part_that_surely_failed() -> None:
     swings = Finding("tuning", "pitch oscillates", 20.0, 70.0, "warning", "", "", "parameter", 0.2)
     assert lead(weigh({"a": 0.3}, 0.1, [swings, finding(0.85)], "fits"))[0] == "hardware"

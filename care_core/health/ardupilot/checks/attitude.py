@@ -12,15 +12,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.health.ardupilot.checks.thrust import saturated
-from care_core.health.ardupilot.flight import Flight, Span
+from care_core.health.ardupilot.flight import Flight, Mask, Span
 from care_core.health.ardupilot.measure import lasting, smooth, top
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
-from care_core.logs.base import Wanted
+from care_core.logs.base import Table, Wanted
 
 READS: Wanted = {
     "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
-    "RATE": ("R", "P", "RDes", "PDes"),
+    "RATE": ("R", "P", "RDes", "PDes", "ROut", "POut"),
 }
 
 FAR_DEG, YAW_DEG = 15.0, 45.0
@@ -28,9 +28,11 @@ _LASTS_S, _YAW_LASTS_S = 1.0, 3.0
 SWING_DPS, OVER_DEMAND = 30.0, 3.0
 """degrees/s; how many times the demand's own movement."""
 _SWING_S, _ENOUGH = 5.0, 10
+_ALL = 1.0
+"""All that the motors have for one axis (AP_Motors.h: roll and pitch run from -1 to 1)."""
 _SPENT = 0.85
 """Probability that a swing which takes all that the motors have is what fails the mission. 31 of the 34 training
-flights that swing and then run out of thrust or fall fail; all 104 that swing have a gain of that axis raised or the
+flights that swing and then run out of thrust or fall fail; all 106 that swing have a gain of that axis raised or the
 gyros' filter lowered."""
 
 
@@ -101,7 +103,8 @@ def _swings(flight: Flight) -> Iterator[Finding]:
     for axis, wanted, name in (("R", "RDes", "roll"), ("P", "PDes", "pitch")):
         swing, asked = np.abs(table[axis] - table[wanted]), np.abs(table[wanted])
         level, demand = smooth(t, swing, 3.0), smooth(t, asked, 3.0)
-        spans = lasting(t, flown & (level > SWING_DPS) & (level > OVER_DEMAND * demand), _SWING_S)
+        unasked = (level > OVER_DEMAND * demand) | _exhausted(table, f"{axis}Out")
+        spans = lasting(t, flown & (level > SWING_DPS) & unasked, _SWING_S)
         if spans and _to_and_fro((table[axis] - table[wanted])[flight.during(spans, t)]):
             found.append((top(level[flight.during(spans, t)], 0.9), name, spans))
     if not found:
@@ -116,9 +119,16 @@ def _swings(flight: Flight) -> Iterator[Finding]:
     yield Finding(
         "tuning", f"{name} oscillates", spans[0][0], spans[-1][1], "critical" if lost else "warning",
         f"the {name} rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
-        f"{OVER_DEMAND:g} times what is asked){limit}",
+        f"{OVER_DEMAND:g} times what is asked, or all that the motors have){limit}",
         "RATE against its demand", suspect="parameter", probability=_SPENT if spent or down else 0.2,
     )  # fmt: skip
+
+
+def _exhausted(table: Table, output: str) -> Mask:
+    """Where the controller asks for more than the motors can give: then the demand swings with the vehicle."""
+    if output not in table.columns:
+        return np.zeros(len(table), dtype=bool)
+    return smooth(table.t, np.abs(table[output]), 3.0) > _ALL
 
 
 def _to_and_fro(error: Floats) -> bool:
