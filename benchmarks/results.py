@@ -71,6 +71,7 @@ BENCHMARKS = (
     ),
     Benchmark("ros_health", "benchmarks.ros_health {shared}/data/ros_hardware", "kind in three in 70 %", "none known"),
     Benchmark("wild_logs", "benchmarks.wild_logs --shared {shared}", "no crash, each refusal a sentence", "none known"),
+    Benchmark("hostile_files", "benchmarks.hostile_files", "1000 MB and 20 s", "none known"),
     Benchmark("few_runs", "benchmarks.few_runs --shared {shared} --tables {tables}", "above the peers", "CBI, plain"),
     Benchmark("learning", "benchmarks.learning --shared {shared}", "120 s, 2 GB", "causal-learn's FCI"),
     Benchmark("fleet", "benchmarks.fleet", "peak grows by 15 % at most; 0.8 of a loop on one worker", "a plain loop"),

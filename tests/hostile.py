@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bz2
 import io
+import json
 import shutil
 import sqlite3
 import struct
@@ -314,7 +315,9 @@ def array_shape(folder: Path) -> None:
 def _forget_digest(folder: Path) -> None:
     """As a model of an earlier version, which names no digest."""
     path = folder / "model.json"
-    path.write_text(path.read_text().replace('"arrays_sha256"', '"arrays_sha256": "", "notes"'))
+    model = json.loads(path.read_text())
+    del model["arrays_sha256"]
+    path.write_text(json.dumps(model))
 
 
 INDENTED = "".join(f"    {line}\n" for line in aliases().splitlines())

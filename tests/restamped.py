@@ -13,6 +13,7 @@ import numpy as np
 from care_core.logs.dataflash import DataFlashLog
 from care_core.logs.mapped import FileArray
 from care_core.logs.mavlink_packets import find_packets
+from tests.groundstation import write_tlog
 
 Clock = Callable[[int], int]
 """The time that is written, of the one that was."""
@@ -101,4 +102,27 @@ def bag(source: Path, path: Path, topic: str, change: Callable[[Any], None]) -> 
                 change(message)
                 content = store.serialize_ros1(message, connection.msgtype)
             write.write(written[connection.id], time_ns, content)
+    return path
+
+
+CLOCKS: dict[str, Clock] = {
+    "constant": lambda stamp: 60_000_000,
+    "zero": lambda stamp: 0,
+    "milliseconds": lambda stamp: stamp // 1000,
+    "a thousand times too fast": lambda stamp: stamp * 1000 % 2**63,
+    "standing still half the time": lambda stamp: stamp - stamp % 40_000_000,
+}
+"""What broken clocks write, in microseconds."""
+
+
+def written(folder: Path, source: Path, clock: Clock, kind: str) -> Path:
+    """A log with other stamps in one of three formats."""
+    path = folder / f"log.{kind}"
+    if kind == "tlog":
+        heard = write_tlog(folder / "heard.tlog", source, np.random.default_rng(0))
+        path.write_bytes(telemetry(heard, clock))
+    elif kind == "mcap":
+        path.write_bytes(mcap(source, lambda time_ns: 1000 * clock(time_ns // 1000)))
+    else:
+        path.write_bytes(dataflash(source, clock))
     return path

@@ -4,42 +4,19 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from care_core.errors import ExitCode
 from care_core.files import bundled
 from tests import restamped
 from tests.conftest import Care
-from tests.groundstation import write_tlog
 
 DATA = Path(__file__).parents[1] / "data"
 GOOD, FAILED = DATA / "arducopter_good.BIN", bundled("samples", "arducopter_failed.BIN")
 DRIVE = DATA / "move_base_good.bag"
-
-CLOCKS: dict[str, Callable[[int], int]] = {
-    "constant": lambda stamp: 60_000_000,
-    "zero": lambda stamp: 0,
-    "milliseconds": lambda stamp: stamp // 1000,
-    "a thousand times too fast": lambda stamp: stamp * 1000 % 2**63,
-    "standing still half the time": lambda stamp: stamp - stamp % 40_000_000,
-}
-
-
-def written(folder: Path, source: Path, clock: Callable[[int], int], kind: str) -> Path:
-    path = folder / f"log.{kind}"
-    if kind == "tlog":
-        heard = write_tlog(folder / "heard.tlog", source, np.random.default_rng(0))
-        path.write_bytes(restamped.telemetry(heard, clock))
-    elif kind == "mcap":
-        path.write_bytes(restamped.mcap(source, lambda time_ns: 1000 * clock(time_ns // 1000)))
-    else:
-        path.write_bytes(restamped.dataflash(source, clock))
-    return path
 
 
 def judged(care: Care, path: Path, profile: str = "arducopter") -> tuple[int, dict[str, Any]]:
@@ -57,11 +34,11 @@ def check_not_judged(code: int, objectives: dict[str, Any]) -> None:
         assert one["reason"]
 
 
-@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize("clock", restamped.CLOCKS)
 @pytest.mark.parametrize("source", [GOOD, FAILED], ids=["good", "failed"])
 @pytest.mark.parametrize("kind", ["BIN", "tlog"])
 def test_a_flight_whose_clock_is_broken(care: Care, tmp_path: Path, kind: str, source: Path, clock: str) -> None:
-    check_not_judged(*judged(care, written(tmp_path, source, CLOCKS[clock], kind)))
+    check_not_judged(*judged(care, restamped.written(tmp_path, source, restamped.CLOCKS[clock], kind)))
 
 
 def test_a_receiver_that_stands_still_is_a_finding(care: Care, tmp_path: Path) -> None:
@@ -75,7 +52,7 @@ def test_a_receiver_that_stands_still_is_a_finding(care: Care, tmp_path: Path) -
 
 @pytest.mark.parametrize("clock", ["constant", "zero", "milliseconds"])
 def test_a_drive_whose_clock_is_broken(care: Care, tmp_path: Path, clock: str) -> None:
-    check_not_judged(*judged(care, written(tmp_path, DRIVE, CLOCKS[clock], "mcap"), "move_base"))
+    check_not_judged(*judged(care, restamped.written(tmp_path, DRIVE, restamped.CLOCKS[clock], "mcap"), "move_base"))
 
 
 @pytest.mark.parametrize("source", [GOOD, FAILED], ids=["good", "failed"])
@@ -192,7 +169,7 @@ def test_values_that_cannot_be_raise_nothing(
 
 def test_nothing_found_is_not_said_of_a_log_whose_clock_cannot_be(tmp_path: Path, care: Care) -> None:
     path = tmp_path / "fast.BIN"
-    path.write_bytes(restamped.dataflash(GOOD, CLOCKS["a thousand times too fast"]))
+    path.write_bytes(restamped.dataflash(GOOD, restamped.CLOCKS["a thousand times too fast"]))
     code, out, _ = care("inspect", path, "--json")
     (finding,) = json.loads(out)["findings"]
     assert code == ExitCode.OK
