@@ -1,12 +1,13 @@
 """Which way of finding the graph is best? Simulated robots with known graphs, alternatives side by side.
 
     python -m benchmarks.discovery [--robots 12] [--runs 400 1500]
+    python -m benchmarks.discovery --latent
 
 The robots (`tests/robots.py`) have codes, counts, heavy tails and yes-or-no metrics, effects that bend or have an
 optimum inside, two options that matter only together, a context that confounds, hidden causes, and refused missions
 without metrics. Printed per alternative: structural Hamming distance to the true graph (pairs whose edges differ) and
 F1 of "this option has a directed path to this objective", means over the robots with the standard error of the
-difference to the default, robot by robot.
+difference to the default, robot by robot. `--latent`: which hidden causes of a pair of metrics the latent search finds.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from care_core.causal.graph import CausalGraph
 from care_core.learn.completion import RATE, complete
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import FisherZ, IndependenceTest, IntArray, discover
-from care_core.learn.orientation import resolve
+from care_core.learn.orientation import has_latent_cause, joint_distribution, resolve
 from care_core.learn.screening import screen_options
 from care_core.learn.table import FloatArray, normal_scores
 from care_core.profile.schema import Schema
@@ -157,12 +158,36 @@ def show(runs: int, answers: list[dict[str, tuple[float, float, float]]]) -> Non
         print(f"| {name:30s} | {distance:.1f} | {against[0]} | {f1:.3f} | {against[1]} | {seconds:.2f} |")
 
 
+PAIRS, PAIR_RUNS = 12, 400
+
+
+def show_latent() -> None:
+    """Pairs of metrics that only a hidden cause, or only a direct effect, correlates: how many are called latent?"""
+    for kind in ("normal hidden cause", "hidden cause of two states", "direct effect"):
+        for r in (0.5, 0.8):
+            pairs = [joint_distribution(*_pair(kind, r, np.random.default_rng(seed))) for seed in range(PAIRS)]
+            found = sum(has_latent_cause(joint, np.random.default_rng(seed)) for seed, joint in enumerate(pairs))
+            print(f"{kind:27s} correlation {r}: called latent {found} of {PAIRS}")
+
+
+def _pair(kind: str, r: float, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    cause, own, other = rng.normal(size=(3, PAIR_RUNS))
+    if kind == "direct effect":
+        return cause, r * cause + np.sqrt(1 - r**2) * own
+    cause = np.sign(cause) if kind == "hidden cause of two states" else cause
+    return np.sqrt(r) * cause + np.sqrt(1 - r) * own, np.sqrt(r) * cause + np.sqrt(1 - r) * other
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--latent", action="store_true", help="only which hidden causes are found")
     parser.add_argument("--robots", type=int, default=12)
     parser.add_argument("--runs", type=int, nargs="+", default=[400, 1500])
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()
+    if args.latent:
+        show_latent()
+        return
     for runs in args.runs:
         show(runs, Parallel(n_jobs=args.jobs)(delayed(measure)(seed, runs) for seed in range(args.robots)))
 

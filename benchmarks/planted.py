@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -29,6 +29,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.mechanisms import FloatArray
+from care_core.causal.model import Model
 from care_core.diagnose.judging import judge, world_of
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Cause, Diagnosis
@@ -72,6 +73,10 @@ class Planted:
     """What training drew options from; failed runs draw from the whole range."""
     swayed: tuple[str, ...] = ()
     """Options without effect that operators chose by the hidden wind; the table is declared observational."""
+    gains: tuple[float, ...] = (1.0,) * 5
+    """How strongly each option that acts does, as a multiple of this robot's."""
+    known: frozenset[tuple[str, str]] = frozenset()
+    """What the profile declares to act on what."""
 
     @property
     def schema(self) -> Schema:
@@ -88,12 +93,13 @@ class Planted:
         return Schema(
             name="planted", version="1", platform="Planted robot", doc="", match={}, logs=(), mission={}, evidence=(),
             observational=bool(self.swayed), variables={v.name: v for v in (*options, *metrics, *objectives)},
-            digest="d" * 64,
+            known=self.known, digest="d" * 64,
         )  # fmt: skip
 
     def drive(self, options: FloatArray, noise: FloatArray) -> pd.DataFrame:
         """What missions record. options: (n, 8), noise: (n, 5), standard normal."""
         s = 3 * (options - REFERENCE)
+        s[:, : len(self.gains)] *= self.gains
         lag, load, stuck, time, wind = noise.T
         first: FloatArray = 1.4 * (s[:, 0] ** 2) if self.nonlinear else 1.1 * s[:, 0]
         if self.interaction:
@@ -173,14 +179,17 @@ class Score:
             setattr(self, name, getattr(self, name) + value)
 
 
-def measure(world: Planted, seed: int, runs: int, faults: int) -> Score:
+Learn = Callable[[pd.DataFrame, Schema, TrainSettings], Model]
+
+
+def measure(world: Planted, seed: int, runs: int, faults: int, learn: Learn = train) -> Score:
     """One robot: train, fail, diagnose, intervene."""
     with threadpool_limits(1), tempfile.TemporaryDirectory() as folder:
-        rng = np.random.default_rng([seed, WORLDS.index(world)])
+        rng = np.random.default_rng([seed, [each.name for each in WORLDS].index(world.name)])
         frame = training_table(world, runs, rng)
         schema = world.schema
         write_model(
-            train(frame, schema, TrainSettings(seed=seed, resamples=RESAMPLES, folds=0, n_jobs=1)), Path(folder)
+            learn(frame, schema, TrainSettings(seed=seed, resamples=RESAMPLES, folds=0, n_jobs=1)), Path(folder)
         )
         profile = Profile(Path(folder), schema)
         met = (frame["success"] == 1) & (frame["time"] <= 135)
