@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,6 +48,17 @@ class Kinship:
     covariance: FloatArray
     here: float
     repeated: float
+    noise: FloatArray | float = 0.0
+    """What all the noise would add to the covariance if it persisted, shape (m,); `own_noise`: to `repeated`."""
+    own_noise: float = 0.0
+
+    def sharing(self, persistence: float) -> Kinship:
+        """The same where this share of the noise persists besides."""
+        return replace(
+            self,
+            covariance=self.covariance + persistence * self.noise,
+            repeated=self.repeated + persistence * self.own_noise,
+        )
 
 
 def kinship(mechanism: Mechanism, x: FloatArray, here: FloatArray, persistence: float) -> Kinship:
@@ -58,12 +69,8 @@ def kinship(mechanism: Mechanism, x: FloatArray, here: FloatArray, persistence: 
     """
     noise, own = mechanism.noise_at(x) ** 2, float(mechanism.noise_at(here)[0]) ** 2
     variance, covariance, unsure = mechanism.around(x, here)
-    return Kinship(
-        variance=variance + noise,
-        covariance=covariance + persistence * np.sqrt(noise * own),
-        here=unsure + own,
-        repeated=unsure + persistence * own,
-    )
+    free = Kinship(variance + noise, covariance, unsure + own, unsure, np.sqrt(noise * own), own)
+    return free.sharing(persistence)
 
 
 def next_value(kin: Kinship, latent: FloatArray, expected: float, seen: FloatArray) -> tuple[FloatArray, FloatArray]:

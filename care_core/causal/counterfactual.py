@@ -10,17 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
 
 from care_core.causal.abduction import FARTHEST, Kinship, by_mediators, kinship, next_passes, next_value
 from care_core.causal.mechanisms import LEAST, TAIL, FloatArray, Mechanism, columns, restored, transformed
-from care_core.causal.model import UNKNOWN_PERSISTENCE, Mediation, Model, OutcomeRecord, StageRecord
+from care_core.causal.model import UNKNOWN_PERSISTENCE, Mediation, Model, OutcomeRecord, Persistence, StageRecord
 from care_core.run import is_known
 from care_core.variables import Threshold, Variable
 
 INTERVAL = (0.1, 0.9)
+SURELY = NormalDist().inv_cdf(INTERVAL[1])
+_HALVINGS = 30
 
 Config = Mapping[str, float]
 Conditions = Literal["same", "another day"]
@@ -62,6 +65,9 @@ class World:
     """Options that stay as they are."""
     assumed: frozenset[str] = frozenset()
     """Options that no source of the run holds: taken to be at their reference."""
+    wary_from: Config | None = None
+    """Where set, each mechanism counts as bad as it may be (90 %) at other configurations, given what it does at this
+    one: what training did not show between the two is not taken for granted."""
     _told: dict[str, _Answers] = field(default_factory=dict, init=False, repr=False)
     """What was worked out already: the search asks for most configurations many times over."""
 
@@ -70,13 +76,23 @@ class World:
         outcome = self.model.outcomes[objective]
         return self._functional(outcome, configs) if outcome.stages else self._continuous(outcome, configs)
 
+    def p_ok(self, objective: str, configs: Sequence[Config]) -> FloatArray:
+        """The probability of `predict` alone, shape (m,): NaN where the objective has no threshold."""
+        outcome = self.model.outcomes[objective]
+        if outcome.stages:
+            return self._all_stages(outcome, configs)
+        bound, mechanism = self.thresholds.get(objective), self.model.mechanisms[outcome.mechanism]
+        if bound is None:
+            return np.full(len(configs), np.nan)
+        return _probability_of(mechanism, bound, self._next(outcome, configs))
+
     def probability(self, configs: Sequence[Config]) -> FloatArray:
         """Probability that every objective keeps its threshold, shape (m,).
 
         Objectives that move together (DESIGN: time and energy) share one cause: the least likely of a group counts
         once; the rest multiply. What no mechanism predicts counts with its base rate.
         """
-        p_ok = {name: self.predict(name, configs).p_ok for name in self.model.outcomes if name in self.thresholds}
+        p_ok = {name: self.p_ok(name, configs) for name in self.model.outcomes if name in self.thresholds}
         total = np.full(len(configs), float(np.prod(list(self.base_rates().values()))))
         for group in self._groups(p_ok):
             total *= np.min([p_ok[name] for name in group], axis=0)
@@ -118,10 +134,18 @@ class World:
         return known_value(self.observed, name)
 
     def _persistence(self, objective: str) -> float:
-        persistence = self.model.training.persistence.get(objective, UNKNOWN_PERSISTENCE)
+        persistence = self._measured(objective)
         return persistence.same if self.conditions == "same" else persistence.another
 
+    def _measured(self, objective: str) -> Persistence:
+        return self.model.training.persistence.get(objective, UNKNOWN_PERSISTENCE)
+
     def _functional(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
+        p_ok = self._all_stages(outcome, configs)
+        zero, one = np.zeros_like(p_ok), np.ones_like(p_ok)
+        return Predicted(p_ok, np.where(p_ok > INTERVAL[1], one, zero), np.where(p_ok < INTERVAL[0], zero, one), p_ok)
+
+    def _all_stages(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> FloatArray:
         p_ok = np.ones(len(configs))
         runs = [(seen, True) for seen in (self.observed, *self.repeats)]
         for stage in outcome.stages:
@@ -133,8 +157,7 @@ class World:
                 passed += [] if ok is None else [ok]
                 runs[i] = seen, reached and ok is not False
             p_ok *= self._stage_probability(outcome.objective, stage, passed, configs)
-        zero, one = np.zeros_like(p_ok), np.ones_like(p_ok)
-        return Predicted(p_ok, np.where(p_ok > INTERVAL[1], one, zero), np.where(p_ok < INTERVAL[0], zero, one), p_ok)
+        return p_ok
 
     def _stage_probability(
         self, objective: str, stage: StageRecord, passed: Sequence[bool], configs: Sequence[Config]
@@ -143,7 +166,7 @@ class World:
         mechanism = self.model.mechanisms[stage.mechanism]
 
         def ask(x: FloatArray) -> tuple[FloatArray]:
-            chance = _chance(mechanism, stage.passes, x)
+            chance = _chance(mechanism, stage.passes, x, -self._worse(mechanism, x))
             if not passed:
                 return (chance,)
             here = columns([self.config], mechanism.inputs)
@@ -182,27 +205,42 @@ class World:
         return bound.met(seen) if bound is not None else seen == stage.passes
 
     def _continuous(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
+        mechanism, after = self.model.mechanisms[outcome.mechanism], self._next(outcome, configs)
+        low, high = (restored(after.quantile(mechanism, share), mechanism.transform) for share in INTERVAL)
+        return Predicted(restored(after.mean, mechanism.transform), low, high, self.p_ok(outcome.objective, configs))
+
+    def _next(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> _Next:
+        """The next outcome on the transformed scale."""
         mechanism = self.model.mechanisms[outcome.mechanism]
         least = LEAST[mechanism.transform]
         values = [known_value(seen, outcome.objective) for seen in (self.observed, *self.repeats)]
         seen = transformed(np.array([v for v in values if v is not None and v > least]), mechanism.transform)
-
-        def ask(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-            if not len(seen):
-                return mechanism.latent(x), np.sqrt(mechanism.latent_sd(x) ** 2 + mechanism.noise_at(x) ** 2)
-            here = columns([self.config], mechanism.inputs)
-            kin = kinship(mechanism, x, here, self._persistence(outcome.objective))
-            latent = mechanism.latent(np.vstack([x, here]))
-            return next_value(kin, latent[:-1], float(latent[-1]), seen)
-
-        centre, sd = self._once(outcome.objective, columns(configs, mechanism.inputs), ask)
-        if not len(seen):
-            shift, left = self._by_mediators(outcome.mediation, configs)
-            centre, sd = centre + sd * shift, sd * np.sqrt(left)
+        shares, weights = self._measured(outcome.objective).shares(same=self.conditions == "same")
         bound = self.thresholds.get(outcome.objective)
-        low, high = (restored(centre + mechanism.error_quantile(q) * sd, mechanism.transform) for q in INTERVAL)
-        p_ok = np.full(len(configs), np.nan) if bound is None else _probability_of(mechanism, bound, centre, sd)
-        return Predicted(restored(centre, mechanism.transform), low, high, p_ok)
+        bad = 1.0 if bound is None or bound.op in ("<=", "<") else -1.0
+
+        def ask(x: FloatArray) -> tuple[FloatArray, ...]:
+            worse = bad * self._worse(mechanism, x)
+            if not len(seen):
+                return mechanism.latent(x) + worse, np.sqrt(mechanism.latent_sd(x) ** 2 + mechanism.noise_at(x) ** 2)
+            here = columns([self.config], mechanism.inputs)
+            kin = kinship(mechanism, x, here, 0.0)
+            latent = mechanism.latent(np.vstack([x, here])) + np.append(worse, 0.0)
+            pairs = [next_value(kin.sharing(share), latent[:-1], float(latent[-1]), seen) for share in shares]
+            return tuple(part for pair in pairs for part in pair)
+
+        told = self._once(outcome.objective, columns(configs, mechanism.inputs), ask)
+        centre, sd = told[0::2], told[1::2]
+        if len(seen):
+            return _Next(centre, sd, weights)
+        shift, left = self._by_mediators(outcome.mediation, configs)
+        return _Next(centre + sd * shift, sd * np.sqrt(left), np.ones(1))
+
+    def _worse(self, mechanism: Mechanism, x: FloatArray) -> FloatArray:
+        """What a mechanism may do beyond what it is expected to, from the configuration that is known; shape (m,)."""
+        if self.wary_from is None:
+            return np.zeros(len(x))
+        return SURELY * mechanism.change(x, columns([self.wary_from], mechanism.inputs))[1]
 
     def _by_mediators(self, mediation: Mediation | None, configs: Sequence[Config]) -> tuple[FloatArray, FloatArray]:
         """What the metrics of runs that ended before an objective had a value say of it: centre of its error and what
@@ -255,14 +293,44 @@ def known_value(observed: Mapping[str, object], name: str) -> float | None:
     return float(value) if is_known(value) else None  # type: ignore[arg-type]
 
 
-def _chance(mechanism: Mechanism, passes: float, x: FloatArray) -> FloatArray:
-    one = mechanism.probability(x)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Next:
+    """The next outcome of m configurations: what it is for each of k shares of the noise that may persist, (k, m), and
+    how likely each share is, (k,)."""
+
+    centre: FloatArray
+    sd: FloatArray
+    weights: FloatArray
+
+    @property
+    def mean(self) -> FloatArray:
+        return np.asarray(self.weights @ self.centre)
+
+    def share_below(self, mechanism: Mechanism, values: FloatArray) -> FloatArray:
+        """Distribution function, shape (m,)."""
+        below: FloatArray = self.weights @ mechanism.share_below((values - self.centre) / self.sd)
+        return below
+
+    def quantile(self, mechanism: Mechanism, share: float) -> FloatArray:
+        """By halving, shape (m,): between the least and the largest of those of the single shares."""
+        each = self.centre + mechanism.error_quantile(share) * self.sd
+        low, high = each.min(axis=0), each.max(axis=0)
+        for _ in range(_HALVINGS if len(each) > 1 else 0):
+            middle = (low + high) / 2
+            beyond = self.share_below(mechanism, middle) >= share
+            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        return np.asarray((low + high) / 2)
+
+
+def _chance(mechanism: Mechanism, passes: float, x: FloatArray, beyond: FloatArray | float = 0.0) -> FloatArray:
+    """Probability of passing, the regression moved by `beyond` towards it."""
+    one = mechanism.probability_of(mechanism.latent(x) + (beyond if passes == 1.0 else -np.asarray(beyond)))
     return one if passes == 1.0 else 1.0 - one
 
 
-def _probability_of(mechanism: Mechanism, bound: Threshold, centre: FloatArray, sd: FloatArray) -> FloatArray:
+def _probability_of(mechanism: Mechanism, bound: Threshold, after: _Next) -> FloatArray:
     # A bound that no value of the target can go below (a time of 0 s) lies infinitely far on a log scale.
     reachable = bound.value > LEAST[mechanism.transform]
-    limit = float(transformed(np.array(bound.value), mechanism.transform)) if reachable else -np.inf
-    below = mechanism.share_below((limit - centre) / sd)
+    limit = transformed(np.array(bound.value), mechanism.transform) if reachable else np.array(-np.inf)
+    below = after.share_below(mechanism, limit)
     return below if bound.op in ("<=", "<") else 1.0 - below

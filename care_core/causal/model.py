@@ -13,7 +13,7 @@ import numpy as np
 
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import TAIL, Mechanism, columns
+from care_core.causal.mechanisms import TAIL, FloatArray, Mechanism, columns
 from care_core.variables import Threshold
 
 
@@ -197,7 +197,22 @@ class Persistence:
     another: float
     pairs: tuple[int, int] = (0, 0)
 
+    def shares(self, *, same: bool) -> tuple[FloatArray, FloatArray]:
+        """Shares that it may be, and how likely each is: a beta distribution around the mean, as wide as the pairs
+        leave it. Without any pair under the same conditions each is as likely as the next.
 
+        The mean alone lets the error of a run, however far beyond all noise, go on to the next by just that share: a
+        robot that took half as long again for how it was set would be sure to lose a quarter after its repair.
+        """
+        mean, pairs = (self.same, self.pairs[0]) if same else (self.another, self.pairs[1])
+        strength = 2.0 + pairs / 2.0
+        at = (np.arange(SHARES) + 0.5) / SHARES
+        density = np.exp((strength * mean - 1) * np.log(at) + (strength * (1 - mean) - 1) * np.log(1 - at))
+        return at, np.asarray(density / density.sum())
+
+
+SHARES = 10
+"""Shares of the noise that are told apart."""
 UNKNOWN_PERSISTENCE = Persistence(same=0.5, another=0.25)
 """Where no configuration was run twice: the middle of what is possible, on another day of none to that."""
 

@@ -13,6 +13,9 @@ from care_core.health.telling import LIKELY
 
 ENOUGH = 0.5
 """A change less likely than this to repair the run is no advice."""
+CHANCY = 0.75
+"""Odds of the reference configuration below which missions fail by chance as well: less is then enough, in proportion,
+and one good run after a change proves little, nor one bad run much."""
 
 ALIKE = 0.02
 """Shares of a limit that are no difference to an operator."""
@@ -73,14 +76,29 @@ def untried(fix: Fix, learned_elsewhere: str) -> str | None:
     return f"{learned_elsewhere}, so no change is advised; look at {suspected}, and carry it over with 'care update'"
 
 
-def falls_short(fix: Fix, broken: Sequence[ObjectiveResult]) -> str | None:
-    """Why a fix is not advised that is less likely than not to repair the run, with what it reaches, else None."""
-    if fix.p_fixed >= ENOUGH:
+def falls_short(fix: Fix, broken: Sequence[ObjectiveResult], odds: float) -> str | None:
+    """Why a fix is not advised that is less likely than not to repair the run, with what it reaches, else None.
+
+    Args:
+        odds: probability that the reference configuration meets every limit in such a mission. Where missions fail by
+            chance no change is surer than that, and one that comes near it is what there is to be done.
+    """
+    if fix.p_fixed >= ENOUGH * min(1.0, odds / CHANCY):
         return None
     changes = ", ".join(map(str, fix.changes))
     reached = "; ".join(filter(None, (_reached(fix, result) for result in broken)))
     limit = f"; with it {reached}" if reached else ""
     return f"no change is likely enough to meet every limit: the best found, {changes}, has {fix.p_fixed:.0%}{limit}"
+
+
+def by_chance(fix: Fix, now: float, odds: float) -> str | None:
+    """What an operator has to know of a change where the reference configuration misses limits too, else None."""
+    if odds >= CHANCY:
+        return None
+    return (
+        f"such missions fail by chance too: by the model the reference meets every limit in {odds:.0%} of them, this "
+        f"change in {fix.p_fixed:.0%}, the run as it was in {now:.0%}; one run proves little, repeat it"
+    )
 
 
 def _reached(fix: Fix, result: ObjectiveResult) -> str:

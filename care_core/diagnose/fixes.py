@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -80,22 +81,30 @@ def _is_unordered(option: Variable) -> bool:
 def settled(world: World, assignment: Assignment) -> tuple[Assignment, float]:
     """The same options with values as near to the run's as is safe, and the probability of that.
 
-    A nearer value than the reference is taken only where the value one step nearer still would do nearly as well: the
-    edge of what works, and of what was flown in training, is not known to a step. Where the change gains next to
-    nothing by the model, the model cannot tell its values apart, and the reference is what is known to work.
+    The reference is known to work, a value on the way to it only as far as training shows. So a nearer one is taken
+    where the value one step nearer still would do nearly as well, both for this run and, before anything of it was
+    known, with each mechanism as bad between the two as it may be: the edge of what works, and of what was flown in
+    training, is not known to a step.
     """
     chosen = dict(assignment)
-    here, reset = map(float, world.probability([world.config, {**world.config, **chosen}]))
-    if reset - here < NEARLY:
-        return chosen, reset
-    floor = reset - min(NEARLY, GIVEN_UP * (reset - here))
+    before = replace(world, observed={}, repeats=(), wary_from={**world.config, **chosen})
+    floors = [_floor(asked, chosen) for asked in (world, before)]
     for name in assignment:
         if not _is_unordered(world.variables[name]):
             values = candidate_values(world, name)
-            reached = world.probability([{**world.config, **chosen, name: value} for value in values])
-            works = int(np.argmin(reached >= floor)) if (reached < floor).any() else len(values)
-            chosen[name] = values[max(0, works - 2)]
+            configs = [{**world.config, **chosen, name: value} for value in values]
+            kept = [asked.probability(configs) >= floor for asked, floor in zip((world, before), floors, strict=True)]
+            does = np.append(np.all(kept, axis=0), False)
+            chosen[name] = values[max(0, int(np.argmin(does)) - 2)]
     return chosen, float(world.probability([{**world.config, **chosen}])[0])
+
+
+def _floor(world: World, assignment: Assignment) -> float:
+    """What a nearer value may come down to; where the change gains next to nothing, the model cannot tell its values
+    apart, and there is none."""
+    surely = replace(world, wary_from=None)
+    here, reset = map(float, surely.probability([world.config, {**world.config, **assignment}]))
+    return np.inf if reset - here < NEARLY else reset - min(NEARLY, GIVEN_UP * (reset - here))
 
 
 def best_alone(world: World, name: str) -> tuple[float, float] | None:

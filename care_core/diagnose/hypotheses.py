@@ -117,7 +117,7 @@ def _added(before: World, objective: str) -> tuple[float, float]:
     if objective not in before.model.outcomes:
         return UNKNOWN, UNKNOWN
     asked = [before.config, before.reference]
-    here, there = 1.0 - before.predict(objective, asked).p_ok
+    here, there = 1.0 - before.p_ok(objective, asked)
     added = float(here - there)
     if before.model.outcomes[objective].stages:
         # What makes a mission late or costly makes it fail as well, and then its time and energy are not known.

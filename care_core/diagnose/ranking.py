@@ -79,7 +79,7 @@ def suspects(
     effects = {name: world.model.effects.get((name, objective)) for name in paths}
     names = list(paths)
     learned = [name for name in names if effects[name] is not None and objective in world.model.outcomes]
-    shares = _shapley(learned, lambda sets: world.predict(objective, [_reset(world, s) for s in sets]).p_ok)
+    shares = _shapley(learned, lambda sets: world.p_ok(objective, [_reset(world, s) for s in sets]))
     contribution = {**dict.fromkeys(names, 0.0), **dict(zip(learned, map(float, shares), strict=True))}
     unexplained = max(0.0, 1.0 - sum(max(0.0, share) for share in contribution.values()))
     pointer = pointers(world, objective, _acting_where_it_failed(world, objective, names, said), known, said)

@@ -128,4 +128,4 @@ def _probability_if(
     inert = {name: world.reference[name] for name in pair if name != cause and name in world.reference}
     there = replace(world, config={**world.config, **inert})
     configs = [{**there.config, **({name: value} if name == cause else {})} for name, value in changes]
-    return there.predict(objective, configs).p_ok
+    return there.p_ok(objective, configs)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from care_core.causal.counterfactual import World
 from care_core.causal.model import EffectRecord
 from care_core.diagnose import provenance
-from care_core.diagnose.advice import believed, falls_short, nearest, outweighed, untried
+from care_core.diagnose.advice import believed, by_chance, falls_short, nearest, outweighed, untried
 from care_core.diagnose.circumstances import circumstances, unusual
 from care_core.diagnose.fixes import (
     GAIN_FOR_ONE_MORE,
@@ -155,7 +155,7 @@ def diagnose(
     out_of_reach = next(filter(None, unheard.values()), None)
     abstained = out_of_reach or outweighed(hypotheses, health.findings) or _abstains(case, faults, fixes)
     if abstained is None:
-        abstained = falls_short(fixes[0], broken) or untried(fixes[0], schema.learned_elsewhere)
+        abstained = falls_short(fixes[0], broken, _odds(world)) or untried(fixes[0], schema.learned_elsewhere)
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     if abstained is None:
         faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)
@@ -371,7 +371,7 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
     pinned = f", with {', '.join(sorted(case.world.kept))} kept as it is" if case.world.kept else ""
     broken = [fault.objective for fault in faults]
     best = nearest(_resets(case, faults), broken)
-    short = falls_short(best, broken) if best else None
+    short = falls_short(best, broken, _odds(case.world)) if best else None
     return f"{short or 'no change inside the acceptable ranges is likely enough to meet every limit'}{pinned}"
 
 
@@ -444,6 +444,11 @@ def _reference(judged: Judged) -> str:
     return f"judged against {judged.reference.source}: {count}"
 
 
+def _odds(world: World) -> float:
+    """Probability that the reference configuration meets every limit in a mission like this, whatever this run met."""
+    return float(replace(world, observed={}, repeats=()).probability([world.reference])[0])
+
+
 def _if_hidden(case: _Case, fix: Fix) -> str:
     """What is left of a fix's promise where something unrecorded moved options and objectives together."""
     now = float(case.world.probability([case.world.config])[0])
@@ -469,6 +474,9 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None) -> t
         for name, rate in case.world.base_rates().items()
     ]
     notes.append(_promise(case.world, [result.variable.name for result in broken]))
+    if fix is not None:
+        now = float(case.world.probability([case.world.config])[0])
+        notes += filter(None, [by_chance(fix, now, _odds(case.world))])
     if fix is not None and case.profile.schema.observational:
         notes.append(_if_hidden(case, fix))
     if not case.run.mission.fits and case.run.mission.mismatch not in notes:

@@ -122,7 +122,7 @@ def _probabilities(
 
 
 def _asked(world: World, configs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
-    promised = {name: world.predict(name, configs).p_ok for name in world.thresholds}
+    promised = {name: world.p_ok(name, configs) for name in world.thresholds}
     return {**promised, "all": world.probability(configs)}
 
 

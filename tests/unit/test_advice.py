@@ -1,4 +1,5 @@
-"""Which fix is advised: none that is less likely than not, none where something failed that no parameter repairs."""
+"""Which fix is advised: none that is less likely than not, but where the reference fails by chance too, and none where
+something failed that no parameter repairs."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from care_core.diagnose.advice import believed, falls_short, nearest, outweighed
+from care_core.diagnose.advice import believed, by_chance, falls_short, nearest, outweighed
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
 from care_core.health.records import Finding
 from care_core.variables import Threshold
@@ -29,12 +30,23 @@ def motor(probability: float) -> tuple[Hypothesis, ...]:
 
 def test_a_likely_change_is_advised() -> None:
     assert outweighed(ALONE) is None
-    assert falls_short(fix_with(0.8), [LATE]) is None
+    assert falls_short(fix_with(0.8), [LATE], odds=1.0) is None
+
+
+def test_where_missions_fail_by_chance_a_change_need_not_be_surer_than_the_reference() -> None:
+    fix = fix_with(0.4)
+    assert falls_short(fix, [LATE], odds=0.95) is not None
+    assert falls_short(fix, [LATE], odds=0.75) is not None
+    assert falls_short(fix, [LATE], odds=0.5) is None
+    said = by_chance(fix, now=0.1, odds=0.5)
+    assert said is not None
+    assert "the reference meets every limit in 50% of them, this change in 40%, the run as it was in 10%" in said
+    assert by_chance(fix, now=0.1, odds=0.95) is None
 
 
 def test_a_change_less_likely_than_not_is_named_and_not_advised() -> None:
     fix = replace(fix_with(0.4), predicted={"mission_time": Prediction(118.0, 112.0, 124.0, 0.01)})
-    said = falls_short(fix, [LATE])
+    said = falls_short(fix, [LATE], odds=1.0)
     assert said is not None
     assert "land_speed 16 -> 50, has 40%" in said
     assert "mission_time is 90 % sure to reach 124 s, the limit of 100 s is out of reach" in said

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import TAIL
+from care_core.causal.model import Persistence
 from care_core.profile.store import Profile
 from care_core.run import Unavailable
 from care_core.variables import Threshold
@@ -85,6 +86,29 @@ def test_on_another_day_less_of_it_is_met_again(planted: Profile) -> None:
     slow = world(planted, {"time": expected + 20})
     another = replace(slow, conditions="another day")
     assert expected < another.predict("time", [DEFAULTS]).value[0] < slow.predict("time", [DEFAULTS]).value[0]
+
+
+def test_how_much_of_an_error_far_off_persists_is_what_is_known_least(planted: Profile) -> None:
+    far = world(planted, {"success": 1.0, "time": 400.0})
+
+    def interval(pairs: int) -> tuple[float, float]:
+        seen = {"time": Persistence(same=0.5, another=0.25, pairs=(pairs, 0))}
+        model = replace(far.model, training=replace(far.model.training, persistence=seen))
+        p = replace(far, model=model).predict("time", [{**DEFAULTS, "speed": 6.0}])
+        return float(p.low[0]), float(p.high[0])
+
+    low, high = interval(1000)
+    lowest, highest = interval(0)
+    assert lowest < low < high < highest
+    assert highest - lowest > 1.5 * (high - low)
+
+
+@pytest.mark.parametrize(("same", "pairs"), [(0.5, 0), (0.3, 20), (0.8, 200)])
+def test_shares_that_may_persist_have_the_mean_that_was_measured(same: float, pairs: int) -> None:
+    at, weights = Persistence(same=same, another=0.25, pairs=(pairs, 0)).shares(same=True)
+    assert weights.sum() == pytest.approx(1.0)
+    assert weights @ at == pytest.approx(same, abs=0.02)
+    assert np.sqrt(weights @ (at - same) ** 2) < 0.3 / np.sqrt(1 + pairs / 10)
 
 
 def test_a_second_failure_is_evidence_against_chance(planted: Profile) -> None:

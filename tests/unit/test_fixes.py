@@ -127,6 +127,21 @@ def test_a_nearer_value_than_the_reference_has_a_step_of_margin(planted: Profile
     if step:
         beyond = {**here.config, **chosen, name: values[step + 1]}
         assert here.probability([beyond])[0] >= floor
+    if chosen != back:  # with no help of this run, and the mechanisms at their worst between the reference and there
+        before = replace(here, observed={}, repeats=())
+        reset = {**here.config, **back}
+        at_worst = replace(before, wary_from=reset).probability([{**here.config, **chosen}])[0]
+        assert at_worst >= before.probability([reset])[0] - NEARLY
+
+
+def test_what_is_not_known_between_two_configurations_counts_against_the_second(planted: Profile) -> None:
+    here = planted_world(planted, speed=1.4)
+    back, between = ({**here.config, "speed": speed} for speed in (5.0, 3.0))
+    wary = replace(here, observed={}, wary_from=back)
+    plain = replace(here, observed={})
+    assert wary.probability([back])[0] == pytest.approx(plain.probability([back])[0])
+    assert wary.probability([between])[0] <= plain.probability([between])[0]
+    assert wary.predict("time", [between]).value[0] > plain.predict("time", [between]).value[0]
 
 
 def test_an_option_that_the_model_sees_nothing_of_goes_back_to_its_reference(planted: Profile) -> None:
