@@ -142,7 +142,9 @@ def _how_to_have(option: Variable) -> str:
     if not names:
         return "the profile names no parameter for it"
     namespace = names[0].rpartition("/")[0]
-    recorded = f"record {namespace}/parameter_updates, or " if namespace else ""
+    # On ROS 2 all nodes tell their parameters on one topic, on ROS 1 each that can be reconfigured on its own.
+    topic = "/parameter_events" if "." in names[0].rpartition("/")[2] else f"{namespace}/parameter_updates"
+    recorded = f"record {topic}, or " if namespace else ""
     return f"{recorded}give the file that sets it with --config"
 
 

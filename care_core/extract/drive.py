@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import pairwise
 
@@ -159,6 +159,17 @@ Recoveries = Sequence[tuple[float, str]]
 """Time and name of each recovery behavior that ran."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Poses of the robot in a frame: s, m, rad, all shape (n,)."""
+
+    t: Floats
+    x: Floats
+    y: Floats
+    yaw: Floats
+    frame: str
+
+
 @dataclass(frozen=True, slots=True)
 class GoalServer:
     """How the log of a kind of goal server tells its goals: one a mission kind, see `actionlib` and `nav2`."""
@@ -167,6 +178,8 @@ class GoalServer:
     legs: Callable[[Mapping[str, Table], Args, float], tuple[Leg, ...]]
     """Every goal of a log of that duration (s), in the order they were sent."""
     recoveries: Callable[[Mission], Recoveries | Unavailable]
+    poses: Callable[[Mission], Poses | None] = lambda _: None
+    """Where the server said that the robot was, in the frame of the goals."""
 
 
 GOAL_SERVERS: dict[str, GoalServer] = {}
@@ -237,6 +250,9 @@ class Drive:
     commands: Commands | None
     topics: Topics
     doubt: str = ""
+    placed: Odometry | None = None
+    """The odometry in the frame of the goals, where the goal server says where the robot is; its steps are not those of
+    the wheels: a localization corrects itself."""
 
     @property
     def reached(self) -> tuple[Leg, ...]:
@@ -264,6 +280,7 @@ def analyse(mission: Mission) -> Drive:
         commands=commands,
         topics=names,
         doubt=doubt,
+        placed=None if doubt or odometry is None else _placed(odometry, goal_server(mission.spec).poses(mission)),
     )
 
 
@@ -292,6 +309,23 @@ def _odometry(table: Table | None, legs: Sequence[Leg]) -> Odometry | None:
         turn=table["twist.twist.angular.z"][active],
         leg=leg[active],
         frame=str(table["header.frame_id"][active][0]),
+    )
+
+
+def _placed(odometry: Odometry, poses: Poses | None) -> Odometry | None:
+    """The odometry moved to the last pose that was told before each sample, the first one before it."""
+    if poses is None or poses.frame.strip("/") == odometry.frame.strip("/"):
+        return None
+    told = np.interp(poses.t, odometry.t, np.arange(len(odometry.t))).round().astype(np.intp)
+    at = np.clip(np.searchsorted(poses.t, odometry.t, side="right") - 1, 0, None)
+    off = poses.yaw[at] - odometry.yaw[told[at]]
+    dx, dy = odometry.x - odometry.x[told[at]], odometry.y - odometry.y[told[at]]
+    return replace(
+        odometry,
+        x=poses.x[at] + np.cos(off) * dx - np.sin(off) * dy,
+        y=poses.y[at] + np.sin(off) * dx + np.cos(off) * dy,
+        yaw=odometry.yaw + off,
+        frame=poses.frame,
     )
 
 

@@ -44,10 +44,21 @@ def _obstacles(log: Log, coverage: Coverage, vehicle: Vehicle) -> Iterator[str]:
         yield other
     elif is_other_vehicle(schema, vehicle):
         yield f"it is for {_a(schema.match['vehicle'])}, this is {_a(vehicle.kind)}"
+    elif other := _other_plugin(log, schema):
+        yield other
     elif not coverage.found:
         yield "none of its parameters or sources are in the log"
     elif coverage.sources < LEAST * coverage.sources_wanted:
         yield f"only {coverage.sources} of the {coverage.sources_wanted} messages that it reads are in the log"
+
+
+def _other_plugin(log: Log, schema: Schema) -> str:
+    """Which part of the stack is another than the profile was learned with; '' where the log names none."""
+    for name, text in schema.plugins.items():
+        for setting in log.settings().get(name, ()):
+            if text.casefold() not in str(setting.value).casefold():
+                return f"{name} is {setting.value}, the profile was learned with {text}"
+    return ""
 
 
 def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:

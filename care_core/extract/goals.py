@@ -36,6 +36,7 @@ from care_core.extract.drive import (
 )
 from care_core.extract.registry import Args, Mission, MissionKind, numeric, points
 from care_core.logs.base import Table, Wanted
+from care_core.logs.plausible import kept_its_rate
 from care_core.run import Check, Evidence, Unavailable, Value
 
 ROSOUT = ("/rosout", "/rosout_agg")
@@ -222,7 +223,7 @@ def _warnings(mission: Mission) -> Iterator[Evidence]:
     rows = []
     for time_s, level, name, text in zip(table.t.tolist(), *(table[one] for one in ROSOUT_FIELDS), strict=True):
         kind = next((kind for pattern, kind in _MESSAGE_KINDS if pattern.search(text)), None)
-        if level >= _WARN or kind == "recovery":
+        if (level >= _WARN and not kept_its_rate(text)) or kind == "recovery":
             # On ROS 1 one node does it all and its name begins with a slash; on ROS 2 the server that speaks matters.
             said = text if name.startswith("/") or not name else f"{name}: {text}"
             rows.append((time_s, said, kind or "warning"))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from functools import wraps
 from itertools import pairwise
 
 import numpy as np
@@ -52,7 +53,7 @@ def _start(drive: Drive, first: Pose) -> Pose | Unavailable:
 
     Where the odometry has a frame of its own, the way to the first goal is as long as the robot came forward on it.
     """
-    odometry = drive.odometry
+    odometry = drive.placed or drive.odometry
     if odometry is None:
         return no_odometry(drive)
     here = np.flatnonzero(odometry.leg == 0)
@@ -117,3 +118,22 @@ def way_asked_m(mission: Mission) -> float | Unavailable:
         return found
     length_m = float(found[0].lengths.sum())
     return length_m if length_m > 0 else Unavailable("the goals ask for no way", "judge a mission that leads somewhere")
+
+
+PER_GOAL = {"per": one_of("goal: for each goal that the mission asks for; in all unless given", "goal")}
+PER_METRE = {"per": one_of("metre: for each metre of way that the goals ask for; in all unless given", "metre")}
+
+
+def divided(compute: Callable[[Mission, Args], Value]) -> Callable[[Mission, Args], Value]:
+    """A sum over the mission, for each metre or goal that it asks for where the argument `per` says so."""
+
+    @wraps(compute)
+    def answer(mission: Mission, args: Args) -> Value:
+        value, per = compute(mission, args), args.get("per")
+        if isinstance(value, Unavailable) or per is None:
+            return value
+        drive = mission.shared(analyse)
+        amount = way_asked_m(mission) if per == "metre" else float(len(drive.goals) or len(drive.legs))
+        return amount if isinstance(amount, Unavailable) else value / amount
+
+    return answer

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from care_core.extract.drive import GOAL_SERVERS, GoalServer, Leg, Recoveries, Status, has, heading
+from care_core.extract.drive import GOAL_SERVERS, GoalServer, Leg, Poses, Recoveries, Status, has, heading
 from care_core.extract.goals import GoalMissions
+from care_core.extract.goals_asked import PER_GOAL, PER_METRE, divided
 from care_core.extract.registry import MISSION_KINDS, Args, Mission, extractor, missing, one_of
 from care_core.logs.base import Table, Wanted
 from care_core.run import Unavailable, Value
@@ -36,6 +37,14 @@ PLAN_FIELDS = (
     f"{_POSES}.position.y",
     f"{_POSES}.orientation.z",
     f"{_POSES}.orientation.w",
+)
+
+_PLACE = "feedback.current_pose"
+FEEDBACK_FIELDS = (
+    f"{_PLACE}.header.frame_id",
+    f"{_PLACE}.pose.position.x",
+    f"{_PLACE}.pose.position.y",
+    *(f"{_PLACE}.pose.orientation.{axis}" for axis in "xyzw"),
 )
 
 _ENDS = {4: Status.SUCCEEDED, 5: Status.PREEMPTED, 6: Status.ABORTED}
@@ -77,6 +86,10 @@ def _status_topic(action: str) -> str:
     return f"{action}/_action/status"
 
 
+def _feedback_topic(action: str) -> str:
+    return f"{action}/_action/feedback"
+
+
 def _pose_topic(spec: Args) -> str:
     return str(spec.get("goal_pose", "/goal_pose"))
 
@@ -92,6 +105,7 @@ def _tree_topic(spec: Args) -> str:
 def _needs(spec: Args) -> Wanted:
     return {
         **{_status_topic(action): STATUS_FIELDS for action in _actions(spec)},
+        _feedback_topic(_actions(spec)[0]): FEEDBACK_FIELDS,
         _pose_topic(spec): POSE_FIELDS,
         _plan_topic(spec): PLAN_FIELDS,
         _tree_topic(spec): TREE_FIELDS,
@@ -189,7 +203,9 @@ def _changes(table: Table) -> Iterator[tuple[float, str, str, str]]:
     "status": one_of(
         "state that it comes to: RUNNING, SUCCESS or FAILURE; FAILURE unless given", "RUNNING", "SUCCESS", "FAILURE"
     ),
+    **PER_GOAL,
 })  # fmt: skip
+@divided
 def tree_count(mission: Mission, args: Args) -> Value:
     """How often a node of the behavior tree came to a state: what the planner or the controller failed at."""
     changes = _tree_changes(mission)
@@ -207,7 +223,8 @@ def plans(mission: Mission, args: Args) -> Value:
     return missing(topic) if table is None else float(len(table))
 
 
-@extractor("plan_length", needs={}, unit="m", parts=("goals", "plan"))
+@extractor("plan_length", needs={}, unit="m", parts=("goals", "plan"), args=PER_METRE)
+@divided
 def plan_length(mission: Mission, args: Args) -> Value:
     """Length of the first plan of each goal, summed over the goals: the way that was meant."""
     topic = _plan_topic(mission.spec)
@@ -227,7 +244,21 @@ def _length(table: Table, row: int) -> float:
     return float(np.hypot(np.diff(x), np.diff(y)).sum())
 
 
-GOAL_SERVERS[KIND] = GoalServer(_needs, find_legs, recoveries)
+def poses(mission: Mission) -> Poses | None:
+    """Where the navigator said that the robot was, while it was on its way to a goal."""
+    table = mission.table(_feedback_topic(_actions(mission.spec)[0]))
+    if table is None or not has(table, FEEDBACK_FIELDS):
+        return None
+    x, y = (np.asarray(table[f"{_PLACE}.pose.position.{axis}"], np.float64) for axis in "xy")
+    yaw = heading(table, f"{_PLACE}.pose.orientation")
+    told = np.isfinite(x + y + yaw)
+    frames = table[f"{_PLACE}.header.frame_id"][told]
+    if not len(frames) or not (frames == frames[0]).all():
+        return None
+    return Poses(table.t[told], x[told], y[told], yaw[told], str(frames[0]))
+
+
+GOAL_SERVERS[KIND] = GoalServer(_needs, find_legs, recoveries, poses)
 MISSION_KINDS[KIND] = GoalMissions(
     KIND,
     {

@@ -32,7 +32,7 @@ from care_core.extract.drive import (
     share,
 )
 from care_core.extract.goals import ROSOUT, rosout
-from care_core.extract.goals_asked import goals_asked, way_asked_m
+from care_core.extract.goals_asked import PER_GOAL, PER_METRE, divided, goals_asked
 from care_core.extract.registry import Args, Mission, extractor, missing, numeric, one_of
 from care_core.run import Unavailable, Value
 
@@ -63,17 +63,18 @@ def _moving(drive: Drive) -> Odometry | Unavailable:
 
 def _placed(drive: Drive) -> Odometry | Unavailable:
     """Odometry in the frame of the goals, to measure distances to them."""
-    if drive.odometry is None:
+    odometry = drive.placed or drive.odometry
+    if odometry is None:
         return no_odometry(drive)
     if any(math.isnan(leg.x) for leg in drive.legs):
         return Unavailable("the log does not say where the goals lie", "ros2 bag record /goal_pose /plan")
     frames = {leg.frame.strip("/") for leg in drive.legs} - {""}
-    own = drive.odometry.frame.strip("/")
+    own = odometry.frame.strip("/")
     if own and frames - {own}:
         other = ", ".join(sorted(frames))
         hint = "name in the mission section a topic of nav_msgs/Odometry in the goals' frame"
         return Unavailable(f"goals are in frame {other}, odometry is in {own}", hint)
-    return drive.odometry
+    return odometry
 
 
 def _commands(drive: Drive) -> Commands | Unavailable:
@@ -144,25 +145,6 @@ def of_drive(
     return wrap
 
 
-_PER_GOAL = {"per": one_of("goal: for each goal that the mission asks for; in all unless given", "goal")}
-_PER_METRE = {"per": one_of("metre: for each metre of way that the goals ask for; in all unless given", "metre")}
-
-
-def divided(compute: Callable[[Mission, Args], Value]) -> Callable[[Mission, Args], Value]:
-    """A sum over the mission, for each metre or goal that it asks for where the argument `per` says so."""
-
-    @wraps(compute)
-    def answer(mission: Mission, args: Args) -> Value:
-        value, per = compute(mission, args), args.get("per")
-        if isinstance(value, Unavailable) or per is None:
-            return value
-        drive = mission.shared(analyse)
-        amount = way_asked_m(mission) if per == "metre" else float(len(drive.goals) or len(drive.legs))
-        return amount if isinstance(amount, Unavailable) else value / amount
-
-    return answer
-
-
 # Goals and time
 
 
@@ -172,7 +154,7 @@ def goals_sent(mission: Mission, args: Args) -> Value:
     return float(len(mission.shared(analyse).legs))
 
 
-@extractor("goals_reached", needs={}, parts=("goals",), unit="", args=_PER_GOAL)
+@extractor("goals_reached", needs={}, parts=("goals",), unit="", args=PER_GOAL)
 @divided
 def goals_reached(mission: Mission, args: Args) -> Value:
     """Number of goals that ended in success, late ones included."""
@@ -200,7 +182,7 @@ def goals_success(mission: Mission, args: Args) -> Value:
             "preempted, succeeded, aborted, rejected, recalled or lost; aborted unless given",
             *("preempted", "succeeded", "aborted", "rejected", "recalled", "lost"),
         ),
-        **_PER_GOAL,
+        **PER_GOAL,
     },
 )
 @divided
@@ -328,7 +310,7 @@ def passages_passed(mission: Mission, args: Args) -> Value:
 # Path
 
 
-@extractor("path_length", needs={}, parts=("goals", "odometry"), unit="m", args=_PER_METRE)
+@extractor("path_length", needs={}, parts=("goals", "odometry"), unit="m", args=PER_METRE)
 @divided
 @of_drive(_odometry)
 def path_length(drive: Drive, odometry: Odometry, args: Args) -> Value:
@@ -336,7 +318,7 @@ def path_length(drive: Drive, odometry: Odometry, args: Args) -> Value:
     return float(odometry.step_m.sum())
 
 
-@extractor("detour", needs={}, parts=("goals", "odometry"), unit="m", args=_PER_METRE)
+@extractor("detour", needs={}, parts=("goals", "odometry"), unit="m", args=PER_METRE)
 @divided
 @of_drive(_placed)
 def detour(drive: Drive, odometry: Odometry, args: Args) -> Value:
@@ -446,7 +428,7 @@ def no_way_time(drive: Drive, odometry: Odometry, args: Args) -> Value:
     return longest(np.abs(odometry.speed) < MOVING_MPS, odometry.dt)
 
 
-@extractor("total_turn", needs={}, parts=("goals", "odometry"), unit="rad", args=_PER_METRE)
+@extractor("total_turn", needs={}, parts=("goals", "odometry"), unit="rad", args=PER_METRE)
 @divided
 @of_drive(_moving)
 def total_turn(drive: Drive, odometry: Odometry, args: Args) -> Value:
@@ -544,7 +526,7 @@ def command_interval(drive: Drive, commands: Commands, args: Args) -> Value:
         "absent": numeric(
             "value where the log lacks the topic, which is only published on a recovery; not known unless given"
         ),
-        **_PER_GOAL,
+        **PER_GOAL,
     },
 )
 @divided

@@ -75,6 +75,8 @@ class Schema:
     carried_over: str = ""
     """What the profile was learned from, where that is not what its logs are of: then it names suspects and advises no
     change. Empty where it is."""
+    plugins: Mapping[str, str] = field(default_factory=dict)
+    """Parameter that names a part of the stack -> what its value contains where it is the part learned from."""
     firmware_window: tuple[tuple[int, ...], tuple[int, ...]] | None = None
     """First and last version of the firmware that the profile is good for, as far as each is written."""
     digest: str = field(default="", compare=False)

@@ -177,6 +177,7 @@ class _Profile(Strict):
     logs: list[str] = Field(default_factory=list)
     observational: bool = False
     carried_over: str = ""
+    plugins: dict[str, str] = Field(default_factory=dict)
     mission: dict[str, Any] = Field(default_factory=dict)
     evidence: list[_EvidenceRule] = Field(default_factory=list)
     circumstances: dict[str, dict[str, Side]] = Field(default_factory=dict)
@@ -261,6 +262,7 @@ def _to_schema(data: _Profile) -> Schema:
         logs=tuple(data.logs),
         observational=data.observational,
         carried_over=data.carried_over,
+        plugins=data.plugins,
         mission=data.mission,
         evidence=tuple(map(_to_rule, data.evidence)),
         variables=variables,

@@ -12,6 +12,8 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import random
+import signal
 import sys
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,7 @@ from nav2_robot.robot import Robot
 from nav2_robot.standin import StandIn
 from nav2_robot.world import WORLDS, Conditions, described
 
+_DRAWN = "drawn"
 _CONTROLLER_HZ = 20.0
 """Nav2's, where the file does not say."""
 _FILES = ("nav2.yaml", "campaign.yaml")
@@ -44,10 +47,11 @@ def main(words: list[str]) -> int:
         print(f"nav2_robot: {asked.params}: {err}", file=sys.stderr)
         return 2
     conditions = Conditions.of(asked.seed, asked.world)
+    failure = Failure.drawn(random.Random(f"failure {asked.seed}")) if asked.fail == _DRAWN else asked.fail
     robots: list[Robot] = []
 
     def make() -> Robot:
-        robots.append(Robot(conditions, asked.fail, asked.skid))
+        robots.append(Robot(conditions, failure, asked.skid))
         return robots[-1]
 
     path = asked.logs / "drive.mcap"
@@ -73,6 +77,7 @@ def _nav2(path: Path, make: Any, settings: Parameters, asked: argparse.Namespace
         from nav2_robot.servers import Servers
 
         os.environ["ROS_DOMAIN_ID"] = str(asked.domain)
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
         hz = parameters.number(settings, "/controller_server", "controller_frequency", _CONTROLLER_HZ)
         outputs = asked.outputs or asked.logs
         outputs.mkdir(parents=True, exist_ok=True)
@@ -84,6 +89,9 @@ def _nav2(path: Path, make: Any, settings: Parameters, asked: argparse.Namespace
                 drive.close()
     except (ImportError, FileNotFoundError, NavigationError) as err:
         print(f"nav2_robot: {err}", file=sys.stderr)
+        return None
+    except KeyboardInterrupt:
+        print("nav2_robot: interrupted", file=sys.stderr)
         return None
     return {**vars(told), "reached": told.reached}
 
@@ -106,7 +114,8 @@ def _arguments(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--seed", type=int, default=1, help="what the run meets, its world and goals too")
     parser.add_argument("--world", choices=sorted(WORLDS), default="", help="this world, whatever the seed says")
     parser.add_argument("--skid", action="store_true", help="skid steering in place of two driven wheels")
-    parser.add_argument("--fail", type=_failure, metavar="KIND:AT:SIZE", help="what fails, s after the first command")
+    parser.add_argument("--fail", type=_failure, metavar="KIND:AT:SIZE", 
+                        help="what fails, s after the first command; 'drawn': what the seed says")  # fmt: skip
     parser.add_argument("--stand-in", action="store_true", help="drive without ROS 2, to try the files")
     parser.add_argument("--domain", type=int, default=42, help="ROS domain; another for each drive at a time")
     parser.add_argument("--speedup", type=float, default=1.0, help="simulated time to real time, at most")
@@ -119,8 +128,10 @@ def _arguments(words: list[str]) -> argparse.Namespace:
     return asked
 
 
-def _failure(text: str) -> Failure:
+def _failure(text: str) -> Failure | str:
     try:
+        if text == _DRAWN:
+            return text
         return Failure.parse(text)
     except ValueError as err:
         raise argparse.ArgumentTypeError(str(err)) from err

@@ -43,7 +43,7 @@ class Failure:
     @classmethod
     def drawn(cls, rng: random.Random, kind: str = "") -> Failure:
         name = kind or rng.choice(sorted(KINDS))
-        return cls(name, round(rng.uniform(4, 35), 1), round(rng.uniform(*KINDS[name]), 3))
+        return cls(name, round(rng.uniform(3, 20), 1), round(rng.uniform(*KINDS[name]), 3))
 
     @classmethod
     def parse(cls, text: str) -> Failure:

@@ -12,7 +12,7 @@ from care_samples.ros import Maker
 from nav2_robot import laser
 from nav2_robot.robot import STEP_S, Robot
 
-ODOMETRY_STEPS = 2
+ODOMETRY_STEPS = 1
 SCAN_STEPS = round(laser.PERIOD_S / STEP_S)
 BATTERY_STEPS = round(0.5 / STEP_S)
 

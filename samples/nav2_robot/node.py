@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import array
 import math
-import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -23,15 +23,18 @@ from nav2_robot.robot import STEP_S, Robot
 from nav2_robot.servers import SERVERS, Servers
 from nav2_robot.world import CELL_M, Pose
 
-GOAL_LIMIT_S = 90.0
-"""Whoever waits for a goal gives it up then."""
+GOAL_LIMIT_S = 60.0
+"""Whoever waits for a goal gives it up then, and the mission with it."""
 
 _CLOCK_BEGINS_S = 10.0
 _START_LIMIT_S, _CALL_LIMIT_S = 90.0, 10.0
 """Of real time."""
+_START_SPEEDUP = 3.0
 _SETTLE_S = 2.0
-_NO_WAY_M = 0.5
-"""A second goal in a row that fails without so much way ends the mission."""
+_OWED = 3
+"""Subscriptions that tell of it: the controller's command, its state and the planner's."""
+_ASK_STEPS = 4
+"""So often the answers to goals are looked for."""
 
 _SUCCEEDED, _ABORTED = 4, 6
 _ACTIVE = (1, 2, 3)
@@ -66,31 +69,29 @@ class Drive:
         from rclpy.action import ActionClient
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.node import Node
-        from rclpy.parameter import Parameter
+        from rclpy.signals import SignalHandlerOptions
 
         self.make, self.recorder, self.speedup = make, recorder, speedup
         self.robot = make()
         self.answers = Answers(1.0 / controller_hz)
         self.steps = 0
         self._next_wall = time.monotonic()
-        self._writing = threading.Lock()
-        rclpy.init()
-        self.node = Node("robot", parameter_overrides=[Parameter("use_sim_time", value=True)])
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        # What is published and recorded is most of the work: taken by hand, as an executor needs several times as long.
+        self.node = Node("robot", start_parameter_services=False)
         self._publishers = self._published()
-        self._subscribe()
-        # One client for all goals: the listener still waits on it when a goal is over.
-        self._goals = ActionClient(self.node, NavigateToPose, "/navigate_to_pose")
+        self._subscriptions = self._subscribed()
+        self._client = Node("robot_client", start_parameter_services=False)
+        self._goals = ActionClient(self._client, NavigateToPose, "/navigate_to_pose")
         self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self.node)
-        self._listener = threading.Thread(target=self._executor.spin, daemon=True)
-        self._listener.start()
+        self._executor.add_node(self._client)
 
     def close(self) -> None:
         import rclpy
 
         self._executor.shutdown()
-        self._listener.join(2.0)
         self._goals.destroy()
+        self._client.destroy_node()
         self.node.destroy_node()
         rclpy.try_shutdown()
 
@@ -107,13 +108,9 @@ class Drive:
         self.robot.now_s = parked.now_s
         self._advance(servers, _SETTLE_S)
         told, begun_s, begun_wall = Told(), self.robot.now_s, time.monotonic()
-        fruitless = 0
         for goal in self.robot.conditions.world.goals:
-            before = self.robot.distance
             told.results.append(self._go(servers, goal))
-            moved = self.robot.distance - before
-            fruitless = 0 if told.results[-1] == _SUCCEEDED or moved > _NO_WAY_M else fruitless + 1
-            if fruitless == 2:
+            if told.results[-1] != _SUCCEEDED:
                 break
             self._advance(servers, 0.5)
         told.mission_s, told.wall_s = self.robot.now_s - begun_s, time.monotonic() - begun_wall
@@ -134,32 +131,38 @@ class Drive:
                   "/battery_state": (BatteryState, 5)}  # fmt: skip
         return {topic: self.node.create_publisher(kind, topic, quality) for topic, (kind, quality) in wanted.items()}
 
-    def _subscribe(self) -> None:
+    def _subscribed(self) -> list[tuple[Any, Callable[[Any], None]]]:
+        """What is listened to, and what is done with a message of it: serialized for the recording."""
         from action_msgs.msg import GoalStatusArray
         from geometry_msgs.msg import Twist
         from rclpy.qos import DurabilityPolicy, QoSProfile
 
         many = QoSProfile(depth=1000)
         kept = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        latest = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        found: list[tuple[Any, Callable[[Any], None]]] = []
+
+        def listen(kind: Any, topic: str, quality: Any, heard: Callable[[Any], None], raw: bool = False) -> None:
+            found.append((self.node.create_subscription(kind, topic, heard, quality, raw=raw), heard))
+
         for topic, kind in TOPICS.items():
             quality = kept if topic == "/rosout" or topic.endswith("/status") else many
-            self.node.create_subscription(
-                _type(kind), topic, lambda data, topic=topic: self._record(topic, data), quality, raw=True
-            )
-        self.node.create_subscription(Twist, "/cmd_vel", self._obey, 1)
-        self.node.create_subscription(Twist, "/cmd_vel_nav", lambda _: self.answers.commanded(self.robot.now_s), 10)
-        latest = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            listen(_type(kind), topic, quality, partial(self._record, topic), raw=True)
+        listen(Twist, "/cmd_vel", 1, self._obey)
+        listen(Twist, "/cmd_vel_nav", many, lambda _: self.answers.commanded(self.robot.now_s))
         for action, tell in (("follow_path", self.answers.driving), ("compute_path_to_pose", self.answers.planning)):
-            self.node.create_subscription(
-                GoalStatusArray,
-                f"/{action}/_action/status",
-                lambda told, tell=tell: tell(any(one.status in _ACTIVE for one in told.status_list)),
-                latest,
-            )
+            listen(GoalStatusArray, f"/{action}/_action/status", latest, partial(_tell, tell))
+        return found
+
+    def _listen(self, last: int = 0) -> None:
+        """Take what came, of all that is listened to or of the last few: those that tell what Nav2 owes."""
+        for subscription, heard in self._subscriptions[-last:]:
+            with subscription.handle:
+                while (taken := subscription.handle.take_message(subscription.msg_type, subscription.raw)) is not None:
+                    heard(taken[0])
 
     def _record(self, topic: str, data: bytes) -> None:
-        with self._writing:
-            self.recorder.write(topic, self.robot.now_s, data)
+        self.recorder.write(topic, self.robot.now_s, data)
 
     def _obey(self, command: Any) -> None:
         self.robot.command(command.linear.x, command.angular.z)
@@ -171,14 +174,14 @@ class Drive:
 
         for number in (Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE):
             for name in SERVERS:
-                asking = self.node.create_client(ChangeState, f"/{name}/change_state")
+                asking = self._client.create_client(ChangeState, f"/{name}/change_state")
                 self._tick_until(servers, asking.service_is_ready, f"{name} did not start")
                 request = ChangeState.Request(transition=Transition(id=number))
                 answer = asking.call_async(request)
                 self._tick_until(servers, answer.done, f"{name} did not answer")
                 if not answer.result().success:
                     raise NavigationError(f"{name} could not be {'configured' if number == 1 else 'activated'}")
-                self.node.destroy_client(asking)
+                self._client.destroy_client(asking)
 
     def _tick_until(self, servers: Servers, is_so: Callable[[], bool], otherwise: str) -> None:
         until = time.monotonic() + _START_LIMIT_S
@@ -186,6 +189,7 @@ class Drive:
             if time.monotonic() > until:
                 raise NavigationError(otherwise)
             self._tick(servers, moves=False)
+            self._executor.spin_once(timeout_sec=0.0)
 
     def _record_parameters(self) -> None:
         """Each server's parameters as the event that it sent when it declared them, before anybody listened."""
@@ -205,16 +209,16 @@ class Drive:
             self._record("/parameter_events", serialize_message(event))
 
     def _called(self, kind: Any, name: str, request: Any) -> Any:
-        asking = self.node.create_client(kind, name)
+        asking = self._client.create_client(kind, name)
         try:
             until = time.monotonic() + _CALL_LIMIT_S
             answer = asking.call_async(request) if asking.wait_for_service(_CALL_LIMIT_S) else None
             while answer is not None and time.monotonic() < until:
                 if answer.done():
                     return answer.result()
-                time.sleep(0.005)
+                self._executor.spin_once(timeout_sec=0.005)
         finally:
-            self.node.destroy_client(asking)
+            self._client.destroy_client(asking)
         raise NavigationError(f"no answer from {name}")
 
     def _go(self, servers: Servers, goal: Pose) -> int:
@@ -244,6 +248,8 @@ class Drive:
         until = self.robot.now_s + time_s - STEP_S / 2
         while self.robot.now_s < until and not is_over():
             self._tick(servers)
+            if self.steps % _ASK_STEPS == 0:
+                self._executor.spin_once(timeout_sec=0.0)
 
     def _tick(self, servers: Servers, moves: bool = True) -> None:
         if moves:
@@ -252,12 +258,13 @@ class Drive:
             self.robot.now_s += STEP_S
         self.steps += 1
         self._publish()
-        self.answers.wait(self.robot.now_s, self._publish_clock)
+        self._listen()
+        self.answers.wait(self.robot.now_s, lambda: self._listen(_OWED), self._publish_clock)
         if self.steps % 40 == 0 and servers.ended():
             raise NavigationError(f"{servers.ended()} ended")
-        if not self._listener.is_alive():
-            raise NavigationError("nothing of Nav2 is heard any more")
-        self._next_wall = max(self._next_wall + STEP_S / self.speedup, time.monotonic() - 0.1)
+        # While Nav2 starts it needs time of the machine, not of the mission.
+        pace = self.speedup if moves else min(self.speedup, _START_SPEEDUP)
+        self._next_wall = max(self._next_wall + STEP_S / pace, time.monotonic() - 0.1)
         time.sleep(max(0.0, self._next_wall - time.monotonic()))
 
     def _publish(self) -> None:
@@ -340,6 +347,11 @@ class Drive:
 
         seconds, nanoseconds = divmod(round((_CLOCK_BEGINS_S + self.robot.now_s) * 1e9), 1_000_000_000)
         return Time(sec=seconds, nanosec=nanoseconds)
+
+
+def _tell(tell: Callable[[bool], None], told: Any) -> None:
+    """Pass on whether any goal of an action is under way."""
+    tell(any(one.status in _ACTIVE for one in told.status_list))
 
 
 def _type(kind: str) -> Any:

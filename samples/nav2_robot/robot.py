@@ -12,8 +12,8 @@ from nav2_robot.battery import Battery
 from nav2_robot.failures import Failing, Failure
 from nav2_robot.world import Conditions, Floats, Pose
 
-STEP_S = 0.025
-HALF_LENGTH, HALF_WIDTH = 0.34, 0.25
+STEP_S = 0.05
+RADIUS = 0.3
 TOP_SPEED, TOP_TURN = 1.0, 1.8
 ACCELERATION, TURN_ACCELERATION = 1.5, 3.0
 COMMAND_TIMEOUT_S = 0.6
@@ -90,7 +90,7 @@ class Robot:
             size = self.failing.size
             self.odometry = x + size * float(aside[0]), y + size, yaw + 0.3 * size * float(aside[1])
         if self.failing.is_on("blocked"):
-            ahead = [gap for gap in self.world.passages if gap.x > self.pose[0] + HALF_LENGTH + _WALL_THERE_M]
+            ahead = [gap for gap in self.world.passages if gap.x > self.pose[0] + RADIUS + _WALL_THERE_M]
             if ahead:
                 self.world = self.world.blocked(ahead[0])
 
@@ -114,7 +114,7 @@ class Robot:
         turn = self.turn * grip * (1 + 2 * slip * self._slip[1]) + 0.4 * slip * self._slip[1] * abs(self.speed)
         after = _moved(self.pose, speed, turn)
         measured = self.speed
-        if (speed or turn) and self.world.touches(after, HALF_LENGTH, HALF_WIDTH):
+        if (speed or turn) and self.world.touches(after[0], after[1], RADIUS):
             self.collisions += not self._touching
             self._touching = True
             measured = speed = turn = 0.0
@@ -122,7 +122,7 @@ class Robot:
             self._touching = self._touching and not (speed or turn)
             self.distance += abs(speed) * STEP_S
             self.pose = after
-        x = self.pose[0] - HALF_LENGTH - _WALL_THERE_M
+        x = self.pose[0] - RADIUS - _WALL_THERE_M
         self.passed = max(self.passed, sum(x > gap.x for gap in self.world.passages))
         # Encoders count what the wheels turn, slip included; the gyroscope sees what the body turns.
         seen = turn + (_GYRO * float(self.rng.standard_normal()) / math.sqrt(STEP_S) if turn else 0.0)

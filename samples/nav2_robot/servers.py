@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -21,7 +22,8 @@ SERVERS: Mapping[str, tuple[str, str, Mapping[str, str]]] = {
 }
 """By node, in the order in which Nav2 brings them up: package, executable, remapped names."""
 
-_PATIENCE_S = 4.0
+_PATIENCE_S = 2.0
+"""Who sleeps on the simulated clock does not wake any more."""
 
 
 def installed(prefixes: str, package: str, name: str) -> Path:
@@ -64,9 +66,10 @@ class Servers:
         for process in self._running.values():
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
+        until = time.monotonic() + _PATIENCE_S
         for process in self._running.values():
             try:
-                process.wait(_PATIENCE_S)
+                process.wait(max(0.0, until - time.monotonic()))
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()

@@ -15,12 +15,12 @@ import numpy as np
 from nav2_robot import messages, parameters
 from nav2_robot.parameters import Parameters
 from nav2_robot.recorder import STATUS, Recorder
-from nav2_robot.robot import HALF_WIDTH, STEP_S, Robot
+from nav2_robot.robot import RADIUS, STEP_S, Robot
 from nav2_robot.world import Pose, World
 
 GOAL_LIMIT_S = 60.0
 
-_CELL_M, _LOOKAHEAD_M, _KEEP_M = 0.1, 0.5, HALF_WIDTH + 0.1
+_CELL_M, _LOOKAHEAD_M, _KEEP_M = 0.1, 0.5, RADIUS + 0.1
 _CONTROL_S, _REPLAN_S = 0.1, 1.0
 _SPEED, _TOLERANCE_M = 0.5, 0.25
 """Of Nav2's parameters, where the file does not say."""

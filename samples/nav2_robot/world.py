@@ -1,4 +1,4 @@
-"""Where the robot drives: a corridor with passages or an open hall; clutter that the map lacks. Lengths in m."""
+"""Where the robot drives: a corridor with passages, a hall, an open yard; clutter that the map lacks. Lengths in m."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ CELL_M = 0.05
 """Of the map that Nav2 is given."""
 
 _WALL_M = 0.2
+_LEG_M = 3.0
+"""In the yard goals lie so far apart at least."""
 _FREE_M = 0.95
 """Clutter leaves a gap of so much on one of its sides at least: a careful robot gets everywhere."""
 
@@ -74,22 +76,16 @@ class World:
         hit = (along > 0) & (share >= 0) & (share <= 1)
         return np.asarray(np.where(hit, along, np.inf).min(axis=1, initial=np.inf), np.float64)
 
-    def touches(self, pose: Pose, half_length: float, half_width: float) -> bool:
-        """Whether a rectangular body at a pose touches anything: each side is clipped against it (Liang and Barsky)."""
-        x, y, yaw = pose
-        turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-        begin, end = (self.segments[:, :2] - (x, y)) @ turn, (self.segments[:, 2:] - (x, y)) @ turn
-        low, high = np.zeros(len(begin)), np.ones(len(begin))
-        for axis, half in ((0, half_length), (1, half_width)):
-            at, step = begin[:, axis], end[:, axis] - begin[:, axis]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                first, second = (-half - at) / step, (half - at) / step
-            still = step == 0
-            inside = np.abs(at) <= half
-            enter = np.where(still, np.where(inside, -np.inf, np.inf), np.minimum(first, second))
-            leave = np.where(still, np.where(inside, np.inf, -np.inf), np.maximum(first, second))
-            low, high = np.maximum(low, enter), np.minimum(high, leave)
-        return bool((low <= high).any())
+    @cached_property
+    def boxes(self) -> Floats:
+        """Everything that stands, shape (boxes, 4): x0, y0, x1, y1."""
+        return np.array((*self.walls, *self.clutter), np.float64).reshape(-1, 4)
+
+    def touches(self, x: float, y: float, radius: float) -> bool:
+        """Whether a round body with its middle there touches anything."""
+        low, high = self.boxes[:, :2], self.boxes[:, 2:]
+        apart = np.maximum(np.maximum(low - (x, y), (x, y) - high), 0.0)
+        return bool(((apart**2).sum(axis=1) < radius**2).any())
 
     def map(self) -> tuple[NDArray[np.int8], tuple[float, float]]:
         """The walls as an occupancy grid (rows along y; 100 wall, 0 free) and the place of its first cell's corner."""
@@ -105,17 +101,21 @@ class World:
 
 
 def corridor(rng: random.Random) -> World:
-    """A corridor of 17 m with four walls across, each with one passage, and a goal in each bay."""
+    """A corridor of 17 m with four walls across, each with one passage, and goals in some of its bays."""
     length, below, above = 17.0, -2.2, 2.2
     places = (2.8, 6.2, 9.6, 13.0)
-    passages = tuple(Passage(x, rng.uniform(-0.9, 0.9), rng.uniform(0.85, 1.25)) for x in places)
+    passages = tuple(Passage(x, rng.uniform(-0.9, 0.9), rng.uniform(0.95, 1.35)) for x in places)
     walls = list(_room(-1.5, below, length - 1.5, above))
     for gap in passages:
         left, right = gap.x - _WALL_M / 2, gap.x + _WALL_M / 2
         walls += [(left, below, right, gap.y - gap.width / 2), (left, gap.y + gap.width / 2, right, above)]
     bays = [(low + high) / 2 for low, high in zip(places, (*places[1:], length - 1.5), strict=True)]
-    goals = tuple((x, rng.uniform(-0.8, 0.8), rng.uniform(-1.2, 1.2)) for x in bays)
-    clutter = _clutter(rng, rng.choice((0, 1, 2, 2, 3, 4)), (0.8, below, length - 2.0, above), walls, goals, passages)
+    goals = tuple(
+        (x, rng.uniform(-0.8, 0.8), rng.uniform(-1.2, 1.2))
+        for x in sorted(rng.sample(bays, rng.choice((2, 2, 3, 3, 4))))
+    )
+    area = (0.8, below, length - 2.0, above)
+    clutter = _clutter(rng, rng.choice((0, 1, 2, 2, 3, 4)), area, walls, goals, passages)
     return World(tuple(walls), clutter, passages, _start(rng), goals)
 
 
@@ -130,13 +130,29 @@ def hall(rng: random.Random) -> World:
         walls.append((x - 0.2, y - 0.2, x + 0.2, y + 0.2))
     corners = [(9.8, 0.2), (9.8, 6.0), (6.9, 3.0), (3.2, 6.0), (1.0, 5.6), (3.2, 0.6)]
     rng.shuffle(corners)
-    goals = tuple((x, y, rng.uniform(-math.pi, math.pi)) for x, y in corners[: rng.choice((3, 4, 5))])
+    goals = tuple((x, y, rng.uniform(-math.pi, math.pi)) for x, y in corners[: rng.choice((2, 3, 3, 4))])
     clutter = _clutter(rng, rng.choice((0, 2, 3, 4, 6)), (left + 0.8, below + 0.8, right - 0.8, above - 0.8), walls,
                        goals, (door,))  # fmt: skip
     return World(tuple(walls), clutter, (door,), _start(rng), goals)
 
 
-WORLDS: Mapping[str, Callable[[random.Random], World]] = {"corridor": corridor, "hall": hall}
+def yard(rng: random.Random) -> World:
+    """An open yard of 11 by 11 m: nothing on the map but its walls, boxes that only the laser sees, goals anywhere."""
+    low, high = -1.5, 9.5
+    walls = list(_room(low, low, high, high))
+    goals: list[Pose] = []
+    wanted = rng.choice((2, 3, 3, 4))
+    while len(goals) < wanted:
+        x, y = rng.uniform(low + 1.0, high - 1.0), rng.uniform(low + 1.0, high - 1.0)
+        last = goals[-1] if goals else (0.0, 0.0, 0.0)
+        if math.hypot(x - last[0], y - last[1]) > _LEG_M:
+            goals.append((x, y, rng.uniform(-math.pi, math.pi)))
+    area = (low + 0.6, low + 0.6, high - 0.6, high - 0.6)
+    clutter = _clutter(rng, rng.choice((2, 4, 6, 8)), area, walls, goals, ())
+    return World(tuple(walls), clutter, (), _start(rng), tuple(goals))
+
+
+WORLDS: Mapping[str, Callable[[random.Random], World]] = {"corridor": corridor, "hall": hall, "yard": yard}
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.extract.drive import ODOMETRY_FIELDS, ROSOUT_FIELDS, STAMPED_COMMAND_FIELDS, Status
-from care_core.extract.nav2 import PLAN_FIELDS, POSE_FIELDS, STATUS_FIELDS, TREE_FIELDS, find_legs
+from care_core.extract.nav2 import FEEDBACK_FIELDS, PLAN_FIELDS, POSE_FIELDS, STATUS_FIELDS, TREE_FIELDS, find_legs
 from care_core.extract.registry import MISSION_KINDS, Mission, find_extractor
 from care_core.logs.base import Table
 from care_core.run import Unavailable, Value
@@ -138,6 +138,23 @@ def test_without_a_plan_nobody_knows_where_the_goal_lies() -> None:
     assert value("goals_success", one) == 1.0
 
 
+def test_goals_on_the_map_are_measured_by_where_the_navigator_says_the_robot_is() -> None:
+    """The map lies 10 m beside the odometry and is turned by a quarter."""
+    quarter = math.sqrt(0.5)
+    on_map = plans(plan(10.5, (10.0, 0.0), (10.0, 2.0), frame="map"), plan(21.5, (10.0, 2.0), (10.0, 4.0), frame="map"))
+    told = [10.2, 15.0, 20.0, 25.0, 31.0]
+    way = np.interp(told, [10, 20, 21, 31], [0, 2, 2, 4])
+    feedback = table(told, FEEDBACK_FIELDS, [("map", 10.0, one, 0.0, 0.0, quarter, quarter) for one in way.tolist()])
+    without = mission(drive(plan=on_map))
+    assert isinstance(value("distance_left", without), Unavailable)
+    one = mission({**drive(plan=on_map), "/navigate_to_pose/_action/feedback": feedback})
+    assert value("distance_left", one) == pytest.approx(0.0, abs=0.05)
+    assert value("detour", one) == pytest.approx(0.0, abs=0.05)
+    assert value("goals_asked", one, what="path_length") == pytest.approx(4.0, abs=0.1)
+    assert value("path_length", one) == pytest.approx(4.0, abs=0.05)
+    assert value("plan_length", one, per="metre") == pytest.approx(1.0, abs=0.03)
+
+
 def test_recoveries_and_failures_of_the_behavior_tree() -> None:
     tree = table(
         [12.0, 13.0, 14.0],
@@ -184,6 +201,13 @@ def test_what_nodes_of_ros_2_said() -> None:
         ("planner", "controller_server: Failed to make progress"),
         ("planner", "planner_server: GridBased: failed to create plan with tolerance 0.50."),
     ]
+
+
+def test_a_loop_that_kept_its_rate_by_its_own_clock_did_not_miss_it() -> None:
+    missed = "Control loop missed its desired rate of 10.0000 Hz. Current loop rate is {} Hz."
+    rows = [(30.0, "controller_server", missed.format(rate)) for rate in ("10.0000", "9.8765", "6.6667")]
+    one = mission(drive(rosout=table([12.0, 13.0, 14.0], ROSOUT_FIELDS, rows)))
+    assert [(e.time_s, e.kind) for e in KIND.evidence(one)] == [(14.0, "timing")]
 
 
 def test_a_log_without_goals_holds_no_mission() -> None:

@@ -10,8 +10,8 @@ import numpy as np
 from care_core.health.moments import counted
 from care_core.health.records import Finding, FindingKind, Severity
 from care_core.health.ros import plan
-from care_core.health.ros.recording import WARN, Recording
-from care_core.logs.plausible import APART, STAMP, is_simulated, stamps_pace
+from care_core.health.ros.recording import WARN, Recording, Said
+from care_core.logs.plausible import APART, STAMP, is_simulated, kept_its_rate, stamps_pace
 
 SHARE = 0.1
 """Of the time, with a message a second counted as all of it: loops that miss now and then are no fault."""
@@ -44,7 +44,7 @@ def known(text: str) -> bool:
 def check(recording: Recording) -> Iterator[Finding]:
     yield from _lags(recording)
     for pattern, kind, title in _FAMILIES:
-        words = [one for one in recording.said if one.level >= WARN and pattern.search(one.text)]
+        words = [one for one in recording.said if _counts(one, pattern)]
         if not words or len(words) < max(3.0, SHARE * recording.duration_s):
             continue
         at = words[0].time_s
@@ -52,6 +52,10 @@ def check(recording: Recording) -> Iterator[Finding]:
             kind, title, at, words[-1].time_s, "info" if kind == "control" else _at_most_warning(recording, at),
             f'{len(words)} messages from {words[0].node}, first "{words[0].text[:90]}"', "/rosout", "parameter", 0.3,
         )  # fmt: skip
+
+
+def _counts(one: Said, pattern: re.Pattern[str]) -> bool:
+    return one.level >= WARN and pattern.search(one.text) is not None and not kept_its_rate(one.text)
 
 
 def _at_most_warning(recording: Recording, at: float) -> Severity:

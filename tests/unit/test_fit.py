@@ -1,0 +1,39 @@
+"""Whether a profile fits a log, by what the log says runs on the robot; and how to record what it misses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from care_core.extract.coverage import cover, try_on
+from care_core.extract.fit import fit_of
+from care_core.logs.opening import open_log
+from care_core.profile.store import load_profile
+from tests.courier import TOLERANCE, USUAL, deliver
+
+PLUGIN = "/controller_server.FollowPath.plugin"
+
+
+@pytest.fixture(scope="module")
+def log_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return deliver(tmp_path_factory.mktemp("fit") / "a.mcap", {**USUAL, TOLERANCE: 0.25}, np.random.default_rng(3))
+
+
+def test_another_part_of_the_stack_does_not_fit(log_path: Path) -> None:
+    log, schema = open_log(log_path), load_profile("nav2").schema
+    named = next(name for name in log.settings() if name.endswith("xy_goal_tolerance"))
+    own = str(log.settings()[named][0].value)
+    fits = fit_of(log, cover(log, replace(schema, plugins={named: own, PLUGIN: "DWB"})))
+    other = fit_of(log, cover(log, replace(schema, plugins={named: "MPPI"})))
+    assert fits.verdict != "no"
+    assert other.verdict == "no"
+    assert f"{named} is {own}, the profile was learned with MPPI" in other.reasons
+
+
+def test_what_ros_2_misses_is_recorded_on_the_topic_of_all_nodes(log_path: Path) -> None:
+    hints = {one.variable.name: one.hint for one in try_on(open_log(log_path), load_profile("nav2").schema).missed}
+    assert "record /parameter_events, or " in hints["inflation_radius_global"]
+    assert not any("parameter_updates" in hint for hint in hints.values())
