@@ -206,6 +206,10 @@ def _rounded(value: float, *, up: bool) -> float:
 
 
 def for_any_mission(schema: Schema) -> Schema:
-    """The schema whose objectives are judged whatever the mission: it is the operator's, as the limits will be."""
-    own = {o.name: replace(o, own_limit=OwnLimit("")) for o in schema.objectives}
+    """The schema whose objectives are judged whatever the mission: it is the operator's, as the limits will be. The
+    profile's fixed limits are for its own mission, so where it has ratios these are what counts."""
+    own = {
+        o.name: replace(o, own_limit=OwnLimit(""), threshold=o.threshold if o.relative is None else None)
+        for o in schema.objectives
+    }
     return replace(schema, variables={**schema.variables, **own})

@@ -64,7 +64,8 @@ class ObjectiveResult:
     def basis(self) -> str:
         """What the threshold was made of and where it is written, empty where it is the profile's fixed one."""
         own = self.variable.own_limit
-        parts = (self._made_of, "" if own is None or self.threshold is None else f"limit of {own.source}")
+        written = "" if own is None or not own.source or self.threshold is None else f"limit of {own.source}"
+        parts = (self._made_of, written)
         return "; ".join(part for part in parts if part)
 
     @property

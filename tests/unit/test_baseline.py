@@ -51,6 +51,15 @@ def test_a_relative_limit_is_a_ratio_to_what_the_reference_needs(planted: Profil
     assert energy.limit > energy.seen[-1]
 
 
+def test_a_profile_with_a_limit_for_its_own_mission_too_proposes_ratios(planted: Profile) -> None:
+    both = with_variable(SCHEMA, replace(TIME, relative=RATIO))
+    runs = good(planted, both)
+    without = propose(good(planted), Profile(planted.path, TRAVELLING))[0]
+    assert without.limit is not None
+    assert propose(runs, Profile(planted.path, both))[0].limit == without.limit
+    assert "limit of" not in "".join(result.wanted for run in runs for result in run.results)
+
+
 def test_one_run_is_judged_by_how_much_training_runs_differ(planted: Profile) -> None:
     one = propose(good(planted, count=1), Profile(planted.path, TRAVELLING))[0]
     many = propose(good(planted, count=8), Profile(planted.path, TRAVELLING))[0]
