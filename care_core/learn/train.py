@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from care_core.causal.effects import Effect, acceptable_values, along, average_causal_effect
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import FloatArray, Mechanism, solve, transformed
+from care_core.causal.mechanisms import LEAST, FloatArray, Mechanism, solve, transformed
 from care_core.causal.model import EdgeRecord, EffectRecord, Model, OutcomeRecord, PathRecord, Summary, Training
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.learn.bootstrap import Finding, Reaches
@@ -389,7 +389,8 @@ def _witnesses(frame: pd.DataFrame, schema: Schema, mechanisms: Mapping[str, Mec
             mechanism = mechanisms.get(metric.name)
             if mechanism is None:
                 continue
-            values = transformed(frame[metric.name].to_numpy(dtype=float), mechanism.transform)
+            values = frame[metric.name].to_numpy(dtype=float)
+            values = transformed(np.where(values > LEAST[mechanism.transform], values, np.nan), mechanism.transform)
             both = np.isfinite(values) & np.isfinite(bad)
             if both.sum() < MIN_ROWS or np.ptp(values[both]) == 0 or np.ptp(bad[both]) == 0:
                 continue
