@@ -43,6 +43,7 @@ from care_core.health.records import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
 from care_core.run import LogInfo, MissionInfo, ProfileChoice, Run, Setting, is_known
+from care_core.variables import Variable
 
 MIN_CONTRIBUTION = 0.02
 """Probability an option must cost before it is called a cause of this run."""
@@ -143,7 +144,7 @@ def diagnose(
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
     case = _Case(profile, choice, run, world, _reference(judged), unranked)
-    refused = _refused_by_operator(case, health)
+    refused = _refused_otherwise(case, health)
     unheard = {result.variable.name: refused or _out_of_reach(case, result) for result in broken}
     faults = tuple(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
@@ -403,12 +404,23 @@ def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
     )
 
 
-def _refused_by_operator(case: _Case, health: Health) -> str | None:
-    """Said where the run ended at a refusal to arm for what an operator has to do: no option is read by that check."""
-    if case.run.refused_by:
+def _refused_otherwise(case: _Case, health: Health) -> str | None:
+    """Said where the run ended at a refusal to arm that speaks of no option of the profile: for what an operator has to
+    do, or for none of the complaints that the profile tells apart. What options do in flight is no cause of it."""
+    said = next((one for one in health.findings if one.kind == "prearm"), None)
+    if said is None or case.run.refused_by:
         return None
-    said = next((one for one in health.findings if one.kind == "prearm" and one.suspect == "operation"), None)
-    return f"{said.title}: that check reads no option of the profile, so none explains it" if said else None
+    if said.suspect == "operation":
+        return f"{said.title}: that check reads no option of the profile, so none explains it"
+    complaints = [one for one in case.profile.schema.metrics if _is_of_one_complaint(one)]
+    if not complaints or any(case.run.metrics.get(one.name) == 1 for one in complaints):
+        return None
+    return f"{said.title}: that complaint speaks of no option of the profile, so none is blamed"
+
+
+def _is_of_one_complaint(metric: Variable) -> bool:
+    how = metric.extract
+    return how is not None and how.kind == "arming_refused" and bool(how.args)
 
 
 def _new_way_to_fail(case: _Case) -> str | None:

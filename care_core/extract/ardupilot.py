@@ -32,7 +32,7 @@ from care_core.extract.registry import (
 from care_core.logs.base import Table, Wanted
 from care_core.logs.plausible import is_alive, plausible
 from care_core.run import Check, Evidence, Unavailable, Value, is_known
-from care_core.vehicles import FAILSAFE, error_kind, error_words, flies, mode_name, motor_outputs
+from care_core.vehicles import FAILSAFE, error_kind, error_words, flies, mode_name, motor_outputs, with_said
 
 Floats = NDArray[np.float64]
 
@@ -157,12 +157,13 @@ def _armed_spans(tables: Mapping[str, Table], duration_s: float) -> list[tuple[f
 
 def _arm_events(tables: Mapping[str, Table]) -> list[tuple[float, bool]]:
     arm, events = tables.get("ARM"), tables.get("EV")
+    recorded: list[tuple[float, bool]] = []
     if arm is not None and has(arm, "ArmState"):
-        return list(zip(arm.t.tolist(), (arm["ArmState"] == 1).tolist(), strict=True))
-    if events is not None and has(events, "Id"):
+        recorded = list(zip(arm.t.tolist(), (arm["ArmState"] == 1).tolist(), strict=True))
+    elif events is not None and has(events, "Id"):
         part = events.where(np.isin(events["Id"], (_EV_ARMED, _EV_DISARMED)))
-        return list(zip(part.t.tolist(), (part["Id"] == _EV_ARMED).tolist(), strict=True))
-    return []
+        recorded = list(zip(part.t.tolist(), (part["Id"] == _EV_ARMED).tolist(), strict=True))
+    return with_said(recorded, messages(tables.get("MSG")))
 
 
 def _refusals(table: Table | None) -> list[tuple[float, str]]:

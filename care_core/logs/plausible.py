@@ -25,8 +25,15 @@ LIMITS: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "BAT": {"Volt": (0, 1e3), "Curr": (-1e3, 1e4), "EnrgTot": (0, 1e6)},
     "ATT": {"Roll": (-360, 360), "Pitch": (-360, 360), "Yaw": (-360, 720)},
     "GPS": {"HDop": (0, 655.35)},
-}
-"""Lowest and highest value of a field that any vehicle could record."""
+    **{name: {
+        **{f"Gyr{axis}": (-100, 100) for axis in "XYZ"}, **{f"Acc{axis}": (-1e3, 1e3) for axis in "XYZ"},
+    } for name in ("IMU", "IMU2", "IMU3")},
+    **{name: {f"Mag{axis}": (-32768, 32767) for axis in "XYZ"} for name in ("MAG", "MAG2", "MAG3")},
+    "VIBE": {f"Vibe{axis}": (0, 1e3) for axis in "XYZ"},
+    "CTUN": {"Alt": (-1.2e4, 1e5), "DAlt": (-1.2e4, 1e5), "BAlt": (-1.2e4, 1e5)},
+}  # fmt: skip
+"""Lowest and highest value of a field that any vehicle could record. Gyros measure up to 70 rad/s (ICM-45686: 4000
+degrees/s), accelerometers up to 400 m/s^2 (ADIS16507: 40 g), a record of a field is of 16 bits."""
 
 JUMPS: Mapping[str, Mapping[str, float]] = {
     "POS": {"Lat": 5e-4, "Lng": 5e-4, "RelHomeAlt": 50.0},  # 50 m in a sample

@@ -3,7 +3,7 @@
 Facts of ArduPilot's and PX4's source, as tables. Knows nothing of logs.
 """
 
-from care_core.vehicles.arming import method_words
+from care_core.vehicles.arming import method_words, with_said
 from care_core.vehicles.errors import FAILSAFE, error_kind, error_words, is_over
 from care_core.vehicles.events import event_words
 from care_core.vehicles.modes import Way, mode_name, mode_number, reason_words, way_of
@@ -38,4 +38,5 @@ __all__ = [
     "spellings",
     "vehicle_of",
     "way_of",
+    "with_said",
 ]

@@ -1,8 +1,9 @@
-"""Who armed or disarmed a vehicle: ARM.Method of ArduPilot (AP_Arming::Method)."""
+"""How a vehicle was armed or disarmed: ARM.Method of ArduPilot (AP_Arming::Method), and what it says when it is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from bisect import bisect
+from collections.abc import Iterable, Mapping, Sequence
 
 _METHODS: Mapping[int, str] = {
     0: "by the rudder stick", 1: "by the ground station", 2: "by a switch", 3: "for a motor test", 4: "by a script",
@@ -22,3 +23,25 @@ _METHODS: Mapping[int, str] = {
 def method_words(method: int) -> str:
     """How a vehicle was armed or disarmed, "" where the number tells nothing."""
     return _METHODS.get(method, "")
+
+
+_SAID: Mapping[str, bool] = {
+    "Arming motors": True, "Disarming motors": False, "Throttle armed": True, "Throttle disarmed": False,
+}  # fmt: skip
+"""What the firmware says when arming cannot fail any more, and when it is over (AP_Arming.cpp of Copter, Sub, Plane and
+Rover: send_arm_disarm_statustext)."""
+
+
+def with_said(
+    recorded: Sequence[tuple[float, bool]], messages: Iterable[tuple[float, str]]
+) -> list[tuple[float, bool]]:
+    """When a vehicle was armed (True) and disarmed by its records, in order of time, and by what it said where they
+    tell of none: a log that is written while armed only is opened after the record of the arming."""
+    times = [t for t, _ in recorded]
+
+    def is_untold(t: float, state: bool) -> bool:
+        at = bisect(times, t)
+        return state not in [now for _, now in recorded[max(at - 1, 0) : at + 1]]
+
+    said = [(t, _SAID[text]) for t, text in messages if text in _SAID]
+    return sorted((*recorded, *(one for one in said if is_untold(*one))))

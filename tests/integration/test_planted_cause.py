@@ -12,10 +12,12 @@ import pytest
 from care_core.diagnose.judging import judge
 from care_core.diagnose.records import Diagnosis
 from care_core.diagnose.triage import diagnose
+from care_core.health.records import NOTHING_SEEN, Finding
 from care_core.learn.train import train
 from care_core.profile.model import write_model
 from care_core.profile.store import Profile
 from care_core.run import ProfileChoice, Run, Unavailable
+from care_core.variables import Extract, Role, Variable
 from tests.planted import (
     CALM,
     DEFAULTS,
@@ -180,6 +182,26 @@ def test_a_refused_mission_is_explained_by_its_stage(planted: Profile) -> None:
     (fault,) = diagnosis.faults
     assert [node.name for node in fault.causes[0].path] == ["min_sats", "armed", "success"]
     assert repaired(diagnosis)
+
+
+@pytest.mark.parametrize(("met", "is_blamed"), [(1.0, True), (0.0, False)])
+def test_a_refusal_for_what_the_profile_does_not_know_blames_no_option(
+    planted: Profile, tmp_path: Path, met: float, is_blamed: bool
+) -> None:
+    """The profile tells one complaint apart; where the vehicle made another, what options do in flight is no cause."""
+    complaint = Variable("bad_angle", Role.METRIC, "bool", extract=Extract("arming_refused", {"text": "ANGLE_MAX"}))
+    schema = with_variable(planted.schema, complaint)
+    write_model(replace(planted.model, schema_digest=schema.digest), tmp_path)
+    profile = Profile(tmp_path, schema)
+    run = planted_run(min_sats=13, speed=1.4)
+    judged = judge(replace(run, metrics={**run.metrics, "bad_angle": met}), schema, profile.model, {})
+    said = Finding("prearm", "arming was refused: no motors", 0.0, 1.0, "critical", "no motors", "MSG", "parameter")
+    diagnosis = diagnose(judged, profile, CHOICE, health=replace(NOTHING_SEEN, findings=(said,)))
+    assert bool(diagnosis.faults[0].causes) is is_blamed
+    if not is_blamed:
+        assert diagnosis.fix is None
+        assert diagnosis.abstained is not None
+        assert diagnosis.abstained.startswith("arming was refused: no motors")
 
 
 def test_a_mission_that_armed_is_not_blamed_on_arming(planted: Profile) -> None:

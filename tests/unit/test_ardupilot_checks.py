@@ -610,7 +610,7 @@ def test_gyros_that_turn_fast_differ_by_their_scale_and_are_not_noisy() -> None:
 
 def test_a_log_that_is_written_while_armed_only_tells_of_no_arming() -> None:
     made = Made()
-    del made.rows["ARM"]
+    del made.rows["ARM"], made.rows["MSG"]
     made.table["CTUN"]["ThO"][:] = 0.0
     assert made.flight().armed == ()
     made.settings["LOG_DISARMED"] = 0
@@ -691,3 +691,77 @@ def test_a_receiver_that_starts_has_not_lost_its_satellites() -> None:
     made.table["GPS"]["Status"][starts] = 1
     made.table["GPS"]["NSats"][starts] = 0
     assert [one.kind for one in made.find()] == ["prearm"]
+
+
+def test_a_logger_that_is_opened_by_the_arming_tells_of_it_in_words_alone() -> None:
+    made = Made()
+    made.rows["ARM"] = [(DOWN_S + 5, {"ArmState": 0.0, "Forced": 0.0})]
+    made.rows["MSG"] = [(2.0, {"Message": "Arm: Need Position Estimate"}), (40.0, {"Message": "Arming motors"})]
+    tables = {name: table.where((table.t < 20.0) | (table.t >= 39.9)) for name, table in made.tables().items()}
+    flight = Flight(tables, made.flight().settings, made.facts, END_S)
+    assert flight.armed == ((40.0, DOWN_S + 5),)
+    assert not [one for one in find(flight) if one.kind in ("log", "prearm")]  # it was closed, and then it did arm
+
+
+def test_what_is_armed_once_more_was_disarmed_while_nothing_was_recorded() -> None:
+    made = Made()
+    made.rows["ARM"].insert(1, (60.0, {"ArmState": 1.0, "Forced": 0.0}))
+    whole = made.flight()
+    assert whole.armed == ((ARMED_S, 60.0), (60.0, DOWN_S + 5))
+    tables = {name: table.where((table.t < 40.0) | (table.t >= 59.9)) for name, table in made.tables().items()}
+    flight = Flight(tables, whole.settings, whole.facts, END_S)
+    assert np.ravel(flight.armed).tolist() == pytest.approx([ARMED_S, 39.9, 60.0, DOWN_S + 5])
+    assert not [one for one in find(flight) if one.kind == "log"]
+
+
+@pytest.mark.parametrize("text", ["PreArm: Compass not calibrated", "PreArm: Compass calibrated requires reboot"])
+def test_a_compass_that_is_to_be_calibrated_is_not_wrong(text: str) -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    made.rows["MSG"] = [(20.0, {"Message": text}), (50.0, {"Message": text})]
+    assert [(one.kind, one.suspect) for one in made.find()] == [("prearm", "operation")]
+
+
+def test_a_transmitter_that_is_off_on_the_ground_is_noted() -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    made.rows["MSG"] = [(20.0, {"Message": "PreArm: Need 3D Fix"}), (30.0, {"Message": "Radio Failsafe - Disarming"})]
+    assert [one.severity for one in made.find() if one.kind == "radio"] == ["info"]
+
+
+@pytest.mark.parametrize(("mates", "kinds"), [((2,), ["motor"]), ((1, 2), [])])
+def test_two_motors_that_are_asked_for_alike_turn_the_vehicle_and_are_not_weak(
+    mates: tuple[int, ...], kinds: list[str]
+) -> None:
+    made = Made()
+    for n in mates:  # 1 and 2 turn the same way
+        made.table["RCOU"][f"C{n}"][made.after(50.0, 56.0)] += 250
+    made.rows["MSG"].append((53.0, {"Message": "Potential Thrust Loss (2)"}))
+    assert [one.kind for one in made.find() if one.kind == "motor"] == kinds
+
+
+def test_a_heading_that_turns_to_a_demand_given_at_once_follows_it() -> None:
+    made = Made()
+    yaw = np.interp(made.t, [50.0, 54.0], [20.0, 199.0])
+    made.table["ATT"].update({"Yaw": yaw, "DesYaw": np.where(made.t < 50.0, 20.0, 199.0)})
+    assert not [one for one in made.find() if one.kind == "attitude"]
+    made.table["ATT"]["Yaw"] = np.where(made.t < 54.0, yaw, 20.0 + 40.0 * (made.t - 54.0))  # and spins on
+    assert [one.title for one in made.find() if one.kind == "attitude"] == ["the heading does not follow its demand"]
+
+
+@pytest.mark.parametrize(
+    ("firmware", "mode", "since_s", "title"),
+    [
+        ("ArduRover V4.5.4", 0.0, 50.0, "the vehicle turned over"),
+        ("ArduSub V4.5.6", 4.0, 0.0, "the vehicle is upside down"),
+        ("ArduSub V4.5.6", 19.0, 0.0, None),
+    ],
+)
+def test_what_lies_on_its_back_is_told(firmware: str, mode: float, since_s: float, title: str | None) -> None:
+    made = Made()
+    made.facts = {"firmware": firmware}
+    made.rows["MODE"] = [(0.0, {"ModeNum": mode})]
+    made.table["ATT"]["Roll"][made.after(since_s)] = 175.0
+    assert [one.title for one in made.find() if one.kind == "attitude"] == ([title] if title else [])

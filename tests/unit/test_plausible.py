@@ -65,3 +65,9 @@ def test_what_a_vehicle_writes_at_once_says_nothing_of_its_clock() -> None:
     burst = Table(np.full(900, 0.5), {"Value": np.arange(900.0)})
     assert clock_doubt({"PARM": burst}, 0.0, 60.0) == ""
     assert "too slow or stands still" in clock_doubt({"ATT": burst}, 0.0, 60.0)
+
+
+def test_a_rate_and_an_acceleration_that_no_sensor_measures_are_left_out() -> None:
+    rates, accelerations = np.array([0.1, 6e29, 0.1, -0.2]), np.array([-9.8, -9.8, 1.9e11, np.nan])
+    sensor = {"IMU2": Table(np.arange(4.0), {"GyrX": rates, "AccZ": accelerations})}
+    np.testing.assert_array_equal(plausible(sensor)["IMU2"].t, [0.0, 3.0])

@@ -45,6 +45,7 @@ from care_core.vehicles import (
     mode_number,
     motors_of,
     reason_words,
+    with_said,
 )
 from care_core.vehicles.modes import px4_mode
 
@@ -143,6 +144,9 @@ def _armings(flight: Flight) -> list[tuple[float, bool, str]]:
             if "Forced" in table.columns and table["Forced"][row] == 1:
                 how = f"{how}, by force".strip(", ")
             known.append((float(table.t[row]), bool(table["ArmState"][row] == 1), how))
+    ways = {(t, is_armed): how for t, is_armed, how in known}
+    told = with_said([(t, is_armed) for t, is_armed, _ in known], flight.messages)
+    known = [(t, is_armed, ways.get((t, is_armed), "")) for t, is_armed in told]
     return [one for at, one in enumerate(known) if at == 0 or known[at - 1][1] != one[1]]
 
 
@@ -152,7 +156,7 @@ def _refusals(flight: Flight) -> Iterator[Moment]:
     if not refused:
         return
     armed = [t for t, is_armed, _ in _armings(flight) if is_armed]
-    if not armed:
+    if not flight.armed:
         standing = dict.fromkeys(refusal(text) or "" for t, text in refused if t >= refused[-1][0] - 1.0)
         what = f"it never armed: {'; '.join(standing)}"
         yield Moment(refused[-1][0], "arming", f"{what} ({counted(len(refused), 'refusal')})", "MSG")

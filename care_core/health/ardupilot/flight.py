@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from care_core.health.ardupilot.signals import Floats, instances
 from care_core.logs.base import Table, Wanted
 from care_core.run import Setting
-from care_core.vehicles import Vehicle, vehicle_of
+from care_core.vehicles import Vehicle, vehicle_of, with_said
 from care_core.vehicles.self_written import SIMULATOR_PREFIX
 
 Mask = NDArray[np.bool_]
@@ -40,6 +40,8 @@ READS: Wanted = {
 """What the course of a flight is told by."""
 
 _EV_ARMED, _EV_DISARMED, _EV_NOT_LANDED, _EV_LANDED = 10, 11, 28, 18
+_OPENED_S, _CLOSED_S = 0.5, 2.0
+"""A logger writes so shortly before the record of the arming that opened it, and was silent for longer than so."""
 _ERR_CRASH = 12
 _CRASH_CHECK_S = 2.0
 """The firmware says "crash" when control was lost for this long (crash_check.cpp: CRASH_CHECK_TRIGGER_SEC)."""
@@ -172,14 +174,18 @@ class Flight:
     @cached_property
     def armed(self) -> tuple[Span, ...]:
         """Spans armed. A log whose first word is a disarming was armed from its start; so was one that tells of none
-        and is written while armed only; any other that tells of none is taken as armed where its throttle is up."""
+        and is written while armed only; any other that tells of none is taken as armed where its throttle is up.
+
+        What is armed once more was disarmed between, as far as nothing is recorded before: the logger was closed."""
         changes = self.arm_changes
         if not changes:
             return ((0.0, self.end_s),) if self.is_written_armed else self._driven()
         spans: list[Span] = []
         start: float | None = 0.0 if not changes[0][1] else None
         for t, is_armed in changes:
-            if is_armed and start is None:
+            if is_armed and start is not None:
+                spans.append((start, self._recorded_before(t)))
+            if is_armed:
                 start = t
             elif not is_armed and start is not None:
                 spans.append((start, t))
@@ -193,9 +199,16 @@ class Flight:
         """When it was armed and disarmed, as the log says it."""
         table = self.one("ARM", "ArmState")
         if table is not None:
-            return tuple((t, state > 0) for t, state in zip(table.t.tolist(), table["ArmState"].tolist(), strict=True))
-        changes = [(t, True) for t in self.events(_EV_ARMED)] + [(t, False) for t in self.events(_EV_DISARMED)]
-        return tuple(sorted(changes))
+            changes = [(t, state > 0) for t, state in zip(table.t.tolist(), table["ArmState"].tolist(), strict=True)]
+        else:
+            changes = [(t, True) for t in self.events(_EV_ARMED)] + [(t, False) for t in self.events(_EV_DISARMED)]
+        return tuple(with_said(sorted(changes), self.messages))
+
+    def _recorded_before(self, t: float) -> float:
+        """The last record of the attitude before the logger was opened at a time; that time where it was open."""
+        table = self.one("ATT")
+        before = table.t[table.t < t - _OPENED_S] if table is not None else np.empty(0)
+        return t if not len(before) or t - float(before[-1]) < _CLOSED_S else float(before[-1])
 
     @property
     def is_written_armed(self) -> bool:
@@ -413,13 +426,13 @@ class Flight:
         """Whether it never armed though that was asked for."""
         return not self.armed and any(text.startswith(("Arm: ", "PreArm: ")) for _, text in self.messages)
 
-    def refused_for(self, *words: str) -> float | None:
-        """When arming was first refused with one of these words, where that still stood at the last refusal and it
-        never armed."""
+    def refused_for(self, *words: str, but: str = "\n") -> float | None:
+        """When arming was first refused with one of these words and without another, where that still stood at the last
+        refusal and it never armed."""
         if not self.was_refused:
             return None
         refusals = [(t, text) for t, text in self.messages if text.startswith(("Arm: ", "PreArm: "))]
-        named = [t for t, text in refusals if any(word in text.casefold() for word in words)]
+        named = [t for t, text in refusals if any(w in text.casefold() for w in words) and but not in text.casefold()]
         return named[0] if named and named[-1] > refusals[-1][0] - _REFUSED_S else None
 
     @cached_property

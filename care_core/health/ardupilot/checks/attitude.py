@@ -24,7 +24,13 @@ READS: Wanted = {
 }
 
 FAR_DEG, YAW_DEG = 15.0, 45.0
+_WAVERS_DEG = 10.0
 _LASTS_S, _YAW_LASTS_S = 1.0, 3.0
+_KEEP_UPRIGHT = frozenset(("rover", "sub"))
+_ANY_WAY_UP = frozenset((1, 19))
+"""Modes of a submarine in which the pilot may turn it over: acro, manual (ArduSub/mode.h)."""
+_OVER_DEG, _LIES_S, _BEFORE_S = 100.0, 5.0, 10.0
+"""Further over, for so long, is no slope and no wave; it had been upright so shortly before where it turned over."""
 SWING_DPS, OVER_DEMAND = 30.0, 3.0
 """degrees/s; how many times the demand's own movement."""
 _SWING_S, _ENOUGH = 5.0, 10
@@ -40,6 +46,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     """Swings of the rates first: then the attitude's error is theirs."""
     if flight.lost_control_s is not None:
         yield from _lost(flight, flight.lost_control_s)
+    yield from _upside_down(flight)
     if not flight.is_copter:
         return
     swings = list(_swings(flight))
@@ -58,6 +65,28 @@ def _lost(flight: Flight, lost: float) -> Iterator[Finding]:
         "attitude", "control was lost", lost, flight.impact_s or flight.end_s, "critical",
         f"the attitude is up to {float(np.max(after)):.0f} degrees off its demand and does not come back",
         "ATT; 30 degrees: ArduCopter's crash check", probability=0.3,
+    )  # fmt: skip
+
+
+def _upside_down(flight: Flight) -> Iterator[Finding]:
+    """A rover that rolled over, a submarine that turned, or a board that is mounted otherwise than it is told."""
+    if flight.vehicle.kind not in _KEEP_UPRIGHT or flight.tilt is None:
+        return
+    t, tilt = flight.tilt
+    over = (tilt > _OVER_DEG) & flight.during(flight.armed, t)
+    if flight.vehicle.kind == "sub":
+        over &= ~np.isin(flight.modes_at(t), tuple(_ANY_WAY_UP))
+    spans = lasting(t, over, _LIES_S)
+    if not spans:
+        return
+    start, end = spans[0][0], spans[-1][1]
+    before = tilt[(t < start) & (t >= start - _BEFORE_S)]
+    turned = len(before) > 0 and float(np.min(before)) < _OVER_DEG / 2
+    yield Finding(
+        "attitude", "the vehicle turned over" if turned else "the vehicle is upside down", start, end, "critical",
+        f"its upper side points {float(np.median(tilt[flight.during(spans, t)])):.0f} degrees away from the sky"
+        + ("" if turned else " from the start: it lies so, or AHRS_ORIENTATION is not how the board is mounted"),
+        "ATT.Roll, Pitch", suspect="world" if turned else "parameter", probability=0.5,
     )  # fmt: skip
 
 
@@ -81,13 +110,22 @@ def _yaw(flight: Flight) -> Iterator[Finding]:
     if table is None or flight.lost_control_s is not None or not np.ptp(table["DesYaw"]):
         return
     off = np.abs((table["Yaw"] - table["DesYaw"] + 180) % 360 - 180)
-    spans = lasting(table.t, (off > YAW_DEG) & flight.during(flight.flown, table.t), _YAW_LASTS_S)
+    spans = [
+        span
+        for span in lasting(table.t, (off > YAW_DEG) & flight.during(flight.flown, table.t), _YAW_LASTS_S)
+        if not _is_a_turn(off[flight.during((span,), table.t)])
+    ]
     if spans:
         yield Finding(
             "attitude", "the heading does not follow its demand", spans[0][0], spans[-1][1], "warning",
             f"up to {top(off[flight.during(spans, table.t)]):.0f} degrees off (limit {YAW_DEG:g})",
             "ATT.Yaw against DesYaw", probability=0.25,
         )  # fmt: skip
+
+
+def _is_a_turn(off: Floats) -> bool:
+    """Whether a heading only comes nearer to its demand, and much: it turns to one that was given at once."""
+    return bool(np.all(off <= np.minimum.accumulate(off) + _WAVERS_DEG)) and float(off[-1]) < 0.6 * float(off[0])
 
 
 def _swings(flight: Flight) -> Iterator[Finding]:

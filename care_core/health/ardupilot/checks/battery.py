@@ -139,7 +139,7 @@ def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
     if np.ptp(known) == 0:
         odd = f"the voltage stays at {known[0]:.2f} V in flight"
     elif float(np.median(known)) < _ALIVE_V:
-        odd = f"{np.median(known):.2f} V cannot fly a vehicle"
+        odd = f"{np.median(known):.2f} V drive no vehicle: nothing is connected to it, or its scale is wrong"
     elif len(amps) and np.isfinite(amps).any() and float(np.nanmedian(amps)) < -0.5:
         odd = f"the current reads {np.nanmedian(amps):.1f} A"
     if odd:

@@ -142,8 +142,9 @@ def _rejected(flight: Flight, start: float) -> bool:
 
 
 def _refused(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
-    """The firmware refused arming for a compass: it knows what the Earth's field should be there."""
-    begin = flight.refused_for("mag field", "compass", "mag anomaly")
+    """The firmware refused arming for a compass: it knows what the Earth's field should be there. One that is to be
+    calibrated, or was and wants a restart, is not wrong."""
+    begin = flight.refused_for("mag field", "compass", "mag anomaly", but="calibrat")
     if begin is not None:
         said = next(text for t, text in flight.messages if t == begin)
         yield Finding(

@@ -221,15 +221,18 @@ def _was_calm(flight: Flight, lost: float) -> bool:
 
 
 def _told(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
-    """The firmware's thrust loss check, which names the motor."""
+    """The firmware's thrust loss check, which names the motor that is asked for most. Where another is asked for as
+    much, as when it turns against its will, neither is weak."""
     for t, text in flight.messages:
         match = _THRUST_LOSS.search(text)
         if match and any(start <= t <= end for start, end in flight.armed):
             motor = next((one for one in outputs.motors if one.number == int(match[1])), None)
             near = np.abs(outputs.t - t) < 5.0
-            excess = _excess(outputs.share[:, near])[outputs.motors.index(motor)] if motor is not None else np.empty(0)
+            excess = np.median(_excess(outputs.share[:, near]), axis=1) if near.any() else np.zeros(len(outputs.motors))
+            own = float(excess[outputs.motors.index(motor)]) if motor is not None else 0.0
+            is_alone = own > ALONE and float(np.sort(excess)[-2]) < _NEXT * own
             crowded = float(np.median(outputs.share[:, near])) > _ROOM if near.any() else True
-            if motor is not None and not crowded and float(np.median(excess)) > ALONE:
+            if motor is not None and not crowded and is_alone:
                 severity: Severity = "critical" if flight.impact_s is not None else "warning"
                 yield _finding(motor, "lost thrust", t, flight.end_s, severity, f"the firmware says: {text}",
                                "MSG; thrust_loss_check of ArduCopter", 0.2)  # fmt: skip

@@ -29,6 +29,8 @@ def find(flight: Flight) -> Iterator[Finding]:
         end = back[0] if back else flight.watched[-1][1]
         away = end - gone[0]
         severity: Severity = "warning" if away < _BRIEF_S or subsystem == 8 else "critical"
+        if not flight.armed:
+            severity = "info"  # a transmitter that is switched off on the ground
         yield Finding(
             "radio", title, gone[0], end, severity,
             f"failsafe at {gone[0]:.1f} s, " + (f"back after {away:.1f} s" if back else "not back"),
