@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_core.causal.counterfactual import Config, World
 from care_core.diagnose.records import Fix, Prediction
@@ -87,23 +88,31 @@ def settled(world: World, assignment: Assignment) -> tuple[Assignment, float]:
     training, is not known to a step.
     """
     chosen = dict(assignment)
-    before = replace(world, observed={}, repeats=(), wary_from={**world.config, **chosen})
-    floors = [_floor(asked, chosen) for asked in (world, before)]
+    before = replace(world, observed={}, repeats=())
+    wary = replace(before, wary_from={**world.config, **chosen})
+    floor = _floor(world, chosen)
     for name in assignment:
-        if not _is_unordered(world.variables[name]):
-            values = candidate_values(world, name)
-            configs = [{**world.config, **chosen, name: value} for value in values]
-            kept = [asked.probability(configs) >= floor for asked, floor in zip((world, before), floors, strict=True)]
-            does = np.append(np.all(kept, axis=0), False)
-            chosen[name] = values[max(0, int(np.argmin(does)) - 2)]
+        if _is_unordered(world.variables[name]):
+            continue
+        values = candidate_values(world, name)
+        configs = [{**world.config, **chosen, name: value} for value in values]
+        does = world.probability(configs) >= floor
+        if _edge(does):  # most often this run itself leaves nothing but the reference
+            chosen[name] = values[_edge(does & (wary.probability(configs) >= _floor(before, assignment)))]
+        else:
+            chosen[name] = values[0]
     return chosen, float(world.probability([{**world.config, **chosen}])[0])
+
+
+def _edge(does: NDArray[np.bool_]) -> int:
+    """Place of the last value but one, from the reference on, up to which all do; 0 where there are fewer."""
+    return max(0, int(np.argmin(np.append(does, False))) - 2)
 
 
 def _floor(world: World, assignment: Assignment) -> float:
     """What a nearer value may come down to; where the change gains next to nothing, the model cannot tell its values
     apart, and there is none."""
-    surely = replace(world, wary_from=None)
-    here, reset = map(float, surely.probability([world.config, {**world.config, **assignment}]))
+    here, reset = map(float, world.probability([world.config, {**world.config, **assignment}]))
     return np.inf if reset - here < NEARLY else reset - min(NEARLY, GIVEN_UP * (reset - here))
 
 
