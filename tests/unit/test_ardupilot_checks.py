@@ -216,6 +216,7 @@ def test_a_compass_that_goes_off(rate_hz: float) -> None:
     made.table["XKF4"]["SM"][made.after(FAILS_S + 2)] = 1.6
     finding = first(made)
     assert (finding.kind, finding.title, finding.severity) == ("compass", "compass 1 is disturbed", "critical")
+    assert finding.evidence.startswith("the difference of compasses 1 and 2 changes by 2")  # what is over its limit
     assert finding.onset_s == pytest.approx(FAILS_S, abs=3.0)
 
 
@@ -511,6 +512,7 @@ def test_a_log_that_ends_in_the_air_and_one_with_a_hole() -> None:
     holed = {name: table.where((table.t < 40) | (table.t > 48)) for name, table in Made().tables().items()}
     (finding,) = find(Flight(holed, flight.settings, flight.facts, END_S))
     assert finding.title == "the log has 1 hole"
+    assert find(Flight(holed, flight.settings, flight.facts, END_S, clock_jumps=True)) == ()  # not by such a clock
 
 
 def test_an_overloaded_autopilot() -> None:

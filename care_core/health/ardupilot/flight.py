@@ -92,6 +92,8 @@ class Flight:
     """Whether a ground station heard it: then holes are the link's."""
     breaks_off: bool = False
     """Whether the log is damaged at its end: what was not yet may still have come."""
+    clock_jumps: bool = False
+    """Whether its clock jumps inside it: two logs in one, or damage; then what lies between two records is unknown."""
     _known: dict[str, tuple[Table, ...]] = field(default_factory=dict, repr=False)
 
     def all(self, name: str, *fields: str) -> tuple[Table, ...]:

@@ -104,11 +104,14 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             continue
         start, end = spans[0][0], spans[-1][1]
         inside = (t >= start) & (t <= end)
-        size, ratio = float(np.median(length(apart)[inside])), float(np.median(over[inside]))
+        ratio = float(np.median(over[inside]))
+        has_moved = float(np.median(moved[inside])) / MOVED > float(np.median(level[inside])) / APART
+        size = float(np.median((moved if has_moved else level)[inside]))
         worse = _odd_one(compasses, n)
         yield Finding(
             "compass", f"compass {worse} is disturbed", start, end, _gravity(flight, start, worse == 1),
-            f"compasses 1 and {n} differ by {size:.0f} mGauss (limit {APART:.0f}, in flight a change of {MOVED:.0f})",
+            f"the difference of compasses 1 and {n} changes by {size:.0f} mGauss in flight (limit {MOVED:.0f})"
+            if has_moved else f"compasses 1 and {n} differ by {size:.0f} mGauss in the level plane (limit {APART:.0f})",
             "MAG, MAG2; AP_COMPASS_MAX_XY_LENGTH_DIFF 200 mGauss", probability=likely(ratio, _CALIBRATION),
         )  # fmt: skip
 

@@ -29,7 +29,7 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def _holes(flight: Flight) -> Iterator[Finding]:
     streams = [table.t for name in _STEADY if (table := flight.one(name)) is not None and len(table) > 20]
-    if not streams:
+    if not streams or flight.clock_jumps:
         return
     t = np.sort(np.concatenate(streams))
     steps = np.diff(t)
