@@ -19,7 +19,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.nav2_names import on_move_base
 from care_core.files import bundled
 from care_core.learn.card import model_card
 from care_core.learn.table import read_table
@@ -41,8 +40,6 @@ class Source:
     origin: str
     hardware: str = ""
     """A table with the columns `tag` and `hardware`: logs in which hardware failed teach nothing about parameters."""
-    from_move_base: bool = False
-    """The logs are of move_base, whatever the profile reads."""
     simulation: str = ""
     """A module that writes a campaign of simulated missions and drives them, in place of `paths`."""
 
@@ -77,10 +74,10 @@ SOURCES = {
         "1000 TurtleBot 3 missions in Gazebo from the CURE artifact (Hossen et al. 2025, MIT license).",
     ),
     "nav2": Source(
-        ("data/move_base/train.tar.xz",),
-        "The 301 missions of move_base on ROS 1 that its own profile was learned from, read under the names and units "
-        "of Nav2; no mission of Nav2 was seen.",
-        from_move_base=True,
+        ("data/nav2/table.tar.xz",),
+        "263 missions of Nav2 1.3.13 (ROS 2 Jazzy: DWB, NavFn, the standard tree for one goal) that drove this "
+        "project's simulated robot (`samples/nav2_robot`) under random configurations in worlds and to goals that "
+        "differ, by `care collect`; MCAP files, read by `care ingest`.",
     ),
     "husky-care": Source(
         ("data/care/care_husky_sim_399.csv",),
@@ -110,7 +107,6 @@ def runs_table(source: Source, schema: Schema, shared: Path, folder: Path) -> Pa
             archive.extractall(folder / schema.name, filter="data")
     table = folder / f"{schema.name}.parquet"
     broken = with_failing_hardware(shared / source.hardware) if source.hardware else frozenset()
-    schema = on_move_base(schema) if source.from_move_base else schema
     logs = [log for log in find_logs([folder / schema.name]) if log.stem not in broken]
     found = ingest(logs, schema, table, progress=lambda _step, _share: None)
     for failure in found.failures:

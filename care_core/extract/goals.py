@@ -85,9 +85,10 @@ GOAL_ARGS: Mapping[str, str] = {
 class GoalMissions(MissionKind):
     """From the first goal of a list to the answer to its last."""
 
-    def __init__(self, name: str, args: Mapping[str, str]) -> None:
-        """`name` is the mission kind, which names its goal server too; `args` are those of that goal server alone."""
-        self.name = name
+    def __init__(self, name: str, args: Mapping[str, str], rosout: Sequence[str] = ROSOUT) -> None:
+        """`name` is the mission kind, which names its goal server too; `args` are those of that goal server alone.
+        `rosout` is where its nodes speak."""
+        self.name, self.rosout = name, rosout
         self.args = {**args, **GOAL_ARGS}
 
     def needs(self, spec: Args) -> Wanted:
@@ -97,7 +98,7 @@ class GoalMissions(MissionKind):
             names.odometry: (*ODOMETRY_FIELDS, *STAMPED_FIELDS),
             names.commands: (*COMMAND_FIELDS, *STAMPED_COMMAND_FIELDS),
             names.battery: (*BATTERY_FIELDS, *STAMPED_FIELDS),
-            **dict.fromkeys(ROSOUT, ROSOUT_FIELDS),
+            **dict.fromkeys(self.rosout, ROSOUT_FIELDS),
         }
 
     def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:

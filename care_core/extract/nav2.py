@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_core.extract.drive import GOAL_SERVERS, GoalServer, Leg, Poses, Recoveries, Status, has, heading
-from care_core.extract.goals import GoalMissions
+from care_core.extract.goals import ROSOUT, GoalMissions
 from care_core.extract.goals_asked import PER_GOAL, PER_METRE, divided
 from care_core.extract.registry import MISSION_KINDS, Args, Mission, extractor, missing, one_of
 from care_core.logs.base import Table, Wanted
@@ -267,4 +267,5 @@ MISSION_KINDS[KIND] = GoalMissions(
         "plan": "topic of nav_msgs/Path, /plan unless given",
         "behavior_tree": "topic of nav2_msgs/BehaviorTreeLog, /behavior_tree_log unless given",
     },
+    ROSOUT[:1],  # ROS 2 has no /rosout_agg
 )
