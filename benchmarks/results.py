@@ -44,6 +44,13 @@ class Benchmark:
 
 BENCHMARKS = (
     Benchmark("planted", "benchmarks.planted", "no confident wrong answer", "plain classifier"),
+    Benchmark(
+        "graph_worth",
+        "benchmarks.graph_worth",
+        "a learned graph is worth more than a permuted one",
+        "none, plain classifier",
+    ),
+    Benchmark("related", "benchmarks.related", "a related robot's profile helps below 100 runs", "from nothing"),
     Benchmark("discovery", "benchmarks.discovery --robots 16", "the default is not beaten", "other ways of the search"),
     Benchmark("observational", "benchmarks.observational", "fewer wrong field days than the peer", "plain classifier"),
     Benchmark("fixes", "benchmarks.fixes", "suggested values do as well as resets", "reset to the reference"),
