@@ -132,6 +132,8 @@ class Variable:
     modes: tuple[str, ...] = ()
     """The modes that read an option; empty where every mode does, or nothing is known."""
     safety: bool = False
+    ceiling: bool = False
+    """How fast the robot may go at most: less than the reference's is no fault but what this robot can or is to do."""
     kind: Kind | None = None
     threshold: Threshold | None = None
     relative: RelativeThreshold | None = None

@@ -1,12 +1,13 @@
 """The configuration that a run is judged against, and what it would need for the mission of this run.
 
 It is the operator's: a good run or a file where one was named, else the defaults that the vehicle itself recorded, else
-those of the profile. A vehicle that was tuned for its frame is judged by its own tune where its operator names it.
+those of the profile. A vehicle that was tuned for its frame is judged by its own tune where its operator names it, and
+a robot that is slower than the profile's by its own speed: nothing says that it can go faster.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,8 +62,19 @@ def reference_of(run: Run, schema: Schema, model: Model, good: Good | None = Non
         # A value that may not be suggested is no reference, but where it is driven it is none to be off either.
         if schema.variables[name].accepts(value) or (name in named and _is_same(value, run.config.get(name))):
             config[name] = value
+    lower = {name: own for name, own in _ceilings(run, schema) if name not in named and own < config.get(name, own)}
+    config.update(lower)
     config.update({name: value for name, value in run.context.items() if is_known(value)})
-    return Reference(config, _whose(named, recorded, good))
+    slower = f", {', '.join(lower)} as low as this robot's" if lower else ""
+    return Reference(config, _whose(named, recorded, good) + slower)
+
+
+def _ceilings(run: Run, schema: Schema) -> Iterator[tuple[str, float]]:
+    """The run's values of options that bound how fast its robot goes."""
+    for option in schema.options:
+        own = run.config.get(option.name)
+        if option.ceiling and own is not None:
+            yield option.name, own
 
 
 def _is_same(value: float, other: float | None) -> bool:

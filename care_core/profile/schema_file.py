@@ -79,6 +79,7 @@ class _Variable(Strict):
     reboot_required: bool = False
     modes: list[str] = Field(default_factory=list)
     safety: bool = False
+    ceiling: bool = False
     kind: Kind | None = None
     threshold: Bound | None = None
     grows: bool = False
@@ -111,6 +112,8 @@ class _Variable(Strict):
             raise ValueError("only options have a 'parameter'")
         if self.role is not Role.OPTION and self.modes:
             raise ValueError("only options have 'modes', those that read it")
+        if self.role is not Role.OPTION and self.ceiling:
+            raise ValueError("only options are a 'ceiling'")
         if self.safety and self.default is None:
             raise ValueError("a 'safety' option needs 'default', the value past which it is never moved")
         if self.range is not None and self.range[0] >= self.range[1]:
@@ -307,6 +310,7 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         reboot_required=v.reboot_required,
         modes=tuple(v.modes),
         safety=v.safety,
+        ceiling=v.ceiling,
         kind=v.kind,
         threshold=absolute,
         relative=relative,

@@ -75,6 +75,8 @@ def _entry(variable: Variable) -> Iterator[tuple[str, Any]]:
         yield "parameter", variable.parameters[0] if len(variable.parameters) == 1 else list(variable.parameters)
     if variable.safety:
         yield "safety", True
+    if variable.ceiling:
+        yield "ceiling", True
     bound = variable.threshold or variable.relative
     if bound is not None:
         yield "threshold", _bound(bound)

@@ -35,6 +35,17 @@ def test_the_bound_is_a_multiple_of_what_the_reference_needs(planted: Profile) -
     assert slow.is_sure
 
 
+def test_a_robot_that_is_slower_is_judged_by_its_own_speed_unless_its_operator_says_otherwise(planted: Profile) -> None:
+    own = with_variable(TRAVELLING, replace(SCHEMA.variables["speed"], parameters=("SPEED",), ceiling=True))
+    slow = judge(planted_run(speed=0.4), own, planted.model)
+    assert (slow.results[1].status, slow.reference.config["speed"]) == ("ok", 0.4)
+    assert "speed as low as this robot's" in slow.reference.source
+    fast = judge(planted_run(speed=DEFAULTS["speed"] + 0.1), own, planted.model)
+    assert fast.reference.config["speed"] == DEFAULTS["speed"]
+    good = Good({"SPEED": Setting("SPEED", DEFAULTS["speed"], "good.param")}, "good.param")
+    assert judge(planted_run(speed=0.4), own, planted.model, good=good).results[1].status == "fault"
+
+
 def test_a_value_within_the_interval_of_the_bound_is_not_sure(planted: Profile) -> None:
     result = judge(planted_run(speed=0.4), TRAVELLING, planted.model).results[1]
     assert result.need is not None
