@@ -158,8 +158,8 @@ def test_apply_prints_a_patch_and_leaves_the_file(care: Care, files: tuple[Path,
     before = config.read_bytes()
     code, out, err = care("apply", report, config)
     assert code == 0
-    assert "-LAND_SPEED 16 # soft\n+LAND_SPEED 32 # soft" in out
-    assert f"{config}:2: LAND_SPEED  16 -> 32" in err
+    assert "-LAND_SPEED 16 # soft\n+LAND_SPEED 40 # soft" in out
+    assert f"{config}:2: LAND_SPEED  16 -> 40" in err
     assert config.read_bytes() == before
 
 
@@ -168,10 +168,10 @@ def test_apply_writes_a_new_file_and_diff_shows_it(care: Care, files: tuple[Path
     new = tmp_path / "new.param"
     assert care("apply", report, config, "-o", new).code == 0
     code, out, _ = care("diff", config, new)
-    assert (code, out) == (1, "! LAND_SPEED  16 -> 32\n")
+    assert (code, out) == (1, "! LAND_SPEED  16 -> 40\n")
     assert care("diff", new, new).code == 0
     assert care("diff", new, SAMPLE).code == 1
-    assert care("diff", SAMPLE, report).stdout == "! LAND_SPEED  16 -> 32\n"
+    assert care("diff", SAMPLE, report).stdout == "! LAND_SPEED  16 -> 40\n"
     assert care("diff", SAMPLE, tmp_path / "none").code == 2
 
 
@@ -180,7 +180,7 @@ def test_apply_in_place_keeps_a_backup_each_time(care: Care, files: tuple[Path, 
     before = config.read_text(encoding="utf-8")
     assert care("apply", report, config, "--in-place").code == 0
     assert care("apply", report, config, "--in-place").code == 0
-    assert "LAND_SPEED 32 # soft" in config.read_text(encoding="utf-8")
+    assert "LAND_SPEED 40 # soft" in config.read_text(encoding="utf-8")
     assert config.with_name("driven.param.bak").read_text(encoding="utf-8") == before
     assert config.with_name("driven.param.bak1").exists()
 
