@@ -97,10 +97,10 @@ def settled(world: World, assignment: Assignment) -> tuple[Assignment, float]:
         values = candidate_values(world, name)
         configs = [{**world.config, **chosen, name: value} for value in values]
         does = world.probability(configs) >= floor
-        if _edge(does):  # most often this run itself leaves nothing but the reference
-            chosen[name] = values[_edge(does & (wary.probability(configs) >= _floor(before, assignment)))]
-        else:
-            chosen[name] = values[0]
+        edge = _edge(does)
+        if edge:  # most often this run itself leaves nothing but the reference
+            edge = _edge(does & (wary.probability(configs) >= _floor(before, assignment)))
+        chosen[name] = values[edge]
     return chosen, float(world.probability([{**world.config, **chosen}])[0])
 
 

@@ -70,8 +70,9 @@ _STRUCK_S = 1.0
 _SHOCK = 30.0
 """m/s^2: three times gravity is no flight."""
 _WINGED = frozenset(("plane", "quadplane"))
-_TUMBLING_DEG, _UPSIDE_DOWN_DEG, _TUMBLES_S = 45.0, 100.0, 2.0
-"""No plane is told to bank as far as the second by a mode that levels it: ROLL_LIMIT_DEG is at most 90."""
+_TUMBLING_DEG, UPSIDE_DOWN_DEG, _TUMBLES_S = 45.0, 100.0, 2.0
+"""No plane is told to bank as far as the second by a mode that levels it: ROLL_LIMIT_DEG is at most 90. Nor is that a
+slope or a wave."""
 UNTOLD = -1
 """The mode where the log does not say."""
 _ROLLS = frozenset((UNTOLD, 0, 3, 4, 23))
@@ -348,7 +349,7 @@ class Flight:
         t, error = self.lean_error
         levels = ~np.isin(self.modes_at(t), tuple(_ROLLS))
         off = (error > _TUMBLING_DEG) & levels & self.during(self.armed, t)
-        over = t[(np.abs(table["Roll"]) > _UPSIDE_DOWN_DEG) & off]
+        over = t[(np.abs(table["Roll"]) > UPSIDE_DOWN_DEG) & off]
         for start, end in runs(t, off, gap_s=1.0):
             if end - start >= _TUMBLES_S and ((over >= start) & (over <= end)).any():
                 return start
@@ -428,13 +429,14 @@ class Flight:
         """Whether it never armed though that was asked for."""
         return not self.armed and any(text.startswith(("Arm: ", "PreArm: ")) for _, text in self.messages)
 
-    def refused_for(self, *words: str, but: str = "\n") -> float | None:
-        """When arming was first refused with one of these words and without another, where that still stood at the last
-        refusal and it never armed."""
+    def refused_for(self, *words: str, but: str | None = None) -> float | None:
+        """When arming was first refused with one of these words, and without another, where that still stood at the
+        last refusal and it never armed."""
         if not self.was_refused:
             return None
         refusals = [(t, text) for t, text in self.messages if text.startswith(("Arm: ", "PreArm: "))]
-        named = [t for t, text in refusals if any(w in text.casefold() for w in words) and but not in text.casefold()]
+        named = [t for t, text in refusals if any(word in text.casefold() for word in words)
+                 and (but is None or but not in text.casefold())]  # fmt: skip
         return named[0] if named and named[-1] > refusals[-1][0] - _REFUSED_S else None
 
     @cached_property

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.health.ardupilot.checks.thrust import saturated
-from care_core.health.ardupilot.flight import Flight, Mask, Span
+from care_core.health.ardupilot.flight import UPSIDE_DOWN_DEG, Flight, Mask, Span
 from care_core.health.ardupilot.measure import lasting, smooth, top
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
@@ -29,8 +29,8 @@ _LASTS_S, _YAW_LASTS_S = 1.0, 3.0
 _KEEP_UPRIGHT = frozenset(("rover", "sub"))
 _ANY_WAY_UP = frozenset((1, 19))
 """Modes of a submarine in which the pilot may turn it over: acro, manual (ArduSub/mode.h)."""
-_OVER_DEG, _LIES_S, _BEFORE_S = 100.0, 5.0, 10.0
-"""Further over, for so long, is no slope and no wave; it had been upright so shortly before where it turned over."""
+_LIES_S, _BEFORE_S = 5.0, 10.0
+"""What is upside down for so long lies so; it had been upright so shortly before where it turned over."""
 SWING_DPS, OVER_DEMAND = 30.0, 3.0
 """degrees/s; how many times the demand's own movement."""
 _SWING_S, _ENOUGH = 5.0, 10
@@ -73,7 +73,7 @@ def _upside_down(flight: Flight) -> Iterator[Finding]:
     if flight.vehicle.kind not in _KEEP_UPRIGHT or flight.tilt is None:
         return
     t, tilt = flight.tilt
-    over = (tilt > _OVER_DEG) & flight.during(flight.armed, t)
+    over = (tilt > UPSIDE_DOWN_DEG) & flight.during(flight.armed, t)
     if flight.vehicle.kind == "sub":
         over &= ~np.isin(flight.modes_at(t), tuple(_ANY_WAY_UP))
     spans = lasting(t, over, _LIES_S)
@@ -81,7 +81,7 @@ def _upside_down(flight: Flight) -> Iterator[Finding]:
         return
     start, end = spans[0][0], spans[-1][1]
     before = tilt[(t < start) & (t >= start - _BEFORE_S)]
-    turned = len(before) > 0 and float(np.min(before)) < _OVER_DEG / 2
+    turned = len(before) > 0 and float(np.min(before)) < UPSIDE_DOWN_DEG / 2
     yield Finding(
         "attitude", "the vehicle turned over" if turned else "the vehicle is upside down", start, end, "critical",
         f"its upper side points {float(np.median(tilt[flight.during(spans, t)])):.0f} degrees away from the sky"
