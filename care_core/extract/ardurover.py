@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.extract.ardupilot import PHASE_ARGS, flight_of, register, series
+from care_core.extract.ardupilot.phases import PHASE_ARGS, flight_of
+from care_core.extract.ardupilot.series import register, series
 from care_core.extract.flight import NEEDS
 from care_core.extract.registry import Args, Mission, extractor, merge_needs, one_of
 from care_core.logs.base import Table, Wanted

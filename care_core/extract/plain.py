@@ -10,7 +10,7 @@ from typing import Any
 
 from care_core.errors import NoMissionError
 from care_core.extract import actionlib, nav2
-from care_core.extract.ardupilot import ArduPilotFlight
+from care_core.extract.ardupilot.mission import ArduPilotFlight
 from care_core.extract.px4 import Px4Flight
 from care_core.extract.read import read_runs
 from care_core.logs.base import Channel, Log, LogFormat

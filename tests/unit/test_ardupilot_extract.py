@@ -14,7 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.extract import ardupilot
+from care_core.extract.ardupilot.mission import ArduPilotFlight
+from care_core.extract.ardupilot.series import statistic
 from care_core.extract.flight import analyse, distance_to_legs
 from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Mission, find_extractor, merge_needs
 from care_core.logs.base import Table
@@ -219,7 +220,7 @@ def test_a_log_without_arming_or_refusal_holds_no_mission() -> None:
 def test_statistics_of_a_hundred_and_one_values() -> None:
     """Each of its own, so that none stands for another."""
     ramp = np.arange(101.0) - 20.0
-    found = {name: ardupilot.statistic(ramp, name) for name in ("mean", "max", "min", "std", "rms", "peak")}
+    found = {name: statistic(ramp, name) for name in ("mean", "max", "min", "std", "rms", "peak")}
     assert found == pytest.approx(
         {"mean": 30, "max": 80, "min": -20, "std": 29.155, "rms": 41.833, "peak": 75}, rel=1e-4
     )
@@ -339,4 +340,4 @@ def test_ranges_and_defaults_are_the_sampled_ones() -> None:
 
 
 def test_the_mission_kind_is_registered() -> None:
-    assert isinstance(KIND, ardupilot.ArduPilotFlight)
+    assert isinstance(KIND, ArduPilotFlight)
