@@ -1,6 +1,7 @@
 """Are faults really repaired? The fixes of failed missions are flown, on whatever a campaign's command starts.
 
     python -m benchmarks.flown CAMPAIGN.yaml --profile DIR -o DIR [--table RUNS.csv] [--other NAME]... [--faults 30]
+                               [--resets alone|pairs]
 
 A fault is a configuration with some options off their reference, under conditions that no run of the campaign met,
 which misses an objective twice. Everything else is the command line's: `care triage` reads the log, `care apply` puts
@@ -8,6 +9,10 @@ what is advised into the parameter file, the campaign's command runs it, `care v
 the conditions of the fault, under others, and once more under the first, to tell chance. `--other` is a profile trained
 elsewhere, asked about the same logs. Peers put one option back to its reference, run once under each of the conditions:
 the one that is furthest from it, and the one that a plain classifier of the table chooses.
+
+`--resets alone` finds the true causes: under the conditions of the fault it runs everything at its reference, and each
+option that is off it back alone. `--resets pairs` goes on, where the reference meets everything and no option alone
+does, with all pairs of them. Then the option that is named first can be held against those that repair.
 
 Whether a mission met everything is what `truth.json` beside the folder of its logs says (`{"met": true}`), where the
 command leaves one, since a simulator knows better than a log; else what the profile reads in the log.
@@ -21,11 +26,13 @@ import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -48,6 +55,9 @@ Z95 = 1.959964
 
 Config = Mapping[str, float]
 Report = dict[str, Any]
+T = TypeVar("T")
+Peer = Callable[[Config], str]
+"""Chooses the option of a configuration that it puts back to its reference."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +147,8 @@ def advised(field: Field, profile: str, fault: Mission, name: str, config: Confi
     report, fixed = place / "report.json", place / "fixed" / field_file(field.campaign)
     code, _ = care("triage", fault.log, "--profile", profile, "--json", "--no-history", "--out", report)
     told = json.loads(report.read_text(encoding="utf-8")) if report.exists() else {}
-    found: Report = {"code": code, "fix": told.get("fix"), "abstained": told.get("abstained")}
+    causes = [cause["option"] for cause in told.get("causes", ())]
+    found: Report = {"code": code, "fix": told.get("fix"), "abstained": told.get("abstained"), "causes": causes}
     if not told.get("fix"):
         return found
     fixed.parent.mkdir(exist_ok=True)
@@ -166,18 +177,8 @@ def field_file(campaign: Campaign) -> str:
     return name
 
 
-@dataclass(frozen=True)
-class Asked:
-    """Who is asked about each fault."""
-
-    profiles: Mapping[str, str]
-    """By what they are called, folders or names."""
-    peers: Mapping[str, Callable[[Config], str]]
-    """The option that each puts back to its reference."""
-
-
-def one_fault(field: Field, asked: Asked, number: int, config: Config, seed: int) -> Report:
-    """Run a configuration; where it fails twice, everything that is to be known of its repair."""
+def one_fault(field: Field, profiles: Mapping[str, str], number: int, config: Config, seed: int) -> Report:
+    """Run a configuration; where it fails twice, what each profile (by what it is called, a folder or name) advises."""
     name = f"{number:04d}"
     found: Report = {"number": number, "seed": seed, "off": off_reference(field.campaign, config)}
     first = field.run(f"{name}/fault/0", config, seed)
@@ -187,17 +188,8 @@ def one_fault(field: Field, asked: Asked, number: int, config: Config, seed: int
         return {**found, "fault": False, "chance": True}
     found["fault"] = True
     found["profiles"] = {
-        word: advised(field, profile, first, f"{name}/{word}", config, seed) for word, profile in asked.profiles.items()
+        word: advised(field, profile, first, f"{name}/{word}", config, seed) for word, profile in profiles.items()
     }
-    found["peers"] = {}
-    reference, flown = field.campaign.space.reference, dict[str, list[bool]]()
-    for word, choose in asked.peers.items():
-        option = choose(config)
-        if option not in flown:
-            reset = {**config, option: reference[option]}
-            place = f"{name}/reset-{option}"
-            flown[option] = [field.run(f"{place}/{k}", reset, day).met for k, day in enumerate(days(seed)[:2])]
-        found["peers"][word] = {"option": option, "met": flown[option]}
     return found
 
 
@@ -207,7 +199,7 @@ def off_reference(campaign: Campaign, config: Config) -> dict[str, float]:
     return {axis.name: config[axis.name] for axis in campaign.space.axes if config[axis.name] != reference[axis.name]}
 
 
-def peers(campaign: Campaign, table: Path) -> dict[str, Callable[[Config], str]]:
+def peers(campaign: Campaign, table: Path) -> dict[str, Peer]:
     """The rules that put one option back, by what they are called."""
     schema, reference = campaign.schema, campaign.space.reference
     frame = read_table(table, schema)
@@ -227,29 +219,107 @@ def peers(campaign: Campaign, table: Path) -> dict[str, Callable[[Config], str]]
     }
 
 
-def measure(field: Field, asked: Asked, wanted: int, seed: int) -> list[Report]:
+class Done:
+    """What is known of each configuration, by its number, in memory and in a file: the last line of a number counts."""
+
+    def __init__(self, path: Path) -> None:
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        self._path, self._guard = path, threading.Lock()
+        self._known: dict[int, Report] = {report["number"]: report for report in map(json.loads, lines)}
+
+    def __contains__(self, number: int) -> bool:
+        return number in self._known
+
+    def add(self, report: Report) -> None:
+        with self._guard, self._path.open("a", encoding="utf-8") as stream:
+            self._known[report["number"]] = report
+            stream.write(json.dumps(report) + "\n")
+
+    def all(self) -> list[Report]:
+        with self._guard:
+            return sorted(self._known.values(), key=lambda report: report["number"])
+
+    def faults(self) -> list[Report]:
+        return [report for report in self.all() if report["fault"]]
+
+
+def measure(field: Field, profiles: Mapping[str, str], done: Done, wanted: int, seed: int) -> None:
     """Try configurations until so many faults are found; what was found before is not run again."""
-    journal = field.folder / "faults.jsonl"
-    done: list[Report] = [json.loads(line) for line in journal.read_text().splitlines()] if journal.exists() else []
-    seen = {report["number"] for report in done}
     configs = points(field.campaign.space, "uniform", MOST_TRIED * wanted, 1 - OFF, seed)
-    guard = threading.Lock()
 
     def work(number: int) -> None:
-        with guard:
-            if number in seen or sum(report["fault"] for report in done) >= wanted:
-                return
+        if number in done or len(done.faults()) >= wanted:
+            return
         try:
-            found = one_fault(field, asked, number, configs[number], run_seed(seed, number))
+            done.add(one_fault(field, profiles, number, configs[number], run_seed(seed, number)))
         except RuntimeError as err:
-            found = {"number": number, "fault": False, "error": str(err)}
-        with guard, journal.open("a", encoding="utf-8") as stream:
-            done.append(found)
-            stream.write(json.dumps(found) + "\n")
+            done.add({"number": number, "fault": False, "error": str(err)})
 
+    at_once(field, work, range(len(configs)))
+
+
+def at_once(field: Field, work: Callable[[T], None], parts: Iterable[T]) -> None:
+    """Do the parts of a work, as many at a time as the campaign has slots."""
     with ThreadPoolExecutor(field.campaign.slots) as workers:
-        list(workers.map(work, range(len(configs))))
-    return sorted(done, key=lambda report: report["number"])
+        list(workers.map(work, parts))
+
+
+def for_each(field: Field, done: Done, work: Callable[[Report], Report]) -> None:
+    """Add to each fault what a work finds; one with a mission that fails to run is left for another call."""
+
+    def add(fault: Report) -> None:
+        try:
+            done.add({**fault, **work(fault)})
+        except RuntimeError as err:
+            print(err, file=sys.stderr)
+
+    at_once(field, add, done.faults())
+
+
+def compare(field: Field, others: Mapping[str, Peer], fault: Report) -> Report:
+    """What becomes of a fault where peers put their option back, under its conditions and under others."""
+    if "peers" in fault:
+        return {}
+    config = {**field.campaign.space.reference, **fault["off"]}
+    chosen = {word: choose(config) for word, choose in others.items()}
+    return {
+        "peers": {
+            word: {"option": option, "met": [put_back(field, fault, (option,), day) for day in (0, 1)]}
+            for word, option in chosen.items()
+        }
+    }
+
+
+def reset(field: Field, fault: Report, *, in_pairs: bool) -> Report:
+    """What becomes of a fault with all of its options back, with each alone, and in pairs where none repairs it alone
+    though all do."""
+    off = fault["off"]
+    found = fault.get("resets") or {
+        "all": put_back(field, fault, tuple(off)),
+        "alone": {option: put_back(field, fault, (option,)) for option in off},
+    }
+    if in_pairs and found["all"] and not any(found["alone"].values()) and "pairs" not in found:
+        found["pairs"] = [pair for pair in combinations(off, 2) if put_back(field, fault, pair)]
+    return {"resets": found}
+
+
+def put_back(field: Field, fault: Report, options: Sequence[str], day: int = 0) -> bool:
+    """Whether a mission meets everything with these options of a fault at their reference, the others as they were.
+
+    What the campaign's limits forbid is not run.
+    """
+    off = {name: value for name, value in fault["off"].items() if name not in options}
+    config = {**field.campaign.space.reference, **off}
+    name = f"{fault['number']:04d}/reset-{'+'.join(options)}" if off else f"{fault['number']:04d}/reference"
+    allowed = field.campaign.space.allows(config)
+    return allowed and field.run(f"{name}/{day}", config, days(fault["seed"])[day]).met
+
+
+def true_causes(fault: Report) -> set[str]:
+    """The options that repair a fault alone; where there is none, those of pairs that do."""
+    resets = fault["resets"]
+    alone = {option for option, met in resets["alone"].items() if met}
+    return alone or {option for pair in resets.get("pairs", ()) for option in pair}
 
 
 def wilson(hits: int, count: int) -> tuple[float, float]:
@@ -274,9 +344,29 @@ def show(done: Sequence[Report]) -> None:
           f"{sum('error' in r for r in done)} gave no mission")  # fmt: skip
     for word in faults[0]["profiles"] if faults else ():
         show_profile(word, [report["profiles"][word] for report in faults])
-    for word in faults[0]["peers"] if faults else ():
-        answers = [report["peers"][word] for report in faults]
+    compared = [report["peers"] for report in faults if "peers" in report]
+    for word in compared[0] if compared else ():
+        answers, n = [peers[word] for peers in compared], len(compared)
         print(f"{word}: repaired {share(first(answers, 0), n)}, another day {share(first(answers, 1), n)}")
+    show_causes([report for report in faults if "resets" in report])
+
+
+def show_causes(faults: Sequence[Report]) -> None:
+    """Print what the resets tell of the causes, and who names one of them first."""
+    alone = sum(any(fault["resets"]["alone"].values()) for fault in faults)
+    known = [fault for fault in faults if true_causes(fault)]
+    print(f"{len(faults)} with every reset run: the reference meets everything in "
+          f"{sum(fault['resets']['all'] for fault in faults)}, an option alone in {alone}, "
+          f"only pairs in {len(known) - alone}")  # fmt: skip
+    for word in known[0]["profiles"] if known else ():
+        named = [fault["profiles"][word]["causes"][:1] for fault in known]
+        right = sum(set(causes) <= true_causes(fault) for causes, fault in zip(named, known, strict=True) if causes)
+        print(f"{word}: a true cause named first {share(right, len(known))}, "
+              f"of those named {share(right, sum(map(len, named)))}")  # fmt: skip
+    compared = [fault for fault in known if "peers" in fault]
+    for word in compared[0]["peers"] if compared else ():
+        right = sum(fault["peers"][word]["option"] in true_causes(fault) for fault in compared)
+        print(f"{word}: a true cause {share(right, len(compared))}")
 
 
 def show_profile(word: str, answers: Sequence[Report]) -> None:
@@ -308,15 +398,22 @@ def main() -> None:
     parser.add_argument("--table", type=Path, help="the campaign's runs.csv: for the peers, without it there are none")
     parser.add_argument("--other", action="append", default=[], help="another profile, a name or a folder")
     parser.add_argument("--faults", type=int, default=30)
+    parser.add_argument("--resets", choices=("alone", "pairs"), help="run each fault with its options put back too")
     parser.add_argument("--seed", type=int, default=9000, help="not the campaign's")
     parser.add_argument("-o", "--out", type=Path, required=True, help="folder of the missions; goes on where it was")
     args = parser.parse_args()
     campaign = read_campaign(args.campaign)
     args.out.mkdir(parents=True, exist_ok=True)
     profiles = {"trained on the campaign": str(args.profile), **{name: name for name in args.other}}
-    field = Field(campaign, args.profile, args.out)
     others = peers(campaign, args.table) if args.table else {}
-    show(measure(field, Asked(profiles, others), args.faults, args.seed))
+    field, done = Field(campaign, args.profile, args.out), Done(args.out / "faults.jsonl")
+    measure(field, profiles, done, args.faults, args.seed)
+    if args.resets:
+        for_each(field, done, partial(reset, field, in_pairs=False))
+    for_each(field, done, partial(compare, field, others))
+    if args.resets == "pairs":
+        for_each(field, done, partial(reset, field, in_pairs=True))
+    show(done.all())
 
 
 if __name__ == "__main__":

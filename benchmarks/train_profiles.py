@@ -75,7 +75,7 @@ SOURCES = {
     ),
     "nav2": Source(
         ("data/nav2/table.tar.xz",),
-        "263 missions of Nav2 1.3.13 (ROS 2 Jazzy: DWB, NavFn, the standard tree for one goal) that drove this "
+        "413 missions of Nav2 1.3.13 (ROS 2 Jazzy: DWB, NavFn, the standard tree for one goal) that drove this "
         "project's simulated robot (`samples/nav2_robot`) under random configurations in worlds and to goals that "
         "differ, by `care collect`; MCAP files, read by `care ingest`.",
     ),

@@ -26,11 +26,13 @@ Verdict = Literal["fixed_as_promised", "fixed_although", "not_fixed", "change_no
 
 @dataclass(frozen=True, slots=True)
 class Before:
-    """An objective as the report has it."""
+    """An objective as the report has it. `need`: what the reference configuration needed for that mission, where the
+    threshold is a multiple of it; None where the threshold holds for any mission."""
 
     value: float | None
     status: Status
     threshold: Threshold | None
+    need: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +83,8 @@ class OtherChange:
 
 @dataclass(frozen=True, slots=True)
 class ObjectiveCheck:
-    """One objective before and after. `inside`: whether the outcome lies in the promised 80 % interval."""
+    """One objective before and after. `inside`: whether the outcome lies in the promised 80 % interval, which is scaled
+    to the mission of the run after."""
 
     variable: Variable
     before: Before
@@ -117,12 +120,19 @@ def verify_log(
 ) -> tuple[Run, Verification]:
     """Compare one mission of a log, judged by the report's thresholds, with what was promised for it.
 
+    A threshold that is a multiple of what the reference configuration needs is this mission's own: the one that failed
+    was given up half-way, or went elsewhere.
+
     Raises:
         CareError: the log holds no mission of the profile.
     """
     schema = profile.schema
     usual = thresholds_in_force(schema, {})
-    wanted = {name: before.threshold for name, before in promise.objectives.items() if before.threshold is not None}
+    wanted = {
+        name: before.threshold
+        for name, before in promise.objectives.items()
+        if before.threshold is not None and before.need is None
+    }
     own = {name: bound.value for name, bound in wanted.items() if name not in usual or usual[name].value != bound.value}
     judged = read_and_judge(log, profile, thresholds=own, mission=mission, sha256=sha256)
     found = verify(promise, judged, schema, _doubt(promise, judged.run, schema))
@@ -205,22 +215,31 @@ def _others(promise: Promise, chosen: PromisedSet, run: Run, schema: Schema) -> 
 
 
 def _check(before: Before, after: ObjectiveResult, interval: tuple[float, float] | None) -> ObjectiveCheck:
+    """Both measured by what the reference configuration needs, where the threshold is: the missions may differ."""
+    longer = after.need.value / before.need if after.need is not None and before.need else 1.0
+    if interval is not None:
+        interval = (interval[0] * longer, interval[1] * longer)
     inside = None
     if interval is not None and after.value is not None:
         inside = bool(interval[0] <= after.value <= interval[1])
-    return ObjectiveCheck(after.variable, before, after, _outcome(before, after, interval), interval, inside)
+    expected = None if before.value is None else before.value * longer
+    outcome = _outcome(before.status, expected, after, interval)
+    return ObjectiveCheck(after.variable, before, after, outcome, interval, inside)
 
 
-def _outcome(before: Before, after: ObjectiveResult, interval: tuple[float, float] | None) -> Outcome:
+def _outcome(
+    before: Status, expected: float | None, after: ObjectiveResult, interval: tuple[float, float] | None
+) -> Outcome:
+    """`expected`: the value of the run before, had it been the mission of the run after."""
     if after.status == "not_evaluated":
         return "unknown"
     if after.status == "ok":
-        return "kept" if before.status == "ok" else "recovered"
-    if before.status != "fault" or before.value is None or after.value is None:
+        return "kept" if before == "ok" else "recovered"
+    if before != "fault" or expected is None or after.value is None:
         return "broken"
     # Runs differ without a cause by about half the interval that was predicted for one.
     noise = (interval[1] - interval[0]) / 2 if interval is not None else 0.0
-    moved = after.value - before.value
+    moved = after.value - expected
     if abs(moved) <= noise or moved == 0:
         return "unchanged"
     wants_less = after.threshold is not None and after.threshold.op in ("<=", "<")

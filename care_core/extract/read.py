@@ -19,6 +19,7 @@ import care_core.extract.goals_asked
 import care_core.extract.laser
 import care_core.extract.nav2
 import care_core.extract.navigation
+import care_core.extract.parameter
 import care_core.extract.px4
 import care_core.extract.recording  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force

@@ -45,7 +45,8 @@ def sound_profiles() -> tuple[list[Profile], list[ProfileError]]:
 
 def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P | None, ProfileChoice]:
     """The candidate that fits best: by its verdict, then by the parameters and sources in the log, then by the robot's
-    or firmware's name. None where none fits, with the reasons; a single candidate is still named then.
+    or firmware's name. One of another stack is none where there is one of the log's own, that does not fit. None where
+    none fits, with the reasons; a single candidate is still named then.
 
     Raises:
         LogError: the log is damaged, and no message of it is left.
@@ -54,9 +55,10 @@ def choose_profile(log: Log, candidates: Sequence[P]) -> tuple[P | None, Profile
     covered = [cover(log, candidate.schema) for candidate in candidates]
     fits = [fit_of(log, coverage) for coverage in covered]
     order = sorted(range(len(fits)), key=lambda i: (_ORDER[fits[i].verdict], *_nearness(log, covered[i])))
-    usable = [i for i in order if fits[i].verdict != "no"]
+    own = [i for i in order if not _is_of_another_stack(log, covered[i])]
+    usable = [i for i in own or order if fits[i].verdict != "no"]
     if not usable:
-        return None, _none_fits(log, covered, fits, order)
+        return None, _none_fits(log, covered, fits, own or order)
     best = usable[0]
     rivals = [covered[i] for i in usable[1:] if not covered[i].schema.carried_over]
     others = [rival.schema.name for rival in rivals if rival.found >= NEARLY_AS_WELL * covered[best].found]
@@ -80,10 +82,13 @@ def fitting_profile(log: Log, candidates: Sequence[P]) -> tuple[P, ProfileChoice
 
 def _nearness(log: Log, coverage: Coverage) -> tuple[int, int, int, str]:
     """What was learned from such logs comes before what was carried over to them, and that before another stack's."""
-    stack, own = coverage.schema.match.get("stack", ""), log.facts.get("stack", "")
-    is_of_another = bool(own) and stack.casefold() not in own.casefold()
-    strange = 2 if is_of_another else 1 if coverage.schema.carried_over else 0
+    strange = 2 if _is_of_another_stack(log, coverage) else 1 if coverage.schema.carried_over else 0
     return strange, -coverage.found, -coverage.names, coverage.schema.name
+
+
+def _is_of_another_stack(log: Log, coverage: Coverage) -> bool:
+    stack, own = coverage.schema.match.get("stack", ""), log.facts.get("stack", "")
+    return bool(own) and stack.casefold() not in own.casefold()
 
 
 def _choice(coverage: Coverage, fit: Fit, others: Sequence[str] = ()) -> ProfileChoice:

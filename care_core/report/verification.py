@@ -132,7 +132,10 @@ def promise_of(report: TriageDocument) -> Promise:
         config={name: float(value) for name, value in report.config.items()},
         objectives={
             one.name: Before(
-                one.value, one.status, Threshold(one.threshold.op, one.threshold.value) if one.threshold else None
+                one.value,
+                one.status,
+                Threshold(one.threshold.op, one.threshold.value) if one.threshold else None,
+                one.needs.value if one.needs else None,
             )
             for one in report.objectives
         },

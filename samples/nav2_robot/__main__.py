@@ -60,7 +60,8 @@ def main(words: list[str]) -> int:
         path.unlink(missing_ok=True)
         return 2
     if asked.truth is not None:
-        asked.truth.write_text(json.dumps({**told, **_truth(robots[-1])}, indent=1) + "\n", encoding="utf-8")
+        driven = {"seed": asked.seed, "params": str(asked.params.absolute()), "log": str(path.absolute())}
+        asked.truth.write_text(json.dumps({**driven, **told, **_truth(robots[-1])}, indent=1) + "\n", encoding="utf-8")
     print(f"{told['reached']} of {len(conditions.world.goals)} goals, {told['mission_s']:.0f} s")
     return 0
 

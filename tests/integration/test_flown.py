@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -36,12 +37,12 @@ def test_a_fault_is_diagnosed_repaired_run_again_and_verified(
 ) -> None:
     field = flown.Field(campaign, Path("owlat"), tmp_path / "flown")
     (tmp_path / "flown").mkdir()
-    asked = flown.Asked({"bundled": "owlat"}, {"first": lambda config: next(iter(config))})
+    done = flown.Done(tmp_path / "flown" / "faults.jsonl")
     configs = points(campaign.space, "uniform", 20, 1 - flown.OFF, 3)
     found = next(
         report
         for number, config in enumerate(configs)
-        if (report := flown.one_fault(field, asked, number, config, 900 + number))["fault"]
+        if (report := flown.one_fault(field, {"bundled": "owlat"}, number, config, 900 + number))["fault"]
     )
     answer = found["profiles"]["bundled"]
     assert answer["code"] == ExitCode.FAULT
@@ -50,9 +51,38 @@ def test_a_fault_is_diagnosed_repaired_run_again_and_verified(
     # What is verified in the log is what was judged of the mission.
     assert [verdict.startswith("fixed") for verdict in answer["verdicts"]] == answer["met"]
     assert set(found["off"]) <= {axis.name for axis in campaign.space.axes}
-    assert len(found["peers"]["first"]["met"]) == 2
-    flown.show([{"number": 0, "fault": False}, found])
+    done.add(found)
+    flown.for_each(field, done, partial(flown.compare, field, {"first": lambda _: next(iter(found["off"]))}))
+    (fault,) = flown.Done(tmp_path / "flown" / "faults.jsonl").faults()
+    assert len(fault["peers"]["first"]["met"]) == 2
+    flown.show([{"number": -1, "fault": False}, fault])
     assert "bundled: flagged 1 of 1, advised 1" in capsys.readouterr().out
+
+
+def test_options_put_back_tell_the_causes(
+    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A mission that only two options make fail, together: neither repairs it alone, both do, and all do."""
+    names = [axis.name for axis in campaign.space.axes][:3]
+    reference = campaign.space.reference
+
+    def run(_field: flown.Field, _name: str, config: flown.Config, _seed: int) -> flown.Mission:
+        return flown.Mission(tmp_path, all(config[name] == reference[name] for name in names[:2]))
+
+    monkeypatch.setattr(flown.Field, "run", run)
+    field = flown.Field(campaign, Path("owlat"), tmp_path)
+    answer = {"code": ExitCode.FAULT, "fix": None, "causes": names[1:]}
+    off = {axis.name: axis.low if axis.low != reference[axis.name] else axis.high for axis in campaign.space.axes[:3]}
+    fault: flown.Report = {"number": 1, "seed": 1, "fault": True, "off": off, "profiles": {"bundled": answer}}
+    fault |= flown.reset(field, fault, in_pairs=True)
+    assert fault["resets"]["all"]
+    assert not any(fault["resets"]["alone"].values())
+    assert fault["resets"]["pairs"] == [tuple(names[:2])]
+    assert flown.true_causes(fault) == set(names[:2])
+    flown.show([fault])
+    told = capsys.readouterr().out
+    assert "the reference meets everything in 1, an option alone in 0, only pairs in 1" in told
+    assert "bundled: a true cause named first 1 of 1" in told
 
 
 @pytest.mark.parametrize(

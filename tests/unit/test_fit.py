@@ -10,6 +10,7 @@ import pytest
 
 from care_core.extract.coverage import cover, try_on
 from care_core.extract.fit import fit_of
+from care_core.extract.select import choose_profile
 from care_core.logs.opening import open_log
 from care_core.profile.store import load_profile
 from tests.courier import TOLERANCE, USUAL, deliver
@@ -31,6 +32,16 @@ def test_another_part_of_the_stack_does_not_fit(log_path: Path) -> None:
     assert fits.verdict != "no"
     assert other.verdict == "no"
     assert f"{named} is {own}, the profile was learned with MPPI" in other.reasons
+
+
+def test_a_profile_of_another_stack_does_not_stand_in_for_one_whose_controller_is_another(log_path: Path) -> None:
+    log, nav2, husky = open_log(log_path), load_profile("nav2"), load_profile("husky")
+    named = next(name for name in log.settings() if name.endswith("xy_goal_tolerance"))
+    other = replace(nav2, schema=replace(nav2.schema, plugins={named: "MPPI"}))
+    assert choose_profile(log, [husky])[0] is husky
+    assert choose_profile(log, [husky, other])[0] is None
+    (reason,) = choose_profile(log, [husky, other])[1].fit.reasons
+    assert reason.endswith("the profile was learned with MPPI")
 
 
 def test_what_ros_2_misses_is_recorded_on_the_topic_of_all_nodes(log_path: Path) -> None:

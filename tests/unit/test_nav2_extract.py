@@ -235,3 +235,15 @@ def test_any_states_make_goals_in_order(told: list[tuple[float, list[tuple[int, 
 def test_the_kind_reads_the_hidden_topic() -> None:
     assert STATUS in KIND.needs(SPEC)
     assert "/move_base/goal" not in KIND.needs(SPEC)
+
+
+@pytest.mark.parametrize(
+    ("settings", "radius"),
+    [({"/l.radius": 0.22, "/g.radius": 0.3}, 0.3), ({"/g.radius": 0.22}, 0.22), ({"/l.radius": "x"}, None), ({}, None)],
+)
+def test_what_parameters_say_of_a_robot_is_the_largest_of_them(
+    settings: dict[str, float | str], radius: float | None
+) -> None:
+    mission = Mission({}, 0.0, DURATION_S, ended=True, spec=SPEC, settings=settings)
+    found = find_extractor("parameter").compute(mission, {"names": ["/l.radius", "/g.radius"]})
+    assert found == radius if radius is not None else isinstance(found, Unavailable)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import ast
+import json
 import math
+import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +16,7 @@ from hypothesis import strategies as st
 
 from care_core.application.case import Request, open_case
 from care_core.logs.opening import open_log
-from nav2_robot import clock, laser, parameters
+from nav2_robot import again, clock, laser, parameters
 from nav2_robot.__main__ import main
 from nav2_robot.battery import Battery
 from nav2_robot.failures import KINDS, Failure
@@ -217,6 +220,28 @@ def test_the_command_drives_and_says_what_it_cannot(tmp_path: Path, capsys: pyte
     with pytest.raises(SystemExit):
         main(["--params", str(START), "--logs", str(tmp_path), "--fail", "nothing:1:2"])
     assert "none.yaml" in capsys.readouterr().err
+
+
+def test_a_mission_with_a_failing_part_is_driven_again_whole(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The stand-in drives; what `care` says is made up."""
+    known = tmp_path / "known.json"
+    failing = ["--stand-in", "--fail", "stall:5:500", "--params", str(START), "--logs", str(tmp_path), "--seed", "2"]
+    assert main([*failing, "--truth", str(known)]) == 0
+    said = {"findings": [{"severity": "critical", "kind": "drive", "title": "it stalls"}], "fix": None}
+
+    def run(words: Sequence[str], **_: object) -> subprocess.CompletedProcess[str]:
+        if words[0] == "drive":
+            main(["--stand-in", *words[1:]])
+        return subprocess.CompletedProcess(words, 0, json.dumps(said))
+
+    monkeypatch.setattr(subprocess, "run", run)
+    assert again.main([str(known), "-o", str(tmp_path / "whole"), "--drive", "drive"]) == 0
+    told = capsys.readouterr().out
+    assert "missed   reached  it stalls" in told
+    assert "missed a goal: 1, with a finding 1, the part named 1, advised a parameter 0" in told
+    assert "driven again whole: 1, reached all 1" in told
 
 
 def test_where_nav2_is_not_the_command_says_so_and_leaves_no_log(

@@ -14,12 +14,14 @@ from ruamel.yaml import YAML
 
 from care_core.configs.driven import same_value
 from care_core.diagnose.judging import judge
+from care_core.diagnose.records import Need
 from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, _notes, verify
 from care_core.errors import ConfigError
 from care_core.report.document import build_document
 from care_core.report.reading import read_report
 from care_core.report.writers import to_json, to_yaml
 from care_core.run import Setting, Unavailable
+from care_core.variables import Threshold
 from tests.conftest import Care
 from tests.made import made_diagnosis
 from tests.planted import DEFAULTS, ENERGY, SCHEMA, SUCCESS, TIME, planted_run
@@ -110,6 +112,19 @@ def test_a_move_within_what_runs_differ_by_is_none(time_s: float, outcome: str) 
     within = replace(PROMISED, intervals={"time": (130.0, 170.0)})
     found = verify(replace(promise(), sets=(within,)), judge(driven, SCHEMA, None), SCHEMA)
     assert {check.variable.name: check.outcome for check in found.objectives}["time"] == outcome
+
+
+def test_a_longer_mission_is_held_against_what_it_needs_itself() -> None:
+    """The mission that failed was given up half-way: the reference needed 60 s for it, and 120 s for the next."""
+    half = {"time": Before(None, "not_evaluated", Threshold("<=", 87.5), need=60.0)}
+    within = replace(PROMISED, intervals={"time": (65.0, 75.0)})
+    judged = judge(planted_run(speed=5.0), SCHEMA, None)
+    time = next(result for result in judged.results if result.variable is TIME)
+    now = replace(judged, results=(replace(time, need=Need(120.0, 110.0, 130.0)),))
+    found = verify(replace(promise(), objectives=half, sets=(within,)), now, SCHEMA)
+    (check,) = found.objectives
+    assert check.interval == (130.0, 150.0)
+    assert found.verdict == "fixed_as_promised"
 
 
 def test_a_recovery_with_other_changes_says_so() -> None:
