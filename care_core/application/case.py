@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from care_core.errors import CareError, ExitCode
+from care_core.frozen import dataclass
 
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing

@@ -18,11 +18,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from care_core.causal.mechanisms import FloatArray, Mechanism
+from care_core.frozen import dataclass
 
 _Z = np.linspace(-6.0, 6.0, 2401)
 _CDF = np.array([0.5 * (1.0 + math.erf(z / math.sqrt(2.0))) for z in _Z.tolist()])

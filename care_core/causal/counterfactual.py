@@ -9,7 +9,7 @@ and for another day apart (`Model.training.persistence`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from statistics import NormalDist
 from typing import Literal
 
@@ -18,6 +18,7 @@ import numpy as np
 from care_core.causal.abduction import FARTHEST, Kinship, by_mediators, kinship, next_passes, next_value
 from care_core.causal.mechanisms import LEAST, TAIL, FloatArray, Mechanism, columns, restored, transformed
 from care_core.causal.model import UNKNOWN_PERSISTENCE, Mediation, Model, OutcomeRecord, Persistence, StageRecord
+from care_core.frozen import dataclass
 from care_core.run import is_known
 from care_core.variables import Threshold, Variable
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from care_core.frozen import dataclass
 from care_core.variables import Role, Variable
 
 FloatArray = NDArray[np.float64]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
+
+from care_core.frozen import dataclass
 
 Edge = tuple[str, str]
 """A directed edge as (cause, effect), or a bidirected edge as its two ends in sorted order."""

@@ -11,7 +11,6 @@ so it learns from few missions, says how sure it is away from the data, and stor
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.causal.nominal import Nominal
+from care_core.frozen import dataclass
 
 FloatArray = NDArray[np.float64]
 Transform = Literal["identity", "log", "log1p"]

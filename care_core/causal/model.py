@@ -6,7 +6,7 @@ Files hold these records as they are (`care_core.records`); nothing here knows o
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import TAIL, FloatArray, Mechanism, columns
+from care_core.frozen import dataclass
 from care_core.variables import Threshold
 
 

@@ -8,10 +8,11 @@ same on every mission. Arguments are arrays of one value a run, in m, s, m/s, W,
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from care_core.frozen import dataclass
 
 FloatArray = NDArray[np.float64]
 Given = Mapping[str, FloatArray]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from care_core.causal.graph import CausalGraph, Edge
+from care_core.frozen import dataclass
 
 
 @dataclass(frozen=True)

@@ -6,11 +6,11 @@ import gc
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from care_core.configs.formats import ConfigFormat, format_of, module_of
 from care_core.errors import ConfigError
+from care_core.frozen import dataclass
 from care_core.run import Find, Setting
 
 _LARGEST_BYTES = 1_000_000

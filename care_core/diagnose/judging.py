@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from care_core.causal.counterfactual import World
 from care_core.causal.model import Model, Summary
@@ -14,6 +14,7 @@ from care_core.diagnose.reference import Good, Reference, need_of, reference_of
 from care_core.errors import UsageError, nearest
 from care_core.extract.plain import read_plain_runs
 from care_core.extract.read import mission_number, read_runs
+from care_core.frozen import dataclass
 from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema

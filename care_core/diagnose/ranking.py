@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Container, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from care_core.causal.paths import CausalPath, rank_paths
 from care_core.configs.driven import same_value
 from care_core.diagnose.records import PathNode
 from care_core.diagnose.symptoms import NOTHING, pointers
+from care_core.frozen import dataclass
 from care_core.run import Evidence, Run, is_known
 from care_core.variables import Role
 

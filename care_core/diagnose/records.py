@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
+from care_core.frozen import dataclass
 from care_core.health.records import NOTHING_SEEN, Health, Severity
 from care_core.run import FitVerdict, MissionInfo, ProfileChoice, Run, shown
 from care_core.text import figures

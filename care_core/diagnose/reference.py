@@ -8,7 +8,7 @@ a robot that is slower than the profile's by its own speed: nothing says that it
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from care_core.causal.counterfactual import Config, World
 from care_core.causal.model import Model
 from care_core.configs.driven import option_setting, option_value, same_value
 from care_core.diagnose.records import Need
+from care_core.frozen import dataclass
 from care_core.profile.schema import Schema
 from care_core.run import Run, Setting, is_known
 

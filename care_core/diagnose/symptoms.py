@@ -9,13 +9,13 @@ takes many runs to be learned, a phase or an error that few options act on needs
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from care_core.causal.counterfactual import Config, World
 from care_core.causal.graph import Edge
 from care_core.causal.mechanisms import LEAST, Mechanism, columns, transformed
+from care_core.frozen import dataclass
 from care_core.run import Evidence
 
 UNLEARNED = 0.02

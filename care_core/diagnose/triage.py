@@ -7,7 +7,7 @@ comparison and verification come by it too.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from care_core.causal.counterfactual import World
 from care_core.causal.model import EffectRecord
@@ -39,6 +39,7 @@ from care_core.diagnose.ranking import (
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Note, ObjectiveResult
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
+from care_core.frozen import dataclass
 from care_core.health.records import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.store import Profile

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_core.extract.registry import Args, Mission, extractor, has, missing, one_of
+from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.run import Unavailable, Value
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from care_core.extract.drive import BATTERY_FIELDS, Floats, has, topics
 from care_core.extract.registry import Args, Mission, extractor, missing, one_of
+from care_core.frozen import dataclass
 from care_core.logs.plausible import is_alive
 from care_core.run import Unavailable, Value
 

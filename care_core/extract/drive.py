@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import IntEnum
 from itertools import pairwise
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.extract.registry import Args, Mission, missing
+from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.logs.plausible import APART, STAMP, is_simulated, never_moved, stamps_pace
 from care_core.run import Unavailable

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from care_core.extract.asked import ITEMS, Asked, Item, asked, home_of, items_of
 from care_core.extract.modes import MODES, kind_flown, modes_in_force
 from care_core.extract.registry import Mission, has, merge_needs
+from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.run import Unavailable
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from care_core.extract.drive import GOAL_SERVERS, GoalServer, Leg, Poses, Recove
 from care_core.extract.goals import ROSOUT, GoalMissions
 from care_core.extract.goals_asked import PER_GOAL, PER_METRE, divided
 from care_core.extract.registry import MISSION_KINDS, Args, Mission, extractor, missing, one_of
+from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.run import Unavailable, Value
 

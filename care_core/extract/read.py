@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 # Importing them registers their extractors and mission kinds.
 import care_core.extract.actionlib
@@ -25,6 +25,7 @@ import care_core.extract.recording  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
 from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
+from care_core.frozen import dataclass
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import Sha256, hashing
 from care_core.logs.plausible import clock_doubt, dead_sources

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeGuard, TypeVar
 
 from care_core.errors import ProfileError, nearest
 from care_core.extract.how_to_record import how_to_record
+from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.run import Check, Evidence, Unavailable, Value
 

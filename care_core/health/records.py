@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, get_args
+
+from care_core.frozen import dataclass
 
 Severity = Literal["info", "warning", "critical"]
 FindingKind = Literal[

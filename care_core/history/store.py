@@ -12,12 +12,13 @@ import sqlite3
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from care_core.errors import CareError
+from care_core.frozen import dataclass
 from care_core.run import Robot
 
 SWITCH = "CARE_HISTORY"

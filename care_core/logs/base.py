@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
 
+from care_core.frozen import dataclass
 from care_core.run import Damage, Setting
 
 if TYPE_CHECKING:  # a log is told by its first bytes before anything needs numbers

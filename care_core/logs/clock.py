@@ -6,13 +6,13 @@ while they run (the ground station found its time server). The first is damage, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.frozen import dataclass
 from care_core.run import Damage
 
 Floats = NDArray[np.float64]

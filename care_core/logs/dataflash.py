@@ -9,7 +9,6 @@ operations: nothing here loops over messages.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from threading import Lock
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from care_core import limits
 from care_core.errors import LogError
+from care_core.frozen import dataclass
 from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, shortest, wall_clock
 from care_core.logs.base import Channel, Kind, LogFormat, Table, Wanted
 from care_core.logs.clock import Clock, find_clock

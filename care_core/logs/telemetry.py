@@ -7,13 +7,13 @@ and its extractors answer `Unavailable`. Arming is known to half the time betwee
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.frozen import dataclass
 from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted
 
 Floats = NDArray[np.float64]

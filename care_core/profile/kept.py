@@ -23,6 +23,7 @@ _RECORDS = {
 }
 _CHECKING = (
     "../variables.py",
+    "../frozen.py",
     "../plain_yaml.py",
     "../limits.py",
     "../causal/nominal.py",

@@ -9,7 +9,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -32,6 +32,7 @@ from care_core.causal.model import (
 from care_core.causal.nominal import FORMULAS, Nominal
 from care_core.errors import ProfileError
 from care_core.files import replace_file, sync_folder
+from care_core.frozen import dataclass
 from care_core.records import UnfitError, plain, read
 
 ARCHIVE = b"PK\x03\x04"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from care_core.causal.nominal import Nominal, nominal
 from care_core.configs.driven import same_value
 from care_core.errors import ProfileError
+from care_core.frozen import dataclass
 from care_core.run import Evidence
 from care_core.variables import Role, Threshold, Variable
 

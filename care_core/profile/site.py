@@ -13,11 +13,12 @@ that stands beside it, for any where none does.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.errors import ConfigError, nearest
+from care_core.frozen import dataclass
 from care_core.profile.schema import Schema
 from care_core.variables import OwnLimit, Role, Variable
 

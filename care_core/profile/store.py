@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from care_core.causal.model import Model
 from care_core.errors import ProfileError, nearest
 from care_core.files import PROFILE_FILE, profile_folders
+from care_core.frozen import dataclass
 from care_core.profile.model import read_model
 from care_core.profile.schema import Schema, read_schema
 

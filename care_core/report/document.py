@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Final, Literal
 
 from care_core.configs.changes import apply_commands, unified_diff
@@ -25,6 +25,7 @@ from care_core.diagnose.records import (
     Since,
     Status,
 )
+from care_core.frozen import dataclass
 from care_core.report.happened import (
     FindingEntry,
     FitEntry,

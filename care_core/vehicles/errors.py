@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from care_core.frozen import dataclass
 from care_core.vehicles.modes import mode_name
 from care_core.vehicles.vehicle import Kind
 

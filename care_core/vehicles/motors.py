@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from care_core.frozen import dataclass
 from care_core.vehicles.frames import Arm, arms_of, frame_of
 from care_core.vehicles.settings import Driven, code
 

@@ -9,9 +9,9 @@ on other parameters (rate gains of 3.3, ARMING_CHECK) are left out.
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 
+from care_core.frozen import dataclass
 from care_core.vehicles.vehicle import Kind
 
 Version = tuple[int, ...]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
 
+from care_core.frozen import dataclass
 from care_core.vehicles.frames import CLASSES, TYPES, frame_of
 from care_core.vehicles.settings import Driven, code
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.frozen import dataclass
 from care_core.health.ardupilot.signals import Floats, instances
 from care_core.logs.base import Table, Wanted
 from care_core.run import Setting

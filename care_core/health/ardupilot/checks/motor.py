@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.frozen import dataclass
 from care_core.health.ardupilot.flight import Flight, Mask
 from care_core.health.ardupilot.measure import Calibration, lasting, likely, smooth
 from care_core.health.ardupilot.signals import Floats
