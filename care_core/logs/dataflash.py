@@ -79,6 +79,7 @@ class _Values:
     def __init__(self, data: FileArray) -> None:
         self._data = data
         self._held: dict[tuple[int, int, int], NDArray[Any]] = {}
+        self._bytes = 0
         self._lock = Lock()  # the app's threads share a log
 
     def of(self, form: Format, offsets: Offsets, name: str, among: Iterable[str] = ()) -> NDArray[Any]:
@@ -92,9 +93,10 @@ class _Values:
                     missing = {asked: wanted[asked]}
                 read = self._data.fields(offsets, [(field.offset, field.dtype) for field in missing.values()])
                 self._held |= zip(missing, read, strict=True)
+                self._bytes += sum(column.nbytes for column in read)
             found = self._held[asked] = self._held.pop(asked)  # what was asked for last goes last
-            while len(self._held) > 1 and sum(column.nbytes for column in self._held.values()) > limits.VALUES_BYTES:
-                del self._held[next(iter(self._held))]
+            while len(self._held) > 1 and self._bytes > limits.VALUES_BYTES:
+                self._bytes -= self._held.pop(next(iter(self._held))).nbytes
         return found
 
 

@@ -36,11 +36,27 @@ class CareScreen(Screen[None]):
         )
         yield from self.compose_body()
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._is_settling = False
+
     def _on_timer_update(self) -> None:
         # Its timer goes on until the link is free; what is to be drawn gathers meanwhile.
         link = getattr(self.app, "link", None)
-        if not isinstance(link, Link) or not link.is_busy:
-            super()._on_timer_update()
+        if isinstance(link, Link) and link.is_busy:
+            return
+        # New sizes are given one tick before anything is drawn: Textual draws at once, and again when the widgets have
+        # made their lines for the new size, which sent a change of step to the terminal three times.
+        was_settling, self._is_settling = self._is_settling, self._layout_required and not self._is_settling
+        super()._on_timer_update()
+        if self._is_settling:
+            self._update_timer.resume()
+        elif was_settling:
+            self._compositor_refresh()
+
+    def _compositor_refresh(self) -> None:
+        if not self._is_settling:
+            super()._compositor_refresh()
 
     @abstractmethod
     def compose_body(self) -> ComposeResult:

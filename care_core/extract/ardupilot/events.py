@@ -73,6 +73,10 @@ def last_refusals(mission: Mission) -> list[tuple[float, str]]:
 
 
 def is_armed(mission: Mission) -> bool:
+    return mission.shared(_was_armed)
+
+
+def _was_armed(mission: Mission) -> bool:
     return any(armed and t <= mission.end_s for t, armed in arm_events(mission.tables))
 
 
