@@ -32,12 +32,13 @@ class Outcome(NamedTuple):
 
 
 def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    """Run a command away from the sources. Pythons are isolated (-I): what lies in that folder is nobody's module."""
     return subprocess.run([*map(str, words)], capture_output=True, text=True, check=False, cwd=tempfile.gettempdir())
 
 
 def built(folder: Path) -> list[Path]:
     """The wheel and the source archive. Raises RuntimeError where they cannot be built."""
-    made = run(sys.executable, "-m", "build", "--outdir", folder, ROOT)
+    made = run(sys.executable, "-I", "-m", "build", "--outdir", folder, ROOT)
     if made.returncode:
         raise RuntimeError(made.stdout[-1000:] + made.stderr[-1000:])
     return [*folder.glob("*.whl"), *folder.glob("*.tar.gz")]
@@ -49,8 +50,8 @@ def installed(python: str, archive: Path, folder: Path) -> Outcome:
     if shutil.which(f"python{python}") is None or run(f"python{python}", "--version").returncode:
         return Outcome("this Python is not here")
     steps: tuple[tuple[tuple[str | Path, ...], int], ...] = (
-        ((f"python{python}", "-m", "venv", folder), 0),
-        ((folder / "bin" / "python", "-m", "pip", "install", *QUIET, archive), 0),
+        ((f"python{python}", "-I", "-m", "venv", folder), 0),
+        ((folder / "bin" / "python", "-I", "-m", "pip", "install", *QUIET, archive), 0),
         ((folder / "bin" / "care", "--version"), 0),
         ((folder / "bin" / "care", "demo"), 1),
     )
@@ -70,8 +71,8 @@ def installed(python: str, archive: Path, folder: Path) -> Outcome:
 def without_wheel(python: str, wheel: Path, folder: Path) -> str:
     """What pip says where a base dependency has no wheel for aarch64; empty where all have."""
     platforms = [word for platform in PLATFORMS for word in ("--platform", platform)]
-    found = run(sys.executable, "-m", "pip", "download", *QUIET, "--only-binary=:all:", *platforms, "--python-version",
-                python, "--dest", folder, wheel)  # fmt: skip
+    found = run(sys.executable, "-I", "-m", "pip", "download", *QUIET, "--only-binary=:all:", *platforms,
+                "--python-version", python, "--dest", folder, wheel)  # fmt: skip
     missing = re.findall(r"No matching distribution found for (\S+)", found.stderr)
     return ", ".join(missing) or ("" if found.returncode == 0 else found.stderr.strip()[-200:])
 

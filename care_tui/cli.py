@@ -65,7 +65,15 @@ class CareGroup(TyperGroup):
         try:
             return super().main(*args, **extra)
         except Exception as err:
+            if _was_interrupted(err):
+                raise KeyboardInterrupt from None
             raise SystemExit(int(explain(err))) from None
+
+
+def _was_interrupted(err: BaseException | None) -> bool:
+    """Whether an interruption lies behind an error: Python before 3.12 makes a RuntimeError of one that meets a class
+    while it names its attributes, which importing does all the time."""
+    return err is not None and (isinstance(err, KeyboardInterrupt) or _was_interrupted(err.__cause__))
 
 
 def route(args: list[str], commands: Iterable[str], own: Iterable[str]) -> list[str]:

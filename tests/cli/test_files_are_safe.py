@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -12,7 +14,7 @@ import pytest
 import zstandard
 
 from care_core.errors import ExitCode
-from care_core.files import bundled
+from care_core.files import bundled, write_atomically
 from care_tui.start import main
 from tests.conftest import Care
 
@@ -70,6 +72,25 @@ def test_the_backup_is_as_private_as_the_file(care: Care, tmp_path: Path) -> Non
     assert care("apply", report, config, "-o", tmp_path / "new.param").code == ExitCode.OK
     for name in ("vehicle.param", "vehicle.param.bak", "new.param"):
         assert (tmp_path / name).stat().st_mode & 0o777 == 0o600, name
+
+
+def test_a_file_is_on_the_disk_before_it_gets_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a power cut leaves the name with nothing behind it."""
+    done: list[str] = []
+    sync, rename = os.fsync, Path.replace
+
+    def synced(handle: int) -> None:
+        done.append("file" if stat.S_ISREG(os.fstat(handle).st_mode) else "folder")
+        sync(handle)
+
+    def renamed(path: Path, target: Path) -> Path:
+        done.append("name")
+        return rename(path, target)
+
+    monkeypatch.setattr(os, "fsync", synced)
+    monkeypatch.setattr(Path, "replace", renamed)
+    write_atomically(tmp_path / "report.md", "whole\n")
+    assert done == ["file", "name", "folder"]
 
 
 def test_a_polite_kill_leaves_no_temporary_files(tmp_path: Path) -> None:

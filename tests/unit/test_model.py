@@ -209,6 +209,33 @@ def test_a_model_that_does_not_hold_together_is_a_profile_error(
     assert "care train" in caught.value.hint
 
 
+@pytest.mark.parametrize("step", range(4))
+def test_a_model_whose_writing_is_broken_off_is_the_old_or_the_new_one(
+    planted: Profile, folder: Path, monkeypatch: pytest.MonkeyPatch, step: int
+) -> None:
+    """Three files get their names one after the other, and a kill may come before each."""
+    other = {key: replace(mechanism, mean=mechanism.mean + 1) for key, mechanism in planted.model.mechanisms.items()}
+    new, rename, names = replace(planted.model, schema_digest="new", mechanisms=other), Path.replace, list[str]()
+
+    def renamed(path: Path, target: Path) -> Path:
+        if len(names) == step:
+            raise KeyboardInterrupt
+        names.append(Path(target).name)
+        return rename(path, target)
+
+    monkeypatch.setattr(Path, "replace", renamed)
+    try:
+        write_model(new, folder)
+    except KeyboardInterrupt:
+        assert len(names) == step < 3
+    found = read_model(folder)
+    expected = new if found.schema_digest == "new" else planted.model
+    assert {key: one.mean for key, one in found.mechanisms.items()} == pytest.approx(
+        {key: one.mean for key, one in expected.mechanisms.items()}
+    )
+    assert (found.schema_digest == "new") == (step >= 2)
+
+
 @pytest.mark.parametrize("name", ["model.json", "mechanisms.npz"])
 def test_a_missing_file_says_to_train(folder: Path, name: str) -> None:
     (folder / name).unlink()

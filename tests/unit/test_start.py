@@ -6,7 +6,9 @@ import signal
 from threading import Condition
 
 import pytest
+from typer.core import TyperGroup
 
+from care_tui.cli import CareGroup
 from care_tui.start import _leave
 
 
@@ -43,3 +45,15 @@ def test_a_termination_while_an_interruption_unwinds_breaks_no_lock(settings: di
     with pytest.raises(KeyboardInterrupt):
         _interrupted_while_waiting(Condition())
     assert settings[signal.SIGINT] == signal.default_int_handler
+
+
+class _Interrupted:
+    def __set_name__(self, owner: type, name: str) -> None:
+        raise KeyboardInterrupt
+
+
+def test_an_interruption_while_a_class_is_made_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python before 3.12 says RuntimeError then, and the command would end as on a defect of its own."""
+    monkeypatch.setattr(TyperGroup, "main", lambda *_args, **_extra: type("Made", (), {"one": _Interrupted()}))
+    with pytest.raises(KeyboardInterrupt):
+        CareGroup().main()
