@@ -11,8 +11,9 @@ conditions and half on another day.
 Per world: failed runs; those in which some single reset truly helps; how often the first cause is one of these, and the
 same for the plain classifier; answers at high confidence, and how many of them are wrong; promised probability of the
 suggested fixes against the truth (share of 400 simulated next missions under the same conditions that meet everything);
-Brier score of the promise, and of the probabilities of every reset (each option alone, and all of them); how often the
-engine abstains, and how often there was indeed nothing to name.
+Brier score of the promise, and of the probabilities of every reset (each option alone, and all of them), of the plain
+classifier's of the same, and of those with the engine's abduction of the failed run; the odds of the reference as told
+and as they are, whatever a run met; how often the engine abstains, and how often there was indeed nothing to name.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ import pandas as pd
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
+from benchmarks.diagnosis import abducted
 from care_core.causal.mechanisms import FloatArray
 from care_core.causal.model import Model
 from care_core.diagnose.judging import judge, world_of
@@ -172,7 +174,13 @@ class Score:
     kept: list[float] = field(default_factory=list)
     asked: list[float] = field(default_factory=list)
     """Probabilities of every reset of every failed run, and in `true` what they are."""
+    plain_asked: list[float] = field(default_factory=list)
+    """The same by the plain classifier, and in `plain_abducted` with the engine's abduction of the run."""
+    plain_abducted: list[float] = field(default_factory=list)
     true: list[float] = field(default_factory=list)
+    odds: list[float] = field(default_factory=list)
+    """Of the reference, whatever a run met: what each diagnosis goes by, and in `true_odds` what they are."""
+    true_odds: list[float] = field(default_factory=list)
 
     def add(self, other: Score) -> None:
         for name, value in vars(other).items():
@@ -223,7 +231,12 @@ def _judge(
     true = [true_probability(world, reset, noise) for reset in resets]
     gain = {name: kept - now for name, kept in zip(off, true, strict=True)}
     everything = dict.fromkeys(OPTIONS, REFERENCE)
-    score.asked.extend(world_of(judged, profile).probability([*resets, everything]))
+    engine = world_of(judged, profile)
+    score.asked.extend(engine.probability([*resets, everything]))
+    score.plain_asked.extend(plain.probability([*resets, everything]))
+    score.plain_abducted.extend(abducted(plain, config, [*resets, everything], 1))
+    score.odds.extend(replace(engine, observed={}).probability([everything]))
+    score.true_odds.append(true_odds(world, everything))
     score.true.extend([*true, true_probability(world, everything, noise)])
     enough = max(WORTH, max(gain.values(), default=0.0) / 2)
     helps = {name for name in off if gain[name] >= enough}
@@ -251,6 +264,13 @@ def true_probability(world: Planted, config: Mapping[str, float], noise: FloatAr
     return float(((flown["success"] == 1) & (flown["time"] <= 135)).mean())
 
 
+def true_odds(world: Planted, config: Mapping[str, float]) -> float:
+    """Share of missions that meet everything, whatever they meet."""
+    options = np.tile([config[name] for name in OPTIONS], (10 * NEXT, 1))
+    flown = world.drive(options, np.random.default_rng(8).normal(size=(10 * NEXT, len(SOURCES))))
+    return float(((flown["success"] == 1) & (flown["time"] <= 135)).mean())
+
+
 def first_cause(diagnosis: Diagnosis) -> Cause | None:
     """The cause that the report names first, of all its faults; None where it names none."""
     causes = [cause for fault in diagnosis.faults for cause in fault.causes if not cause.is_lead]
@@ -273,13 +293,15 @@ def _run_of(schema: Schema, row: Mapping[str, float]) -> Run:
 
 def show(scores: Mapping[str, Score]) -> None:
     print(f"{'world':24s}{'failed':>7s}{'helped':>7s}{'rank 1':>7s}{'plain':>7s}{'high':>6s}{'wrong':>6s}"
-          f"{'promise':>9s}{'truth':>7s}{'Brier':>7s}{'resets':>7s}{'abstains':>9s}{'rightly':>8s}")  # fmt: skip
+          f"{'promise':>9s}{'truth':>7s}{'Brier':>7s}{'resets':>7s}{'plain':>7s}{'abd.':>7s}"
+          f"{'ref.':>6s}{'truth':>7s}{'abstains':>9s}{'rightly':>8s}")  # fmt: skip
     for name, s in scores.items():
         promised, kept = np.array(s.promised), np.array(s.kept)
         means = (float(np.mean(v)) if len(v) else float("nan") for v in (promised, kept))
-        resets = brier(np.array(s.asked), np.array(s.true))
+        resets = [brier(np.array(p), np.array(s.true)) for p in (s.asked, s.plain_asked, s.plain_abducted)]
         print(f"{name:24s}{s.faults:7d}{s.helped:7d}{s.right:7d}{s.plain_right:7d}{s.high:6d}{s.high_wrong:6d}"
-              "{:9.2f}{:7.2f}".format(*means) + f"{brier(promised, kept):7.3f}{resets:7.3f}"
+              "{:9.2f}{:7.2f}".format(*means) + f"{brier(promised, kept):7.3f}"
+              "{:7.3f}{:7.3f}{:7.3f}".format(*resets) + f"{np.mean(s.odds):6.2f}{np.mean(s.true_odds):7.2f}"
               f"{s.abstained:9d}{s.abstained_rightly:8d}")  # fmt: skip
 
 
