@@ -245,7 +245,7 @@ class Done:
 
 def measure(field: Field, profiles: Mapping[str, str], done: Done, wanted: int, seed: int) -> None:
     """Try configurations until so many faults are found; what was found before is not run again."""
-    configs = points(field.campaign.space, "uniform", MOST_TRIED * wanted, 1 - OFF, seed)
+    configs = points(field.campaign.space, "uniform", MOST_TRIED * wanted, 1 - OFF, seed, alike=True)
 
     def work(number: int) -> None:
         if number in done or len(done.faults()) >= wanted:

@@ -17,7 +17,7 @@ from care_core.collect.adaptive import Known, choose
 from care_core.collect.campaign import Campaign, parameter_file_names
 from care_core.collect.journal import Done, Journal
 from care_core.collect.mission import fly
-from care_core.collect.sampling import Planned, one_at_a_time, points, repeats_among, run_seed, with_repeats
+from care_core.collect.sampling import Planned, one_at_a_time, points, repeat_of, repeats_among, run_seed, with_repeats
 from care_core.configs.driven import parameter_value, readable
 from care_core.configs.edit import Wanted, apply_changes
 from care_core.errors import UsageError
@@ -162,14 +162,16 @@ def _next_round(found: Collected) -> list[Planned]:
             apart=campaign.tell_apart,
         )
     )
-    repeated = {run.repeats for run in found.planned.values()}
+    repeated = {run.repeats for run in found.planned.values()} - {None}
     originals = (n for n, run in sorted(found.planned.items()) if run.repeats is None and n not in repeated)
     planned = []
     for number in numbers:
         original = next(originals, None) if number in repeats else None
-        config = next(configs, None) if original is None else found.planned[original].config
-        if config is not None:
-            planned.append(Planned(number, config, run_seed(campaign.seed, number), original))
+        if original is not None:
+            planned.append(repeat_of(found.planned[original], number, campaign.seed, before=len(repeated)))
+            repeated.add(original)
+        elif (config := next(configs, None)) is not None:
+            planned.append(Planned(number, config, run_seed(campaign.seed, number)))
     return planned
 
 

@@ -1,7 +1,9 @@
 """Which configurations a campaign drives, and in which order; same seed, same plan.
 
 Points of the ranges come from scipy's quasi-Monte Carlo (Owen 1998 for the scrambled Sobol' points, McKay et al. 1979
-for Latin hypercubes). Half of the dimensions say whether an option stays at its reference, which is as evenly spread.
+for Latin hypercubes). Further dimensions say whether an option stays at its reference, and in how many a run leaves it,
+which is as evenly spread. Where every run left it in about as many, nothing would be known of those that leave it in
+few, which is how robots are driven, nor of the reference itself (`benchmarks.reference_odds`).
 """
 
 from __future__ import annotations
@@ -31,19 +33,23 @@ class Planned:
     repeats: int | None = None
 
 
-def points(space: Space, method: Method, count: int, at_reference: float, seed: int) -> list[dict[str, float]]:
+def points(
+    space: Space, method: Method, count: int, at_reference: float, seed: int, *, alike: bool = False
+) -> list[dict[str, float]]:
     """So many different configurations beside the reference, all within the limits.
 
     Args:
         method: `sobol`, `latin_hypercube` or `uniform`; `adaptive` begins as `sobol`.
-        at_reference: share of the options that stay at their reference.
+        at_reference: share of the options that stay at their reference, over all configurations.
+        alike: it is that share in each of them; else some leave the reference in few options, others in many.
 
     Raises:
         UsageError: the limits leave too little, or scipy is not installed.
     """
     found: list[dict[str, float]] = []
     seen = {_key(space, space.reference)}
-    for looked, row in enumerate(_unit_points(2 * len(space.axes), method, count, seed)):
+    half = len(space.axes)
+    for looked, row in enumerate(_unit_points(2 * half + (not alike), method, count, seed)):
         if len(found) == count:
             break
         if looked == _TRIES * count:
@@ -51,13 +57,18 @@ def points(space: Space, method: Method, count: int, at_reference: float, seed: 
                 f"Only {len(found)} of {count} configurations were found that are new and keep all limits.",
                 hint="Ask for fewer runs, or widen the ranges or the limits.",
             )
-        half = len(space.axes)
-        config = space.config(row[:half], [share < at_reference for share in row[half:]])
+        kept = at_reference if alike else _share_kept(at_reference, row[-1])
+        config = space.config(row[:half], [share < kept for share in row[half : 2 * half]])
         key = _key(space, config)
         if key not in seen and space.allows(config):
             seen.add(key)
             found.append(config)
     return found
+
+
+def _share_kept(mean: float, place: float) -> float:
+    """The share of one run: evenly from none or all of them to as far beyond the mean. place: 0 to 1."""
+    return mean + min(mean, 1.0 - mean) * (2.0 * place - 1.0)
 
 
 def one_at_a_time(space: Space, count: int) -> list[dict[str, float]]:
@@ -94,15 +105,18 @@ def with_repeats(space: Space, configs: Sequence[Config], count: int, share: flo
     Args:
         count: runs in all.
         share: share of them that repeat an earlier one: the reference first, then the others from the beginning.
+            Every other one of them meets the conditions of the run that it repeats once more.
     """
     planned: list[Planned] = []
+    repeats = 0
     fresh, originals = iter((space.reference, *configs)), iter(range(1, count + 1))
     for number in range(1, count + 1):
         # Spread over the campaign: one that is cut short has its share of them too.
         is_repeat = number > 1 and int(number * share) > int((number - 1) * share)
         if is_repeat:
             original = next(n for n in originals if planned[n - 1].repeats is None)
-            planned.append(Planned(number, planned[original - 1].config, run_seed(seed, number), original))
+            planned.append(repeat_of(planned[original - 1], number, seed, before=repeats))
+            repeats += 1
             continue
         config = next(fresh, None)
         if config is None:
@@ -116,8 +130,14 @@ def repeats_among(count: int, share: float) -> int:
     return sum(int(n * share) > int((n - 1) * share) for n in range(2, count + 1))
 
 
+def repeat_of(run: Planned, number: int, seed: int, *, before: int) -> Planned:
+    """An earlier run's configuration once more, `before` repeats having been planned: in turn under conditions of its
+    own and under that run's, for what is promised of a repair is the next run under the same."""
+    return Planned(number, run.config, run.seed if before % 2 else run_seed(seed, number), run.number)
+
+
 def run_seed(seed: int, number: int) -> int:
-    """The seed that the command of a run gets: every run meets conditions of its own, a repeat too."""
+    """The seed that the command of a run gets, which draws the conditions that it meets."""
     return seed * 100_000 + number
 
 

@@ -76,14 +76,23 @@ def untried(fix: Fix, learned_elsewhere: str) -> str | None:
     return f"{learned_elsewhere}, so no change is advised; look at {suspected}, and carry it over with 'care update'"
 
 
-def falls_short(fix: Fix, broken: Sequence[ObjectiveResult], odds: float) -> str | None:
-    """Why a fix is not advised that is less likely than not to repair the run, with what it reaches, else None.
+def enough(odds: float) -> float:
+    """Probability of meeting every limit from which on a change is advice.
 
     Args:
         odds: probability that the reference configuration meets every limit in such a mission. Where missions fail by
             chance no change is surer than that, and one that comes near it is what there is to be done.
     """
-    if fix.p_fixed >= ENOUGH * min(1.0, odds / CHANCY):
+    return ENOUGH * min(1.0, odds / CHANCY)
+
+
+def falls_short(fix: Fix, broken: Sequence[ObjectiveResult], odds: float) -> str | None:
+    """Why a fix is not advised that is too unlikely to repair the run, with what it reaches, else None.
+
+    Args:
+        odds: as for `enough`.
+    """
+    if fix.p_fixed >= enough(odds):
         return None
     changes = ", ".join(map(str, fix.changes))
     reached = "; ".join(filter(None, (_reached(fix, result) for result in broken)))

@@ -1,8 +1,9 @@
 """One change for a fleet: right for most of the robots that fail and harmful to none that does not, or none.
 
 Every run is asked the same question by its own profile's model: how likely would it have met all its limits with this
-option at this value, under what it met. A robot is helped where most of its failed runs would then be likelier than not
-to be repaired. A part that failed is repaired by no value: its probability is taken off, as for a single run.
+option at this value, under what it met. A robot is helped where most of its failed runs would then be likely enough to
+be repaired, as for a single run: likelier than not, or less where the reference fails by chance too. A part that failed
+is repaired by no value: its probability is taken off, as for a single run.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from care_core.causal.model import Model
 from care_core.configs.driven import same_value
-from care_core.diagnose.advice import ENOUGH
+from care_core.diagnose.advice import enough
 from care_core.diagnose.fixes import GAIN_FOR_ONE_MORE
 from care_core.errors import CareError
 from care_core.fleet.rows import Row, distinct
@@ -133,9 +134,9 @@ def _tried(
     name: str, model: Model, candidates: Sequence[tuple[Variable, float]], rows: Sequence[Row], unit: Unit
 ) -> list[Suggestion]:
     """Every candidate with what it would do to each robot. A run is asked all of them at once."""
-    robots: dict[str, list[tuple[Row, Probabilities | None]]] = {}
+    robots: dict[str, list[tuple[Row, _Answer | None]]] = {}
     for row in rows:
-        robots.setdefault(name_of(row, unit), []).append((row, _probabilities(row, model, candidates)))
+        robots.setdefault(name_of(row, unit), []).append((row, _answer(row, model, candidates)))
     return [
         Suggestion(
             name,
@@ -143,7 +144,7 @@ def _tried(
             value,
             unit,
             tuple(
-                _outlook(robot, [_Run(row, option.name, value, then, place) for row, then in own])
+                _outlook(robot, [_Run(row, option.name, value, answer, place) for row, answer in own])
                 for robot, own in robots.items()
             ),
         )
@@ -151,16 +152,26 @@ def _tried(
     ]
 
 
-def _probabilities(row: Row, model: Model, candidates: Sequence[tuple[Variable, float]]) -> Probabilities | None:
-    """That a run meets every limit: unchanged, then with each candidate; None where no model can be asked."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Answer:
+    """What a model says of a run: the probabilities that it meets every limit, unchanged and then with each candidate,
+    and the one from which on a change of this run is advice."""
+
+    probabilities: Probabilities
+    enough: float
+
+
+def _answer(row: Row, model: Model, candidates: Sequence[tuple[Variable, float]]) -> _Answer | None:
+    """None where no model can be asked."""
     # A worker may have had a profile of the same name and version that was trained on other variables.
     if row.asked is None or any(
         name not in row.asked.config for one in model.mechanisms.values() for name in one.inputs
     ):
         return None
-    config = row.asked.config
+    config, world = row.asked.config, row.asked.world(model)
     changed = [{**config, option.name: value} for option, value in candidates]
-    return (1.0 - row.broken) * row.asked.world(model).probability([config, *changed])
+    odds = replace(world, observed={}).probability([{**config, **row.off}])[0]
+    return _Answer((1.0 - row.broken) * world.probability([config, *changed]), enough(float(odds)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,7 +181,7 @@ class _Run:
     row: Row
     option: str
     value: float
-    probabilities: Probabilities | None
+    answer: _Answer | None
     place: int
 
     @property
@@ -180,11 +191,11 @@ class _Run:
 
     @property
     def now(self) -> float | None:
-        return None if self.probabilities is None else float(self.probabilities[0])
+        return None if self.answer is None else float(self.answer.probabilities[0])
 
     @property
     def then(self) -> float | None:
-        return None if self.probabilities is None else float(self.probabilities[1 + self.place])
+        return None if self.answer is None else float(self.answer.probabilities[1 + self.place])
 
     @property
     def gain(self) -> float:
@@ -192,12 +203,13 @@ class _Run:
 
     @property
     def is_helped(self) -> bool:
-        return self.then is not None and self.then >= ENOUGH and self.gain >= GAIN_FOR_ONE_MORE
+        is_likely = self.answer is not None and self.then is not None and self.then >= self.answer.enough
+        return is_likely and self.gain >= GAIN_FOR_ONE_MORE
 
 
 def _outlook(robot: str, runs: Sequence[_Run]) -> Outlook:
     failed = [run for run in runs if run.row.status == "fault"]
-    asked = [run for run in failed or runs if run.probabilities is not None]
+    asked = [run for run in failed or runs if run.answer is not None]
     now, then = (_mean([getattr(run, name) for run in asked]) for name in ("now", "then"))
     if any(run.row.status == "ok" and run.gain <= -GAIN_FOR_ONE_MORE for run in runs):
         return Outlook(robot, "harmed", now, then, bool(failed))

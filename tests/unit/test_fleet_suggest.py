@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from care_core.application.case import Request
 from care_core.application.fleet import triage_one
+from care_core.diagnose.advice import enough, falls_short
+from care_core.diagnose.records import Fix
 from care_core.fleet.rows import Explained, NamedCause, Row
 from care_core.fleet.sources import Source
 from care_core.fleet.suggest import Silence, Suggestion, suggest
@@ -114,6 +117,26 @@ def test_a_robot_is_helped_where_most_of_its_failures_are(failed: Row) -> None:
     assert isinstance(found, Suggestion)
     assert [one.name for one in found.having("helped")] == ["b", "c"]
     assert [one.name for one in found.having("not helped")] == ["a"]
+
+
+def test_what_is_enough_goes_by_the_odds_of_the_reference(failed: Row, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert failed.asked is not None
+    world = replace(failed.asked.world(load_profile("arducopter").model), observed={})
+    odds = float(world.probability([{**world.config, **failed.off}])[0])
+    assert falls_short(promising(enough(0.3)), [], 0.3) is None  # as for a single run
+    assert falls_short(promising(enough(0.3) - 0.01), [], 0.3)
+    for least, helped in ((0.2, ["a", "b"]), (0.99, [])):
+        told = Mock(return_value=least)
+        monkeypatch.setattr("care_core.fleet.suggest.enough", told)
+        found = only([on("a", failed), on("b", failed)])
+        best = found if isinstance(found, Suggestion) else found.best
+        assert best is not None
+        assert [one.name for one in best.having("helped")] == helped
+        assert [call.args[0] for call in told.call_args_list] == pytest.approx([odds, odds])
+
+
+def promising(probability: float) -> Fix:
+    return Fix(changes=(), p_fixed=probability, predicted={})
 
 
 def test_what_another_version_of_the_profile_judged_is_not_asked(failed: Row) -> None:

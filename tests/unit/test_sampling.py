@@ -84,9 +84,26 @@ def test_a_share_stays_at_the_reference(method: Method) -> None:
     where = space(dict.fromkeys("abcdefgh", (0.0, 1.0)))
     found = points(where, method, 256, 0.75, 1)
     kept = np.mean([[config[name] == 0.5 for name in "abcdefgh"] for config in found])
-    assert 0.68 < kept < 0.78
+    assert 0.64 < kept < 0.78  # none of them is the reference itself
     assert len({tuple(config.values()) for config in found}) == 256
     assert not any(all(value == 0.5 for value in config.values()) for config in found)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_runs_leave_the_reference_in_few_options_and_in_many(method: Method) -> None:
+    names = [f"o{i}" for i in range(20)]
+    where = space(dict.fromkeys(names, (0.0, 1.0)))
+    left = {
+        alike: [
+            sum(config[name] != 0.5 for name in names) for config in points(where, method, 256, 0.6, 1, alike=alike)
+        ]
+        for alike in (True, False)
+    }
+    assert np.mean(left[True]) == pytest.approx(8, abs=0.5)
+    assert np.mean(left[False]) == pytest.approx(8, abs=0.8)  # none is the reference itself
+    assert np.mean(np.array(left[True]) <= 3) < 0.05
+    assert np.mean(np.array(left[False]) <= 3) > 0.12
+    assert np.mean(np.array(left[False]) >= 13) > 0.12
 
 
 def test_sobol_points_cover_a_range_more_evenly_than_chance() -> None:
@@ -111,7 +128,9 @@ def test_repeats_are_spread_and_the_reference_comes_first() -> None:
     assert plan[0].config == where.reference
     assert {run.number: run.repeats for run in plan if run.repeats} == {5: 1, 10: 2, 15: 3, 20: 4}
     assert all(run.config == plan[run.repeats - 1].config for run in plan if run.repeats)
-    assert len({run.seed for run in plan}) == 20
+    again = {run.number: run.repeats for run in plan if run.repeats and run.seed == plan[run.repeats - 1].seed}
+    assert again == {10: 2, 20: 4}  # every other one meets the conditions of the run that it repeats
+    assert len({run.seed for run in plan}) == 18
 
 
 def test_limits_that_leave_nothing_are_said() -> None:
