@@ -37,7 +37,7 @@ def reduced(campaign: Path) -> None:
 def enlarge(table: Path, campaign: Campaign, folder: Path) -> None:
     """More runs into the table, made in this process: starting a program for each is what takes the time."""
     rows: list[TableRow] = rows_of(_driven(campaign, campaign.space.reference, 500, folder), campaign.schema)
-    for seed, config in enumerate(points(campaign.space, "sobol", 44, 0.5, 1)):
+    for seed, config in enumerate(points(campaign.space, "sobol", 44, 0.5, 1, alike=True)):
         rows += rows_of(_driven(campaign, config, seed, folder), campaign.schema)
     write_table(table, rows, campaign.schema)
 
