@@ -50,6 +50,12 @@ BENCHMARKS = (
         "a learned graph is worth more than a permuted one",
         "none, plain classifier",
     ),
+    Benchmark(
+        "reference_odds",
+        "benchmarks.reference_odds",
+        "less bias than where every run leaves the reference in as many options",
+        "such a campaign",
+    ),
     Benchmark("related", "benchmarks.related", "a related robot's profile helps below 100 runs", "from nothing"),
     Benchmark("discovery", "benchmarks.discovery --robots 16", "the default is not beaten", "other ways of the search"),
     Benchmark("observational", "benchmarks.observational", "fewer wrong field days than the peer", "plain classifier"),
