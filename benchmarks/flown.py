@@ -10,9 +10,9 @@ the conditions of the fault, under others, and once more under the first, to tel
 elsewhere, asked about the same logs. Peers put one option back to its reference, run once under each of the conditions:
 the one that is furthest from it, and the one that a plain classifier of the table chooses.
 
-`--resets alone` finds the true causes: under the conditions of the fault it runs everything at its reference, and each
-option that is off it back alone. `--resets pairs` goes on, where the reference meets everything and no option alone
-does, with all pairs of them. Then the option that is named first can be held against those that repair.
+`--resets alone` finds the true causes: under the conditions of the fault it runs everything at its reference, and where
+that meets everything, each option that is off it back alone. `--resets pairs` goes on, where no option alone does, with
+all pairs of them. Then the option that is named first can be held against those that repair.
 
 Whether a mission met everything is what `truth.json` beside the folder of its logs says (`{"met": true}`), where the
 command leaves one, since a simulator knows better than a log; else what the profile reads in the log.
@@ -147,7 +147,7 @@ def advised(field: Field, profile: str, fault: Mission, name: str, config: Confi
     report, fixed = place / "report.json", place / "fixed" / field_file(field.campaign)
     code, _ = care("triage", fault.log, "--profile", profile, "--json", "--no-history", "--out", report)
     told = json.loads(report.read_text(encoding="utf-8")) if report.exists() else {}
-    causes = [cause["option"] for cause in told.get("causes", ())]
+    causes = [cause["option"] for broken in told.get("faults", ())[:1] for cause in broken["causes"]]
     found: Report = {"code": code, "fix": told.get("fix"), "abstained": told.get("abstained"), "causes": causes}
     if not told.get("fix"):
         return found
@@ -291,13 +291,12 @@ def compare(field: Field, others: Mapping[str, Peer], fault: Report) -> Report:
 
 
 def reset(field: Field, fault: Report, *, in_pairs: bool) -> Report:
-    """What becomes of a fault with all of its options back, with each alone, and in pairs where none repairs it alone
-    though all do."""
+    """What becomes of a fault with all of its options back; where that repairs it with each alone, and in pairs where
+    none does. Where the reference fails like this as well no option is to blame."""
     off = fault["off"]
-    found = fault.get("resets") or {
-        "all": put_back(field, fault, tuple(off)),
-        "alone": {option: put_back(field, fault, (option,)) for option in off},
-    }
+    found = fault.get("resets") or {"all": put_back(field, fault, tuple(off))}
+    if found["all"] and "alone" not in found:
+        found["alone"] = {option: put_back(field, fault, (option,)) for option in off}
     if in_pairs and found["all"] and not any(found["alone"].values()) and "pairs" not in found:
         found["pairs"] = [pair for pair in combinations(off, 2) if put_back(field, fault, pair)]
     return {"resets": found}
@@ -306,10 +305,15 @@ def reset(field: Field, fault: Report, *, in_pairs: bool) -> Report:
 def put_back(field: Field, fault: Report, options: Sequence[str], day: int = 0) -> bool:
     """Whether a mission meets everything with these options of a fault at their reference, the others as they were.
 
-    What the campaign's limits forbid is not run.
+    What was run already, because a profile advised it, is not run again, and what the campaign's limits forbid never.
     """
+    reference = field.campaign.space.reference
+    for answer in fault["profiles"].values():
+        changes = {change["option"]: change["to"] for change in answer["fix"]["changes"]} if "met" in answer else {}
+        if changes == {option: reference[option] for option in options}:
+            return bool(answer["met"][day])
     off = {name: value for name, value in fault["off"].items() if name not in options}
-    config = {**field.campaign.space.reference, **off}
+    config = {**reference, **off}
     name = f"{fault['number']:04d}/reset-{'+'.join(options)}" if off else f"{fault['number']:04d}/reference"
     allowed = field.campaign.space.allows(config)
     return allowed and field.run(f"{name}/{day}", config, days(fault["seed"])[day]).met
@@ -318,7 +322,7 @@ def put_back(field: Field, fault: Report, options: Sequence[str], day: int = 0) 
 def true_causes(fault: Report) -> set[str]:
     """The options that repair a fault alone; where there is none, those of pairs that do."""
     resets = fault["resets"]
-    alone = {option for option, met in resets["alone"].items() if met}
+    alone = {option for option, met in resets.get("alone", {}).items() if met}
     return alone or {option for pair in resets.get("pairs", ()) for option in pair}
 
 
@@ -353,7 +357,7 @@ def show(done: Sequence[Report]) -> None:
 
 def show_causes(faults: Sequence[Report]) -> None:
     """Print what the resets tell of the causes, and who names one of them first."""
-    alone = sum(any(fault["resets"]["alone"].values()) for fault in faults)
+    alone = sum(any(fault["resets"].get("alone", {}).values()) for fault in faults)
     known = [fault for fault in faults if true_causes(fault)]
     print(f"{len(faults)} with every reset run: the reference meets everything in "
           f"{sum(fault['resets']['all'] for fault in faults)}, an option alone in {alone}, "

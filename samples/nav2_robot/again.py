@@ -20,7 +20,7 @@ from typing import Any
 
 NAMED: Mapping[str, str] = {
     "laser_dead": "laser", "laser_noise": "laser", "laser_stuck": "laser",
-    "odom_jump": "odometry", "odom_drift": "odometry",
+    "odom_jump": "localisation", "odom_drift": "localisation",
     "drive_weak": "drive", "drive_one_side": "drive", "stall": "drive",
     "blocked": "blocked", "battery": "battery", "command_loss": "commands",
 }  # fmt: skip
@@ -31,8 +31,12 @@ WORDS = {True: "reached", False: "missed", None: "-"}
 Truth = Mapping[str, Any]
 
 
-def read(path: Path) -> Truth:
-    return dict(json.loads(path.read_text(encoding="utf-8")))
+def read(path: str | Path) -> Truth:
+    """A truth. Raises ArgumentTypeError where there is none."""
+    try:
+        return dict(json.loads(Path(path).read_text(encoding="utf-8")))
+    except (OSError, ValueError) as err:
+        raise argparse.ArgumentTypeError(f"{path}: {err}") from err
 
 
 def missed(truth: Truth) -> bool:
@@ -65,13 +69,13 @@ def answer(truth: Truth, command: Sequence[str]) -> dict[str, Any]:
 
 def main(words: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("truth", type=Path, nargs="+")
+    parser.add_argument("truths", type=read, nargs="+", metavar="TRUTH")
     parser.add_argument("-o", "--out", type=Path, required=True, metavar="DIR", help="where they are driven again")
     parser.add_argument("--drive", default=f"{sys.executable} -m nav2_robot", help="what drives a mission")
     parser.add_argument("--care", default="care")
     given = parser.parse_args(words)
     found = []
-    for truth in filter(lambda truth: truth["failure"], map(read, given.truth)):
+    for truth in (truth for truth in given.truths if truth["failure"]):
         told = answer(truth, shlex.split(given.care))
         whole = reaches_all(truth, given.out, shlex.split(given.drive)) if missed(truth) else None
         found.append({**told, "missed": missed(truth), "whole": whole})
