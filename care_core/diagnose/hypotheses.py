@@ -25,7 +25,7 @@ from care_core.profile.schema import Schema
 from care_core.run import Evidence, FitVerdict
 
 MISSION_LOST: Mapping[Severity, float] = {"critical": 0.95, "warning": 0.6, "info": 0.05}
-"""Probability that a mission fails with what a finding shows, by how severe it is."""
+"""Probability that a mission fails with what a finding shows, by how severe it is, where the finding does not say."""
 UNSEEN = 0.05
 """Weight of a failed part, and of something met, that left no signal."""
 DOUBT: Mapping[FitVerdict, float] = {"fits": 1.0, "partly": 0.5, "no": 0.0}
@@ -108,7 +108,7 @@ def _named_by(finding: Finding, names: Container[str], found: Mapping[str, Seque
     for suspect in (one for group in found.values() for one in group if one.option in names):
         weight[suspect.option] = max(weight.get(suspect.option, 0.0), suspect.weight)
     total = sum(weight.values())
-    whole = finding.probability * MISSION_LOST[finding.severity]
+    whole = finding.probability * _mission_lost(finding)
     return {option: whole * share / total for option, share in weight.items() if total}
 
 
@@ -158,6 +158,10 @@ def weigh(
     return _normalised(weights)
 
 
+def _mission_lost(finding: Finding) -> float:
+    return MISSION_LOST[finding.severity] if finding.mission_lost is None else finding.mission_lost
+
+
 def set_wrong(finding: Finding) -> bool:
     """Whether a finding speaks of how the robot was set, while it still explains anything."""
     return finding.suspect == "parameter" and not finding.after_impact and finding.severity != "info"
@@ -174,7 +178,7 @@ def _is_late(finding: Finding, by_setting: Iterable[Finding]) -> bool:
 def _raised(options: Mapping[str, float], by_setting: Sequence[Finding]) -> dict[str, float]:
     """What the options add, raised to what the findings say that speak of how the robot was set."""
     total = sum(options.values())
-    said = max((one.probability * MISSION_LOST[one.severity] for one in by_setting), default=0.0)
+    said = max((one.probability * _mission_lost(one) for one in by_setting), default=0.0)
     factor = min(max(1.0, said / total), MOST_POINTED) if total >= POINTED else 1.0
     return {name: min(1.0, factor * share) for name, share in options.items()}
 
@@ -185,7 +189,7 @@ def _lost_by(finding: Finding, other: float) -> float:
     Args:
         other: probability that the run fails without it.
     """
-    lost = MISSION_LOST[finding.severity]
+    lost = _mission_lost(finding)
     with_it = finding.probability * (1.0 - (1.0 - lost) * (1.0 - other))
     without = (1.0 - finding.probability) * max(other, UNSEEN)
     return lost * with_it / (with_it + without)

@@ -73,6 +73,8 @@ class Finding:
     probability: float = 0.5
     """How likely it is, seeing this, that the thing named really failed (0 to 1); measured on flights and drives whose
     truth is known where there are any."""
+    mission_lost: float | None = None
+    """How likely a mission fails with it (0 to 1), where the training flights tell; None: as its severity says."""
     after_impact: bool = False
     consequences: tuple[Finding, ...] = ()
     """Later findings that this one explains."""

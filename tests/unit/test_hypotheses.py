@@ -56,6 +56,12 @@ def test_a_part_that_surely_failed_leads_over_a_doubtful_parameter() -> None:
     assert weigh({"LAND_SPEED": 0.03}, 0.02, [finding(0.9)], "fits")[0].probability > 0.8
 
 
+def test_a_part_that_surely_failed_and_that_missions_survive_does_not_lead_over_a_likely_parameter() -> None:
+    few = replace(finding(0.95, "warning"), mission_lost=0.15)
+    assert lead(weigh({"LAND_SPEED": 0.4}, 0.02, [few], "fits")) == ("parameter", "LAND_SPEED")
+    assert lead(weigh({"LAND_SPEED": 0.02}, 0.02, [few], "fits")) == ("hardware", "motor 2 lost thrust")
+
+
 def test_a_part_that_failed_after_the_run_was_failing_explains_little() -> None:
     stuck = Finding("planner", "the planner makes no way", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
     assert lead(weigh({"occdist_scale": 0.6}, 0.3, [stuck, finding(0.98)], "fits")) == ("parameter", "occdist_scale")
