@@ -2,8 +2,9 @@
 
     python benchmarks/tui.py [--log LOG] [--runs N]
 
-Prints: first usable frame (warm), key to repaint with 600 options and 200 paths loaded, bytes for one cursor move,
-frames drawn while idle. The last three use a diagnosis made here, so that the engine's time is not in them.
+Prints: first usable frame (warm), key to repaint with 600 options and 200 paths loaded, bytes for one cursor move and
+for a change of step, frames drawn while idle. All but the first use a diagnosis made here, so that the engine's time is
+not in them.
 """
 
 from __future__ import annotations
@@ -202,6 +203,8 @@ def _measure_keys(width: int, height: int) -> None:
     print(f"{width} x {height}, {OPTIONS} options and {PATHS} paths loaded:")
     sizes = sorted(size for size, _ in moves)
     print(f"  bytes for a cursor move in the causes: median {sizes[len(sizes) // 2]}, most {sizes[-1]} (bar 2000)")
+    steps = sorted(size for size, _ in switches if size)
+    print(f"  bytes for steps and basket: median {steps[len(steps) // 2]}, most {steps[-1]}")
     print(f"  key to repaint, cursor: {_times(moves)}; {1000 * cpu:.0f} ms of processor")
     print(f"  key to repaint, steps and basket: {_times(switches)}; {1000 * cpu_steps:.0f} ms of processor")
     print(f"  idle for 3 s: {idle} bytes, {1000 * idle_cpu:.0f} ms of processor")
