@@ -6,6 +6,9 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
+from rich.console import Console
+from rich.control import Control
+from textual._compositor import ChopsUpdate, Compositor
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
@@ -17,6 +20,25 @@ from care_tui.render.rows import Row
 MIN_WIDTH, MIN_HEIGHT = 60, 20
 WIDE = 160
 """From this width on, lists and what they explain stand side by side, each with the room of a whole terminal."""
+
+
+class _Cropped(ChopsUpdate):
+    """What changed of each line and no more: Textual cuts a line where its change ends, and not where it begins."""
+
+    def render_segments(self, console: Console) -> str:
+        parts: list[str] = []
+        for y, begin, end in self.spans:
+            for behind, (x, strip) in zip(self.chop_ends[y], self.chops[y].items(), strict=False):
+                first, last = max(x, begin), min(behind, end)
+                if strip is not None and first < last:
+                    parts += [Control.move_to(first, y).segment.text, strip.crop(first - x, last - x).render(console)]
+        return "".join(parts)
+
+
+class _Compositor(Compositor):
+    def render_partial_update(self) -> ChopsUpdate | None:
+        update = super().render_partial_update()
+        return None if update is None else _Cropped(update.chops, update.spans, update.chop_ends)
 
 
 class CareScreen(Screen[None]):
@@ -39,6 +61,7 @@ class CareScreen(Screen[None]):
     def __init__(self) -> None:
         super().__init__()
         self._is_settling = False
+        self._compositor = _Compositor()
 
     def _on_timer_update(self) -> None:
         # Its timer goes on until the link is free; what is to be drawn gathers meanwhile.
@@ -49,13 +72,13 @@ class CareScreen(Screen[None]):
         # made their lines for the new size, which sent a change of step to the terminal three times.
         was_settling, self._is_settling = self._is_settling, self._layout_required and not self._is_settling
         super()._on_timer_update()
-        if self._is_settling:
-            self._update_timer.resume()
-        elif was_settling:
+        if was_settling:
             self._compositor_refresh()
 
     def _compositor_refresh(self) -> None:
-        if not self._is_settling:
+        if self._is_settling:
+            self._update_timer.resume()  # whoever asks is drawn with the next tick
+        else:
             super()._compositor_refresh()
 
     @abstractmethod

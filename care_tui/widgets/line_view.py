@@ -11,6 +11,7 @@ from textual.content import Content
 from textual.events import Resize
 from textual.geometry import Region, Size
 from textual.scroll_view import ScrollView
+from textual.scrollbar import ScrollBar
 from textual.strip import Strip
 from textual.visual import Visual
 
@@ -34,7 +35,6 @@ class LineView(ScrollView, can_focus=True, inherit_bindings=False):
     def __init__(self, *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._drawn: list[Content] = []
-        self._changed: dict[int, tuple[int, int]] = {}
 
     @property
     @abstractmethod
@@ -60,7 +60,7 @@ class LineView(ScrollView, can_focus=True, inherit_bindings=False):
         before += [Content()] * (height - len(before))
         for row, (old, new) in enumerate(zip(before, self._drawn, strict=False)):
             if not old.is_same(new):
-                self._changed[row] = first, last = changed_cells(old, new)
+                first, last = changed_cells(old, new)
                 self.refresh(Region(first, row, last - first, 1))
 
     def _fit(self, size: Size) -> None:
@@ -79,9 +79,18 @@ class LineView(ScrollView, can_focus=True, inherit_bindings=False):
 
     def watch_scroll_y(self, old_value: float, new_value: float) -> None:
         if self.show_vertical_scrollbar:
-            self.vertical_scrollbar.position = new_value
+            self._move_bar(old_value, new_value)
         if round(old_value) != round(new_value):
             self.sync()
+
+    def _move_bar(self, before: float, now: float) -> None:
+        """Repaint the scroll bar from where its thumb was to where it is, a row more at both ends: not all of it."""
+        bar, (window, rows) = self.vertical_scrollbar, (self.scrollable_content_region.height, self.size.height)
+        bar.set_reactive(ScrollBar.position, now)
+        share = rows / max(self.virtual_size.height, 1)
+        first = max(int(min(before, now) * share) - 1, 0)
+        behind = min(int((max(before, now) + window) * share) + 2, rows)
+        bar.refresh(Region(0, first, 1, behind - first))
 
     def on_resize(self, event: Resize) -> None:
         self._drawn = []
@@ -92,19 +101,25 @@ class LineView(ScrollView, can_focus=True, inherit_bindings=False):
         width, style = self.size.width, self.visual_style
         if y >= len(self._drawn):
             return Strip.blank(width, style.rich_style)
-        strip = Visual.to_strips(self, Rows([Row(self._drawn[y])]), width, 1, style, pad=True)[0].simplify()
-        # Textual sends whole segments: cut where the change begins and ends, only that part is sent.
-        first, last = self._changed.get(y, (0, width))
-        cuts = sorted({first, min(last, width), width} - {0})
-        return Strip.join(strip.divide(cuts))
+        return Visual.to_strips(self, Rows([Row(self._drawn[y])]), width, 1, style, pad=True)[0].simplify()
 
 
 def changed_cells(old: Content, new: Content) -> tuple[int, int]:
-    """The first cell that differs and the one behind the last; the whole line where styles or wide characters do."""
+    """The first cell that differs, in its letter or its style, and the one behind the last; the whole line where wide
+    characters do."""
     width = max(old.cell_length, new.cell_length)
-    a, b = old.plain.ljust(width), new.plain.ljust(width)
-    if old.spans != new.spans or not (len(a) == len(b) == width):
+    a, b = _cells(old, width), _cells(new, width)
+    if not (len(a) == len(b) == width):
         return 0, width
     first = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(a, b, strict=True)))
     same_end = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(reversed(a), reversed(b), strict=True)))
-    return first, width - same_end
+    return first, max(width - same_end, first)
+
+
+def _cells(line: Content, width: int) -> list[tuple[object, ...]]:
+    """Each letter with the styles that are laid upon it."""
+    cells: list[tuple[object, ...]] = [(letter,) for letter in line.plain.ljust(width)]
+    for span in line.spans:
+        for place in range(span.start, min(span.end, len(cells))):
+            cells[place] += (span.style,)
+    return cells

@@ -6,6 +6,7 @@ import time
 
 import pytest
 from textual.events import CursorPosition
+from textual.geometry import Region
 
 from care_tui.app import CareApp
 from care_tui.link import ASK, Link
@@ -67,6 +68,21 @@ async def test_changes_gather_while_a_frame_is_under_way(make_app: MakeApp, monk
         app.post_message(CursorPosition(0, 0))
         await pilot.pause(0.1)
         assert 1 <= len(drawn) <= 2, "five moves in one frame"
+
+
+async def test_what_is_laid_out_while_sizes_settle_is_drawn_all_the_same(make_app: MakeApp) -> None:
+    """A terminal whose size changes twice at once: the second layout stops the timer that the first one waits for."""
+    app = make_app(sample.faulty())
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "3")
+        screen = app.screen
+        assert isinstance(screen, CareScreen)
+        screen._is_settling = True
+        screen._compositor._dirty_regions.add(Region(0, 0, 1, 1))
+        screen._refresh_layout()
+        await pilot.pause(0.2)
+        assert not screen._compositor._dirty_regions
+        assert not screen._is_settling
 
 
 async def test_leaving_waits_for_the_last_answer(make_app: MakeApp) -> None:
