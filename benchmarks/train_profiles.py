@@ -77,7 +77,10 @@ SOURCES = {
         ("data/nav2/table.tar.xz",),
         "413 missions of Nav2 1.3.13 (ROS 2 Jazzy: DWB, NavFn, the standard tree for one goal) that drove this "
         "project's simulated robot (`samples/nav2_robot`) under random configurations in worlds and to goals that "
-        "differ, by `care collect`; MCAP files, read by `care ingest`.",
+        "differ, by `care collect`; MCAP files, read by `care ingest`. Of 40 failed missions of other configurations, "
+        "driven again, 29 were advised a change and 26 repaired by it, and 29 by the option named first alone; of 37 "
+        "with a failing part that missed a goal, 25 reached all with that part whole, and none of those was advised a "
+        "parameter.",
     ),
     "husky-care": Source(
         ("data/care/care_husky_sim_399.csv",),
