@@ -59,6 +59,8 @@ class Damage:
     what: str
     byte: int | None = None
     time_s: float | None = None
+    is_jump: bool = False
+    """Whether the clock of the log jumps there: what lies between two records of it is unknown."""
 
 
 @dataclass(frozen=True, slots=True)

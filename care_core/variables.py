@@ -168,7 +168,12 @@ class Variable:
         """The acceptable values in words."""
         if self.labels:
             return ", ".join(f"{code:g} ({label})" for code, label in self.labels)
-        return "any" if self.range is None else f"{self.range[0]:g} to {self.range[1]:g} {self.unit}".rstrip()
+        if self.range is None:
+            return "any"
+        low, high = self.range
+        if self.type == "int":  # the range of some whole-numbered parameters is documented with fractions
+            low, high = math.ceil(low), math.floor(high)
+        return f"{low:g} to {high:g} {self.unit}".rstrip()
 
     def code_of(self, text: str) -> float | None:
         """The number that a word stands for: one of the labels, true or false; None where it is no such word."""

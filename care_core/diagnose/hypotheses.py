@@ -43,6 +43,8 @@ POINTED, MOST_POINTED = 0.05, 4.0
 together, and raises them by this factor at most."""
 LEAST = 0.005
 """Hypotheses less likely than this are told together with chance."""
+UNNAMED = "chance, or what no log shows"
+"""What chance is called where there is no reference configuration that could fail as well."""
 _WHAT: Mapping[Suspect, str] = {"hardware": "hardware", "world": "world", "operation": "world"}
 
 
@@ -99,7 +101,8 @@ def without_parameters(findings: Sequence[Finding], *, failed: bool = False) -> 
     (`failed`) or by a critical finding."""
     if not failed and all(finding.severity != "critical" for finding in findings):
         return ()
-    return weigh({}, 0.0, findings, "no")
+    weighed = weigh({}, 0.0, findings, "no")
+    return tuple(replace(one, name=UNNAMED) if one.what == "chance" else one for one in weighed)
 
 
 def _named_by(finding: Finding, names: Container[str], found: Mapping[str, Sequence[Option]]) -> dict[str, float]:

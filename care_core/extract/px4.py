@@ -5,7 +5,9 @@ Topics and fields are those of PX4's message definitions (msg/*.msg).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,13 +16,14 @@ from care_core.extract.registry import MISSION_KINDS, Args, Mission, MissionKind
 from care_core.logs.base import Table, Wanted
 from care_core.run import Check, Evidence, Unavailable, Value
 from care_core.vehicles import mode_name, way_of
+from care_core.vehicles.arming import KILLED, KILLED_ALOFT_M
 from care_core.vehicles.modes import Way
 
 _BARELY_M = 0.5
 """Rise below which a vehicle never left the ground."""
 
 STATUS, LANDED, RESULT, FLAGS = "vehicle_status", "vehicle_land_detected", "mission_result", "failsafe_flags"
-POSITION = "vehicle_local_position"
+POSITION, MESSAGES = "vehicle_local_position", "logged_messages"
 _ARMED = 2
 """arming_state: 2 has meant armed in every version (vehicle_status.msg)."""
 _GAVE_UP = 0b10001111
@@ -46,6 +49,7 @@ class Px4Flight(MissionKind):
             POSITION: ("z",),
             RESULT: ("finished", "failure"),
             FLAGS: ("fd_critical_failure", "fd_motor_failure"),
+            MESSAGES: ("message",),
         }
 
     def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
@@ -85,9 +89,13 @@ def _checks(mission: Mission) -> Iterator[Check]:
         yield Check("took_off", _took_off(mission), "it left the ground")
     if any(_way(mode) == "mission" for mode in _modes(mission)):
         yield Check("mission_success", _mission(mission), "the mission was flown to its end", "the mission failed")
-    broke = _ever(mission, FLAGS, "fd_critical_failure") or _ever(mission, FLAGS, "fd_motor_failure")
-    broke = broke or _TERMINATION in _modes(mission) or _detected(mission)
-    yield Check("no_crash", 1.0 - broke, "the failure detector stayed silent", "the failure detector acted")
+    killed_s = _killed_s(mission)
+    driven = replace(mission, end_s=min(killed_s, mission.end_s))  # what falls with its motors cut is no new failure
+    broke = _ever(driven, FLAGS, "fd_critical_failure") or _ever(driven, FLAGS, "fd_motor_failure")
+    broke = broke or _TERMINATION in _modes(driven) or _detected(driven)
+    cut = not broke and killed_s < math.inf and _height_at(mission, killed_s) > KILLED_ALOFT_M
+    how = "the kill switch cut its motors in the air" if cut else "the failure detector acted"
+    yield Check("no_crash", 0.0 if broke or cut else 1.0, "the failure detector stayed silent", how)
     yield Check("no_failsafe", 1.0 - _ever(mission, STATUS, "failsafe"), "no failsafe acted", "a failsafe acted")
     if flies:
         yield Check("landed", _on_ground(mission), "it was on the ground at the end", "it was disarmed in the air")
@@ -137,6 +145,22 @@ def _modes(mission: Mission) -> list[int]:
 
 def _way(mode: int) -> Way:
     return way_of("px4", mode)
+
+
+def _killed_s(mission: Mission) -> float:
+    """When the kill switch cut its motors, infinity where it did not."""
+    table = mission.table(MESSAGES)
+    if not has(table, "message"):
+        return math.inf
+    said = zip(table.t.tolist(), table["message"].tolist(), strict=True)
+    return next((t for t, text in said if KILLED.search(str(text))), math.inf)
+
+
+def _height_at(mission: Mission, t: float) -> float:
+    """Metres above where the mission began; 0 where no height is told."""
+    position = mission.table(POSITION)
+    known = position.where(np.isfinite(position["z"])) if has(position, "z") else None
+    return float(known["z"][0] - np.interp(t, known.t, known["z"])) if known is not None and len(known) else 0.0
 
 
 def _detected(mission: Mission) -> bool:

@@ -19,6 +19,7 @@ from care_core.health.records import NOT_FLOWN, TOO_SHORT, Finding, FindingKind,
 from care_core.health.telling import Leads, told
 from care_core.logs.base import Log, Table, Wanted
 from care_core.vehicles import mode_name, vehicle_of
+from care_core.vehicles.arming import KILLED, KILLED_ALOFT_M
 
 Floats = NDArray[np.float64]
 Span = tuple[float, float]
@@ -121,6 +122,7 @@ _ROUTINE = re.compile(
 _PREFLIGHT = re.compile(r"Preflight|Not ready|PREFLIGHT|NOT READY|arming denied|Arming denied|ARMING DENIED", re.I)
 _ARMED_BY = re.compile(r"\[commander\] (?:Armed|Disarmed) (by .+)")
 _NOT_READY = re.compile(r"^(?:Not ready to fly|Preflight(?: Fail)?): ?", re.IGNORECASE)
+_FALLING: frozenset[FindingKind] = frozenset(("attitude", "motor", "vibration", "estimator", "crash", "imu"))
 _SPEAKER = re.compile(r"^\[\w+\]\s*")
 _SPOKEN_LEVELS = frozenset(("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING"))
 _SPOKEN_BY = re.compile(r"\[(commander|navigator|failsafe|flight_mode_manager|vtol_att_control|land_detector)\]")
@@ -171,6 +173,20 @@ class Px4Flight:
         return next((match[1] for match in said if match), "")
 
     @cached_property
+    def killed_s(self) -> float | None:
+        """When the kill switch cut its motors while it was armed, as the commander says."""
+        return next((t for t, _, text in self.words if KILLED.search(text) and _within(self.armed, t)), None)
+
+    @cached_property
+    def killed_m(self) -> float | None:
+        """How high it was above where the log began when the kill switch cut its motors; None where it did not, or no
+        height is told. The land detector is no witness: many a pilot kills what it does not let disarm."""
+        position = self.one("vehicle_local_position", "z")
+        if self.killed_s is None or position is None:
+            return None
+        return float(position["z"][0] - np.interp(self.killed_s, position.t, position["z"]))
+
+    @cached_property
     def complaints(self) -> tuple[tuple[float, str], ...]:
         """What kept it from arming, by its own words."""
         return tuple((t, _SPEAKER.sub("", text)) for t, _, text in self.words if _PREFLIGHT.search(text))
@@ -197,9 +213,29 @@ def examine(log: Log) -> Health:
         *damage_of(log.damage),
         *_cut(flight, log.duration_s),
     ]
-    findings = told((*(finding for _, finding in states if finding), *_refused(flight)), LEADS)
+    found = [finding for _, finding in states if finding and not _after_kill(flight, finding)]
+    findings = told((*found, *_killed(flight), *_refused(flight)), LEADS)
     too_little = TOO_SHORT if STATUS not in tables or flight.end_s < _TOO_SHORT_S else "" if flight.armed else NOT_FLOWN
     return Health(vehicle.title, account_of(moments, introduction), findings, too_little)
+
+
+def _killed(flight: Px4Flight) -> Iterator[Finding]:
+    """Motors that somebody cut in the air. What its attitude does from then on says nothing."""
+    if flight.killed_s is not None and flight.killed_m is not None and flight.killed_m > KILLED_ALOFT_M:
+        yield Finding(
+            "crash", "the kill switch cut the motors in the air", flight.killed_s, flight.end_s, "critical",
+            f"the commander says so, {flight.killed_m:.1f} m above where the log begins",
+            f"{MESSAGES}; vehicle_local_position.z", "operation", probability=0.9,
+        )  # fmt: skip
+
+
+def _after_kill(flight: Px4Flight, finding: Finding) -> bool:
+    """Whether a finding tells only of a vehicle that falls, or lies, with its motors cut."""
+    return flight.killed_s is not None and finding.onset_s >= flight.killed_s and finding.kind in _FALLING
+
+
+def _within(spans: Iterable[Span], t: float) -> bool:
+    return any(start <= t <= end for start, end in spans)
 
 
 def _end(tables: Mapping[str, Table], duration_s: float) -> float:

@@ -21,6 +21,8 @@ OVER_S = 60.0
 """What was over for so long before something began did not bring it about."""
 SYMPTOMS: frozenset[FindingKind] = frozenset(("attitude", "crash", "estimator", "log"))
 """What shows that something is wrong, not what: told after causes of the same weight."""
+ON_GROUND: frozenset[FindingKind] = frozenset(("prearm",))
+"""What is seen before anything runs: no chain of events lies between it and its cause."""
 _SEVERITY = {"critical": 0, "warning": 1, "info": 2}
 
 
@@ -86,5 +88,7 @@ def _closure(leads: Leads) -> dict[FindingKind, frozenset[FindingKind]]:
     while True:
         grown = {kind: after.union(*(reach.get(one, set()) for one in after)) for kind, after in reach.items()}
         if grown == reach:
-            return {kind: frozenset(after) for kind, after in reach.items()}
+            return {
+                kind: frozenset(after - (ON_GROUND - leads.get(kind, frozenset()))) for kind, after in reach.items()
+            }
         reach = grown

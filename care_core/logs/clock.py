@@ -18,8 +18,6 @@ from care_core.run import Damage
 Floats = NDArray[np.float64]
 Offsets = NDArray[np.integer[Any]]
 
-JUMPS = "the clock of the log jumps"
-"""What damage says of a clock that does."""
 BACK_S = 1.0
 """How far a record may lie before the one written ahead of it: several tasks write into one log."""
 STEP_S = 5.0
@@ -81,7 +79,8 @@ def find_clock(stamps_s: Floats, places: Offsets) -> tuple[Clock, NDArray[np.boo
                 continue
         elif now > -np.inf and not -BACK_S <= begins - now <= PAUSE_S:
             jump_s = begins - now
-            jumps.append(Damage(f"{JUMPS} by {jump_s:+.0f} s", int(places[start]), now - first_s))
+            what = f"the clock of the log jumps by {jump_s:+.0f} s"
+            jumps.append(Damage(what, int(places[start]), now - first_s, is_jump=True))
             shift += jump_s
             shifts.append((int(places[start]), shift))
             ends -= jump_s

@@ -18,4 +18,4 @@ def summarised(found: Sequence[Damage], what: str) -> tuple[Damage, ...]:
         return tuple(found)
     first, last = found[0], found[-1]
     text = f"{len(found)} {what}, the first: {first.what}"
-    return Damage(text, first.byte, first.time_s), last
+    return Damage(text, first.byte, first.time_s, first.is_jump), last

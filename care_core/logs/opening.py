@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from importlib import import_module
 from pathlib import Path
+from typing import BinaryIO
 
 from care_core.errors import LogError
 from care_core.logs.base import Log, LogFormat
@@ -45,6 +46,7 @@ UNREADABLE_MAGIC = (
 
 _CONFIGURATION = (".yaml", ".yml", ".param", ".params", ".parm")
 _SNIFF_BYTES = 4096
+_PIECE_BYTES = 1 << 20
 _ZSTD_BYTES = 1 << 18
 """Enough for the first block of a zstd file, which unpacks as a whole."""
 _TEXT_FORMAT = re.compile(rb"(?m)^FMT, ?\d+, ?\d+, ?\w+")
@@ -137,11 +139,30 @@ def _read_head(path: Path, size: int = _SNIFF_BYTES) -> bytes:
             raise LogError("This is no file but a pipe or a device.", hint="Save the log to a file.", where=str(path))
         with path.open("rb") as stream:
             head = stream.read(size)
+            if head and not head.strip(b"\0"):
+                stream.seek(_first_written(stream))
+                head = stream.read(size)
+                if not head:
+                    hint = "Was the recorder switched off before it wrote?"
+                    raise LogError("The file holds nothing but zeros.", hint=hint, where=str(path))
     except OSError as err:
         raise cannot_open(path, err) from err
     if not head:
         raise LogError("The file is empty.", hint="Was the recording stopped properly?", where=str(path))
     return head
+
+
+def _first_written(stream: BinaryIO) -> int:
+    """The byte from which on a file is more than zeros, with room for the zeros that a time stamp begins with: what
+    was set aside for a log and never written, or lost. The file's end where there is none."""
+    stream.seek(0)
+    at = 0
+    while piece := stream.read(_PIECE_BYTES):
+        rest = piece.lstrip(b"\0")
+        if rest:
+            return max(at + len(piece) - len(rest) - 8, 0)
+        at += len(piece)
+    return at
 
 
 def _unpacked(path: Path) -> bytes:

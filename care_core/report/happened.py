@@ -180,10 +180,10 @@ def _led_to(finding: Finding | FindingEntry, indent: str) -> Iterator[str]:
         yield from wrapped(f"led to: {'; '.join(titles[:LED_TO_SHOWN])}{more}", indent)
 
 
-def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> Iterator[str]:
+def hypothesis_lines(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding]) -> Iterator[str]:
     """What explains the failure, the likeliest first."""
     if not hypotheses:
         return
     yield "What explains it"
     for one in hypotheses[:HYPOTHESES_SHOWN]:
-        yield from wrapped(hypothesis_text(one), f"  {one.probability:>4.0%}  ")
+        yield from wrapped(hypothesis_text(one, findings), f"  {one.probability:>4.0%}  ")

@@ -148,7 +148,7 @@ def _explanations(report: Report) -> Iterator[str]:
     for one in report.hypotheses:
         bar = f'<span class="bar" aria-hidden="true"><i style="width:{one.probability:.0%}"></i></span>'
         share = f'<span class="number">{one.probability:.0%}</span>'
-        yield f"<li>{share}{bar}<span>{escape(hypothesis_text(one))}</span></li>"
+        yield f"<li>{share}{bar}<span>{escape(hypothesis_text(one, report.findings))}</span></li>"
     yield "</ol>"
 
 

@@ -109,7 +109,7 @@ def _why(one: ObjectiveEntry, fault: FaultEntry | None, report: Report) -> list[
         lines += report.apply
     elif report.abstained:
         lines.append(f"no change advised: {report.abstained}")
-    lines += [f"{h.probability:.0%} {hypothesis_text(h)}" for h in report.hypotheses]
+    lines += [f"{h.probability:.0%} {hypothesis_text(h, report.findings)}" for h in report.hypotheses]
     return [line.replace("\u00a0", " ") for line in lines]
 
 

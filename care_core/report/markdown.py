@@ -57,7 +57,9 @@ def to_markdown(report: Report) -> str:
 def _sections(report: Report) -> Iterator[Iterable[str]]:
     """The parts in their order; the first and the last are always there."""
     yield _head(report)
-    yield _listed("What explains it", (f"{h.probability:.0%}: {hypothesis_text(h)}" for h in report.hypotheses))
+    yield _listed(
+        "What explains it", (f"{h.probability:.0%}: {hypothesis_text(h, report.findings)}" for h in report.hypotheses)
+    )
     told = (f"{SEVERITY_WORDS[one.severity]}: {finding_sentence(one)}" for one in noted(report.findings))
     yield _listed("Findings, the first cause first", told)
     yield _objectives(report.objectives)

@@ -27,7 +27,7 @@ def to_text(diagnosis: Diagnosis) -> str:
     health = diagnosis.health
     sections = [
         _headline(diagnosis),
-        hypothesis_lines(diagnosis.hypotheses),
+        hypothesis_lines(diagnosis.hypotheses, diagnosis.health.findings),
         finding_lines(health.findings) if health.account or health.findings else (),
         account_lines(health.account, health.robot),
         _origin(diagnosis),

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from care_core.diagnose.records import Hypothesis, ObjectiveResult, Status
 from care_core.health.records import WHOLE_LOG, Finding, Health, Severity
+from care_core.health.telling import SYMPTOMS
 from care_core.run import FIT_WORDS, FitVerdict
 
 if TYPE_CHECKING:
@@ -79,11 +80,12 @@ def said_without_profile(
     return f"nothing that could be judged failed ({NO_LIMITS})"
 
 
-def hypothesis_text(one: Hypothesis | HypothesisEntry) -> str:
-    """An explanation in a clause."""
+def hypothesis_text(one: Hypothesis | HypothesisEntry, findings: Sequence[Finding | FindingEntry] = ()) -> str:
+    """An explanation in a clause; a finding that is itself a symptom stands for what the log does not show."""
     if one.what == "parameter":
         return f"the parameter {one.name}"
     if one.name:
-        return one.name
+        is_symptom = any(finding.title == one.name and finding.kind in SYMPTOMS for finding in findings)
+        return f"something this log does not show: {one.name}" if is_symptom else one.name
     unnamed = {"hardware": "a part whose failure left no trace in this log", "world": "something the robot met"}
     return unnamed.get(one.what, "chance: the reference configuration fails like this as well")

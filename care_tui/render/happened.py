@@ -153,7 +153,9 @@ def hypothesis_item(one: Hypothesis, finding: Finding | None) -> tuple[Content, 
     """An explanation that is no cause of the list: how likely it is, what it is, and when it began."""
     when = "" if finding is None else f", from {seconds(finding.onset_s)}"
     kind = {"hardware": "a part of the robot", "world": "what the robot met", "parameter": "a parameter"}
-    head = Content.assemble(f"{percent(one.probability):>5} ", text(hypothesis_text(one), "bold"))
+    head = Content.assemble(
+        f"{percent(one.probability):>5} ", text(hypothesis_text(one, [finding] if finding else ()), "bold")
+    )
     return head, Content(f"      {kind[one.what]}{when}" if one.name and one.what in kind else "")
 
 

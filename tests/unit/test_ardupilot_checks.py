@@ -52,6 +52,28 @@ def test_a_weak_motor_is_named(rate_hz: float) -> None:
     assert finding.probability > 0.8
 
 
+def test_motors_that_push_against_an_obstacle_tell_nothing_of_themselves() -> None:
+    made = Made()
+    leaning = made.after(FAILS_S, DOWN_S)
+    made.table["ATT"]["Roll"][leaning] = made.table["ATT"]["DesRoll"][leaning] = 25.0
+    made.table["GPS"]["Spd"][leaning] = 0.0
+    made.table["RCOU"]["C1"][leaning] += 300.0
+    assert "blocked" not in [one.kind for one in made.find()]  # a gale could do it
+    made.table["VIBE"]["Clip"][made.after(FAILS_S)] = 3.0
+    finding = first(made)
+    assert (finding.kind, finding.title) == ("blocked", "something holds it: it leans and does not move")
+    assert "motor" not in [one.kind for one in (finding, *finding.consequences)]
+
+
+def test_a_plane_was_armed_when_its_status_says_so() -> None:
+    made = Made()
+    made.rows = {"MODE": [(0.0, {"ModeNum": 15.0})]}
+    made.settings["LOG_DISARMED"] = 0.0
+    made.table["STAT"] = {"Armed": ((made.t > 20) & (made.t < 60)).astype(float)}
+    ((start, end),) = made.flight().armed
+    assert (start, end) == (pytest.approx(20, abs=0.2), pytest.approx(60, abs=0.2))
+
+
 def test_an_uneven_load_moves_motors_in_pairs_and_is_no_lost_motor() -> None:
     made = Made()
     for output in ("C1", "C3"):
@@ -143,6 +165,15 @@ def test_vibration(rate_hz: float) -> None:
     finding = first(made)
     assert (finding.kind, finding.severity) == ("vibration", "warning")
     assert finding.onset_s == pytest.approx(FAILS_S, abs=2.0 + 1 / rate_hz)
+
+
+@pytest.mark.parametrize("rate_hz", RATES)
+def test_a_single_blow_is_no_vibration(rate_hz: float) -> None:
+    made = Made(rate_hz)
+    blow = 400.0 * np.exp(-2 * np.pi * np.clip(made.t - FAILS_S, 0.0, None)) * (made.t >= FAILS_S)
+    for number in ("", "#2"):
+        made.table[f"VIBE{number}"]["VibeZ"] += blow
+    assert made.find() == ()
 
 
 def test_vibration_that_upsets_the_estimator_is_critical() -> None:
@@ -331,6 +362,16 @@ def test_a_battery_that_was_not_charged() -> None:
     assert "3 cells" in finding.evidence
     made.rows["ERR"] = [(40.0, {"Subsys": 6.0, "ECode": 1.0})]
     assert first(made).severity == "critical"
+
+
+def test_a_battery_is_no_reason_for_a_refusal_that_names_another() -> None:
+    made = Made()
+    made.rows = {"MSG": [(t, {"Message": "PreArm: RC not found"}) for t in (20.0, 50.0, 80.0)]}
+    made.table["BAT"]["Volt"][:] = 11.4 + made.noise(0.01)
+    for name in ("CTUN", "POS"):
+        made.table.pop(name)
+    refusal, battery = made.find()
+    assert (refusal.kind, battery.kind, battery.severity) == ("prearm", "battery", "info")
 
 
 def test_a_failsafe_above_what_a_battery_needs_is_a_parameter() -> None:

@@ -240,3 +240,13 @@ def test_fetched_parameters_of_a_wild_log_are_those_of_its_file() -> None:
     assert len(settings) == len(written) == 1374
     agree = [name for name, value in written.items() if settings[name][0].value == pytest.approx(value, abs=1e-5)]
     assert len(agree) > 1360
+
+
+def test_zeros_that_a_log_begins_with_do_not_hide_it(tmp_path: Path) -> None:
+    path = flight().write(tmp_path / "run.tlog")
+    sound = open_log(path).channels()
+    path.write_bytes(bytes(10_000) + path.read_bytes())
+    assert open_log(path).channels() == sound
+    path.write_bytes(bytes(10_000))
+    with pytest.raises(LogError, match="nothing but zeros"):
+        open_log(path)

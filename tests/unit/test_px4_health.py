@@ -152,3 +152,17 @@ def test_a_log_that_ends_armed_says_so() -> None:
 
 def test_nothing_is_said_of_a_log_without_status() -> None:
     assert examine(MadeLog({})).too_little
+
+
+def test_what_falls_after_the_kill_switch_is_the_kill_switchs_doing() -> None:
+    def killed(up_m: float) -> Health:
+        return examine(MadeLog({
+            "vehicle_status": FLOWN,
+            "failsafe_flags": states(fd_critical_failure=[(0, 0), (42, 1), (43, 0)]),
+            "vehicle_local_position": states(z=[(0, 0.0), (12, -up_m)]),
+            "logged_messages": words((40.0, "WARNING", "[commander] Kill engaged\t")),
+        }))  # fmt: skip
+
+    (finding,) = killed(1.2).findings
+    assert (finding.title, finding.suspect) == ("the kill switch cut the motors in the air", "operation")
+    assert killed(0.1).findings == ()  # a pilot killed what did not let itself be disarmed

@@ -11,7 +11,6 @@ from care_core.health.ardupilot.signals import expanded
 from care_core.health.records import Finding
 from care_core.health.telling import told
 from care_core.logs.base import Log, LogFormat, Wanted
-from care_core.logs.clock import JUMPS
 from care_core.logs.plausible import plausible
 from care_core.logs.telemetry import as_dataflash
 
@@ -37,7 +36,7 @@ def flight_of(log: Log) -> flight.Flight:
     tables = plausible(as_dataflash(log).read(READS))
     end_s, is_telemetry = log.duration_s, log.format is LogFormat.MAVLINK_TLOG
     breaks_off = any(damage.time_s is None or damage.time_s >= end_s - _LAST_S for damage in log.damage)
-    clock_jumps = any(JUMPS in damage.what for damage in log.damage)
+    clock_jumps = any(damage.is_jump for damage in log.damage)
     return flight.Flight(tables, log.settings(), log.facts, end_s, is_telemetry, breaks_off, clock_jumps)
 
 

@@ -28,6 +28,7 @@ _T = TypeVar("_T")
 
 READS: Wanted = {
     "ARM": ("ArmState", "Forced"),
+    "STAT": ("Armed",),
     "EV": ("Id",),
     "ERR": ("Subsys", "ECode"),
     "MODE": ("ModeNum",),
@@ -37,6 +38,8 @@ READS: Wanted = {
     "POS": ("Lat", "Lng", "RelHomeAlt"),
     "RCOU": tuple(f"C{n}" for n in range(1, 15)),
     "IMU": ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ"),
+    "GPS": ("Spd",),
+    "VIBE": ("Clip",),
 }
 """What the course of a flight is told by."""
 
@@ -70,6 +73,10 @@ _STRUCK_S = 1.0
 """A blow so shortly before control was lost is what took it."""
 _SHOCK = 30.0
 """m/s^2: three times gravity is no flight."""
+STANDS_MS = 0.5
+_LEANS_DEG, _HELD_S = 15.0, 10.0
+"""A lean of 15 degrees speeds a copter up by 2.6 m/s^2, to 26 m/s in 10 s, and ANGLE_MAX allows 30 or 45 as shipped. A
+gale holds such a lean still as well, but strikes nothing."""
 _WINGED = frozenset(("plane", "quadplane"))
 _TUMBLING_DEG, UPSIDE_DOWN_DEG, _TUMBLES_S = 45.0, 100.0, 2.0
 """No plane is told to bank as far as the second by a mode that levels it: ROLL_LIMIT_DEG is at most 90. Nor is that a
@@ -177,11 +184,15 @@ class Flight:
 
     @cached_property
     def armed(self) -> tuple[Span, ...]:
-        """Spans armed. A log whose first word is a disarming was armed from its start; so was one that tells of none
-        and is written while armed only; any other that tells of none is taken as armed where its throttle is up.
+        """Spans armed. A log whose first word is a disarming was armed from its start. One that tells of none was armed
+        as its status says (STAT of Plane), else all along where it is written while armed only, else where its throttle
+        is up.
 
         What is armed once more was disarmed between, as far as nothing is recorded before: the logger was closed."""
         changes = self.arm_changes
+        status = self.one("STAT", "Armed")
+        if not changes and status is not None:
+            return tuple(runs(status.t, status["Armed"] > 0, gap_s=_CLOSED_S))
         if not changes:
             return ((0.0, self.end_s),) if self.is_written_armed else self._driven()
         spans: list[Span] = []
@@ -424,6 +435,24 @@ class Flight:
         if lost is not None:
             shock = self.shock_after(lost - _STRUCK_S)
         return lost is not None and shock is not None and shock < lost
+
+    @cached_property
+    def held(self) -> tuple[Span, ...]:
+        """Spans well above the ground, before it was lost, in which a copter that was struck leans as it is told and
+        yet stands: something holds it."""
+        moved = self.one("GPS", "Spd")
+        if not self.is_copter or moved is None or self.tilt is None or self.lean_error is None or self.height is None:
+            return ()
+        if not self.flown:
+            return ()
+        begin = self.flown[0][0]
+        clips = (one.t[1:][(np.diff(one["Clip"]) > 0) & (one.t[1:] > begin)] for one in self.all("VIBE", "Clip"))
+        blows = [*(float(t[0]) for t in clips if len(t)), self.shock_after(begin)]
+        struck = min((t for t in blows if t is not None), default=math.inf)
+        leans = (np.interp(moved.t, *self.tilt) > _LEANS_DEG) & (np.interp(moved.t, *self.height) > _AIRBORNE_M)
+        leans &= np.interp(moved.t, *self.lean_error) < _HELD_DEG
+        stands = (moved["Spd"] < STANDS_MS) & (moved.t > struck) & self.during(self.flown, moved.t)
+        return tuple((a, b) for a, b in runs(moved.t, leans & stands, gap_s=1.0) if b - a >= _HELD_S)
 
     @cached_property
     def was_refused(self) -> bool:

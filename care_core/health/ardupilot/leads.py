@@ -28,5 +28,6 @@ LEADS: Mapping[FindingKind, frozenset[FindingKind]] = {
     ),
     "attitude": frozenset(("crash", "takeoff", "thrust", "estimator", "vibration", "motor")),
     "crash": frozenset(("attitude", "log")),
+    "blocked": frozenset(("motor", "thrust", "tuning", "vibration", "attitude", "crash", "log")),
 }
 """By physics, not by statistics: what fails first shows in what follows, the attitude and the crash last."""

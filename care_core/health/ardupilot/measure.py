@@ -12,6 +12,8 @@ from care_core.health.ardupilot.signals import Floats
 Calibration = Sequence[tuple[float, float]]
 """Points (how many times over the limit, probability that the part really failed), rising."""
 
+_DOZENS = 40
+
 
 def likely(over: float, points: Calibration) -> float:
     """Probability at `over` times the limit, between measured points on a logarithmic scale."""
@@ -39,12 +41,31 @@ def smooth(t: Floats, x: Floats, width_s: float) -> Floats:
     """Mean over a window of `width_s` around each record, shape of x; at least three records wide."""
     if len(t) < 3:
         return x
-    step = max(float(np.median(np.diff(t))), 1e-6)
-    n = min(max(round(width_s / step) | 1, 3), len(t) if len(t) % 2 else len(t) - 1)
+    n = _records(t, width_s)
     padded = np.pad(x, n // 2, mode="edge")
     total = np.cumsum(np.concatenate(([0.0], padded)))
     mean: Floats = (total[n:] - total[:-n]) / n
     return mean
+
+
+def steady(t: Floats, x: Floats, width_s: float) -> Floats:
+    """Median over a window as `smooth` has it: what lasts for less than half of it leaves no trace. Of what comes fast
+    only so many records are looked at that a window holds a few dozen."""
+    if len(t) < 3:
+        return x
+    n = _records(t, width_s)
+    if n > 2 * _DOZENS:
+        few = slice(None, None, n // _DOZENS)
+        return np.interp(t, t[few], steady(t[few], x[few], width_s))
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(x, n // 2, mode="edge"), n)
+    middle: Floats = np.median(windows, axis=1)
+    return middle
+
+
+def _records(t: Floats, width_s: float) -> int:
+    """How many of at least three records, an odd number, lie in a window of `width_s`."""
+    step = max(float(np.median(np.diff(t))), 1e-6)
+    return min(max(round(width_s / step) | 1, 3), len(t) if len(t) % 2 else len(t) - 1)
 
 
 def roughness(x: Floats) -> Floats:

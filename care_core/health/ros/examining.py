@@ -16,6 +16,13 @@ SHORT_S = 5.0
 """Nothing can be said of how a robot drives in less."""
 _UNREAD = "not decoded "
 """How the facts about encodings begin that no reader knows."""
+_HELD = {
+    "geometry_msgs/PoseStamped": "poses", plan.LOCALISED: "poses", "geometry_msgs/TransformStamped": "poses",
+    **dict.fromkeys(plan.TF, "transforms"), plan.IMU: "inertial data", "sensor_msgs/NavSatFix": "satellite positions",
+    "sensor_msgs/Image": "images", "sensor_msgs/CompressedImage": "images", plan.CLOUD: "point clouds",
+    "sensor_msgs/JointState": "joint states", "sensor_msgs/Range": "ranges",
+}  # fmt: skip
+"""What recordings without a robot's own streams hold, in words."""
 _STACKS = {"move_base": "move_base", "nav2": "Nav2"}
 
 
@@ -45,9 +52,20 @@ def _too_little(recording: Recording) -> str:
     if longest < STREAM_MESSAGES and not speaks and unread:
         return f"its messages are {' and '.join(unread)}, not ROS 1, CDR or JSON: only when they came is known"
     if longest < STREAM_MESSAGES and not speaks:
-        return "nothing in it tells of a robot: no odometry, goals, commands, laser, battery or messages"
+        return _nothing_of_a_robot(recording)
     if recording.duration_s < SHORT_S:
         return f"{recording.duration_s:.1f} s are too short to judge a robot by"
     if not speaks:
         return "neither goals nor messages of nodes are recorded: what the robot was to do is not known"
     return ""
+
+
+def _nothing_of_a_robot(recording: Recording) -> str:
+    """What is there, so that its reader sees that it was read, and what would be needed."""
+    there = {plan.kind_of(channel) for channel in recording.channels if channel.count}
+    held = list(dict.fromkeys(words for kind, words in _HELD.items() if kind in there))
+    lacks = "no odometry, goals, commands, laser, battery or messages"
+    if not held:
+        return f"nothing in it tells of a robot: {lacks}"
+    listed = " and ".join(filter(None, (", ".join(held[:-1]), held[-1])))
+    return f"it holds {listed}, and nothing that tells how a robot did: {lacks}"

@@ -63,7 +63,7 @@ def _pack(flight: Flight, table: Table) -> Iterator[Finding]:
     flown = float(np.min(lowest[watched])) if watched.any() else math.nan
     if rest is not None and rest / cells < NOT_FULL and flight.watched:
         missing = 1 - rest / cells / NOT_FULL
-        severity: Severity = "critical" if failsafe is not None or low else "warning"
+        severity: Severity = "critical" if failsafe is not None or low else "warning" if flight.armed else "info"
         begin = flight.watched[0][0]
         yield Finding(
             "battery", "the battery was not charged", begin, flight.watched[-1][1], severity,

@@ -109,9 +109,10 @@ def _range(flight: Flight, pwm: Floats) -> tuple[float, float]:
 
 
 def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
-    """Rows in which the motors lift it, upright: in the air, or where it never left the ground the first seconds of
-    trying, before the integrators wind up."""
+    """Rows in which the motors lift it, upright, and nothing else holds it: in the air, or where it never left the
+    ground the first seconds of trying, before the integrators wind up."""
     lifting = flight.watch(outputs.t) & (np.median(outputs.share, axis=0) > _LIFTING)
+    lifting &= ~flight.during(flight.held, outputs.t)
     if flight.tilt is not None:
         lifting &= np.interp(outputs.t, *flight.tilt) < 60.0
     if flight.flown:

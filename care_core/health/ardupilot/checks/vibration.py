@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.health.ardupilot.flight import Flight
-from care_core.health.ardupilot.measure import Calibration, lasting, length, likely, roughness, smooth, top
+from care_core.health.ardupilot.measure import Calibration, lasting, length, likely, roughness, smooth, steady, top
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
 
@@ -54,7 +54,7 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
     if len(t) < 3:
         return None
     level = np.maximum(np.maximum(table["VibeX"], table["VibeY"]), table["VibeZ"])[calm]
-    level = smooth(t, np.where(np.isfinite(level), level, 0.0), 2.0)
+    level = steady(t, np.where(np.isfinite(level), level, 0.0), _LASTS_S)  # not a blow, which fades within a second
     aloft = flight.during(flight.flown, t)  # on the ground its motors idle, which says nothing of what it was
     before = float(np.quantile(level[aloft] if aloft.any() else level, 0.05))
     upset = _upset(flight)

@@ -20,6 +20,8 @@ TOGETHER_S = 4.0
 _QOS = re.compile(r"incompatible qos", re.IGNORECASE)
 _TOPIC = re.compile(r"topic '?\"?([\w/~]+)")
 _KINDS: dict[str, FindingKind] = {plan.ODOMETRY: "localisation", plan.IMU: "imu", plan.BATTERY: "battery"}
+_CONTACT = re.compile(r"contact|collision|bumper", re.IGNORECASE)
+"""Topics that speak only while something touches (gazebo_ros bumpers and their like)."""
 _LASERS = (plan.SCAN, plan.CLOUD)
 
 
@@ -92,7 +94,7 @@ def _comes_in_a_burst(times: Floats, after_s: float) -> bool:
 def _ended(recording: Recording) -> Iterator[Finding]:
     for channel in recording.channels:
         kind = plan.kind_of(channel)
-        if kind in (*_LASERS, plan.TWIST, plan.TWIST_STAMPED, plan.STATUS):
+        if kind in (*_LASERS, plan.TWIST, plan.TWIST_STAMPED, plan.STATUS) or _CONTACT.search(channel.name):
             continue
         over = ends_early(recording, channel.name)
         if over is None or recording.duration_s - over[0] < 0.1 * recording.duration_s:
