@@ -25,8 +25,10 @@ def _quick(cls: type[T] | None = None, /, *, eq: bool = True, **options: Any) ->
     if not options.pop("frozen", False):
         return standard(cls, eq=eq, **options)
     own = set(vars(cls))
-    cls.__doc__ = cls.__doc__ or cls.__name__  # else its signature is worked out to say so
+    said = cls.__doc__
+    cls.__doc__ = said or cls.__name__  # else its signature is worked out to say so
     made: Any = standard(cls, init=False, repr=False, eq=False, **options)
+    made.__doc__ = said
     made.__init__ = _init(made)
     made.__setattr__, made.__delattr__ = _refuse_to_set, _refuse_to_delete
     if "__repr__" not in own:
