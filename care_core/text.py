@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 import unicodedata
+from collections.abc import Sequence
 
 WIDTH = 80
 """Columns of plain text for people."""
@@ -28,6 +29,11 @@ def cell(text: str) -> str:
     """The text as a cell of a table, made safe: a spreadsheet computes what begins as a formula does."""
     made = clean(text)
     return f"'{made}" if made[:1] in ("=", "+", "-", "@") else made
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """`a`, `a and b`, `a, b and c`; nothing of none."""
+    return f" {last} ".join([", ".join(names[:-1]), *names[-1:]]) if len(names) > 1 else "".join(names)
 
 
 def figures(value: float, digits: int = 3) -> str:

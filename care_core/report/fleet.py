@@ -21,7 +21,7 @@ from care_core.health.records import FindingKind, Severity
 from care_core.report.document import plain_number
 from care_core.report.published import Strict
 from care_core.run import FitVerdict
-from care_core.text import clean, wrapped
+from care_core.text import clean, listed, wrapped
 
 SCHEMA_ID: Final = "care.fleet/1"
 NAMED = 8
@@ -386,10 +386,6 @@ def counted(fleet: Fleet) -> str:
     told += [f"{copies} cop{'ies' if copies > 1 else 'y'} counted once"] if copies else []
     logs = f"{len(rows)} log{'s' if len(rows) != 1 else ''}"
     return clean(f"{logs}{f' of {listed(of)}' if of else ''}: {', '.join(told)}")
-
-
-def listed(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
 
 
 def shared_lines(fleet: Fleet, short: Mapping[str, str]) -> Iterator[str]:

@@ -23,11 +23,11 @@ from care_core.report.document import (
 from care_core.report.happened import FindingEntry
 from care_core.report.path_drawing import MOST, paths_svg
 from care_core.report.plots import NOTHING_DRAWN, Drawn, mark_list, plot_figure
-from care_core.report.together import listed, together
+from care_core.report.together import together
 from care_core.report.wording import SEVERITY_WORDS, chance, fit_text, hypothesis_text, noted
 from care_core.report.writers import STATUS_WORDS, plain_verdict
 from care_core.run import shown
-from care_core.text import clean, seconds
+from care_core.text import clean, listed, seconds
 from care_core.variables import ASSUMED
 
 _SIGNS = {"ok": "✓", "fault": "✗", "not_evaluated": "?"}

@@ -274,10 +274,10 @@ def _missed(missed: Missed) -> MissedEntry:
 def inspection_text(document: InspectDocument) -> str:
     """Lines for a terminal."""
     fitting = next((profile.name for profile in document.profiles if profile.usable), "")
+    findings = list(finding_lines(document.findings))
     lines = [
         *wrapped(fit_text("" if document.fit.verdict == "no" else fitting, document.fit)),
-        "",
-        *finding_lines(document.findings),
+        *(["", *findings] if findings else []),
         "",
         *account_lines(document.account, most=len(document.account)),
     ]

@@ -21,11 +21,11 @@ from care_core.report.document import (
     wanted_text,
 )
 from care_core.report.happened import finding_sentence
-from care_core.report.together import listed, together
+from care_core.report.together import together
 from care_core.report.wording import SEVERITY_WORDS, chance, fit_text, hypothesis_text, noted
 from care_core.report.writers import STATUS_WORDS, plain_verdict
 from care_core.run import shown
-from care_core.text import seconds
+from care_core.text import listed, seconds
 from care_core.variables import ASSUMED
 
 LONGEST = 30_000

@@ -10,10 +10,10 @@ from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
 from care_core.report.happened import account_lines, finding_lines, finding_text, hypothesis_lines
-from care_core.report.together import listed, together
+from care_core.report.together import together
 from care_core.report.wording import chance, critical, fit_text, said_without_profile
 from care_core.report.writers import STATUS_WORDS
-from care_core.text import clean, wrapped
+from care_core.text import clean, listed, wrapped
 from care_core.variables import Variable
 
 EVIDENCE_SHOWN = 5

@@ -29,8 +29,3 @@ def together(faults: Sequence[F], paths: Callable[[F], Paths]) -> list[list[F]]:
 def _lead_on(short: Paths, long: Paths) -> bool:
     pairs = zip(short, long, strict=False)
     return bool(short) and len(short) == len(long) and all([*b[: len(a)]] == [*a] for a, b in pairs)
-
-
-def listed(names: Sequence[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    return " and ".join(part for part in (", ".join(names[:-1]), names[-1]) if part)

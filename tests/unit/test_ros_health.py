@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -181,6 +182,19 @@ def test_recordings_that_tell_of_no_robot_say_so(tmp_path: Path) -> None:
     assert health.too_little
     assert health.findings == ()
     assert health.too_little.startswith("it holds inertial data, and nothing that tells how a robot did: no odometry")
+
+
+def test_a_battery_that_says_nothing_plausible_is_not_said_to_be_missing(tmp_path: Path) -> None:
+    messages = [
+        (topic, kind, START_NS + round(t * 1e9), message)
+        for topic, kind, t, message in Drive().messages()
+        if kind == BATTERY
+    ]
+    dead = [(topic, kind, at, dataclasses.replace(message, voltage=0.9)) for topic, kind, at, message in messages]
+    health = examine(open_log(write_db3(tmp_path / "bag", messages=dead)))
+    assert health.too_little.endswith(
+        "goals, commands, laser or messages, and too little or nothing plausible of battery"
+    )
 
 
 def test_an_empty_recording_is_said_to_be_empty(tmp_path: Path) -> None:

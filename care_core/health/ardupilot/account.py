@@ -32,6 +32,7 @@ from care_core.health.moments import (
 from care_core.health.records import Moment
 from care_core.logs.base import Wanted
 from care_core.run import Damage
+from care_core.text import listed
 from care_core.vehicles import (
     FAILSAFE,
     Vehicle,
@@ -357,7 +358,7 @@ def _ranges(numbers: Sequence[int]) -> str:
         else:
             parts.append([number])
     texts = [f"{part[0]} to {part[-1]}" if len(part) > 1 else str(part[0]) for part in parts]
-    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
+    return listed(texts)
 
 
 # --- the end --------------- ---------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from care_core.health.ros.find import find
 from care_core.health.ros.recording import STREAM_MESSAGES, Recording
 from care_core.logs.base import Log
 from care_core.logs.ros_log import RosLog
+from care_core.text import listed
 
 SHORT_S = 5.0
 """Nothing can be said of how a robot drives in less."""
@@ -23,6 +24,10 @@ _HELD = {
     "sensor_msgs/JointState": "joint states", "sensor_msgs/Range": "ranges",
 }  # fmt: skip
 """What recordings without a robot's own streams hold, in words."""
+_STREAMS = {plan.ODOMETRY: "odometry", plan.SCAN: "laser", plan.BATTERY: "battery"}
+"""What counts where there is more than a little of it, and plausible."""
+_TELLING = ("odometry", "goals", "commands", "laser", "battery", "messages")
+"""What tells how a robot did."""
 _STACKS = {"move_base": "move_base", "nav2": "Nav2"}
 
 
@@ -64,8 +69,10 @@ def _nothing_of_a_robot(recording: Recording) -> str:
     """What is there, so that its reader sees that it was read, and what would be needed."""
     there = {plan.kind_of(channel) for channel in recording.channels if channel.count}
     held = list(dict.fromkeys(words for kind, words in _HELD.items() if kind in there))
-    lacks = "no odometry, goals, commands, laser, battery or messages"
+    poor = [word for kind, word in _STREAMS.items() if kind in there]
+    lacks = f"no {listed([word for word in _TELLING if word not in poor], 'or')}"
+    if poor:
+        lacks += f", and too little or nothing plausible of {listed(poor, 'and')}"
     if not held:
         return f"nothing in it tells of a robot: {lacks}"
-    listed = " and ".join(filter(None, (", ".join(held[:-1]), held[-1])))
-    return f"it holds {listed}, and nothing that tells how a robot did: {lacks}"
+    return f"it holds {listed(held, 'and')}, and nothing that tells how a robot did: {lacks}"
