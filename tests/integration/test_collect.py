@@ -137,11 +137,9 @@ def _wait_for_the_end_of(process: int) -> None:
 
 
 def test_a_run_that_takes_too_long_is_ended_and_the_others_are_made(care: Care, tmp_path: Path) -> None:
-    script = 'test $CARE_RUN = 2 && sleep 60; cp drive.bag "$CARE_LOGS"'
+    script = 'test $CARE_RUN = 2 && sleep 3600; cp drive.bag "$CARE_LOGS"'
     path = campaign_in(tmp_path, command=["sh", "-c", script], time_limit_s=1.5, retries=0)
-    started = time.monotonic()
     code, told = document(care, path)
-    assert time.monotonic() - started < 45
     assert code == ExitCode.NOT_EVALUATED
     assert [run["status"] for run in told["runs"]] == ["done", "failed", "done", "done"]
     assert told["runs"][1]["reason"] == "the command took longer than 1.5 s"
