@@ -12,8 +12,8 @@ Those profiles as they are, without any run, stand last. Columns as in `benchmar
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -32,10 +32,11 @@ SOURCE_RUNS = 400
 FACTORS = {"related": 2.0, "signs": 4.0}
 """How much more or less an option of the other robot may do."""
 Way = Literal["nothing", "known", "related", "signs", "related as it is", "signs as they are"]
-WAYS: tuple[Way, ...] = ("nothing", "known", "related", "signs", "related as it is", "signs as they are")
+LEARNING: tuple[Way, ...] = ("nothing", "known", "related", "signs")
+WAYS: tuple[Way, ...] = (*LEARNING, "related as it is", "signs as they are")
+"""Without a run the size of the table says nothing: the last two are asked once."""
 
 
-@cache
 def other_robot(world: Planted, seed: int, factor: float) -> Model:
     """The profile of a robot whose options act by other factors."""
     rng = np.random.default_rng([seed, int(factor), 99])
@@ -46,18 +47,27 @@ def other_robot(world: Planted, seed: int, factor: float) -> Model:
         return train(training_table(other, SOURCE_RUNS, rng), other.schema, settings)
 
 
-def one(world: Planted, seed: int, runs: int, faults: int, way: Way) -> Score:
-    """One robot, learned in one way."""
+def one(world: Planted, seed: int, runs: int, faults: int, way: Way, others: Mapping[str, Model]) -> Score:
+    """One robot, learned in one way; `others` are the profiles of other robots by `FACTORS`."""
     if way == "nothing":
         return measure(world, seed, runs, faults)
     if way == "known":
         return measure(replace(world, known=TRUE), seed, runs, faults)
-    source = other_robot(world, seed, FACTORS[way.split()[0]])
+    source = others[way.split()[0]]
 
     def learn(frame: pd.DataFrame, schema: Schema, settings: TrainSettings) -> Model:
         return update(source, schema, frame, settings) if way in FACTORS else source
 
     return measure(world, seed, runs, faults, learn)
+
+
+def all_ways(world: Planted, seed: int, sizes: Sequence[int], faults: int) -> dict[int, dict[str, Score]]:
+    """One robot, learned in all ways from tables of each size."""
+    others = {name: other_robot(world, seed, factor) for name, factor in FACTORS.items()}
+    return {
+        runs: {way: one(world, seed, runs, faults, way, others) for way in WAYS if runs == sizes[-1] or way in LEARNING}
+        for runs in sizes
+    }
 
 
 def main() -> None:
@@ -68,18 +78,14 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args()
     robots = [(world, seed) for world in WORLDS if world.name in ROBOTS for seed in range(asked.robots)]
-
-    def all_ways(world: Planted, seed: int, runs: int) -> dict[str, Score]:
-        ways = WAYS if runs == asked.runs[-1] else WAYS[:4]  # without a run there is nothing to repeat
-        return {way: one(world, seed, runs, asked.faults, way) for way in ways}
-
+    tasks = (delayed(all_ways)(world, seed, asked.runs, asked.faults) for world, seed in robots)
+    answers = Parallel(n_jobs=asked.jobs)(tasks)
     for runs in asked.runs:
-        answers = Parallel(n_jobs=asked.jobs)(delayed(all_ways)(world, seed, runs) for world, seed in robots)
         scores: dict[str, Score] = {}
         for answer in answers:
-            for way, score in answer.items():
+            for way, score in answer[runs].items():
                 scores.setdefault(way, Score()).add(score)
-        print(f"{runs} runs", flush=True)
+        print(f"{runs} runs")
         show(scores)
 
 
