@@ -38,7 +38,8 @@ METRIC = Effort(points=300, iterations=30)
 RELEVANCE_SCALE = 0.1
 """Relevance below which an input counts as unused in the penalty."""
 UNUSED = 0.02
-"""An input is left out where one standard deviation of it moves the target by less, in standard deviations."""
+"""An input is left out where one standard deviation of it moves the target by less, in standard deviations, but not
+among few runs: what they hardly show they have not ruled out."""
 WEAK = 0.2
 """Least relevance of any option where runs are few: the slope it may have before runs show one."""
 NOISE, BINARY_NOISE = 0.02, 0.3
@@ -67,7 +68,7 @@ class Inputs:
     nominal: Nominal | None = None
     """What physics says of a positive target; its arguments are among the names."""
     least: float = 0.0
-    """No relevance ends below it."""
+    """No relevance ends below it; where it is above 0 no input is left out, however little it moves."""
 
     @classmethod
     def all_read(cls, names: Sequence[str], log: NDArray[np.bool_]) -> Inputs:
@@ -133,7 +134,7 @@ def fit(
     mean, scale = float(coded.mean()), float(coded.std()) or 1.0
     targets = ((coded - mean) / scale).astype(np.float32).astype(float)
     kernel = _fit_kernel(points, targets, effort.iterations, BINARY_NOISE if binary else NOISE, inputs.least)
-    used = _slopes(kernel) > UNUSED
+    used = (_slopes(kernel) > UNUSED) | (inputs.least > 0)
     kernel = replace(kernel, relevance=kernel.relevance[used], idle=int((~used).sum()))
     points = points[:, used]
     errors, error_sd = left_out(kernel, points, targets, groups)

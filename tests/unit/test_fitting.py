@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import check_grad
@@ -9,6 +11,7 @@ from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism
 from care_core.errors import LearningError
 from care_core.learn.fitting import (
     RELEVANCE_SCALE,
+    WEAK,
     Effort,
     Inputs,
     _negative_log_posterior,
@@ -51,6 +54,16 @@ def test_a_straight_line_keeps_its_small_slopes_and_loses_what_moves_nothing() -
     assert mechanism.reads.tolist() == [0, 1, 2]
     near, far = np.zeros((1, 4)), np.array([[0.0, 1.0, 0.0, 0.0]])
     assert mechanism.latent(far)[0] - mechanism.latent(near)[0] == pytest.approx(0.1, abs=0.03)
+
+
+def test_among_few_runs_no_input_is_left_out() -> None:
+    x = RNG(0).uniform(-1, 1, (60, 3))
+    y = RNG(1).normal(size=60)  # nothing moves it
+    read = [
+        fit_mechanism(x, y, replace(inputs(3), least=least), binary=False, rng=RNG(0), effort=FULL).reads.tolist()
+        for least in (0.0, WEAK)
+    ]
+    assert read == [[], [0, 1, 2]]
 
 
 def test_knows_less_away_from_the_data() -> None:
