@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
-from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
@@ -23,7 +22,8 @@ from care_core.run import is_known
 from care_core.variables import Threshold, Variable
 
 INTERVAL = (0.1, 0.9)
-SURELY = NormalDist().inv_cdf(INTERVAL[1])
+SURELY = 1.2815515655446004
+"""The standard normal quantile of the upper end; `statistics` has it for 4 ms of importing."""
 _HALVINGS = 30
 
 Config = Mapping[str, float]

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from care_core.frozen import dataclass
+from care_core.numbers import distinct
 from care_core.variables import Role, Variable
 
 FloatArray = NDArray[np.float64]
@@ -97,8 +98,8 @@ def acceptable_values(variable: Variable, observed: ArrayLike, count: int = 9) -
     else:
         known = np.asarray(observed, dtype=float)
         known = known[np.isfinite(known)]
-        levels = np.unique(known)
+        levels = distinct(known)
         if len(levels) <= count:
             return levels
         steps = np.quantile(known, np.linspace(0.05, 0.95, count))
-    return np.unique(np.round(steps) if variable.type == "int" else steps)
+    return distinct(np.round(steps) if variable.type == "int" else steps)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+import random
 from collections.abc import Callable, Collection, Container, Sequence
+from itertools import permutations
 
 import numpy as np
 
@@ -23,7 +26,7 @@ FELT = 0.05
 HARDLY = 0.01
 """Share of its acceptable range by which an option may be off its reference and be as good as at it."""
 PERMUTATIONS = 12
-"""Orders of reset per Shapley estimate, each also taken backwards."""
+"""Sampled orders of reset per Shapley estimate, each also taken backwards."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,20 +179,27 @@ def _reset(world: World, names: frozenset[str]) -> dict[str, float]:
 
 
 def _shapley(names: Sequence[str], worth: Callable[[Sequence[frozenset[str]]], FloatArray]) -> FloatArray:
-    """Shapley values by sampled orders, each with its reverse; the seed is fixed, so the answer repeats."""
+    """Shapley values over all orders where those are few, else over `_orders`."""
     if not names:
         return np.zeros(0)
-    rng = np.random.default_rng(0)
-    orders = [rng.permutation(len(names)) for _ in range(PERMUTATIONS)]
-    orders += [order[::-1] for order in orders]
+    orders = _orders(len(names))
     chains = [[frozenset(names[i] for i in order[:k]) for k in range(len(names) + 1)] for order in orders]
     distinct = list(dict.fromkeys(subset for chain in chains for subset in chain))
     value = dict(zip(distinct, worth(distinct), strict=True))
     shares = np.zeros(len(names))
     for order, chain in zip(orders, chains, strict=True):
-        shares[order] += np.diff([value[subset] for subset in chain])
+        shares[list(order)] += np.diff([value[subset] for subset in chain])
     mean: FloatArray = shares / len(orders)
     return mean
+
+
+def _orders(count: int) -> list[tuple[int, ...]]:
+    """All orders of so many places, or sampled ones, each with its reverse; one seed, so the answer repeats."""
+    if math.factorial(count) <= 2 * PERMUTATIONS:
+        return list(permutations(range(count)))
+    rng = random.Random(0)  # numpy's generators take as long to import as all of this
+    drawn = [tuple(rng.sample(range(count), count)) for _ in range(PERMUTATIONS)]
+    return drawn + [order[::-1] for order in drawn]
 
 
 def describe_path(path: CausalPath, world: World, run: Run) -> tuple[PathNode, ...]:

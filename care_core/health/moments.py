@@ -11,6 +11,7 @@ import numpy as np
 
 from care_core.health.records import Moment
 from care_core.logs.base import Table
+from care_core.numbers import distinct
 from care_core.run import Damage, Setting, shown
 from care_core.vehicles import is_self_written
 
@@ -85,7 +86,7 @@ def parameter_changes(
 def gaps(tables: Iterable[Table], armed: Sequence[Span]) -> Iterator[Moment]:
     """The longest time in which nothing at all was recorded while armed, and while disarmed if it is long."""
     stamps = [table.t[np.isfinite(table.t)] for table in tables if len(table) > _GAP_MEDIANS]
-    t = np.unique(np.concatenate(stamps)) if stamps else np.empty(0)
+    t = distinct(np.concatenate(stamps)) if stamps else np.empty(0)
     steps = np.diff(t)
     if not len(steps):
         return

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.logs.base import Table
+from care_core.numbers import distinct
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -217,7 +218,7 @@ def _instances(table: Table) -> list[Mask]:
     name = next((name for name in ("Inst", "Instance", "I") if name in table.columns), None)
     if name is None:
         return [np.ones(len(table), dtype=bool)]
-    return [np.asarray(table[name] == number) for number in np.unique(table[name])]
+    return [np.asarray(table[name] == number) for number in distinct(table[name])]
 
 
 def _leaps(column: Floats, step: float) -> Mask:

@@ -12,6 +12,7 @@ from textual._compositor import ChopsUpdate, Compositor
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
+from textual.timer import Timer
 from textual.widgets import Static
 
 from care_tui.link import Link
@@ -20,6 +21,9 @@ from care_tui.render.rows import Row
 MIN_WIDTH, MIN_HEIGHT = 60, 20
 WIDE = 160
 """From this width on, lists and what they explain stand side by side, each with the room of a whole terminal."""
+_TICK_S = 1 / 120
+"""A change of step takes two or three ticks of the screen's timer, which runs while there is something to draw. With
+Textual's 60 a second they are most of what a key waits for."""
 
 
 class _Cropped(ChopsUpdate):
@@ -61,7 +65,14 @@ class CareScreen(Screen[None]):
     def __init__(self) -> None:
         super().__init__()
         self._is_settling = False
+        self._ticks: Timer | None = None
         self._compositor = _Compositor()
+
+    @property
+    def _update_timer(self) -> Timer:
+        if self._ticks is None:
+            self._ticks = self.set_interval(_TICK_S, self._on_timer_update, name="screen_update", pause=True)
+        return self._ticks
 
     def _on_timer_update(self) -> None:
         # Its timer goes on until the link is free; what is to be drawn gathers meanwhile.

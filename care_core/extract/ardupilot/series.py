@@ -11,6 +11,7 @@ from care_core.extract.ardupilot.phases import PHASE_ARGS, flight_of, span_of_ph
 from care_core.extract.flight import NEEDS
 from care_core.extract.registry import Args, Mission, extractor, merge_needs, missing, one_of
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import distinct
 from care_core.run import Unavailable, Value
 
 Floats = NDArray[np.float64]
@@ -53,7 +54,7 @@ def instances(table: Table) -> list[Table]:
     name = next((name for name in ("I", "IMU", "C", "Inst", "Instance") if name in table.columns), None)
     if name is None:
         return [table]
-    return [table.where(table[name] == number) for number in np.unique(table[name])]
+    return [table.where(table[name] == number) for number in distinct(table[name])]
 
 
 def statistic(values: Floats, stat: str) -> Value:

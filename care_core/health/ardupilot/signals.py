@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import distinct
 
 Floats = NDArray[np.float64]
 
@@ -113,4 +114,4 @@ def _split(name: str, table: Table) -> list[Table]:
     if field is None:
         return [table]
     number = table[field]
-    return [table.where(number == own) for own in np.unique(number[np.isfinite(number)])]
+    return [table.where(number == own) for own in distinct(number[np.isfinite(number)])]
