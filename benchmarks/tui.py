@@ -77,9 +77,11 @@ def made(options: int = OPTIONS, paths: int = PATHS) -> tuple[Diagnosis, tuple[V
 def serve_made() -> None:
     """The app on the made diagnosis, in this process: what the benchmark starts as its child."""
     from care_core.application.case import Case, Request
+    from care_tui.settings import Settings, prepare_terminal
+
+    prepare_terminal(Settings())
     from care_tui.app import CareApp
     from care_tui.jobs import Engine
-    from care_tui.settings import Settings
 
     diagnosis, options = made()
     fix = diagnosis.fix

@@ -8,11 +8,12 @@ from typing import ClassVar
 
 from rich.console import Console
 from rich.control import Control
+from rich.style import Style
 from textual._compositor import ChopsUpdate, Compositor
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.screen import Screen
-from textual.timer import Timer
+from textual.strip import Strip
 from textual.widgets import Static
 
 from care_tui.link import Link
@@ -21,9 +22,8 @@ from care_tui.render.rows import Row
 MIN_WIDTH, MIN_HEIGHT = 60, 20
 WIDE = 160
 """From this width on, lists and what they explain stand side by side, each with the room of a whole terminal."""
-_TICK_S = 1 / 120
-"""A change of step takes two or three ticks of the screen's timer, which runs while there is something to draw. With
-Textual's 60 a second they are most of what a key waits for."""
+_FEW = 8
+"""Blanks that are as short as what would erase them."""
 
 
 class _Cropped(ChopsUpdate):
@@ -35,8 +35,25 @@ class _Cropped(ChopsUpdate):
             for behind, (x, strip) in zip(self.chop_ends[y], self.chops[y].items(), strict=False):
                 first, last = max(x, begin), min(behind, end)
                 if strip is not None and first < last:
-                    parts += [Control.move_to(first, y).segment.text, strip.crop(first - x, last - x).render(console)]
+                    parts += [Control.move_to(first, y).segment.text, _sent(strip.crop(first - x, last - x), console)]
         return "".join(parts)
+
+
+def _sent(strip: Strip, console: Console) -> str:
+    """A part of a line as the terminal gets it: blanks at its end are erased (ECH, ECMA-48 section 8.3.38)."""
+    segments = list(strip)
+    blanks = segments[-1].text if segments else ""
+    if len(blanks) < _FEW or blanks.strip(" ") or not _is_bare(segments[-1].style):
+        return strip.render(console)
+    return f"{Strip(segments[:-1]).render(console)}\x1b[{len(blanks)}X"
+
+
+def _is_bare(style: Style | None) -> bool:
+    """Whether a blank shows nothing but the terminal's own background."""
+    if style is None:
+        return True
+    drawn = style.reverse or style.underline or style.underline2 or style.overline or style.strike
+    return not drawn and (style.bgcolor is None or style.bgcolor.is_default)
 
 
 class _Compositor(Compositor):
@@ -65,14 +82,7 @@ class CareScreen(Screen[None]):
     def __init__(self) -> None:
         super().__init__()
         self._is_settling = False
-        self._ticks: Timer | None = None
         self._compositor = _Compositor()
-
-    @property
-    def _update_timer(self) -> Timer:
-        if self._ticks is None:
-            self._ticks = self.set_interval(_TICK_S, self._on_timer_update, name="screen_update", pause=True)
-        return self._ticks
 
     def _on_timer_update(self) -> None:
         # Its timer goes on until the link is free; what is to be drawn gathers meanwhile.

@@ -5,12 +5,16 @@ from __future__ import annotations
 import time
 
 import pytest
+from rich.console import Console
+from rich.segment import Segment
+from rich.style import Style
 from textual.events import CursorPosition
 from textual.geometry import Region
+from textual.strip import Strip
 
 from care_tui.app import CareApp
 from care_tui.link import ASK, Link
-from care_tui.screens.base import CareScreen
+from care_tui.screens.base import CareScreen, _sent
 from tests.tui import sample_diagnosis as sample
 from tests.tui.conftest import MakeApp, settle
 
@@ -44,6 +48,28 @@ def test_what_was_not_even_sent_is_waited_for_at_any_terminal() -> None:
     assert link.is_busy
     waiting[0] = 0
     assert not link.is_busy
+
+
+@pytest.mark.parametrize(
+    ("style", "erased"),
+    [
+        (None, True),
+        (Style(bold=True), True),
+        (Style(bgcolor="default"), True),
+        (Style(bgcolor="red"), False),
+        (Style(reverse=True), False),
+        (Style(underline=True), False),
+    ],
+)
+def test_blanks_at_the_end_of_a_change_are_erased_where_they_show_nothing(style: Style | None, erased: bool) -> None:
+    console = Console(color_system="truecolor")
+    line = Strip([Segment("words"), Segment(" " * 30, style)])
+    told = _sent(line, console)
+    assert told.startswith("words")
+    assert told.endswith("\x1b[30X") is erased
+    assert (" " * 30 in told) is not erased
+    assert _sent(Strip([]), console) == ""
+    assert _sent(Strip([Segment("a   ", style)]), console) == Strip([Segment("a   ", style)]).render(console)
 
 
 async def test_changes_gather_while_a_frame_is_under_way(make_app: MakeApp, monkeypatch: pytest.MonkeyPatch) -> None:

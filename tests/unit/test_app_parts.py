@@ -151,10 +151,10 @@ def test_ssh_gets_fewer_frames_unless_told_otherwise(monkeypatch: pytest.MonkeyP
         monkeypatch.setenv(name, "")
         monkeypatch.delenv(name)
     prepare_terminal(Settings())
-    assert "TEXTUAL_FPS" not in os.environ
+    assert os.environ.pop("TEXTUAL_FPS") == "120"
     monkeypatch.setenv("SSH_CONNECTION", "1.2.3.4 1 5.6.7.8 22")
     prepare_terminal(Settings(color="16"))
-    assert os.environ["TEXTUAL_FPS"] == "15"
+    assert os.environ["TEXTUAL_FPS"] == "30"
     assert os.environ["TEXTUAL_COLOR_SYSTEM"] == "standard"
     prepare_terminal(Settings(color="none"))
     assert os.environ["NO_COLOR"] == "1"
