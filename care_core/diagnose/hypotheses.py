@@ -96,12 +96,25 @@ def explain(
     return weigh(options, min(chance, default=0.0), findings, verdict)
 
 
-def without_parameters(findings: Sequence[Finding], *, failed: bool = False) -> tuple[Hypothesis, ...]:
+def unasked(
+    findings: Sequence[Finding],
+    *,
+    failed: bool = False,
+    shown: Mapping[str, Evidence] | None = None,
+    verdict: FitVerdict = "no",
+) -> tuple[Hypothesis, ...]:
     """What explains a failure of which no model can be asked; empty where nothing failed, by a check of the run
-    (`failed`) or by a critical finding."""
-    if not failed and all(finding.severity != "critical" for finding in findings):
+    (`failed`) or by a critical finding. Options are those that such a finding names (`shown`, as for `explain`)."""
+    critical = [finding for finding in findings if finding.severity == "critical"]
+    if not failed and not critical:
         return ()
-    weighed = weigh({}, 0.0, findings, "no")
+    options: dict[str, float] = {}
+    for finding in critical:
+        named = shown[finding.title].options if shown and finding.title in shown else ()
+        for option in named:
+            share = finding.probability * _mission_lost(finding) / len(named)
+            options[option] = max(options.get(option, 0.0), share)
+    weighed = weigh(options, 0.0, findings, verdict if options else "no")
     return tuple(replace(one, name=UNNAMED) if one.what == "chance" else one for one in weighed)
 
 

@@ -27,7 +27,7 @@ from care_core.diagnose.fixes import (
     smallest_good,
     to_fix,
 )
-from care_core.diagnose.hypotheses import explain, speaking, without_parameters
+from care_core.diagnose.hypotheses import explain, speaking, unasked
 from care_core.diagnose.judging import Judged, check_wishes, unread_options, world_of
 from care_core.diagnose.ranking import (
     Suspect,
@@ -125,7 +125,7 @@ def diagnose(
     choice = replace(choice, fit=choice.fit.but(*unusual(run, profile)))
     if not broken:
         missed = any(result.status == "fault" for result in judged.checks)
-        explained = without_parameters(health.findings, failed=missed)
+        explained = unasked(health.findings, failed=missed, shown=shown, verdict=choice.fit.verdict)
         return Diagnosis(
             choice,
             run,
@@ -185,7 +185,7 @@ def unjudged(log: LogInfo, settings: Mapping[str, Setting], choice: ProfileChoic
     """The answer for a log that no profile fits: what happened in it is all that can be said."""
     whole = MissionInfo(0, 0, 0.0, log.duration_s, ended=True, fits=False)
     run = Run({}, {}, {}, {}, settings, log, whole)
-    explained = without_parameters(health.findings)
+    explained = unasked(health.findings)
     return Diagnosis(choice, run, (), (), None, health=health, hypotheses=explained)
 
 
@@ -200,7 +200,7 @@ def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Di
         None,
         missions=judged.missions,
         health=health,
-        hypotheses=without_parameters(health.findings, failed=bool(broken)),
+        hypotheses=unasked(health.findings, failed=bool(broken)),
     )
 
 

@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.diagnose.hypotheses import weigh, without_parameters
+from care_core.diagnose.hypotheses import unasked, weigh
 from care_core.diagnose.records import Hypothesis
 from care_core.health.records import Finding, Severity, Suspect
+from care_core.run import Evidence
 
 
 def finding(
@@ -100,9 +101,20 @@ def test_where_no_profile_fits_no_parameter_is_named() -> None:
 
 
 def test_without_a_model_only_a_failure_is_explained() -> None:
-    assert without_parameters([finding(0.9, "warning")]) == ()
-    assert lead(without_parameters([finding(0.9, "warning")], failed=True))[0] == "hardware"
-    assert lead(without_parameters([finding(0.9)])) == ("hardware", "motor 2 lost thrust")
+    assert unasked([finding(0.9, "warning")]) == ()
+    assert lead(unasked([finding(0.9, "warning")], failed=True))[0] == "hardware"
+    assert lead(unasked([finding(0.9)])) == ("hardware", "motor 2 lost thrust")
+
+
+def test_a_critical_finding_names_its_options_where_no_objective_has_a_value() -> None:
+    swings = Finding("tuning", "the steering oscillates", 30.0, 220.0, "critical", "", "", "parameter", 0.85)
+    shown = {swings.title: Evidence(30.0, "the steering oscillates", "found", options=("P", "FF"))}
+    found = unasked([swings], shown=shown, verdict="fits")
+    assert {one.name for one in found[:2]} == {"P", "FF"}
+    assert found[0].probability == pytest.approx(found[1].probability)
+    assert found[0].probability > 0.35
+    assert lead(unasked([swings]))[0] != "parameter", "without the rule it names none"
+    assert unasked([replace(swings, severity="warning")], shown=shown, verdict="fits") == ()
 
 
 def test_what_the_operator_did_counts_as_met() -> None:

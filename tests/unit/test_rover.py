@@ -10,7 +10,7 @@ import pytest
 from care_core.application.case import Request, open_case
 from care_core.diagnose.records import Diagnosis
 from care_core.files import bundled
-from care_core.health.ardupilot.checks import blocked
+from care_core.health.ardupilot.checks import attitude, blocked
 from care_core.health.ardupilot.flight import Flight
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
@@ -91,3 +91,34 @@ def test_a_rover_that_moves_turns_waits_or_is_driven_by_hand_is_not() -> None:
     assert not list(blocked.find(stuck(turn_dps=20.0)))
     assert not list(blocked.find(stuck(throttle=0.0)))
     assert not list(blocked.find(stuck(mode=0)))
+
+
+def steering(speed_ms: float = 0.1, mode: int = 10, demand: float = 20.0, swing: float = 250.0) -> Flight:
+    """Armed from 5 to 90 s; from 20 to 80 s it turns to and fro by so much, at 2.4 records a second."""
+    t = np.arange(0.0, 95.0, 1 / 2.4)
+    swung = np.where((t >= 20) & (t <= 80), swing * np.sign(np.sin(2 * np.pi * 0.9 * t)), 0.0)
+    asked = demand * np.sin(t)
+    tables = {
+        "ARM": Table(np.array([5.0, 90.0]), {"ArmState": np.array([1.0, 0.0])}),
+        "MODE": Table(np.array([0.0]), {"ModeNum": np.array([float(mode)])}),
+        "THR": Table(t, {"ThrOut": np.full(len(t), 30.0), "Speed": np.full(len(t), speed_ms)}),
+        "STER": Table(t, {"TurnRate": asked + swung, "DesTurnRate": asked, "SteerOut": -20 * swung}),
+    }
+    return Flight(tables, {}, {"firmware": "ArduRover V4.5.4"}, 95.0)
+
+
+def test_a_steering_that_swings_to_and_fro_is_set_wrong() -> None:
+    (finding,) = attitude.find(steering())
+    assert (finding.title, finding.severity, finding.suspect) == ("the steering oscillates", "critical", "parameter")
+    assert finding.onset_s == pytest.approx(20.0, abs=2.0)
+    assert finding.evidence.endswith("the vehicle does not get on")
+    (mild,) = attitude.find(steering(speed_ms=2.0))
+    assert (mild.severity, mild.probability) == ("warning", 0.2)
+
+
+def test_a_steering_that_follows_its_demand_or_is_turned_by_hand_does_not_oscillate() -> None:
+    assert not list(attitude.find(steering(swing=10.0)))
+    assert not list(attitude.find(steering(mode=0)))
+    (full,) = attitude.find(steering(demand=200.0))  # the demand swings with it, and the steering gives all it has
+    assert full.title == "the steering oscillates"
+    assert not list(attitude.find(steering(demand=200.0, swing=100.0)))

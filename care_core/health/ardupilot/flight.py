@@ -19,7 +19,7 @@ from care_core.frozen import dataclass
 from care_core.health.ardupilot.signals import Floats, instances
 from care_core.logs.base import Table, Wanted
 from care_core.run import Setting
-from care_core.vehicles import Vehicle, vehicle_of, with_said
+from care_core.vehicles import Vehicle, vehicle_of, way_of, with_said
 from care_core.vehicles.self_written import SIMULATOR_PREFIX
 
 Mask = NDArray[np.bool_]
@@ -85,6 +85,7 @@ UNTOLD = -1
 """The mode where the log does not say."""
 _ROLLS = frozenset((UNTOLD, 0, 3, 4, 23))
 """Plane modes in which the pilot may roll it over: manual, training, acro, QAcro; any where the log does not say."""
+_BY_ITSELF = frozenset(("mission", "return", "guided"))
 _ACRO = frozenset((1, 13, 14))
 """Copter modes in which any attitude is meant: acro, sport, flip."""
 
@@ -181,6 +182,11 @@ class Flight:
         """The number of the mode at each of these times, `UNTOLD` where the log does not say."""
         codes = np.array([UNTOLD, *(mode for _, mode in self.modes)], dtype=np.int64)
         return codes[np.searchsorted([start for start, _ in self.modes], t, side="right")]
+
+    def drives_itself(self, t: Floats) -> Mask:
+        """Which of these times lie in an armed span and a mode of a rover that drives without a pilot."""
+        driven = np.isin(self.modes_at(t), [mode for _, mode in self.modes if way_of("rover", mode) in _BY_ITSELF])
+        return np.asarray(self.during(self.armed, t) & driven)
 
     @cached_property
     def armed(self) -> tuple[Span, ...]:

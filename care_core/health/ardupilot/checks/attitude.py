@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.health.ardupilot.checks.thrust import saturated
-from care_core.health.ardupilot.flight import UPSIDE_DOWN_DEG, Flight, Mask, Span
+from care_core.health.ardupilot.flight import STANDS_MS, UPSIDE_DOWN_DEG, Flight, Mask, Span
 from care_core.health.ardupilot.measure import lasting, smooth, top
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
@@ -21,6 +21,7 @@ from care_core.logs.base import Table, Wanted
 READS: Wanted = {
     "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
     "RATE": ("R", "P", "RDes", "PDes", "ROut", "POut"),
+    "STER": ("TurnRate", "DesTurnRate", "SteerOut"),
 }
 
 FAR_DEG, YAW_DEG = 15.0, 45.0
@@ -36,6 +37,9 @@ SWING_DPS, OVER_DEMAND = 30.0, 3.0
 _SWING_S, _ENOUGH = 5.0, 10
 _ALL = 1.0
 """All that the motors have for one axis (AP_Motors.h: roll and pitch run from -1 to 1)."""
+_ALL_STEERING = 4500.0
+"""The same of a rover's steering (AP_MotorsUGV.h)."""
+_GETS_ON_S = 30.0
 _SPENT = 0.85
 """Probability that a swing which takes all that the motors have is what fails the mission. 31 of the 34 training
 flights that swing and then run out of thrust or fall fail; all 106 that swing have a gain of that axis raised or the
@@ -47,6 +51,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     if flight.lost_control_s is not None:
         yield from _lost(flight, flight.lost_control_s)
     yield from _upside_down(flight)
+    yield from _steering(flight)
     if not flight.is_copter:
         return
     swings = list(_swings(flight))
@@ -139,12 +144,9 @@ def _swings(flight: Flight) -> Iterator[Finding]:
         return
     found = []
     for axis, wanted, name in (("R", "RDes", "roll"), ("P", "PDes", "pitch")):
-        swing, asked = np.abs(table[axis] - table[wanted]), np.abs(table[wanted])
-        level, demand = smooth(t, swing, 3.0), smooth(t, asked, 3.0)
-        unasked = (level > OVER_DEMAND * demand) | _exhausted(table, f"{axis}Out")
-        spans = lasting(t, flown & (level > SWING_DPS) & unasked, _SWING_S)
-        if spans and _to_and_fro((table[axis] - table[wanted])[flight.during(spans, t)]):
-            found.append((top(level[flight.during(spans, t)], 0.9), name, spans))
+        spans, peak = _unasked(flight, table, axis, wanted, flown, _exhausted(table, f"{axis}Out", _ALL))
+        if spans:
+            found.append((peak, name, spans))
     if not found:
         return
     peak, name, spans = max(found)
@@ -162,11 +164,47 @@ def _swings(flight: Flight) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def _exhausted(table: Table, output: str) -> Mask:
-    """Where the controller asks for more than the motors can give: then the demand swings with the vehicle."""
+def _steering(flight: Flight) -> Iterator[Finding]:
+    """A rover that steers by itself turns to and fro: gains of the steering that are too high."""
+    table = flight.one("STER", "TurnRate", "DesTurnRate")
+    if flight.vehicle.kind != "rover" or table is None:
+        return
+    steered = flight.drives_itself(table.t)
+    spans, peak = _unasked(
+        flight, table, "TurnRate", "DesTurnRate", steered, _exhausted(table, "SteerOut", _ALL_STEERING)
+    )
+    if not spans:
+        return
+    driven = flight.one("THR", "Speed")
+    swung = np.zeros(0) if driven is None else np.abs(driven["Speed"][flight.during(spans, driven.t)])
+    stays = len(swung) > 0 and spans[-1][1] - spans[0][0] > _GETS_ON_S and float(np.median(swung)) < STANDS_MS
+    end = "; the vehicle does not get on" if stays else ""
+    yield Finding(
+        "tuning", "the steering oscillates", spans[0][0], spans[-1][1], "critical" if stays else "warning",
+        f"the turn rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
+        f"{OVER_DEMAND:g} times what is asked, or all that the steering has){end}",
+        "STER.TurnRate against its demand", suspect="parameter", probability=_SPENT if stays else 0.2,
+    )  # fmt: skip
+
+
+def _unasked(
+    flight: Flight, table: Table, rate: str, wanted: str, where: Mask, exhausted: Mask
+) -> tuple[list[Span], float]:
+    """Where a rate swings far more than is asked for, and how far it is off its demand at most."""
+    error = table[rate] - table[wanted]
+    level, demand = smooth(table.t, np.abs(error), 3.0), smooth(table.t, np.abs(table[wanted]), 3.0)
+    spans = lasting(table.t, where & (level > SWING_DPS) & ((level > OVER_DEMAND * demand) | exhausted), _SWING_S)
+    swung = flight.during(spans, table.t)
+    if not spans or not _to_and_fro(error[swung]):
+        return [], 0.0
+    return spans, top(level[swung], 0.9)
+
+
+def _exhausted(table: Table, output: str, most: float) -> Mask:
+    """Where the controller asks for more than the vehicle can give: then the demand swings with it."""
     if output not in table.columns:
         return np.zeros(len(table), dtype=bool)
-    return smooth(table.t, np.abs(table[output]), 3.0) > _ALL
+    return smooth(table.t, np.abs(table[output]), 3.0) > most
 
 
 def _to_and_fro(error: Floats) -> bool:

@@ -12,18 +12,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.health.ardupilot.flight import STANDS_MS, Flight, Mask
+from care_core.health.ardupilot.flight import STANDS_MS, Flight
 from care_core.health.ardupilot.measure import lasting
-from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding
 from care_core.logs.base import Wanted
-from care_core.vehicles import way_of
 
 READS: Wanted = {"THR": ("ThrOut", "Speed"), "STER": ("TurnRate",)}
 
 THROTTLE_PERCENT, STANDING_MS, TURNING_DPS = 5.0, 0.08, float(np.degrees(0.08))
 _LASTS_S = 2.0
-_BY_ITSELF = frozenset(("mission", "return", "guided"))
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -37,7 +34,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     if turned is not None and len(turned):
         still &= np.abs(np.interp(driven.t, turned.t, turned["TurnRate"])) < TURNING_DPS
     pushed = np.abs(driven["ThrOut"]) >= THROTTLE_PERCENT
-    spans = lasting(driven.t, still & pushed & _drives_itself(flight, driven.t), _LASTS_S)
+    spans = lasting(driven.t, still & pushed & flight.drives_itself(driven.t), _LASTS_S)
     if spans:
         start, end = spans[0]
         most = float(np.abs(driven["ThrOut"])[(driven.t >= start) & (driven.t <= end)].max())
@@ -61,9 +58,3 @@ def _held(flight: Flight) -> Iterator[Finding]:
             f"for {lasted:.0f} s below {STANDS_MS:g} m/s at a lean of {lean:.0f} degrees, after a blow",
             "ATT, GPS.Spd; blows by VIBE.Clip and IMU", suspect="world", probability=0.9,
         )  # fmt: skip
-
-
-def _drives_itself(flight: Flight, t: Floats) -> Mask:
-    """Which of these times lie in an armed span and a mode that drives without a pilot."""
-    driven = np.isin(flight.modes_at(t), [mode for _, mode in flight.modes if way_of("rover", mode) in _BY_ITSELF])
-    return np.asarray(flight.during(flight.armed, t) & driven)
