@@ -316,9 +316,9 @@ def make_mcap(path: Path) -> None:
 
 
 CASES = (
-    Case("six.BIN", make_bin(6_000_000), DECODE_BIN, "pymavlink", 1.5),
-    Case("hundred.BIN", make_bin(100_000_000), DECODE_BIN, "pymavlink", 6.0),
-    Case("robot.bag", make_bag, DECODE_BAG, "rosbags", 3.0),
+    Case("six.BIN", make_bin(6_000_000), DECODE_BIN, "pymavlink", 0.8),
+    Case("hundred.BIN", make_bin(100_000_000), DECODE_BIN, "pymavlink", 2.0),
+    Case("robot.bag", make_bag, DECODE_BAG, "rosbags", 0.8),
     Case("robot.mcap", make_mcap, DECODE_MCAP, "mcap and rosbags", 3.0),
 )
 MOST_ANONYMOUS_MB = 300

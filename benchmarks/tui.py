@@ -174,7 +174,7 @@ def main() -> None:
     middle, cpu = statistics.median(frame[0] for frame in frames), frames[0][1]
     print(f"load of the machine {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     print(
-        f"first usable frame, warm: median {middle:.2f} s, best {frames[0][0]:.2f} s (bar 0.7 s);"
+        f"first usable frame, warm: median {middle:.2f} s, best {frames[0][0]:.2f} s (bar 0.5 s);"
         f" {cpu:.2f} s of processor"
     )
     for width, height in ((80, 24), (120, 40)):
