@@ -88,7 +88,12 @@ BENCHMARKS = (
     Benchmark("wild_logs", "benchmarks.wild_logs --shared {shared}", "no crash, each refusal a sentence", "none known"),
     Benchmark("hostile_files", "benchmarks.hostile_files", "1000 MB and 20 s", "none known"),
     Benchmark("few_runs", "benchmarks.few_runs --shared {shared} --tables {tables}", "above the peers", "CBI, plain"),
-    Benchmark("learning", "benchmarks.learning --shared {shared}", "30 s (622 options), 120 s (10,000 runs), 2 GB", "causal-learn's FCI"),
+    Benchmark(
+        "learning",
+        "benchmarks.learning --shared {shared}",
+        "30 s (622 options), 120 s (10,000 runs), 2 GB",
+        "causal-learn's FCI",
+    ),
     Benchmark("fleet", "benchmarks.fleet", "peak grows by 15 % at most; 0.8 of a loop on one worker", "a plain loop"),
     Benchmark("ingest", "benchmarks.ingest", "0.8, 2, 0.8 s; 300 MB; 5 times faster", "pymavlink, rosbags, mcap"),
     Benchmark("small_triage", "benchmarks.small_triage", "0.4 s of processor", "importing numpy"),
