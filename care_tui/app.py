@@ -6,7 +6,9 @@ import asyncio
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import ClassVar
 
@@ -19,6 +21,7 @@ from textual.scrollbar import ScrollBar, ScrollBarRender
 
 from care_core.application.case import Case, Request, exit_code
 from care_core.errors import CareError, ExitCode, UsageError, nearest
+from care_tui.hangup import on_hangup
 from care_tui.jobs import Engine
 from care_tui.link import Link
 from care_tui.places import as_path, is_openable
@@ -31,7 +34,7 @@ from care_tui.settings import SERVER, Settings
 from care_tui.themes import DEFAULT, HIGH_CONTRAST
 from care_tui.widgets.step_bar import STEPS
 
-_LEAVE_S = 0.05
+_LEAVE_S, _MOST_S = 0.05, 3.0
 """How often an app that is about to end looks whether the terminal's last answer is there: a shell would take it for
 typed."""
 _LOOK_S = 2.0
@@ -93,8 +96,11 @@ class CareApp(App[int], inherit_bindings=False):
         """A lost connection or a polite kill ends the app as `q` does, so the terminal is given back as it was."""
         loop = asyncio.get_running_loop()
         if threading.current_thread() is threading.main_thread():  # no other thread may be told of signals
-            for number in (signal.SIGHUP, signal.SIGTERM):
-                loop.add_signal_handler(number, self.action_interrupt)
+            loop.add_signal_handler(signal.SIGTERM, self.action_interrupt)
+            on_hangup(
+                partial(loop.call_soon_threadsafe, self.action_interrupt),
+                partial(loop.call_soon_threadsafe, self._lose_terminal),
+            )
 
     def _end_with_server(self) -> None:
         """In a browser, end when the server is gone, however it ended: nobody could close the app any more."""
@@ -148,14 +154,22 @@ class CareApp(App[int], inherit_bindings=False):
         self._leave(ExitCode.INTERRUPTED)
 
     def _leave(self, code: ExitCode) -> None:
+        self._cancel_all()
+        self._exit_with(code, time.monotonic() + _MOST_S)
+
+    def _lose_terminal(self) -> None:
+        self._cancel_all()
+        self.exit(ExitCode.INTERRUPTED)
+
+    def _cancel_all(self) -> None:
         for screen in self.screen_stack:
             if isinstance(screen, PanesScreen):
                 screen.cancel_all()
-        self._exit_with(code)
 
-    def _exit_with(self, code: ExitCode) -> None:
-        if self.link.is_busy:
-            self.set_timer(_LEAVE_S, lambda: self._exit_with(code))
+    def _exit_with(self, code: ExitCode, at_the_latest_s: float) -> None:
+        """Once the terminal has shown the last frame; one that takes nothing any more is not waited for."""
+        if self.link.is_busy and time.monotonic() < at_the_latest_s:
+            self.set_timer(_LEAVE_S, lambda: self._exit_with(code, at_the_latest_s))
         else:
             self.exit(code)
 

@@ -156,6 +156,23 @@ def test_a_lost_connection_gives_the_terminal_back(tmp_path: Path, sample: str, 
     assert terminal.end() == 130
 
 
+def test_nothing_outlives_its_terminal(tmp_path: Path, sample: str) -> None:
+    terminal = Terminal(tmp_path, sample)
+    terminal.expect("Objectives")
+    child = terminal.child.pid
+    os.close(terminal.child.child_fd)  # as when a connection is lost or tmux is killed: SIGHUP, and then SIGCONT
+    deadline = time.monotonic() + 20
+    ended, status = os.waitpid(child, os.WNOHANG)
+    while not ended and time.monotonic() < deadline:
+        time.sleep(0.05)
+        ended, status = os.waitpid(child, os.WNOHANG)
+    if not ended:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert ended, "it went on without a terminal"
+    assert os.waitstatus_to_exitcode(status) == 130
+
+
 def test_a_crash_gives_the_terminal_back_and_says_so(tmp_path: Path, sample: str) -> None:
     terminal = Terminal(tmp_path, sample, code=CRASH)
     terminal.expect("Objectives")
