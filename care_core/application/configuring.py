@@ -125,7 +125,8 @@ def _wanted(report: Path, alternative: int, profile: str | None) -> list[Wanted]
         if option is None:
             raise ConfigError(f"The profile has no option '{clean(change.option)}'.", where=str(report))
         named = [change.parameter] if isinstance(change.parameter, str) else change.parameter
-        wanted += [Wanted(option, parameter, float(change.to)) for parameter in named]
+        driven = None if change.assumed else float(change.from_)
+        wanted += [Wanted(option, parameter, float(change.to), driven) for parameter in named]
     return wanted
 
 

@@ -18,7 +18,7 @@ def same_value(a: float | str | None, b: float | str | None) -> bool:
     """The one answer to "the same parameter value": equal as far as a vehicle or a file holds it, `true` is 1."""
     if a is None or b is None:
         return a is b
-    one, other = _as_number(a), _as_number(b)
+    one, other = as_number(a), as_number(b)
     if one is None or other is None:
         from care_core.configs.yaml_tree import plain  # YAML's parser, which few logs need
 
@@ -26,7 +26,8 @@ def same_value(a: float | str | None, b: float | str | None) -> bool:
     return math.isclose(one, other, rel_tol=SEVEN_DIGITS, abs_tol=1e-12) or (math.isnan(one) and math.isnan(other))
 
 
-def _as_number(value: float | str) -> float | None:
+def as_number(value: float | str) -> float | None:
+    """A value as a number, `true` as 1; None for what is none."""
     if not isinstance(value, str):
         return float(value)
     word = value.strip().casefold()
@@ -84,7 +85,7 @@ def option_value(option: Variable, setting: Setting) -> float | None:
     value = setting.value
     if isinstance(value, str) and (code := option.code_of(value)) is not None:
         return code
-    number = _as_number(value)
+    number = as_number(value)
     return None if number is None or not math.isfinite(number) else _unscaled(option, number)
 
 

@@ -7,11 +7,13 @@ so a line that cannot be edited safely is refused, never damaged.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from care_core.configs.driven import as_number, same_value
 from care_core.configs.formats import ConfigFormat, text_for
 from care_core.configs.loading import ConfigFile, guesses, read_configs, read_text, resolve, split_name
 from care_core.errors import ConfigError
@@ -28,6 +30,7 @@ _LINES = {
     ConfigFormat.ROS2_YAML: _YAML_VALUE,
 }
 """Before the value, the value, behind it."""
+_ROUNDED = 1e-3
 _APART = "One file is loaded for both: put one of them into a file of its own, loaded after it."
 
 
@@ -38,6 +41,8 @@ class Wanted:
     option: Variable
     parameter: str
     value: float
+    driven: float | None = None
+    """What was driven, where a log holds it."""
 
 
 @dataclass(slots=True)
@@ -137,9 +142,23 @@ def _set(file: EditedFile, setting: Setting, one: Wanted, *, unsure: bool) -> No
     notes = ["takes effect after a restart"] if one.option.reboot_required else []
     if unsure:
         notes.append("the file does not say whose parameter this is: every node that loads it gets the value")
+    if one.driven is not None and _differs(setting.value, one.driven):
+        notes.append(_not_driven(setting, one))
     others = [held for held in file.held if held.settings.get(setting.name) is not setting]
     shared = {other.name for held in others for other in held.settings.values() if _is_same(file, setting, other)}
     file.edits.append(Edit(setting.source, [one.parameter], setting, after, notes, shared))
+
+
+def _differs(held: float | str, driven: float) -> bool:
+    """By more than a report rounds."""
+    number = as_number(held)
+    return number is not None and not math.isclose(number, driven, rel_tol=_ROUNDED, abs_tol=_ROUNDED)
+
+
+def _not_driven(setting: Setting, one: Wanted) -> str:
+    """A robot that does not drive with what its file says will not do so after a change of the file either."""
+    says = "this already" if same_value(setting.value, one.value) else shown(setting.value)
+    return f"the file says {says}, and {shown(one.driven)} was driven: it is not from this file, look on the robot"
 
 
 def _is_same(file: EditedFile, one: Setting, other: Setting) -> bool:

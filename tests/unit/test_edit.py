@@ -70,6 +70,23 @@ def test_a_vehicle_parameter_keeps_its_line(tmp_path: Path, line: str) -> None:
     assert file.after == before.replace("50", "40")
 
 
+@pytest.mark.parametrize(
+    ("held", "driven", "says"),
+    [
+        ("5", 9.757, "this already, and 9.757 was driven"),
+        ("7", 9.757, "7, and 9.757 was driven"),
+        ("9.75712", 9.757, ""),
+        ("7", None, ""),
+    ],
+)
+def test_a_file_that_was_not_driven_is_told(tmp_path: Path, held: str, driven: float | None, says: str) -> None:
+    speed = Variable("WP_SPEED", Role.OPTION, parameters=("WP_SPEED",))
+    named = written(tmp_path, "rover.parm", f"WP_SPEED,{held}\n")
+    (file,) = apply_changes([named], [Wanted(speed, "WP_SPEED", 5.0, driven)])
+    assert [note for note in file.edits[0].notes if says in note] == file.edits[0].notes
+    assert bool(file.edits[0].notes) is bool(says)
+
+
 def test_a_vehicle_parameter_that_is_missing_is_added_with_a_note(tmp_path: Path) -> None:
     (file,) = apply_changes([written(tmp_path, "a.param", "RTL_ALT 1500")], wanted(LAND, 40))
     assert file.after == "RTL_ALT 1500\nLAND_SPEED,40\n"
