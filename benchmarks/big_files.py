@@ -350,6 +350,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="names of files, or parts of them, with commas")
     parser.add_argument("--folder", type=Path, help="where the files are made; they go again")
     args = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it, and so its children
     start = median_of([*TRIAGE, str(SAMPLE)], args.runs)
     print(f"{SAMPLE.name}: {start.seconds:.2f} s, {start.cpu_s:.2f} s cpu, {start.read_mb:.1f} MB read, Python's own")
     for case in CASES:
