@@ -28,6 +28,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from bisect import bisect_left
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -171,6 +173,10 @@ TELEMETRY = {
 }  # fmt: skip
 """What is repeated; GPS is not, for its messages carry the satellites' time as well."""
 THINNED_US = 400_000
+OFTENEST = 700
+"""Repeats that keep a message below 2 kHz: the log has it 2.5 times a second."""
+OFTENEST_OF = {b"ATT": 300, b"POS": 300, b"BAT": 30, b"RATE": 7000}
+"""Below 1 kHz, 100 Hz and 20 kHz."""
 
 
 def records(raw: bytes) -> Iterator[tuple[bytes, bytes]]:
@@ -187,13 +193,24 @@ def records(raw: bytes) -> Iterator[tuple[bytes, bytes]]:
 
 
 def full_rate(raw: bytes, size: int) -> bytes:
-    """The log with its telemetry repeated until it has about `size` bytes."""
+    """The log with its telemetry repeated until it has about `size` bytes, none faster than a vehicle records it as far
+    as that is enough."""
     parts = list(records(raw))
-    telemetry = sum(len(record) for name, record in parts if name in TELEMETRY)
-    repeats = max(1, round((size - len(raw)) / telemetry) + 1)
+    telemetry = Counter[bytes]()
+    for name, record in parts:
+        telemetry[name] += len(record) if name in TELEMETRY else 0
+    wanted = size - len(raw)
+    most = dict.fromkeys(TELEMETRY, OFTENEST) | OFTENEST_OF
+    spare = wanted - sum(length * most.get(name, 0) for name, length in telemetry.items())
+    steps = range(1, max(most.values()) + 1)
+    as_often = bisect_left(
+        steps, wanted, key=lambda k: sum(length * min(k, most.get(name, 0)) for name, length in telemetry.items())
+    )
+    more = max(0, round(spare / sum(telemetry.values())))
     made = bytearray()
     for name, record in parts:
-        for k in range(repeats if name in TELEMETRY else 1):
+        repeats = min(as_often + 1, most.get(name, 1)) + (more if name in TELEMETRY else 0)
+        for k in range(repeats):
             (stamp,) = struct.unpack_from("<Q", record, 3) if name in TELEMETRY else (0,)
             shifted = struct.pack("<Q", stamp + k * THINNED_US // repeats) if name in TELEMETRY else record[3:11]
             made += record[:3] + shifted + record[11:]
