@@ -15,7 +15,6 @@ _CONTAINERS = 200_000
 """New ones after which cycles are looked for. Python looks a hundred times while modules are imported and a small log
 is read, which took 5 % of a small triage and found nothing to free."""
 _INTERRUPTED = 128 + signal.SIGINT
-_TERMINATED = 128 + signal.SIGTERM
 
 
 def main() -> None:
@@ -29,6 +28,8 @@ def main() -> None:
 
     try:
         signal.signal(signal.SIGTERM, _leave)
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # nohup means it
+            signal.signal(signal.SIGHUP, _leave)
         sys.unraisablehook = _once_more
         if is_listening:
             signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -42,7 +43,7 @@ def main() -> None:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def _leave(_number: int, _frame: FrameType | None) -> None:
+def _leave(number: int, _frame: FrameType | None) -> None:
     """End as on an error, so that temporary files go: the system's own way leaves them.
 
     Whoever ends a whole group sends several signals. Another exception while the first unwinds would break what
@@ -52,7 +53,7 @@ def _leave(_number: int, _frame: FrameType | None) -> None:
         return
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
-    raise SystemExit(_TERMINATED)
+    raise SystemExit(128 + number)
 
 
 def _once_more(unraisable: Any) -> None:

@@ -93,7 +93,8 @@ def test_a_file_is_on_the_disk_before_it_gets_its_name(tmp_path: Path, monkeypat
     assert done == ["file", "name", "folder"]
 
 
-def test_a_polite_kill_leaves_no_temporary_files(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_polite_kill_or_a_lost_connection_leaves_no_temporary_files(tmp_path: Path, number: signal.Signals) -> None:
     log = tmp_path / "a.mcap.zstd"
     with log.open("wb") as stream, zstandard.ZstdCompressor().stream_writer(stream) as packer:
         packer.write(b"\x89MCAP0\r\n")
@@ -110,9 +111,9 @@ def test_a_polite_kill_leaves_no_temporary_files(tmp_path: Path) -> None:
     while not list(temporary.glob("*/*")) and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.001)
     assert process.poll() is None, "the log was read before it could be ended"
-    process.send_signal(signal.SIGTERM)
+    process.send_signal(number)
     _, err = process.communicate(timeout=20)
-    assert process.returncode == 128 + signal.SIGTERM
+    assert process.returncode == 128 + number
     assert b"Traceback" not in err
     assert not list(temporary.iterdir())
 
