@@ -6,7 +6,7 @@ comparison and verification come by it too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from care_core.causal.counterfactual import World
@@ -36,14 +36,15 @@ from care_core.diagnose.ranking import (
     not_ruled_out,
     suspects,
 )
-from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Note, ObjectiveResult
+from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Hypothesis, Note, ObjectiveResult
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
 from care_core.frozen import dataclass
 from care_core.health.records import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
-from care_core.run import LogInfo, MissionInfo, ProfileChoice, Run, Setting, is_known
+from care_core.run import Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Setting, is_known, shown
+from care_core.text import listed
 from care_core.variables import Variable
 
 MIN_CONTRIBUTION = 0.02
@@ -119,20 +120,20 @@ def diagnose(
     """Causes and fix of a run that has been judged; the arguments are those of `triage`."""
     report = progress or (lambda _step, _share: None)
     schema, broken = profile.schema, judged.broken
-    shown = speaking(health.findings, schema, judged.run.config)
-    run = replace(judged.run, evidence=(*judged.run.evidence, *shown.values()))
+    said = speaking(health.findings, schema, judged.run.config)
+    run = replace(judged.run, evidence=(*judged.run.evidence, *said.values()))
     objectives = (*judged.results, *judged.checks)
     choice = replace(choice, fit=choice.fit.but(*unusual(run, profile)))
     if not broken:
         missed = any(result.status == "fault" for result in judged.checks)
-        explained = unasked(health.findings, failed=missed, shown=shown, verdict=choice.fit.verdict)
+        explained = unasked(health.findings, failed=missed, shown=said, verdict=choice.fit.verdict)
         return Diagnosis(
             choice,
             run,
             objectives,
             (),
             None,
-            notes=() if run.checks else (_reference(judged),),
+            notes=(*_set_wrong(judged, explained, said), *(() if run.checks else (_reference(judged),))),
             missions=judged.missions,
             health=health,
             hypotheses=explained,
@@ -151,7 +152,7 @@ def diagnose(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
         for name, result in ((result.variable.name, result) for result in broken)
     )
-    hypotheses = explain(world, broken, weighed, run.refused_by, health.findings, shown, choice.fit.verdict)
+    hypotheses = explain(world, broken, weighed, run.refused_by, health.findings, said, choice.fit.verdict)
     report("searching for a fix", 0.85)
     fixes = believed(_fixes(case, {s.option for group in found.values() for s in group}), hypotheses)
     out_of_reach = next(filter(None, unheard.values()), None)
@@ -179,6 +180,19 @@ def diagnose(
         health=health,
         hypotheses=hypotheses,
     )
+
+
+def _set_wrong(judged: Judged, explained: Sequence[Hypothesis], said: Mapping[str, Evidence]) -> Iterator[str]:
+    """What a finding says of the options that explain a run of which no objective could be judged, and their values."""
+    named = {one.name for one in explained if one.what == "parameter"}
+    for title, evidence in said.items():
+        values = [
+            f"{name} {shown(judged.run.config[name])} (reference {shown(judged.reference.config.get(name))})"
+            for name in evidence.options
+            if name in named
+        ]
+        if values:
+            yield f"{title}: {evidence.says or 'it speaks of how the robot was set'}: {listed(values)}"
 
 
 def unjudged(log: LogInfo, settings: Mapping[str, Setting], choice: ProfileChoice, health: Health) -> Diagnosis:
