@@ -124,8 +124,8 @@ def test_a_steering_that_follows_its_demand_or_is_turned_by_hand_does_not_oscill
     assert not list(attitude.find(steering(demand=200.0, swing=100.0)))
 
 
-def test_a_steering_gain_that_is_too_high_is_named_where_nothing_could_be_evaluated(shared: Path) -> None:
-    found = triaged(shared / "data" / "rover" / "faults" / "h62_06_01.BIN")
+def test_a_steering_gain_that_is_too_high_is_named_where_nothing_could_be_evaluated(recorded: Path) -> None:
+    found = triaged(recorded / "data" / "rover" / "faults" / "h62_06_01.BIN")
     assert {result.status for result in found.objectives} == {"not_evaluated"}
     assert (found.hypotheses[0].what, found.hypotheses[0].name) == ("parameter", "ATC_STR_RAT_P")
     assert any("ATC_STR_RAT_P 1.86 (reference 0.2)" in note for note in found.notes)
