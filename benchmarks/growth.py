@@ -105,11 +105,12 @@ def _plot(what: str, points: Sequence[Point], left: int) -> list[str]:
         parts.append(f'<text x="{left - 6}" y="{at + 4:.1f}" text-anchor="end">{10.0**power:g} s</text>')
     line = " ".join(f"{x(point.size):.1f},{y(point.cpu_s):.1f}" for point in points)
     parts.append(f'<polyline points="{line}" fill="none" stroke="{COLOUR}" stroke-width="2"/>')
-    for point in points:
+    for number, point in enumerate(points):
+        label = (20, -9)[number % 2]  # below and above in turn: neighbours would cover each other
         across, down = x(point.size), y(point.cpu_s)
         parts.append(f'<circle cx="{across:.1f}" cy="{down:.1f}" r="4" fill="{COLOUR}"/>')
         parts.append(
-            f'<text x="{across:.1f}" y="{down - 9:.1f}" text-anchor="middle">{point.cpu_s:.0f} s,'
+            f'<text x="{across:.1f}" y="{down + label:.1f}" text-anchor="middle">{point.cpu_s:.0f} s,'
             f" {point.peak_mb:.0f} MB</text>"
         )
         below = TOP + PLOT_HEIGHT + 18
