@@ -189,7 +189,7 @@ def _set_wrong(judged: Judged, explained: Sequence[Hypothesis], said: Mapping[st
         values = [
             f"{name} {shown(judged.run.config[name])} (reference {shown(judged.reference.config.get(name))})"
             for name in evidence.options
-            if name in named
+            if name in named and name in judged.run.config
         ]
         if values:
             yield f"{title}: {evidence.says or 'it speaks of how the robot was set'}: {listed(values)}"

@@ -354,9 +354,8 @@ def _way_m(commands: Commands | None, legs: Sequence[Leg]) -> float:
     way_m = sum(one for a, b in pairwise(reached) if math.isfinite(one := math.dist((a.x, a.y), (b.x, b.y))))
     if commands is None:
         return way_m
-    ordered = np.abs(commands.speed) * commands.dt
-    under = _active(commands.t, reached)[0] >= 0
-    return max(way_m, float(ordered[under & np.isfinite(ordered)].sum()))
+    under = (_active(commands.t, reached)[0] >= 0) & np.isfinite(commands.speed) & np.isfinite(commands.dt)
+    return max(way_m, float((np.abs(commands.speed[under]) * commands.dt[under]).sum()))
 
 
 def _commands(table: Table | None, legs: Sequence[Leg]) -> Commands | None:

@@ -7,6 +7,7 @@ is the goal server's own, see `drive.GoalServer`.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -244,11 +245,18 @@ def _condensed(rows: Sequence[tuple[float, str, str]]) -> Iterator[Evidence]:
         yield Evidence(time_s, text + times, kind)
 
 
+def _is_said(level: object, name: object, text: object) -> bool:
+    return isinstance(level, (int, float)) and math.isfinite(level) and isinstance(name, str) and isinstance(text, str)
+
+
 def rosout(mission: Mission) -> Table | None:
-    """What nodes said during the mission, with levels as ROS 1 has them."""
+    """What nodes said during the mission, with levels as ROS 1 has them. What a damaged definition reads as no text, or
+    no level, was said by nobody."""
     for channel in ROSOUT:
         table = mission.table(channel)
         if table is not None and all(name in table.columns for name in ROSOUT_FIELDS):
+            said = zip(*(table[name].tolist() for name in ROSOUT_FIELDS), strict=True)
+            table = table.where(np.array([_is_said(*row) for row in said], dtype=bool))
             levels = np.array([_ROS2_LEVELS.get(int(level), int(level)) for level in table["level"]], np.float64)
             return Table(table.t, {**table.columns, "level": levels})
     return None
