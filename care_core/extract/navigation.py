@@ -455,7 +455,7 @@ def start_delay(drive: Drive, odometry: Odometry, args: Args) -> Value:
 @of_drive(_commands)
 def commanded_speed(drive: Drive, commands: Commands, args: Args) -> Value:
     """Mean commanded forward speed among commands to drive."""
-    driving = np.abs(commands.speed) >= MOVING_MPS
+    driving = np.isfinite(commands.speed) & (np.abs(commands.speed) >= MOVING_MPS)
     return float(commands.speed[driving].mean()) if driving.any() else 0.0
 
 
