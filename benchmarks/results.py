@@ -14,6 +14,7 @@ import platform
 import re
 import subprocess
 import sys
+import sysconfig
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -167,10 +168,18 @@ def section(one: Benchmark, words: list[str] | None) -> str:
         check=False,
     )
     told = f"{machine()}, {date.today().isoformat()}, commit {commit()}, {time.monotonic() - began:.0f} s"
-    printed = ended.stdout.rstrip() or "(nothing)"
-    failed = "" if ended.returncode == 0 else f"\nEnded with {ended.returncode}: {ended.stderr.strip()[-300:]}\n"
+    printed = _anywhere(ended.stdout.rstrip()) or "(nothing)"
+    failed = (
+        "" if ended.returncode == 0 else f"\nEnded with {ended.returncode}: {_anywhere(ended.stderr.strip()[-300:])}\n"
+    )
     set_to = "".join(f"{name}={value} " for name, value in one.settings)
     return f"{head}`{set_to}python -m {one.command}` ({told}):\n\n```\n{printed}\n```\n{failed}"
+
+
+def _anywhere(printed: str) -> str:
+    """A text without the folders of this machine: paths begin at the checkout, and at the packages."""
+    packages = sysconfig.get_path("purelib")
+    return printed.replace(f"{ROOT}/", "").replace(f"{packages}/", "")
 
 
 def document(sections: Iterable[str]) -> str:
