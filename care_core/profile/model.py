@@ -33,6 +33,7 @@ from care_core.causal.nominal import FORMULAS, Nominal
 from care_core.errors import ProfileError
 from care_core.files import replace_file, sync_folder
 from care_core.frozen import dataclass
+from care_core.numbers import six_digits
 from care_core.records import UnfitError, plain, read
 
 ARCHIVE = b"PK\x03\x04"
@@ -157,11 +158,11 @@ def _mechanism_record(key: str, m: Mechanism) -> _MechanismRecord:
 
 
 def _rounded(value: Any) -> Any:
-    """Six significant digits: a model file is read in reviews. Raises ValueError for a number that is not finite."""
+    """Numbers to six digits: a model file is read in reviews. Raises ValueError for one that is not finite."""
     if isinstance(value, float):
         if not math.isfinite(value):
             raise ValueError("a number of the model is not finite")
-        return float(f"{value:.6g}")
+        return six_digits(value)
     if isinstance(value, dict):
         return {key: _rounded(part) for key, part in value.items()}
     return [_rounded(part) for part in value] if isinstance(value, (list, tuple)) else value

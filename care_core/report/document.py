@@ -26,6 +26,7 @@ from care_core.diagnose.records import (
     Status,
 )
 from care_core.frozen import dataclass
+from care_core.numbers import six_digits
 from care_core.report.happened import (
     FindingEntry,
     FitEntry,
@@ -39,7 +40,7 @@ from care_core.report.happened import (
 from care_core.report.published import Strict
 from care_core.run import Evidence, ProfileChoice, Value, is_known
 from care_core.text import clean
-from care_core.variables import ASSUMED, Change, Kind, Op
+from care_core.variables import ASSUMED, Change, Kind, Op, Threshold
 
 SCHEMA_ID: Final = "care.triage/1"
 
@@ -347,6 +348,11 @@ def _finite(value: float | None) -> float | None:
     return float(value) if value is not None and math.isfinite(value) else None
 
 
+def estimate(value: float | None) -> float | None:
+    """What the model says, to six digits, None where that is no finite number."""
+    return six_digits(value) if value is not None and math.isfinite(value) else None
+
+
 def plain_number(value: float) -> int | float:
     """A whole number without its point, as configuration files have it."""
     return int(value) if float(value).is_integer() else float(value)
@@ -378,12 +384,18 @@ def objective_entry(result: ObjectiveResult) -> ObjectiveEntry:
         value=_finite(result.value),
         unit=variable.unit,
         kind=variable.kind or "non-functional",
-        threshold=None if threshold is None else ThresholdEntry(op=threshold.op, value=threshold.value),
-        needs=None if need is None else NeedEntry(value=need.value, low=need.low, high=need.high),
+        threshold=None if threshold is None else _threshold(threshold, is_estimate=bool(result.basis)),
+        needs=None
+        if need is None
+        else NeedEntry(value=six_digits(need.value), low=six_digits(need.low), high=six_digits(need.high)),
         basis=result.basis,
         status=result.status,
         reason=clean(result.reason) or None,
     )
+
+
+def _threshold(threshold: Threshold, *, is_estimate: bool) -> ThresholdEntry:
+    return ThresholdEntry(op=threshold.op, value=six_digits(threshold.value) if is_estimate else threshold.value)
 
 
 def _mission(verdict: MissionVerdict, judged: int) -> MissionEntry:
@@ -427,13 +439,13 @@ def _cause(cause: Cause, warnings: tuple[str, ...]) -> CauseEntry:
         rank=cause.rank,
         option=cause.option.name,
         path=[node.name for node in cause.path],
-        path_ace=_finite(cause.path_ace),
-        contribution=_finite(cause.contribution),
+        path_ace=estimate(cause.path_ace),
+        contribution=estimate(cause.contribution),
         current=plain_number(cause.current),
         assumed=cause.is_assumed,
         suggested=None if cause.suggested is None else plain_number(cause.suggested),
         predicted=None if cause.predicted is None else _predicted(cause.predicted),
-        p_fixed=_finite(cause.p_fixed),
+        p_fixed=estimate(cause.p_fixed),
         confidence=cause.confidence,
         edge_support=[_finite(node.support) for node in cause.path[:-1]],
         in_support=cause.in_support,
@@ -442,7 +454,7 @@ def _cause(cause: Cause, warnings: tuple[str, ...]) -> CauseEntry:
 
 
 def _predicted(prediction: Prediction) -> PredictedValue | None:
-    value, low, high = _finite(prediction.value), _finite(prediction.low), _finite(prediction.high)
+    value, low, high = estimate(prediction.value), estimate(prediction.low), estimate(prediction.high)
     if value is None or low is None or high is None:
         return None
     return PredictedValue(value=value, low=low, high=high)
@@ -473,7 +485,7 @@ def _fix_set(fix: Fix) -> FixSet:
     entries = {name: predicted_objective(prediction) for name, prediction in fix.predicted.items()}
     return FixSet(
         changes=[_change(change) for change in fix.changes],
-        p_fixed=fix.p_fixed,
+        p_fixed=six_digits(fix.p_fixed),
         guess=fix.is_guess,
         predicted={name: entry for name, entry in entries.items() if entry is not None},
     )

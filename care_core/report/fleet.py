@@ -18,7 +18,7 @@ from care_core.fleet.sources import INSTALL
 from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
 from care_core.fleet.together import Fleet
 from care_core.health.records import FindingKind, Severity
-from care_core.report.document import plain_number
+from care_core.report.document import estimate, plain_number
 from care_core.report.published import Strict
 from care_core.run import FitVerdict
 from care_core.text import clean, listed, wrapped
@@ -225,7 +225,7 @@ def _row_entries(rows: Sequence[Row]) -> list[RowEntry]:
             ],
             findings=[SeenEntry(kind=one.kind, title=one.title, severity=one.severity) for one in row.findings],
             change={name: plain_number(value) for name, value in row.change.items()},
-            p_fixed=row.p_fixed,
+            p_fixed=estimate(row.p_fixed),
             off={} if row.asked is None else {name: plain_number(row.asked.config[name]) for name in row.off},
         )
         for place, row in enumerate(rows)
@@ -298,8 +298,8 @@ def _change_entry(one: Suggestion) -> ChangeEntry:
                 name=each.name,
                 effect=each.effect,
                 fails_now=each.is_failing,
-                p_ok_now=each.now,
-                p_ok_then=each.then,
+                p_ok_now=estimate(each.now),
+                p_ok_then=estimate(each.then),
                 why=each.why,
             )
             for each in one.outlooks

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from care_core.diagnose.whatif import Answer, Outlook, Question
+from care_core.numbers import six_digits
 from care_core.report.document import (
     ObjectiveEntry,
     PredictedObjective,
     ProfileEntry,
+    estimate,
     objective_entry,
     plain_number,
     predicted_objective,
@@ -85,14 +87,14 @@ def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
             OutlookEntry(
                 objective=objective_entry(outlook.objective),
                 predicted=predicted_objective(outlook.predicted),
-                p_ok=outlook.predicted.p_ok,
-                p_ok_unchanged=outlook.now.p_ok,
+                p_ok=estimate(outlook.predicted.p_ok),
+                p_ok_unchanged=estimate(outlook.now.p_ok),
             )
             for outlook in answer.outlooks
         ],
-        p_ok=answer.p_ok,
+        p_ok=six_digits(answer.p_ok),
         guess=answer.is_guess,
-        p_ok_unchanged=answer.p_ok_now,
+        p_ok_unchanged=six_digits(answer.p_ok_now),
     )
 
 
