@@ -18,6 +18,7 @@ from care_core.fleet.sources import INSTALL
 from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
 from care_core.fleet.together import Fleet
 from care_core.health.records import FindingKind, Severity
+from care_core.numbers import six_digits
 from care_core.report.document import estimate, plain_number
 from care_core.report.published import Strict
 from care_core.run import FitVerdict
@@ -211,7 +212,7 @@ def _row_entries(rows: Sequence[Row]) -> list[RowEntry]:
             objectives=dict(row.objectives),
             breaches=list(row.breaches),
             explained=[
-                ExplainedEntry(what=one.what, name=one.name, probability=one.probability, kind=one.kind)
+                ExplainedEntry(what=one.what, name=one.name, probability=six_digits(one.probability), kind=one.kind)
                 for one in row.explained
             ],
             causes=[
@@ -350,7 +351,7 @@ def _flat(entry: RowEntry, row: Row) -> dict[str, Any]:
         **flat,
         "cause": None if main is None else main.name,
         "cause_what": None if main is None else main.what,
-        "cause_probability": None if main is None else main.probability,
+        "cause_probability": None if main is None else six_digits(main.probability),
         "causes": [one.option for one in row.causes],
         "findings": [one.title for one in row.findings],
         "change": [f"{name}={value:g}" for name, value in row.change.items()],

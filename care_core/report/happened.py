@@ -12,6 +12,7 @@ from typing import TypeVar
 from care_core.diagnose.records import Hypothesis, What
 from care_core.frozen import dataclass
 from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
+from care_core.numbers import six_digits
 from care_core.report.published import Strict
 from care_core.report.wording import SEVERITY_WORDS, hypothesis_text, noted
 from care_core.run import Fit, FitVerdict
@@ -107,7 +108,7 @@ def finding_entries(health: Health) -> list[FindingEntry]:
 
 
 def hypothesis_entries(hypotheses: Sequence[Hypothesis]) -> list[HypothesisEntry]:
-    return [HypothesisEntry(what=h.what, name=clean(h.name), probability=h.probability) for h in hypotheses]
+    return [HypothesisEntry(what=h.what, name=clean(h.name), probability=six_digits(h.probability)) for h in hypotheses]
 
 
 def _consequence(finding: Finding) -> ConsequenceEntry:
