@@ -134,7 +134,13 @@ def _row(readers: list[_Reader]) -> _Reader:
     def read(value: Any) -> Any:
         if not isinstance(value, (list, tuple)) or len(value) != len(readers):
             raise UnfitError(f"should be a list of {len(readers)}")
-        return tuple(_at(i, one, part) for i, (one, part) in enumerate(zip(readers, value, strict=True)))
+        found = []
+        try:
+            for reader, part in zip(readers, value, strict=True):
+                found.append(reader(part))
+        except ValueError as err:
+            raise _unfit(err, len(found)) from None
+        return tuple(found)
 
     return read
 
@@ -143,14 +149,27 @@ def _many(kind: type, reader: _Reader) -> _Reader:
     def read(value: Any) -> Any:
         if not isinstance(value, (list, tuple)):
             raise UnfitError("should be a list")
-        return kind(_at(i, reader, part) for i, part in enumerate(value))
+        found = []
+        try:
+            for part in value:
+                found.append(reader(part))
+        except ValueError as err:
+            raise _unfit(err, len(found)) from None
+        return kind(found)
 
     return read
 
 
 def _mapping(reader: _Reader) -> _Reader:
     def read(value: Any) -> Any:
-        return {_key(key): _at(key, reader, part) for key, part in _entries(value).items()}
+        found = {}
+        for key, part in _entries(value).items():
+            _key(key)
+            try:
+                found[key] = reader(part)
+            except ValueError as err:
+                raise _unfit(err, key) from None
+        return found
 
     return read
 
@@ -170,7 +189,10 @@ def _record(kind: type) -> _Reader:
             if key not in readers:
                 raise UnfitError("is not known", _key(key))
             name, reader = readers[key]
-            values[name] = _at(key, reader, part)
+            try:
+                values[name] = reader(part)
+            except ValueError as err:
+                raise _unfit(err, key) from None
         return kind(**values)
 
     return read
@@ -188,11 +210,6 @@ def _key(key: Any) -> str:
     return key
 
 
-def _at(place: str | int, reader: _Reader, value: Any) -> Any:
-    """What stands at a place; an error tells the way to it."""
-    try:
-        return reader(value)
-    except UnfitError as err:
-        raise UnfitError(err.message, place, *err.where) from None
-    except ValueError as err:  # of the record's own
-        raise UnfitError(str(err), place) from None
+def _unfit(err: ValueError, place: str | int) -> UnfitError:
+    """The error of what stands at a place, with the way to it; one of a record's own says only what is wrong."""
+    return UnfitError(err.message, place, *err.where) if isinstance(err, UnfitError) else UnfitError(str(err), place)

@@ -22,7 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from care_core.causal.mechanisms import FloatArray, Mechanism
+from care_core.causal.mechanisms import At, FloatArray
 from care_core.frozen import dataclass
 
 _Z = np.linspace(-6.0, 6.0, 2401)
@@ -62,15 +62,16 @@ class Kinship:
         )
 
 
-def kinship(mechanism: Mechanism, x: FloatArray, here: FloatArray, persistence: float) -> Kinship:
-    """How outcomes at x go together with those here.
+def kinship(there: At, here: At, persistence: float) -> Kinship:
+    """How outcomes at m places go together with those here, at one place.
 
     Args:
-        x: shape (m, p). here: shape (1, p). persistence: share of the noise variance, 0 to 1.
+        persistence: share of the noise variance, 0 to 1.
     """
-    noise, own = mechanism.noise_at(x) ** 2, float(mechanism.noise_at(here)[0]) ** 2
-    variance, covariance, unsure = mechanism.around(x, here)
-    free = Kinship(variance + noise, covariance, unsure + own, unsure, np.sqrt(noise * own), own)
+    mechanism = there.mechanism
+    noise, own = mechanism.noise_at(there.x) ** 2, float(mechanism.noise_at(here.x)[0]) ** 2
+    unsure = float(here.variance[0])
+    free = Kinship(there.variance + noise, there.covariance(here), unsure + own, unsure, np.sqrt(noise * own), own)
     return free.sharing(persistence)
 
 

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from care_core.causal.abduction import FARTHEST, Kinship, by_mediators, kinship, next_passes, next_value
-from care_core.causal.mechanisms import LEAST, TAIL, FloatArray, Mechanism, columns, restored, transformed
+from care_core.causal.mechanisms import LEAST, TAIL, At, FloatArray, Mechanism, columns, restored, transformed
 from care_core.causal.model import UNKNOWN_PERSISTENCE, Mediation, Model, OutcomeRecord, Persistence, StageRecord
 from care_core.frozen import dataclass
 from care_core.run import is_known
@@ -71,6 +71,7 @@ class World:
     one: what training did not show between the two is not taken for granted."""
     _told: dict[str, _Answers] = field(default_factory=dict, init=False, repr=False)
     """What was worked out already: the search asks for most configurations many times over."""
+    _asked: dict[tuple[str, bool], At] = field(default_factory=dict, init=False, repr=False)
 
     def predict(self, objective: str, configs: Sequence[Config]) -> Predicted:
         """The objective under each configuration, given what this run met."""
@@ -167,12 +168,13 @@ class World:
         mechanism = self.model.mechanisms[stage.mechanism]
 
         def ask(x: FloatArray) -> tuple[FloatArray]:
-            chance = _chance(mechanism, stage.passes, x, -self._worse(mechanism, x))
+            there = mechanism.at(x)
+            chance = _chance(there, stage.passes, -self._worse(stage.mechanism, there))
             if not passed:
                 return (chance,)
-            here = columns([self.config], mechanism.inputs)
-            kin = kinship(mechanism, x, here, self._persistence(objective))
-            expected = float(_chance(mechanism, stage.passes, here)[0])
+            here = self._at(stage.mechanism, self.config)
+            kin = kinship(there, here, self._persistence(objective))
+            expected = float(_chance(here, stage.passes)[0])
             return (np.clip(next_passes(kin, chance, expected, passed), TAIL, 1 - TAIL),)
 
         probability: FloatArray = self._once(f"{objective}/{stage.mechanism}", columns(configs, mechanism.inputs), ask)[
@@ -221,13 +223,13 @@ class World:
         bad = 1.0 if bound is None or bound.op in ("<=", "<") else -1.0
 
         def ask(x: FloatArray) -> tuple[FloatArray, ...]:
-            worse = bad * self._worse(mechanism, x)
+            there = mechanism.at(x)
+            latent = there.latent + bad * self._worse(outcome.mechanism, there)
             if not len(seen):
-                return mechanism.latent(x) + worse, np.sqrt(mechanism.latent_sd(x) ** 2 + mechanism.noise_at(x) ** 2)
-            here = columns([self.config], mechanism.inputs)
-            kin = kinship(mechanism, x, here, 0.0)
-            latent = mechanism.latent(np.vstack([x, here])) + np.append(worse, 0.0)
-            pairs = [next_value(kin.sharing(share), latent[:-1], float(latent[-1]), seen) for share in shares]
+                return latent, np.sqrt(there.variance + mechanism.noise_at(x) ** 2)
+            here = self._at(outcome.mechanism, self.config)
+            kin = kinship(there, here, 0.0)
+            pairs = [next_value(kin.sharing(share), latent, float(here.latent[0]), seen) for share in shares]
             return tuple(part for pair in pairs for part in pair)
 
         told = self._once(outcome.objective, columns(configs, mechanism.inputs), ask)
@@ -237,11 +239,19 @@ class World:
         shift, left = self._by_mediators(outcome.mediation, configs)
         return _Next(centre + sd * shift, sd * np.sqrt(left), np.ones(1))
 
-    def _worse(self, mechanism: Mechanism, x: FloatArray) -> FloatArray:
+    def _at(self, key: str, config: Config) -> At:
+        """A mechanism at this run's configuration or at the one that is known, which every question asks about."""
+        asked = key, config is self.config
+        if asked not in self._asked:
+            mechanism = self.model.mechanisms[key]
+            self._asked[asked] = mechanism.at(columns([config], mechanism.inputs))
+        return self._asked[asked]
+
+    def _worse(self, key: str, there: At) -> FloatArray:
         """What a mechanism may do beyond what it is expected to, from the configuration that is known; shape (m,)."""
         if self.wary_from is None:
-            return np.zeros(len(x))
-        return SURELY * mechanism.change(x, columns([self.wary_from], mechanism.inputs))[1]
+            return np.zeros(len(there.x))
+        return SURELY * there.change_sd(self._at(key, self.wary_from))
 
     def _by_mediators(self, mediation: Mediation | None, configs: Sequence[Config]) -> tuple[FloatArray, FloatArray]:
         """What the metrics of runs that ended before an objective had a value say of it: centre of its error and what
@@ -259,23 +269,22 @@ class World:
             seen = np.array([v for v in values if v is not None and v > LEAST[mechanism.transform]])
             if len(seen) < len(values):
                 return nothing
-            here = columns([self.config], mechanism.inputs)
-            kin.append(self._kinship_of(name, here, columns(configs, mechanism.inputs)))
-            error = transformed(seen, mechanism.transform) - mechanism.latent(here)
+            kin.append(self._kinship_of(name, columns(configs, mechanism.inputs)))
+            error = transformed(seen, mechanism.transform) - self._at(name, self.config).latent
             far = FARTHEST * np.sqrt(kin[-1].here)
             errors.append(np.clip(error, -far, far))
         return by_mediators(kin, np.array(errors).T, np.array(mediation.weights), np.array(mediation.among))
 
-    def _kinship_of(self, metric: str, here: FloatArray, x: FloatArray) -> Kinship:
-        """How the metric's errors at x (m, p) go with those here (1, p)."""
-        mechanism, persistence = self.model.mechanisms[metric], self._persistence(metric)
+    def _kinship_of(self, metric: str, x: FloatArray) -> Kinship:
+        """How the metric's errors at x (m, p) go with those here."""
+        here, persistence = self._at(metric, self.config), self._persistence(metric)
 
         def ask(rows: FloatArray) -> tuple[FloatArray, ...]:
-            kin = kinship(mechanism, rows, here, persistence)
+            kin = kinship(here.mechanism.at(rows), here, persistence)
             return kin.variance, kin.covariance
 
         variance, covariance = self._once(f"on its way/{metric}", x, ask)
-        return replace(kinship(mechanism, here, here, persistence), variance=variance, covariance=covariance)
+        return replace(kinship(here, here, persistence), variance=variance, covariance=covariance)
 
     def _behind_the_end(self) -> frozenset[str]:
         """Metrics that the graph puts behind a stage that this run failed."""
@@ -323,9 +332,9 @@ class _Next:
         return np.asarray((low + high) / 2)
 
 
-def _chance(mechanism: Mechanism, passes: float, x: FloatArray, beyond: FloatArray | float = 0.0) -> FloatArray:
+def _chance(there: At, passes: float, beyond: FloatArray | float = 0.0) -> FloatArray:
     """Probability of passing, the regression moved by `beyond` towards it."""
-    one = mechanism.probability_of(mechanism.latent(x) + (beyond if passes == 1.0 else -np.asarray(beyond)))
+    one = there.mechanism.probability_of(there.latent + (beyond if passes == 1.0 else -np.asarray(beyond)))
     return one if passes == 1.0 else 1.0 - one
 
 

@@ -178,80 +178,31 @@ class Mechanism:
         return scaled
 
     @cached_property
-    def _training(self) -> Factor:
+    def training(self) -> Factor:
+        """Of the covariance of the training outcomes."""
         covariance = self.kernel.among(self.points)
         covariance[np.diag_indices_from(covariance)] += self.kernel.noise**2 + JITTER
         return Factor.of(covariance)
 
+    def at(self, x: FloatArray) -> At:
+        """The mechanism at places x, shape (m, p)."""
+        return At(self, x)
+
     def latent(self, x: FloatArray) -> FloatArray:
         """Posterior mean on the transformed scale. x: (m, p) -> (m,)."""
-        mean: FloatArray = self.mean + self.scale * (self.kernel(self.scaled(x), self.points) @ self.weights)
-        return mean + self.known(x)
-
-    def known(self, x: FloatArray) -> FloatArray:
-        """What physics and the other platform's mechanism say, shape (m,); zero without either."""
-        latent = np.zeros(len(x))
-        if self.nominal is not None:
-            latent += np.log(self.nominal.of(self._columns(x, self.nominal.inputs)))
-        if self.prior is not None:
-            source, share = self.prior
-            latent += share * source.latent(self._columns(x, source.inputs))
-        return latent
-
-    def _columns(self, x: FloatArray, names: Sequence[str]) -> FloatArray:
-        return x[:, [self.inputs.index(name) for name in names]]
+        return self.at(x).latent
 
     def latent_sd(self, x: FloatArray) -> FloatArray:
         """Posterior standard deviation of the noise-free value, shape (m,)."""
-        own = self._known_sd(np.full(len(x), self.kernel.variance), self.kernel(self.scaled(x), self.points))
-        if self.prior is None:
-            return own
-        source, share = self.prior
-        return np.hypot(own, share * source.latent_sd(self._columns(x, source.inputs)))
+        return self.at(x).latent_sd
 
-    def change(self, x: FloatArray, here: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """f(x) - f(here) on the transformed scale: posterior mean and standard deviation, both of shape (m,).
+    def known(self, x: FloatArray) -> FloatArray:
+        """What physics and the other platform's mechanism say, shape (m,); zero without either."""
+        return self.at(x).known
 
-        What is not known at both places cancels, so a small change is known better than either value.
-
-        Args:
-            x: shape (m, p). here: shape (1, p).
-        """
-        z, origin = self.scaled(x), self.scaled(here)
-        cross = self.kernel(z, self.points) - self.kernel(origin, self.points)
-        prior = 2 * (self.kernel.variance - self.kernel(z, origin)[:, 0])
-        mean: FloatArray = self.scale * (cross @ self.weights)
-        sd = self._known_sd(prior, cross)
-        if self.prior is not None:
-            source, share = self.prior
-            places = source.inputs
-            sd = np.hypot(sd, share * source.change(self._columns(x, places), self._columns(here, places))[1])
-        return mean + self.known(x) - self.known(here), sd
-
-    def around(self, x: FloatArray, here: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-        """What is not known of the noise-free values at x (m, p) and at here (1, p): their posterior variances, shape
-        (m,) and a number, and between them the covariance, shape (m,).
-
-        What is not known of the mechanism at one place is partly what is not known at the other.
-        """
-        z = self.scaled(np.vstack([x, here]))
-        half = self._training.whitened(self.kernel(z, self.points))
-        variance = self.scale**2 * np.maximum(self.kernel.variance - (half**2).sum(axis=1), 1e-12)
-        covariance: FloatArray = self.scale**2 * (self.kernel(z[:-1], z[-1:])[:, 0] - half[:-1] @ half[-1])
-        if self.prior is None:
-            return variance[:-1], covariance, float(variance[-1])
-        source, share = self.prior
-        there, between, at_here = source.around(self._columns(x, source.inputs), self._columns(here, source.inputs))
-        return (
-            variance[:-1] + share**2 * there,
-            covariance + share**2 * between,
-            float(variance[-1]) + share**2 * at_here,
-        )
-
-    def _known_sd(self, prior: FloatArray, cross: FloatArray) -> FloatArray:
-        explained = (self._training.whitened(cross) ** 2).sum(axis=1)
-        sd: FloatArray = self.scale * np.sqrt(np.maximum(prior - explained, 1e-12))
-        return sd
+    def columns(self, x: FloatArray, names: Sequence[str]) -> FloatArray:
+        """Those of the inputs, of x (m, p)."""
+        return x[:, [self.inputs.index(name) for name in names]]
 
     def ignorance(self, x: FloatArray) -> FloatArray:
         """How little the training data say there: posterior over prior variance, 0 (known) to 1 (nothing known)."""
@@ -273,7 +224,7 @@ class Mechanism:
         """The same for missions of any number of parts, shape (m,)."""
         if self.averaging is None:
             return np.full(len(x), self.noise_sd)
-        parts = np.maximum(self._columns(x, (self.averaging.count,))[:, 0], 1.0)
+        parts = np.maximum(self.columns(x, (self.averaging.count,))[:, 0], 1.0)
         share = self.averaging.share
         return np.asarray(self.noise_sd * np.sqrt(1 - share + share * self.averaging.usual / parts))
 
@@ -307,14 +258,100 @@ class Mechanism:
         was expected there. x: (1, p). An error that no training run had is 0 or 1."""
         if value <= LEAST[self.transform]:
             return 0.0, float(self.expected(x)[0])
-        sd = np.sqrt(self.latent_sd(x) ** 2 + self.noise_at(x) ** 2)
-        z = (transformed(np.array([value]), self.transform) - self.latent(x)) / sd
+        there = self.at(x)
+        sd = np.sqrt(there.latent_sd**2 + self.noise_at(x) ** 2)
+        z = (transformed(np.array([value]), self.transform) - there.latent) / sd
         share = np.searchsorted(self.calibration, z)[0] / len(self.calibration)
-        return float(share), float(self.expected(x)[0])
+        return float(share), float(restored(there.latent, self.transform)[0])
 
     def expected(self, x: FloatArray) -> FloatArray:
         """Expected value in the target's own unit; the probability of 1 for binary targets."""
         return self.probability(x) if self.binary else restored(self.latent(x), self.transform)
+
+
+@dataclass(frozen=True, eq=False)
+class At:
+    """A mechanism at m places x, shape (m, p). The kernel, which is what costs, is asked once for all that is asked of
+    them, and nothing before it is needed."""
+
+    mechanism: Mechanism
+    x: FloatArray
+
+    @cached_property
+    def latent(self) -> FloatArray:
+        """Posterior mean on the transformed scale, shape (m,)."""
+        m = self.mechanism
+        mean: FloatArray = m.mean + m.scale * (self._cross @ m.weights)
+        return mean + self.known
+
+    @cached_property
+    def latent_sd(self) -> FloatArray:
+        """Posterior standard deviation of the noise-free value, shape (m,)."""
+        return np.sqrt(self.variance)
+
+    @cached_property
+    def variance(self) -> FloatArray:
+        """Its square, shape (m,)."""
+        m = self.mechanism
+        own: FloatArray = m.scale**2 * np.maximum(m.kernel.variance - (self._half**2).sum(axis=1), 1e-12)
+        return own if self._prior is None else own + self._prior[1] ** 2 * self._prior[0].variance
+
+    @cached_property
+    def known(self) -> FloatArray:
+        """What physics and the other platform's mechanism say, shape (m,); zero without either."""
+        latent, physics = np.zeros(len(self.x)), self.mechanism.nominal
+        if physics is not None:
+            latent += np.log(physics.of(self.mechanism.columns(self.x, physics.inputs)))
+        if self._prior is not None:
+            latent += self._prior[1] * self._prior[0].latent
+        return latent
+
+    def change_sd(self, here: At) -> FloatArray:
+        """Posterior standard deviation of f(x) - f(here), shape (m,); `here` is one place.
+
+        What is not known at both places cancels, so a small change is known better than either value.
+        """
+        m = self.mechanism
+        prior = 2 * (m.kernel.variance - m.kernel(self._z, here._z)[:, 0])
+        explained = ((self._half - here._half) ** 2).sum(axis=1)
+        sd: FloatArray = m.scale * np.sqrt(np.maximum(prior - explained, 1e-12))
+        if self._prior is None or here._prior is None:
+            return sd
+        return np.hypot(sd, self._prior[1] * self._prior[0].change_sd(here._prior[0]))
+
+    def covariance(self, here: At) -> FloatArray:
+        """Posterior covariance of the noise-free values with that of one place, shape (m,).
+
+        What is not known of the mechanism at one place is partly what is not known at the other.
+        """
+        m = self.mechanism
+        between = m.kernel(self._z, here._z)[:, 0]
+        own: FloatArray = m.scale**2 * (between - self._half @ here._half[0])
+        if self._prior is None or here._prior is None:
+            return own
+        return own + self._prior[1] ** 2 * self._prior[0].covariance(here._prior[0])
+
+    @cached_property
+    def _z(self) -> FloatArray:
+        return self.mechanism.scaled(self.x)
+
+    @cached_property
+    def _cross(self) -> FloatArray:
+        """Covariances with the training runs, shape (m, n)."""
+        return self.mechanism.kernel(self._z, self.mechanism.points)
+
+    @cached_property
+    def _half(self) -> FloatArray:
+        """The same, whitened: products of its rows are covariances that the training runs explain."""
+        return self.mechanism.training.whitened(self._cross)
+
+    @cached_property
+    def _prior(self) -> tuple[At, float] | None:
+        """The other platform's mechanism there, and the share of it that is kept."""
+        if self.mechanism.prior is None:
+            return None
+        source, share = self.mechanism.prior
+        return source.at(self.mechanism.columns(self.x, source.inputs)), share
 
 
 def solve(kernel: Kernel, points: FloatArray, targets: FloatArray) -> FloatArray:

@@ -43,7 +43,7 @@ def rank_paths(
     if objective not in graph.nodes:
         raise ValueError(f"unknown objective {objective!r}")
     index = {node: i for i, node in enumerate(graph.nodes)}
-    usable = {edge: abs(weight[edge]) for edge in graph.directed if edge in weight}
+    usable = {edge: abs(value) for edge, value in weight.items() if edge in graph.directed}
     ahead = _best_sums(index, sources, usable)
     lengths = np.arange(len(ahead))
     found: list[CausalPath] = []

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Collection, Container, Sequence
+from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from itertools import permutations
 
 import numpy as np
 
 from care_core.causal.counterfactual import Config, World
-from care_core.causal.graph import CausalGraph, Edge
+from care_core.causal.graph import Edge
 from care_core.causal.mechanisms import FloatArray, columns
 from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, rank_paths
@@ -147,14 +147,16 @@ def best_paths(
     Args:
         mediators: metrics that may have carried this run's fault; all when None.
     """
-    weight = {edge: record.effect * record.support for edge, record in model.edges.items()}
-    whole = model.graph.directed
-    met = frozenset(edge for edge in whole if mediators is None or edge[1] in mediators or edge[1] == objective)
-    felt = frozenset(edge for edge in whole if weight[edge] >= FELT)
-    graphs = [CausalGraph(model.graph.nodes, edges) for edges in (met & felt, met, felt, whole)]
+    whole = {edge: record.effect * record.support for edge, record in model.edges.items()}
+    felt = {edge: value for edge, value in whole.items() if value >= FELT}
+
+    def met(weight: Mapping[Edge, float]) -> dict[Edge, float]:
+        return {e: v for e, v in weight.items() if mediators is None or e[1] in mediators or e[1] == objective}
+
+    weights = (met(felt), met(whole), felt, whole)
     found: dict[str, CausalPath] = {}
     for option in options:
-        paths = next(filter(None, (rank_paths(graph, objective, [option], weight, top=1) for graph in graphs)), None)
+        paths = next(filter(None, (rank_paths(model.graph, objective, [option], w, top=1) for w in weights)), None)
         if paths:
             effects = [model.edges[edge].effect for edge in paths[0].edges]
             found[option] = CausalPath(paths[0].nodes, sum(effects) / len(effects))

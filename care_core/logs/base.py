@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from care_core.frozen import dataclass
 from care_core.run import Damage, Setting
@@ -48,12 +49,13 @@ class Channel:
 Kind = Literal["number", "text", "other"]
 
 
-@runtime_checkable
-class LazyColumns(Protocol):
+class LazyColumns(Mapping[str, Any]):
     """Columns that a reader decodes only when they are asked for, and then only the rows that are left."""
 
+    @abstractmethod
     def where(self, mask: NDArray[np.bool_] | slice) -> Mapping[str, NDArray[Any]]: ...
 
+    @abstractmethod
     def kind(self, name: str) -> Kind: ...
 
 

@@ -21,7 +21,7 @@ from care_core import limits
 from care_core.errors import LogError
 from care_core.frozen import dataclass
 from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, shortest, wall_clock
-from care_core.logs.base import Channel, Kind, LogFormat, Table, Wanted
+from care_core.logs.base import Channel, Kind, LazyColumns, LogFormat, Table, Wanted
 from care_core.logs.clock import Clock, find_clock
 from care_core.logs.damage import summarised
 from care_core.logs.mapped import FileArray, Offsets
@@ -100,7 +100,7 @@ class _Values:
         return found
 
 
-class _RecordColumns(Mapping[str, NDArray[Any]]):
+class _RecordColumns(LazyColumns):
     """Columns of records of one layout. Numbers are made of what is stored each time they are asked for. Text is slow
     to decode and rare, so it is kept."""
 
