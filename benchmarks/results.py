@@ -111,7 +111,7 @@ BENCHMARKS = (
     Benchmark("fuzz", "tests.fuzzing --seconds 60", "no finding in any target", "none"),
     Benchmark(
         "mutate",
-        "tests.mutating --count 1200 samples/arducopter_failed.BIN samples/ardurover_failed.BIN"
+        "tests.mutating --count 3000 samples/arducopter_failed.BIN samples/ardurover_failed.BIN"
         " samples/move_base_drive.bag samples/nav2_failed.mcap",
         "no traceback, no death, 1 GB and 20 s",
         "none",
