@@ -277,6 +277,29 @@ def test_messages_are_counted_and_condensed() -> None:
     assert (evidence.kind, evidence.time_s) == ("planner", 11)
 
 
+def test_what_a_damaged_definition_reads_is_said_by_nobody() -> None:
+    failed = "DWA planner failed to produce path."
+    rows: list[tuple[object, ...]] = [
+        (4.0, "/move_base", 7.5),
+        (4.0, 1.0, failed),
+        (math.nan, "/move_base", failed),
+        (4.0, "/move_base", failed.encode()),
+        (4.0, "/move_base", failed),
+    ]
+    one = mission(drive(rosout=table([11, 12, 13, 14, 15], ROSOUT_FIELDS, rows)))
+    assert value("rosout_count", one, text="planner failed") == 1
+    assert [(evidence.time_s, evidence.text) for evidence in KIND.evidence(one)] == [(15, failed)]
+
+
+def test_commands_that_are_no_numbers_go_no_way() -> None:
+    some = drive()["/cmd_vel"]
+    column = next(name for name in some.columns if name.endswith("linear.x"))
+    speeds = some[column].copy()
+    speeds[::2] = math.nan
+    damaged = drive(cmd_vel=with_columns(some, **{column: speeds}))
+    assert value("commanded_speed", mission(damaged)) == pytest.approx(0.2)
+
+
 def test_recoveries() -> None:
     names = ("conservative_reset", "rotate_recovery", "rotate_recovery")
     ran = table([12, 13, 14], RECOVERY_FIELDS, [(name,) for name in names])
