@@ -295,7 +295,7 @@ def test_commands_that_are_no_numbers_go_no_way() -> None:
     some = drive()["/cmd_vel"]
     column = next(name for name in some.columns if name.endswith("linear.x"))
     speeds = some[column].copy()
-    speeds[::2] = math.nan
+    speeds[::2] = math.inf
     damaged = drive(cmd_vel=with_columns(some, **{column: speeds}))
     assert value("commanded_speed", mission(damaged)) == pytest.approx(0.2)
 
