@@ -87,13 +87,14 @@ class Reading:
     choice: ProfileChoice
     configs: tuple[ConfigFile, ...]
     judged: Judged
+    health: Health
 
     @cached_property
     def question(self) -> Question:
         """The run ready to be asked what other options would have done."""
         from care_core.diagnose.whatif import question
 
-        return question(self.judged, self.profile, self.choice)
+        return question(self.judged, self.profile, self.choice, self.health)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,25 +146,26 @@ def open_case(request: Request, progress: Progress) -> Case:
         reading = None
         if profile is not None:
             try:
-                reading = _read(log, profile, choice, request, configs, progress, sha256)
+                reading = _read(log, profile, choice, health, request, configs, progress, sha256)
             except NoMissionError as err:
                 reason = err.message[:1].lower() + err.message[1:].rstrip(".")
                 choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, reason)))
         if reading is None:
             diagnosis = _of_robot(_plainly(log, choice, health, request, sha256), log, request)
             return Case(diagnosis, (), log, None, request.configs)
-        diagnosis = _of_robot(_diagnose(reading, health, request, progress), log, request)
+        diagnosis = _of_robot(_diagnose(reading, request, progress), log, request)
     return Case(diagnosis, reading.profile.schema.options, log, reading, request.configs)
 
 
 def read_case(request: Request, progress: Progress) -> Reading:
     """The first half of the line: a judged run, whose faults nobody asked about. Raises CareError."""
     from care_core.configs.loading import read_configs
+    from care_core.health.examine import examine
 
     configs = read_configs(request.configs)
     with opened(request.log) as (log, sha256):
         profile, choice = fitting(log, request.profile)
-        return _read(log, profile, choice, request, configs, progress, sha256)
+        return _read(log, profile, choice, examine(log), request, configs, progress, sha256)
 
 
 def _of_robot(diagnosis: Diagnosis, log: Log, request: Request) -> Diagnosis:
@@ -234,6 +236,7 @@ def _read(
     log: Log,
     profile: Profile,
     choice: ProfileChoice,
+    health: Health,
     request: Request,
     configs: tuple[ConfigFile, ...],
     progress: Progress,
@@ -253,7 +256,7 @@ def _read(
             repeats.append(
                 read_and_judge(other, profile, configs=configs, thresholds=request.thresholds, good=good, sha256=digest)
             )
-    return Reading(profile, choice, configs, with_repeats(judged, repeats))
+    return Reading(profile, choice, configs, with_repeats(judged, repeats), health)
 
 
 def with_own_limits(profile: Profile, site: Path | None) -> Profile:
@@ -285,7 +288,7 @@ def _good(request: Request, profile: Profile) -> Good | None:
     return Good({name: history[-1] for name, history in open_log(path).settings().items()}, source)
 
 
-def _diagnose(reading: Reading, health: Health, request: Request, progress: Progress) -> Diagnosis:
+def _diagnose(reading: Reading, request: Request, progress: Progress) -> Diagnosis:
     from care_core.diagnose.triage import triage
     from care_core.logs.opening import open_log
 
@@ -296,7 +299,7 @@ def _diagnose(reading: Reading, health: Health, request: Request, progress: Prog
         reading.choice,
         keep=request.keep,
         since=None if request.since is None else open_log(request.since),
-        health=health,
+        health=reading.health,
         top=request.top,
         progress=progress,
     )

@@ -8,6 +8,7 @@ from typing import Literal
 
 from care_core.frozen import dataclass
 from care_core.health.records import NOTHING_SEEN, Health, Severity
+from care_core.health.telling import lost_by
 from care_core.run import FitVerdict, MissionInfo, ProfileChoice, Run, shown
 from care_core.text import figures
 from care_core.variables import Change, Threshold, Variable
@@ -287,6 +288,11 @@ class Diagnosis:
     health: Health = NOTHING_SEEN
     hypotheses: tuple[Hypothesis, ...] = ()
     """What explains the failure, the likeliest first; empty where nothing failed."""
+
+    @property
+    def lost_by(self) -> tuple[str, ...]:
+        """What lost the run and no prediction knows of."""
+        return lost_by(self.health.findings, is_judged=bool(self.faults))
 
     @property
     def status(self) -> Status:

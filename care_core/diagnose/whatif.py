@@ -11,6 +11,8 @@ from care_core.diagnose.fixes import change_notes, prediction
 from care_core.diagnose.judging import Judged, world_of
 from care_core.diagnose.records import ObjectiveResult, Prediction
 from care_core.errors import UsageError, nearest
+from care_core.health.records import NOTHING_SEEN, Health
+from care_core.health.telling import lost_by
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.run import ProfileChoice, Run, Setting
@@ -54,6 +56,8 @@ class Question:
     run: Run
     world: World
     objectives: tuple[ObjectiveResult, ...]
+    lost_by: tuple[str, ...] = ()
+    """What this run was lost by and no prediction knows of."""
 
     def ask(self, changes: Mapping[str, float]) -> Answer:
         """The prediction for this run with these options changed; option names must be the profile's."""
@@ -102,7 +106,7 @@ class Question:
         return (*found, *change_notes(option))
 
 
-def question(judged: Judged, profile: Profile, choice: ProfileChoice) -> Question:
+def question(judged: Judged, profile: Profile, choice: ProfileChoice, health: Health = NOTHING_SEEN) -> Question:
     """Get a run ready to be asked. Raises UsageError for one without a mission, whose outcome nobody can predict."""
     if judged.run.checks:
         raise UsageError("No mission was flown, so no outcome of one can be predicted.", hint=NO_MISSION_HINT)
@@ -112,6 +116,7 @@ def question(judged: Judged, profile: Profile, choice: ProfileChoice) -> Questio
         run=judged.run,
         world=world_of(judged, profile),
         objectives=judged.results,
+        lost_by=lost_by(health.findings, is_judged=bool(judged.broken)),
     )
     asked.ask({})  # The mechanisms invert their covariance when first asked, which nobody should wait for at a key.
     return asked

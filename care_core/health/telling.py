@@ -48,6 +48,19 @@ def told(findings: Iterable[Finding], leads: Leads, impact_s: float | None = Non
     return tuple(replace(root, consequences=tuple(sorted(below, key=lambda f: f.onset_s))) for root, below in roots)
 
 
+def lost_by(findings: Iterable[Finding], *, is_judged: bool) -> tuple[str, ...]:
+    """By title, what lost a run and no prediction from its options knows of: whether it happens again, they cannot say.
+
+    Args:
+        is_judged: whether an objective was found broken. Predictions know of that, and so of its symptoms and of what
+            speaks of a parameter.
+    """
+    critical = [one for one in findings if one.severity == "critical" and not one.after_impact]
+    return tuple(
+        one.title for one in critical if not (is_judged and (one.suspect == "parameter" or one.kind in SYMPTOMS))
+    )
+
+
 def _place(finding: Finding, every: Iterable[Finding], reach: Leads) -> tuple[bool, int, bool, bool, float, bool]:
     """Sorts findings: one whose cause was seen within the slack after it comes after that cause."""
     causes = (

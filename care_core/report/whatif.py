@@ -23,7 +23,7 @@ from care_core.report.happened import FitEntry, fit_entry
 from care_core.report.published import Strict
 from care_core.report.wording import chance, fit_text
 from care_core.report.writers import STATUS_WORDS
-from care_core.text import clean, wrapped
+from care_core.text import clean, listed, wrapped
 
 SCHEMA_ID: Final = "care.whatif/1"
 
@@ -60,6 +60,8 @@ class WhatIfDocument(Strict):
     guess: bool
     """Whether a value is one that no training run came near."""
     p_ok_unchanged: float
+    lost_by: list[str] = field(default_factory=list)
+    """What this run was lost by: the probabilities are those of a run that it does not happen to."""
 
 
 def whatif_schema() -> dict[str, Any]:
@@ -95,6 +97,7 @@ def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
         p_ok=six_digits(answer.p_ok),
         guess=answer.is_guess,
         p_ok_unchanged=six_digits(answer.p_ok_now),
+        lost_by=[clean(title) for title in question.lost_by],
     )
 
 
@@ -128,6 +131,7 @@ def _lines(question: Question, answer: Answer) -> Iterator[str]:
     yield from wrapped(
         f"{chance(answer.p_ok, answer.is_guess)} that all objectives are met with the change, "
         f"{answer.p_ok_now:.0%} if the same configuration runs again"
+        + (f", unless it happens again: {clean(listed(question.lost_by))}" if question.lost_by else "")
     )
 
 

@@ -120,13 +120,14 @@ class CausesPage(DiagnosisPage):
         cause, hypothesis = self.ranked()[index]
         if cause is None or result is None:
             assert hypothesis is not None
-            return Rows(hypothesis_rows(hypothesis, self._finding(hypothesis)))
+            return Rows(hypothesis_rows(hypothesis, self._finding(hypothesis), session.diagnosis.notes))
         model = session.case.model
         effect = model.effects.get((cause.option.name, result.variable.name)) if model else None
         return cause_detail(cause, session.causes, result, effect, session.diagnosis, session.dismissed, self.glyphs)
 
     def open(self, index: int | None) -> None:
-        self.session.option = self.option_at(index)
+        one = None if index is None else self.ranked()[index].hypothesis
+        self.session.option = one.name if one is not None and one.what == "parameter" else self.option_at(index)
         self.walk.action_go(4)
 
     def next_fault(self) -> None:

@@ -13,7 +13,7 @@ from care_tui.basket import nudged, parsed, possible
 from care_tui.pages.page import View
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.fix import no_fix_rows, option_item, option_rows, outcome_rows
-from care_tui.render.rows import Row, Rows, error_rows, heading, percent
+from care_tui.render.rows import Row, Rows, error_rows, heading, percent, warning
 from care_tui.screens.prompt import Prompt
 from care_tui.widgets.choices import Listing
 
@@ -67,15 +67,16 @@ class FixPage(DiagnosisPage):
         count = len(session.basket.ticked)
         shown = session.fix if count else session.unchanged
         probability = "..." if shown is None else percent(shown.p_fixed)
+        again = Content.styled(" unless it happens again", "$text-warning") if session.diagnosis.lost_by else Content()
         if not count:
             return Content.assemble(
-                "Probability of no fault ", (probability, "bold"), " as driven", ("  nothing ticked", "dim")
+                "Probability of no fault ", (probability, "bold"), " as driven", again, ("  nothing ticked", "dim")
             )
         changes = f"{count} change{'' if count == 1 else 's'}"
         now = "" if session.unchanged is None else f"  (as driven {percent(session.unchanged.p_fixed)})"
         outside = " a guess, outside the training runs" if shown is not None and shown.is_guess else ""
         return Content.assemble(
-            "Probability of no fault ", (probability, "bold"), outside, now, (f"  {changes}", "dim")
+            "Probability of no fault ", (probability, "bold"), outside, again, now, (f"  {changes}", "dim")
         )
 
     def _detail(self, option: Variable | None) -> Rows:
@@ -92,6 +93,7 @@ class FixPage(DiagnosisPage):
                 rows.append(Row(Content()))
             rows.append(heading(f"Predicted {'with what is ticked' if ticked else 'as driven'}, 80 % interval"))
             rows += outcome_rows(shown, session.diagnosis.objectives, self.glyphs)
+            rows += [warning("Unless", f"it happens again: {title}") for title in session.diagnosis.lost_by]
         if option is not None:
             rows += [Row(Content()), *option_rows(option, self._caveats(option), self.glyphs)]
         return Rows(rows)

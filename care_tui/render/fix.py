@@ -8,7 +8,7 @@ from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Fix, ObjectiveResult, Prediction
 from care_core.run import Run
-from care_core.text import clean
+from care_core.text import clean, listed
 from care_core.variables import Variable
 from care_tui.basket import possible
 from care_tui.render.rows import (
@@ -99,6 +99,8 @@ def no_fix_rows(diagnosis: Diagnosis) -> Rows:
         return Rows([Row(Content("No fix is suggested.")), warning("Reason", diagnosis.abstained)])
     if diagnosis.faults:
         return Rows([Row(Content("No change of options is predicted to keep all thresholds."))])
+    if lost_by := diagnosis.lost_by:
+        return Rows([Row(text(f"What went wrong is no objective: {listed(lost_by)}. No change is suggested."))])
     if all(objective.status == "ok" for objective in diagnosis.objectives):
         return Rows([Row(Content("No fault was found: there is nothing to change."))])
     return Rows([Row(Content("No fault was found, but not everything could be evaluated: no change is suggested."))])

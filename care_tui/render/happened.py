@@ -159,9 +159,10 @@ def hypothesis_item(one: Hypothesis, finding: Finding | None) -> tuple[Content, 
     return head, Content(f"      {kind[one.what]}{when}" if one.name and one.what in kind else "")
 
 
-def hypothesis_rows(one: Hypothesis, finding: Finding | None) -> list[Row]:
-    """All about an explanation."""
+def hypothesis_rows(one: Hypothesis, finding: Finding | None, notes: Sequence[str] = ()) -> list[Row]:
+    """All about an explanation, with the notes of the diagnosis that name it."""
     rows = [] if finding is None else [*finding_rows(finding), Row(Content())]
     if one.what in ("hardware", "world"):
         rows.append(warning("No parameter", "as far as this explains it, no change of a parameter helps"))
-    return [labelled("Probability", percent(one.probability)), *rows]
+    said = [warning("Note", note) for note in notes if one.what == "parameter" and one.name in note]
+    return [labelled("Probability", percent(one.probability)), *said, *rows]

@@ -234,3 +234,27 @@ async def test_no_pane_is_wider_than_its_terminal(
                     assert all(pane.line(y).cell_length <= pane.size.width for y in range(pane.line_count))
             screen = "\n".join(strip.text for strip in app.screen._compositor.render_strips())
             assert "\x1b" not in screen
+
+
+async def test_no_odds_are_told_without_what_no_prediction_knows_of(make_app: MakeApp) -> None:
+    app = make_app(sample.crashed())
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "4")
+        assert "unless it happens again" in title(app)
+        assert "Unless      it happens again: motor 2 lost thrust" in text(app)
+    note = "the steering oscillates: a gain is too high: LAND_SPEED 60 (reference 50)"
+    lost = replace(
+        sample.all_ok(),
+        health=sample.HEALTH,
+        hypotheses=(Hypothesis("parameter", "LAND_SPEED", 0.9), Hypothesis("chance", "", 0.1)),
+        notes=(note, "another thing"),
+    )
+    app = make_app(lost)
+    async with app.run_test(size=(120, 40)) as pilot:
+        await settle(pilot, "3")
+        assert f"Note        {note}" in " ".join(text(app).split("\n"))
+        assert "another thing" not in text(app)
+        await settle(pilot, "enter")
+        assert "LAND_SPEED  " in text(app), "the cursor is on it"
+        assert text(app).startswith("What went wrong is no objective: motor 2 lost thrust")
+        assert "unless it happens again" in title(app)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.health.records import Finding, FindingKind, Severity
-from care_core.health.telling import OVER_S, SLACK_S, Leads, told
+from care_core.health.telling import OVER_S, SLACK_S, Leads, lost_by, told
 
 LEADS: Leads = {"laser": frozenset({"planner"}), "planner": frozenset({"control"}), "battery": frozenset({"drive"})}
 KINDS: tuple[FindingKind, ...] = ("laser", "planner", "control", "battery", "drive")
@@ -77,3 +77,15 @@ def test_every_finding_is_told_once(given_ones: list[tuple[FindingKind, float, S
     findings = [finding(*one) for one in given_ones]
     said = [(one.kind, one.onset_s) for root in told(findings, LEADS) for one in (root, *root.consequences)]
     assert sorted(said) == sorted((one.kind, one.onset_s) for one in findings)
+
+
+def test_predictions_know_of_a_broken_objective_and_of_no_part() -> None:
+    seen = [
+        finding("motor", 5.0),
+        finding("crash", 6.0),
+        replace(finding("tuning", 7.0), suspect="parameter"),
+        finding("gps", 8.0, "warning"),
+        replace(finding("battery", 9.0), after_impact=True),
+    ]
+    assert lost_by(seen, is_judged=True) == ("motor",)
+    assert lost_by(seen, is_judged=False) == ("motor", "crash", "tuning")

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from care_core.diagnose.judging import judge
 from care_core.diagnose.whatif import Question, parse_change, question
 from care_core.errors import UsageError
+from care_core.health.records import Finding, Health
 from care_core.profile.store import Profile
 from care_core.report.whatif import whatif_document, whatif_text
 from care_core.run import ProfileChoice
@@ -76,6 +77,14 @@ def test_a_run_without_a_fault_can_be_asked(planted: Profile) -> None:
     asked = question(judge(planted_run(), SCHEMA, planted.model), planted, CHOICE)
     assert all(result.status == "ok" for result in asked.objectives)
     assert asked.ask({"speed": 1.2}).p_ok < asked.ask({}).p_ok
+
+
+def test_odds_are_told_with_what_lost_the_run_and_no_prediction_knows_of(planted: Profile) -> None:
+    motor = Finding("motor", "motor 2 lost thrust", 5.0, 9.0, "critical", "", "")
+    asked = question(judge(planted_run(), SCHEMA, planted.model), planted, CHOICE, Health("", (), (motor,)))
+    answer = asked.ask({"speed": 2.0})
+    assert "unless it happens again: motor 2 lost thrust" in " ".join(whatif_text(asked, answer).split())
+    assert whatif_document(asked, answer).lost_by == ["motor 2 lost thrust"]
 
 
 @pytest.mark.parametrize(
