@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
-from threadpoolctl import threadpool_limits
 
 from care_core.causal.graph import Edge
 from care_core.errors import LearningError
+from care_core.learn.processes import answers
 from care_core.learn.structure import learn_structure
 from care_core.profile.schema import Schema
 
@@ -53,9 +53,8 @@ def support(
         n_jobs: processes.
     """
     seeds = rng.bit_generator.seed_seq.spawn(resamples)  # type: ignore[attr-defined]  # numpy's stub lacks spawn
-    tasks = (delayed(_findings)(frame, schema, seed, alpha) for seed in seeds)
     counts: Counter[Finding] = Counter()
-    for findings in Parallel(n_jobs=min(n_jobs, resamples))(tasks) if resamples else ():
+    for findings in answers([partial(_findings, frame, schema, seed, alpha) for seed in seeds], n_jobs):
         counts.update(findings)
     return {finding: count / resamples for finding, count in counts.items()}
 
@@ -65,8 +64,7 @@ def _findings(frame: pd.DataFrame, schema: Schema, seed: np.random.SeedSequence,
     rows = rng.choice(len(frame), size=round(SHARE * len(frame)), replace=False)
     resample = frame.iloc[np.sort(rows)].reset_index(drop=True)
     try:
-        with threadpool_limits(1):  # as many resamples at once as processes; the last digits depend on the threads
-            graph = learn_structure(resample, schema, alpha=alpha, rng=rng).graph
+        graph = learn_structure(resample, schema, alpha=alpha, rng=rng).graph
     except LearningError:  # a rare outcome may be in no run of the resample
         return ()
     options = {option.name for option in schema.options}

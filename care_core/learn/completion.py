@@ -21,6 +21,7 @@ from care_core.learn.constraints import Constraints
 from care_core.learn.outcomes import find_stages
 from care_core.learn.regression import Regressions
 from care_core.learn.screening import discoveries
+from care_core.learn.table import varying
 from care_core.profile.schema import Schema
 from care_core.variables import Variable
 
@@ -66,8 +67,8 @@ class _Completer:
         self.regressions = Regressions(frame)
         self.options = [*options, *((c.name for c in schema.contexts) if schema.observational else ())]
         self.constraints = Constraints.of(schema)
-        self.metrics = [m.name for m in schema.metrics if frame[m.name].nunique() > 1]
-        self.objectives = [o.name for o in schema.objectives if frame[o.name].nunique() > 1]
+        self.metrics = varying(frame, [m.name for m in schema.metrics])
+        self.objectives = varying(frame, [o.name for o in schema.objectives])
         self.direct: list[DirectEdge] = []
         self.notes: list[str] = []
 

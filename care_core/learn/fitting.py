@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,16 @@ PAIRS = 4096
 MIN_ROWS = 20
 
 
+Rows = NDArray[np.int64] | slice
+
+
+class Fold(NamedTuple):
+    """Runs that are left out, shape (n,), and which of the others a fit keeps."""
+
+    out: NDArray[np.bool_]
+    kept: Rows
+
+
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """A mechanism, and how badly it predicts runs that it does not know: mean negative log likelihood."""
@@ -86,8 +97,9 @@ def fit_mechanism(
     effort: Effort = OUTCOME,
     transform: Transform | None = None,
 ) -> Mechanism:
-    """The mechanism of `fit`, for runs that are each a mission of their own and a target without a nominal."""
-    return fit(x, y, inputs, binary=binary, rng=rng, effort=effort, transform=transform).mechanism
+    """The mechanism of `fit` on as many runs as it keeps, each a mission of its own, for a target without a nominal."""
+    kept = drawn(len(y), effort, rng)
+    return fit(x[kept], y[kept], inputs, binary=binary, effort=effort, transform=transform).mechanism
 
 
 def fit(
@@ -96,7 +108,6 @@ def fit(
     inputs: Inputs,
     *,
     binary: bool,
-    rng: np.random.Generator,
     effort: Effort = OUTCOME,
     transform: Transform | None = None,
     groups: NDArray[np.int64] | None = None,
@@ -104,8 +115,8 @@ def fit(
     """Fit one mechanism.
 
     Args:
-        x: shape (n, p), inputs in their own units. y: shape (n,), 0 or 1 when `binary`. No NaN.
-        rng: only used to thin tables of more than `effort.points` rows.
+        x: shape (n, p), inputs in their own units. y: shape (n,), 0 or 1 when `binary`. No NaN. All n are kept: see
+            `drawn`.
         transform: the scale of the target, `best_transform` when None.
         groups: shape (n,), runs that are left out together have one number (`relative.left_out_together`). Errors are
             those of a model that knows no run of the same number; each run is its own when None.
@@ -115,10 +126,6 @@ def fit(
     """
     if len(y) < MIN_ROWS:
         raise LearningError(f"A mechanism needs {MIN_ROWS} runs, the table has {len(y)}.", hint="Record more missions.")
-    if len(y) > effort.points:
-        keep = np.sort(rng.choice(len(y), effort.points, replace=False))
-        x, y = x[keep], y[keep]
-        groups = None if groups is None else groups[keep]
     nominal = inputs.nominal
     if nominal is not None:
         transform = "log"
@@ -160,15 +167,36 @@ def fit(
     return Fitted(mechanism, _loss(mechanism, errors, error_sd))
 
 
+def drawn(n: int, effort: Effort, rng: np.random.Generator) -> Rows:
+    """The rows that a fit keeps of n."""
+    return slice(None) if n <= effort.points else np.sort(rng.choice(n, effort.points, replace=False))
+
+
+def drawn_folds(groups: NDArray[np.int64], effort: Effort, rng: np.random.Generator) -> tuple[Fold, ...]:
+    """Which runs are left out in turn, those of one number together; none where there are too few.
+
+    Args:
+        groups: as for `fit`.
+    """
+    numbers, place = np.unique(groups, return_inverse=True)
+    if effort.folds < 2 or len(numbers) < 2 * effort.folds:
+        return ()
+    fold = (rng.permutation(len(numbers)) % effort.folds)[place.ravel()]
+    if len(groups) - np.bincount(fold).max() < MIN_ROWS:
+        return ()
+    out = [fold == k for k in range(effort.folds)]
+    return tuple(Fold(own, drawn(int((~own).sum()), effort, rng)) for own in out)
+
+
 def tested_on_runs_left_out(
     mechanism: Mechanism,
     x: FloatArray,
     y: FloatArray,
     inputs: Inputs,
     *,
-    rng: np.random.Generator,
     effort: Effort,
     groups: NDArray[np.int64],
+    folds: Sequence[Fold],
 ) -> Mechanism:
     """The mechanism with the errors of mechanisms that were fitted without the runs they are tested on.
 
@@ -178,22 +206,18 @@ def tested_on_runs_left_out(
     they promise as far as the next run is one like these.
 
     Args:
-        x, y, inputs, groups: as for `fit`; `mechanism` is what it made of them.
+        x, y, inputs, groups: of all runs, as for `fit`; `mechanism` is what it made of those that it keeps.
+        folds: of `drawn_folds`. Without any the mechanism stays as it is.
     """
-    numbers, place = np.unique(groups, return_inverse=True)
-    if mechanism.binary or effort.folds < 2 or len(numbers) < 2 * effort.folds:
-        return mechanism
-    fold = (rng.permutation(len(numbers)) % effort.folds)[place.ravel()]
-    if len(y) - np.bincount(fold).max() < MIN_ROWS:
+    if not folds:
         return mechanism
     read = np.zeros(len(inputs.names), dtype=bool)
     read[mechanism.reads] = True
     errors = np.empty(len(y))
-    for k in range(effort.folds):
-        out = fold == k
+    for out, kept in folds:
         others = fit(
-            x[~out], y[~out], replace(inputs, read=read), binary=False, rng=rng, effort=effort,
-            transform=mechanism.transform, groups=groups[~out],
+            x[~out][kept], y[~out][kept], replace(inputs, read=read), binary=False, effort=effort,
+            transform=mechanism.transform, groups=groups[~out][kept],
         ).mechanism  # fmt: skip
         sd = np.sqrt(others.latent_sd(x[out]) ** 2 + others.noise_sd**2)
         errors[out] = (transformed(y[out], mechanism.transform) - others.latent(x[out])) / sd
@@ -230,13 +254,11 @@ def _fit_kernel(points: FloatArray, targets: FloatArray, iterations: int, least_
     p = points.shape[1]
     if p == 0 or np.ptp(targets) == 0:
         return Kernel(np.zeros(p), 0.0, 0.0, 1.0)
-    squared = _pairs(points)
     start = np.r_[np.full(p, np.log(0.3)), 0.0, 0.0, np.log(0.5)]
     bounds = [(max(-6.0, np.log(max(least, 1e-9))), 2.0)] * p + [(-4.0, 3.0)] * 2 + [(np.log(least_noise), 1.0)]
     best = minimize(
-        _negative_log_posterior,
+        _Posterior(points, targets),
         start,
-        args=(squared, targets),
         jac=True,
         method="L-BFGS-B",
         bounds=bounds,
@@ -269,55 +291,85 @@ def _pairs(points: FloatArray) -> FloatArray:
     return squared
 
 
-def _negative_log_posterior(
-    log_theta: FloatArray, squared: FloatArray, targets: FloatArray
-) -> tuple[float, FloatArray]:
-    """Value and gradient with respect to the logarithms of (relevances, additive, joint, noise).
+class _Posterior:
+    """The negative logarithm of the posterior of a kernel, to be minimised.
 
-    Args:
-        squared: of `_pairs`; a point and itself are at no distance, so their part of each sum is known.
+    It keeps the memory that it works in: an optimiser asks a hundred times, and pages that are new each time cost more
+    than all sums.
     """
-    n, p = len(targets), len(squared)
-    below = _below(n)
-    relevance, (additive, joint, noise) = np.exp(log_theta[:p]), np.exp(log_theta[p:])
-    together, mean_each, leaning = _kernel_of_pairs(relevance, squared)
-    covariance = np.zeros((n, n))
-    covariance[below] = additive**2 * mean_each + joint**2 * together
-    np.fill_diagonal(covariance, additive**2 + joint**2 + noise**2 + JITTER)
-    chol, failed = dpotrf(covariance, lower=1)
-    if failed:
-        return 1e10, np.zeros_like(log_theta)
-    inverse, _ = dpotri(chol, lower=1)  # below the diagonal
-    alpha, _ = dpotrs(chol, targets, lower=1)
-    value = 0.5 * targets @ alpha + np.log(np.diag(chol)).sum()
-    # Each pair stands for two places of the symmetric matrix.
-    sensitivity = inverse[below] - alpha[below[0]] * alpha[below[1]]
-    trace = 0.5 * float(np.trace(inverse) - alpha @ alpha)
-    acting, with_others = sensitivity * (additive**2 / p), sensitivity * joint**2 * together
-    pull = relevance**2 * (squared @ with_others + leaning @ acting)
-    ratio = (relevance / RELEVANCE_SCALE) ** 2
-    gradient = np.r_[
-        -pull + 2 * ratio / (1 + ratio),
-        2 * (p * float(acting @ mean_each) + additive**2 * trace),
-        2 * (float(with_others.sum()) + joint**2 * trace),
-        2 * noise**2 * trace,
-    ]
-    return float(value + np.log1p(ratio).sum()), gradient
 
+    def __init__(self, points: FloatArray, targets: FloatArray) -> None:
+        self._targets = targets
+        self._squared = squared = _pairs(points)
+        n, pairs = len(targets), squared.shape[1]
+        self._rows, self._others = _below(n)
+        # Columns of LAPACK lie one behind the other.
+        self._matrix = np.empty(n * n)
+        self._places = self._others * n + self._rows
+        self._together, self._mean, self._one, self._other = np.empty((4, pairs))
+        self._leaning = np.empty_like(squared)
+        self._part = np.empty_like(squared[:, :PAIRS])
 
-def _kernel_of_pairs(relevance: FloatArray, squared: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The joint part of the kernel and the mean over the inputs of its parts, shape (pairs,), and each part times its
-    squared distance, shape (p, pairs). So many pairs at a time stay in the processor's cache."""
-    pairs = squared.shape[1]
-    joint, mean, leaning = np.empty(pairs), np.empty(pairs), np.empty_like(squared)
-    rate = -0.5 * (relevance**2)[:, None]
-    for begin in range(0, pairs, PAIRS):
-        some = slice(begin, begin + PAIRS)
-        part = squared[:, some] * rate
-        part.sum(axis=0, out=joint[some])
-        np.exp(part, out=part).mean(axis=0, out=mean[some])
-        np.multiply(part, squared[:, some], out=leaning[:, some])
-    return np.exp(joint, out=joint), mean, leaning
+    def __call__(self, log_theta: FloatArray) -> tuple[float, FloatArray]:
+        """Value and gradient with respect to the logarithms of (relevances, additive, joint, noise)."""
+        targets, p = self._targets, len(self._squared)
+        relevance, (additive, joint, noise) = np.exp(log_theta[:p]), np.exp(log_theta[p:])
+        self._measure(relevance)
+        chol, failed = dpotrf(self._covariance(additive, joint, noise), lower=1, clean=0, overwrite_a=1)
+        if failed:
+            return 1e10, np.zeros_like(log_theta)
+        alpha, _ = dpotrs(chol, targets, lower=1)
+        value = 0.5 * targets @ alpha + np.log(np.diag(chol)).sum()
+        inverse, _ = dpotri(chol, lower=1, overwrite_c=1)  # below the diagonal, in place of the factor
+        trace = 0.5 * float(np.trace(inverse) - alpha @ alpha)
+        acting, with_others = self._sensitivities(inverse, alpha, additive**2 / p, joint**2)
+        pull = relevance**2 * (self._squared @ with_others + self._leaning @ acting)
+        ratio = (relevance / RELEVANCE_SCALE) ** 2
+        gradient = np.r_[
+            -pull + 2 * ratio / (1 + ratio),
+            2 * (p * float(acting @ self._mean) + additive**2 * trace),
+            2 * (float(with_others.sum()) + joint**2 * trace),
+            2 * noise**2 * trace,
+        ]
+        return float(value + np.log1p(ratio).sum()), gradient
+
+    def _measure(self, relevance: FloatArray) -> None:
+        """The joint part of the kernel of every pair, the mean over the inputs of its parts, and each part times its
+        squared distance. So many pairs at a time stay in the processor's cache."""
+        rate = -0.5 * (relevance**2)[:, None]
+        for begin in range(0, len(self._mean), PAIRS):
+            some = slice(begin, begin + PAIRS)
+            squared = self._squared[:, some]
+            part = np.multiply(squared, rate, out=self._part[:, : squared.shape[1]])
+            part.sum(axis=0, out=self._together[some])
+            np.exp(part, out=part).mean(axis=0, out=self._mean[some])
+            np.multiply(part, squared, out=self._leaning[:, some])
+        np.exp(self._together, out=self._together)
+
+    def _covariance(self, additive: float, joint: float, noise: float) -> FloatArray:
+        """Of the runs, below the diagonal; a point and itself are at no distance."""
+        n = len(self._targets)
+        np.multiply(self._mean, additive**2, out=self._one)
+        self._one += np.multiply(self._together, joint**2, out=self._other)
+        self._matrix[self._places] = self._one
+        self._matrix[:: n + 1] = additive**2 + joint**2 + noise**2 + JITTER
+        return self._matrix.reshape(n, n, order="F")
+
+    def _sensitivities(
+        self, inverse: FloatArray, alpha: FloatArray, acting: float, with_others: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """How the value answers to the two parts of each pair's kernel. Each pair stands for two places of the
+        symmetric matrix."""
+        one, other = self._one, self._other
+        # No place is out of range; to say how such a one is handled saves a copy.
+        np.take(alpha, self._rows, out=one, mode="clip")
+        one *= np.take(alpha, self._others, out=other, mode="clip")
+        np.take(inverse.ravel(order="K"), self._places, out=other, mode="clip")
+        other -= one
+        np.multiply(other, acting, out=one)
+        other *= with_others
+        other *= self._together
+        return one, other
 
 
 def left_out(
@@ -330,9 +382,9 @@ def left_out(
     covariance = kernel.among(points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
     inverse = np.linalg.inv(covariance)
     weights = inverse @ targets
-    if groups is None:
-        diagonal = np.diag(inverse)
-        return weights / diagonal, 1.0 / np.sqrt(diagonal)
+    if groups is None or len(np.unique(groups)) == len(groups):
+        of_one = 1.0 / np.diag(inverse)
+        return of_one * weights, np.sqrt(of_one)
     errors, error_sd = np.empty(len(targets)), np.empty(len(targets))
     for group in np.unique(groups):
         own = np.flatnonzero(groups == group)

@@ -13,14 +13,15 @@ import pandas as pd
 
 from care_core.causal.graph import CausalGraph
 from care_core.learn.constraints import Constraints
+from care_core.learn.table import varying
 from care_core.profile.schema import Schema
 
 
 def with_known(graph: CausalGraph, frame: pd.DataFrame, schema: Schema) -> CausalGraph:
     """The graph with every known edge between varying variables that the constraints and its own arrows allow."""
     constraints = Constraints.of(schema)
-    varying = {name for name in schema.variables if frame[name].nunique() > 1}
-    possible = [edge for edge in sorted(schema.known) if varying.issuperset(edge) and not constraints.forbids(*edge)]
+    differing = frozenset(varying(frame, schema.variables)) if schema.known else frozenset()
+    possible = [edge for edge in sorted(schema.known) if differing.issuperset(edge) and not constraints.forbids(*edge)]
     children: dict[str, set[str]] = {name: set(graph.children(name)) for name in graph.nodes}
     for cause, effect in possible:
         if cause not in _reached(children, effect):

@@ -24,13 +24,18 @@ from care_core.learn.fitting import (
     WEAK,
     Effort,
     Fitted,
+    Fold,
     Inputs,
+    Rows,
     best_transform,
+    drawn,
+    drawn_folds,
     fit,
     tested_on_runs_left_out,
 )
 from care_core.learn.knowledge import with_known
 from care_core.learn.relative import left_out_together, needs
+from care_core.learn.table import varying
 from care_core.profile.schema import Schema
 from care_core.variables import Events, Role, Variable
 
@@ -85,7 +90,7 @@ def candidates(name: str, graph: CausalGraph, frame: pd.DataFrame, schema: Schem
 
 def varying_options(frame: pd.DataFrame, schema: Schema) -> tuple[str, ...]:
     """The options that the runs tell something about."""
-    return tuple(v.name for v in schema.options if frame[v.name].nunique() > 1)
+    return varying(frame, [v.name for v in schema.options])
 
 
 def inputs_of(names: Sequence[str], schema: Schema, nominal: Nominal | None = None) -> Inputs:
@@ -161,71 +166,83 @@ def _both_ways(stage: Stage) -> bool:
     return reached >= MIN_ROWS and MIN_CLASS <= passed <= reached - MIN_CLASS
 
 
+Outcomes = tuple[dict[str, OutcomeRecord], dict[str, Mechanism]]
+
+
 def fit_outcomes(
     frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, effort: Effort
-) -> tuple[dict[str, OutcomeRecord], dict[str, Mechanism]]:
+) -> Outcomes:
     """Mechanisms of every objective that the graph gives a cause and the table gives values."""
-    outcomes: dict[str, OutcomeRecord] = {}
-    mechanisms: dict[str, Mechanism] = {}
+    sought = sought_of_objectives(frame, schema, graph, rng, effort=effort)
+    return put_together(sought, [question.answer() for one in sought for question in one.questions])
+
+
+@dataclass(frozen=True, eq=False)
+class Sought:
+    """An objective, its stages if it has any, and the questions whose answers are its mechanisms: one each."""
+
+    objective: str
+    stages: tuple[StageRecord, ...]
+    questions: tuple[Question, ...]
+
+
+def sought_of_objectives(
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, effort: Effort
+) -> list[Sought]:
+    """What has to be fitted for every objective that the graph gives a cause and the table gives values."""
+    found = []
     for objective in schema.objectives:
         if objective.kind == "functional":
-            fitted = _fit_functional(objective, frame, schema, graph, rng, effort)
+            found.append(_by_stages(objective, frame, schema, graph, rng, effort))
         else:
-            fitted = _fit_continuous(objective, frame, schema, graph, rng, effort)
-        if fitted is not None:
-            outcomes[objective.name], found = fitted
+            question = ask_total(objective.name, frame, schema, graph, rng, effort=effort)
+            found.append(Sought(objective.name, (), () if question is None else (question,)))
+    return found
+
+
+def put_together(sought: Sequence[Sought], answers: Sequence[Mechanism]) -> Outcomes:
+    """The outcomes from the answers to all their questions, in order."""
+    outcomes: dict[str, OutcomeRecord] = {}
+    mechanisms: dict[str, Mechanism] = {}
+    left = iter(answers)
+    for one in sought:
+        found = {question.target: next(left) for question in one.questions}
+        if one.stages and any(mechanism.inputs for mechanism in found.values()):
+            outcomes[one.objective] = OutcomeRecord(objective=one.objective, stages=one.stages)
+            mechanisms.update(found)
+        elif found and not one.stages:
+            outcomes[one.objective] = OutcomeRecord(objective=one.objective, mechanism=one.objective)
             mechanisms.update(found)
     return outcomes, mechanisms
 
 
-Outcome = tuple[OutcomeRecord, dict[str, Mechanism]]
-
-
-def _fit_functional(
+def _by_stages(
     objective: Variable,
     frame: pd.DataFrame,
     schema: Schema,
     graph: CausalGraph,
     rng: np.random.Generator,
     effort: Effort,
-) -> Outcome | None:
-    records, mechanisms = [], {}
+) -> Sought:
+    records, questions = [], []
     for stage in find_stages(objective, schema, frame):
         # A stage that no option moves stays in, with its base rate: else its failures would be laid to a later one.
         key = f"stage:{stage.variable}"
         one = stage.passed if stage.passes == 1.0 else ~stage.passed
         table = frame.assign(**{key: np.where(stage.reached, one.astype(float), np.nan)})
-        sets = candidates(stage.variable, graph, frame, schema)
-        mechanism = fit_on(sets, key, table, schema, rng, effort=effort)
-        if mechanism is None:
-            continue
-        mechanisms[key] = mechanism
-        records.append(StageRecord(variable=stage.variable, passes=stage.passes, mechanism=key))
-    if not any(mechanism.inputs for mechanism in mechanisms.values()):
-        return None
-    return OutcomeRecord(objective=objective.name, stages=tuple(records)), mechanisms
-
-
-def _fit_continuous(
-    objective: Variable,
-    frame: pd.DataFrame,
-    schema: Schema,
-    graph: CausalGraph,
-    rng: np.random.Generator,
-    effort: Effort,
-) -> Outcome | None:
-    mechanism = fit_total(objective.name, frame, schema, graph, rng, effort=effort)
-    if mechanism is None:
-        return None
-    return OutcomeRecord(objective=objective.name, mechanism=objective.name), {objective.name: mechanism}
+        question = ask(candidates(stage.variable, graph, frame, schema), key, table, schema, rng, effort=effort)
+        if question is not None:
+            questions.append(question)
+            records.append(StageRecord(variable=stage.variable, passes=stage.passes, mechanism=key))
+    return Sought(objective.name, tuple(records), tuple(questions))
 
 
 def fit_total(
     name: str, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, effort: Effort
 ) -> Mechanism | None:
-    """The variable as a function of the exogenous variables that cause it; None where it has no cause or no values."""
-    sets = [names for names in candidates(name, graph, frame, schema) if names]
-    return fit_on(sets, name, frame, schema, rng, effort=effort)
+    """The answer to `ask_total`."""
+    question = ask_total(name, frame, schema, graph, rng, effort=effort)
+    return None if question is None else question.answer()
 
 
 def fit_on(
@@ -237,54 +254,143 @@ def fit_on(
     *,
     effort: Effort,
 ) -> Mechanism | None:
-    """The target as a function of the input set that predicts left-out runs best; None where too few runs hold any.
+    """The answer to `ask`."""
+    question = ask(sets, target, frame, schema, rng, effort=effort)
+    return None if question is None else question.answer()
 
-    A context that a run does not have is taken to be at its median, as where the mechanism is asked.
+
+def ask_total(
+    name: str, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, effort: Effort
+) -> Question | None:
+    """For the variable as a function of the exogenous variables that cause it; None where it has no cause or no
+    values."""
+    sets = [names for names in candidates(name, graph, frame, schema) if names]
+    return ask(sets, name, frame, schema, rng, effort=effort)
+
+
+@dataclass(frozen=True, eq=False)
+class _Set:
+    """Inputs that a target may be read from, their values in the known runs, shape (n, p), the runs that a fit keeps,
+    and what is added to its loss."""
+
+    inputs: Inputs
+    x: FloatArray
+    kept: Rows
+    penalty: float
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """A target as a function of the input set that predicts left-out runs best.
+
+    What chance decides was drawn when it was asked, so any process may answer it, in any order.
+    """
+
+    target: str
+    y: FloatArray
+    groups: NDArray[np.int64]
+    sets: tuple[_Set, ...]
+    folds: tuple[Fold, ...]
+    effort: Effort
+    parts: _Parts | None
+
+    @property
+    def binary(self) -> bool:
+        """Whether the target is a yes or a no."""
+        return _is_binary(self.y)
+
+    def answer(self) -> Mechanism:
+        """Fit it."""
+        fitted = [self._fit(one) for one in self.sets]
+        losses = [found.loss + one.penalty for found, one in zip(fitted, self.sets, strict=True)]
+        place = int(np.argmin(np.nan_to_num(losses, nan=np.inf)))
+        best = self.sets[place]
+        mechanism = tested_on_runs_left_out(
+            fitted[place].mechanism, best.x, self.y, replace(best.inputs, least=0.0),
+            effort=self.effort, groups=self.groups, folds=self.folds,
+        )  # fmt: skip
+        return mechanism if self.parts is None else replace(mechanism, averaging=self.parts.averaging(mechanism))
+
+    def _fit(self, one: _Set) -> Fitted:
+        kept = one.kept
+        groups = self.groups[kept]
+        return fit(one.x[kept], self.y[kept], one.inputs, binary=self.binary, effort=self.effort, groups=groups)
+
+
+def ask(
+    sets: Sequence[Sequence[str]],
+    target: str,
+    frame: pd.DataFrame,
+    schema: Schema,
+    rng: np.random.Generator,
+    *,
+    effort: Effort,
+) -> Question | None:
+    """The question which of the input sets predicts the target best; None where too few runs hold it.
+
+    A context that a run does not have is taken to be at its median, as where the mechanism is asked. The sets are
+    compared on the runs that have all inputs of each; one with an input that no run has is left out.
+
+    Args:
+        rng: draws the runs that each fit keeps, and those that are left out in turn.
     """
     nominal = schema.nominal_of(target) if target in schema.variables else None
-    together = left_out_together(frame, schema)
     met = {v.name: frame[v.name].fillna(frame[v.name].median()) for v in schema.contexts if v.name in frame}
-    frame = frame.assign(**met)
+    filled = frame.assign(**met)
+    asked = [inputs_of(names, schema, nominal) for names in sets]
+    asked = [inputs for inputs in asked if filled[list(inputs.names)].notna().any().all()]
+    if not asked:
+        return None
+    every = list(dict.fromkeys(name for inputs in asked for name in inputs.names))
+    known = filled[[*every, target]].notna().all(axis=1).to_numpy()
+    if nominal is not None:
+        known = known & (frame[target].to_numpy(dtype=float) > 0)
+    y = frame.loc[known, target].to_numpy(dtype=float)
+    if len(y) < MIN_ROWS or np.ptp(y) == 0:
+        return None
+    groups = left_out_together(frame, schema)[known]
     options = set(varying_options(frame, schema))
-    best: Fitted | None = None
-    lowest = np.inf
-    events = schema.variables[target].events if target in schema.variables else None
-    for names in sets:
-        inputs = inputs_of(names, schema, nominal)
-        known = frame[[*inputs.names, target]].notna().all(axis=1).to_numpy()
-        if nominal is not None:
-            known = known & (frame[target].to_numpy(dtype=float) > 0)
-        x = frame.loc[known, list(inputs.names)].to_numpy(dtype=float)
-        y = frame.loc[known, target].to_numpy(dtype=float)
-        if len(y) < MIN_ROWS or np.ptp(y) == 0:
-            continue
-        groups = together[known]
-        binary = set(np.unique(y)) <= {0.0, 1.0}
-        weak = len(frame) < FEW_RUNS and options <= set(names)
-        found = fit(
-            x, y, replace(inputs, least=WEAK) if weak else inputs, binary=binary, rng=rng, effort=effort, groups=groups
-        )
+    compared = []
+    for inputs in asked:
+        read = [name for name, is_read in zip(inputs.names, inputs.read, strict=True) if is_read]
+        weak = len(frame) < FEW_RUNS and options.issubset(read)
         # Their relevances were chosen on the runs that they are tested on: one nat each, as Akaike counts.
-        loss = found.loss + (len(names) / len(y) if weak else 0.0)
-        if loss < lowest:
-            best, lowest, asked = found, loss, (x, y, inputs, groups)
-    if best is None:
-        return None
-    x, y, inputs, groups = asked
-    mechanism = tested_on_runs_left_out(best.mechanism, x, y, inputs, rng=rng, effort=effort, groups=groups)
-    return mechanism if events is None else replace(mechanism, averaging=averaging(mechanism, events, target, frame))
+        penalty = len(read) / len(y) if weak else 0.0
+        x = filled.loc[known, list(inputs.names)].to_numpy(dtype=float)
+        compared.append(_Set(replace(inputs, least=WEAK) if weak else inputs, x, drawn(len(y), effort, rng), penalty))
+    folds = () if _is_binary(y) else drawn_folds(groups, effort, rng)
+    events = schema.variables[target].events if target in schema.variables else None
+    parts = None if events is None else _Parts.seen(events, target, filled)
+    return Question(target, y, groups, tuple(compared), folds, effort, parts)
 
 
-def averaging(mechanism: Mechanism, events: Events, target: str, frame: pd.DataFrame) -> Averaging | None:
-    """How much of the noise belongs to each part of a mission alone: what its parts differ by, averaged over them."""
-    if events.count not in mechanism.inputs:
-        return None
-    runs = frame.loc[frame[target].notna(), [events.count, events.variation]].dropna()
-    usual = float(runs[events.count].median())
-    if not len(runs) or not usual > 0:
-        return None
-    own = float((runs[events.variation] ** 2 / runs[events.count]).mean())
-    return Averaging(events.count, usual, min(1.0, own / max(mechanism.noise_sd**2, 1e-12)))
+def _is_binary(y: FloatArray) -> bool:
+    return set(np.unique(y)) <= {0.0, 1.0}
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """How many like parts the missions have that hold a target, and the variance of their mean that each part alone
+    explains."""
+
+    count: str
+    usual: float
+    own: float
+
+    @classmethod
+    def seen(cls, events: Events, target: str, frame: pd.DataFrame) -> _Parts | None:
+        runs = frame.loc[frame[target].notna(), [events.count, events.variation]].dropna()
+        usual = float(runs[events.count].median())
+        if not len(runs) or not usual > 0:
+            return None
+        return cls(events.count, usual, float((runs[events.variation] ** 2 / runs[events.count]).mean()))
+
+    def averaging(self, mechanism: Mechanism) -> Averaging | None:
+        """How much of the noise belongs to each part of a mission alone: what its parts differ by, averaged over
+        them."""
+        if self.count not in mechanism.inputs:
+            return None
+        return Averaging(self.count, self.usual, min(1.0, self.own / max(mechanism.noise_sd**2, 1e-12)))
 
 
 def groups_that_move_together(schema: Schema, frame: pd.DataFrame) -> tuple[tuple[str, ...], ...]:

@@ -16,7 +16,7 @@ import pandas as pd
 
 from care_core.learn.fitting import MIN_ROWS
 from care_core.learn.outcomes import badness
-from care_core.learn.table import FloatArray, normal_scores
+from care_core.learn.table import FloatArray, normal_scores, varying
 from care_core.profile.schema import Schema
 
 
@@ -31,7 +31,7 @@ class Robustness:
 
 def robustness(frame: pd.DataFrame, schema: Schema, objective: str) -> Mapping[str, Robustness]:
     """Per option that varies; empty where the table is randomised or says too little of the objective."""
-    names = [v.name for v in (*schema.options, *schema.contexts) if frame[v.name].nunique() > 1]
+    names = list(varying(frame, [v.name for v in (*schema.options, *schema.contexts)]))
     y = badness(schema.variables[objective], frame, schema)
     known = np.isfinite(y) & frame[names].notna().all(axis=1).to_numpy()
     freedom = int(known.sum()) - len(names) - 1

@@ -67,8 +67,9 @@ def dependence(sources: FloatArray, targets: FloatArray) -> FloatArray:
         Shape (k, m).
     """
     x, y = normal_scores(sources), normal_scores(targets)
-    straight, binned = _correlation_p(x, y), _binned_p(x, y)
-    rare = _rarest_count(x, y)
+    bins = bin_numbers(x)
+    straight, binned = _correlation_p(x, y), _binned_p(bins, y)
+    rare = _rarest_count(bins, y)
     either = np.where(rare < LEAST_COUNT, straight, 2 * np.minimum(straight, binned))
     uncommon = _off_mode(y) < LEAST_COUNT
     return np.asarray(np.where(uncommon, 1.0, np.minimum(either, 1.0)))
@@ -119,20 +120,18 @@ def _off_mode(y: FloatArray) -> FloatArray:
     return np.array([len(v) - max(np.unique(v, return_counts=True)[1], default=0) for v in known], dtype=float)
 
 
-def _rarest_count(x: FloatArray, y: FloatArray) -> FloatArray:
+def _rarest_count(bins: NDArray[np.int64], y: FloatArray) -> FloatArray:
     """Rows off the usual value of a target that the emptiest bin of a source expects, shape (k, m)."""
-    bins = bin_numbers(x)
     filled = [np.bincount(column[column >= 0], minlength=BINS) for column in bins.T]
     smallest = np.array([min(count[count > 0], default=0) / max(count.sum(), 1) for count in filled])
     return np.asarray(np.outer(smallest, _off_mode(y)))
 
 
-def _binned_p(x: FloatArray, y: FloatArray) -> FloatArray:
+def _binned_p(bins: NDArray[np.int64], y: FloatArray) -> FloatArray:
     """F-tests of the targets' means over the sources' bins, all pairs at once."""
     has_y = np.isfinite(y).astype(float)
     y = np.nan_to_num(y)
-    bins = bin_numbers(x)
-    rows = np.zeros((x.shape[1], y.shape[1]))
+    rows = np.zeros((bins.shape[1], y.shape[1]))
     total, squares, between = rows.copy(), rows.copy(), rows.copy()
     groups = rows.copy()
     for level in range(BINS):

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from sklearn.metrics import roc_auc_score
-from threadpoolctl import threadpool_limits
 
 from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
@@ -17,6 +16,7 @@ from care_core.causal.mechanisms import FloatArray
 from care_core.causal.model import Model, SkillRecord, Training
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met
+from care_core.learn.processes import answers
 from care_core.learn.relative import left_out_together, relative
 from care_core.profile.schema import Schema
 
@@ -57,10 +57,9 @@ def held_out_probabilities(
     def predict(k: int) -> Mapping[str, FloatArray]:
         own = np.random.default_rng(seeds[k])
         runs = frame[fold != k]
-        with threadpool_limits(1):  # the last digits depend on the number of threads
-            return _probabilities(runs, frame[fold == k], schema, learn(runs, own), own)
+        return _probabilities(runs, frame[fold == k], schema, learn(runs, own), own)
 
-    predicted = Parallel(n_jobs=min(n_jobs, folds))(delayed(predict)(k) for k in range(folds))
+    predicted = answers([partial(predict, k) for k in range(folds)], n_jobs)
     promised: dict[str, FloatArray] = {}
     for k, values in enumerate(predicted):
         for name, held_out in values.items():

@@ -17,7 +17,7 @@ from care_core.learn.discovery import FisherZ, Pag, discover
 from care_core.learn.orientation import resolve
 from care_core.learn.relative import relative
 from care_core.learn.screening import pairwise_correlation, screen_options
-from care_core.learn.table import normal_scores
+from care_core.learn.table import normal_scores, varying
 from care_core.profile.schema import Schema
 from care_core.variables import Role
 
@@ -51,9 +51,9 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
         LearningError: no option, or no objective, varies.
     """
     frame = relative(frame, schema)
-    varying = [name for name in schema.variables if frame[name].nunique() > 1]
+    differing = varying(frame, schema.variables)
     for role in (Role.OPTION, Role.OBJECTIVE):
-        if not any(schema.variables[name].role is role for name in varying):
+        if not any(schema.variables[name].role is role for name in differing):
             raise LearningError(
                 f"No {role.value} varies in the table, so no effect can be learned.",
                 hint="Add runs with other configurations and outcomes.",
@@ -63,7 +63,7 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
     # What was asked and what flew was drawn without regard to the options, so it hides nothing; a few dozen missions
     # cannot show what it does either: that is in the nominals, and in what people know.
     given = [] if schema.observational else [v.name for v in schema.contexts if v.about != "world"]
-    searched = [name for name in varying if name not in {*screening.dropped, *given}]
+    searched = [name for name in differing if name not in {*screening.dropped, *given}]
     columns = {name: frame[name].to_numpy(dtype=float) for name in searched}
     test = FisherZ(np.column_stack(list(columns.values())))
     pag = discover(searched, test, constraints, alpha=alpha)
@@ -82,8 +82,8 @@ def learn_structure(frame: pd.DataFrame, schema: Schema, *, alpha: float = 0.01,
         dropped_options=screening.dropped,
         direct=completion.direct,
         notes=(
-            *(f"'{name}' never varies in the table." for name in schema.variables if name not in varying),
-            *_repeats(frame, [v.name for v in schema.metrics if v.name in varying]),
+            *(f"'{name}' never varies in the table." for name in schema.variables if name not in differing),
+            *_repeats(frame, [v.name for v in schema.metrics if v.name in differing]),
             *resolved.notes,
             *completion.notes,
             *(

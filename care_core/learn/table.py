@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,14 @@ def check_table(frame: pd.DataFrame, schema: Schema, where: str = "", at_least: 
     elif STARTED in frame:
         checked[CONDITIONS] = frame[STARTED].astype(str).str[:10].where(frame[STARTED].notna()).to_numpy()
     return checked
+
+
+def varying(frame: pd.DataFrame, names: Iterable[str]) -> tuple[str, ...]:
+    """Those of the columns that hold two different values or more."""
+    asked = list(names)
+    values = frame[asked].to_numpy(dtype=float)
+    lowest, highest = np.fmin.reduce(values, axis=0, initial=np.inf), np.fmax.reduce(values, axis=0, initial=-np.inf)
+    return tuple(name for name, differs in zip(asked, lowest < highest, strict=True) if differs)
 
 
 def normal_scores(values: ArrayLike) -> FloatArray:

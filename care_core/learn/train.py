@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 import pandas as pd
-from joblib import Parallel, delayed, parallel_config
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
@@ -23,12 +22,25 @@ from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME
 from care_core.learn.identification import identify, is_answered_by
 from care_core.learn.knowledge import with_known
 from care_core.learn.mediation import with_mediation
-from care_core.learn.outcomes import FEW_RUNS, badness, fit_on, fit_outcomes, fit_total, groups_that_move_together
+from care_core.learn.outcomes import (
+    FEW_RUNS,
+    Outcomes,
+    Question,
+    ask,
+    ask_total,
+    badness,
+    groups_that_move_together,
+    put_together,
+    sought_of_objectives,
+    varying_options,
+)
+from care_core.learn.processes import answers
 from care_core.learn.relative import of_ratios, relative
 from care_core.learn.repeats import persistence
 from care_core.learn.robustness import robustness
 from care_core.learn.skill import cross_validated_skill
 from care_core.learn.structure import Structure, learn_structure
+from care_core.learn.table import varying
 from care_core.profile.schema import Schema
 
 Edge = tuple[str, str]
@@ -77,8 +89,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, report:
     )
     graph = structure.graph
     report("fitting mechanisms", 0.4)
-    outcomes, mechanisms = fit_outcomes(frame, schema, graph, rng, effort=OUTCOME)
-    mechanisms |= _metric_mechanisms(frame, schema, graph, settings)
+    outcomes, mechanisms = _fit_all(frame, schema, graph, settings, rng)
     outcomes = with_mediation(outcomes, mechanisms, with_known(graph, frame, schema), frame, schema)
     training = _training(frame, schema, structure, settings)
     training = replace(training, persistence=persistence(frame, schema, outcomes, mechanisms))
@@ -209,27 +220,30 @@ def with_weak(graph: CausalGraph, frame: pd.DataFrame, schema: Schema) -> Causal
     """Where runs are few, the graph with an edge to every objective from each option that no path leads from."""
     if len(frame) >= FEW_RUNS or schema.observational:
         return graph
-    varying = [v.name for v in schema.options if frame[v.name].nunique() > 1]
     weak = {
-        (option, objective.name)
-        for objective in schema.objectives
-        for option in varying
-        if option not in graph.ancestors(objective.name) and frame[objective.name].nunique() > 1
+        (option, objective)
+        for objective in varying(frame, [v.name for v in schema.objectives])
+        for option in varying_options(frame, schema)
+        if option not in graph.ancestors(objective)
     }
     return CausalGraph(graph.nodes, graph.directed | weak, graph.bidirected)
 
 
-def _metric_mechanisms(
-    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: TrainSettings
-) -> dict[str, Mechanism]:
-    """Every metric as a function of the options that cause it."""
-
-    def fit(i: int, name: str) -> Mechanism | None:
-        return fit_total(name, frame, schema, graph, np.random.default_rng([settings.seed, i]), effort=METRIC)
-
-    names = [metric.name for metric in schema.metrics]
-    fitted = _in_parallel(settings, (delayed(fit)(i, name) for i, name in enumerate(names)))
-    return {name: mechanism for name, mechanism in zip(names, fitted, strict=True) if mechanism is not None}
+def _fit_all(
+    frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: TrainSettings, rng: np.random.Generator
+) -> Outcomes:
+    """Every objective, and every metric as a function of the options that cause it."""
+    sought = sought_of_objectives(frame, schema, graph, rng, effort=OUTCOME)
+    asked = (
+        ask_total(metric.name, frame, schema, graph, np.random.default_rng([settings.seed, i]), effort=METRIC)
+        for i, metric in enumerate(schema.metrics)
+    )
+    questions = [*(question for one in sought for question in one.questions), *filter(None, asked)]
+    fitted = answers([question.answer for question in questions], settings.n_jobs)
+    of_metrics = sum(len(one.questions) for one in sought)
+    outcomes, mechanisms = put_together(sought, fitted[:of_metrics])
+    named = zip(questions[of_metrics:], fitted[of_metrics:], strict=True)
+    return outcomes, mechanisms | {question.target: mechanism for question, mechanism in named}
 
 
 def _edge_effects(
@@ -240,27 +254,23 @@ def _edge_effects(
     An edge from an option that shares a hidden cause with its effect has none that the runs could tell, and carries
     no path.
     """
+    options = {option.name for option in schema.options}
 
-    def measure(i: int, child: str) -> dict[Edge, _Measured]:
+    def measure(question: Question) -> dict[Edge, _Measured]:
+        child = question.target
         parents = sorted(graph.parents(child))
+        effects = _measure(parents, question.answer(), frame, schema, resamples)
+        hidden = options & {*graph.siblings(child)}
+        return {(parent, child): effect for parent, effect in effects.items() if parent not in hidden}
+
+    def asked(i: int, child: str) -> Question | None:
         rng = np.random.default_rng([settings.seed, i])
-        mechanism = fit_on([parents], child, frame, schema, rng, effort=METRIC) if parents else None
-        if mechanism is None:
-            return {}
-        effects = _measure(parents, mechanism, frame, schema, resamples)
-        options = {option.name for option in schema.options} & {*graph.siblings(child)}
-        return {(parent, child): effect for parent, effect in effects.items() if parent not in options}
+        parents = sorted(graph.parents(child))
+        return ask([parents], child, frame, schema, rng, effort=METRIC) if parents else None
 
-    order = graph.topological_order()
-    measured = _in_parallel(settings, (delayed(measure)(i, child) for i, child in enumerate(order)))
-    return {edge: effect for part in measured for edge, effect in part.items()}
-
-
-def _in_parallel(settings: TrainSettings, calls: Iterable[Any]) -> list[Any]:
-    """Run on `n_jobs` processes, one thread each: the matrices are too small to share between threads."""
-    with parallel_config("loky", n_jobs=settings.n_jobs, inner_max_num_threads=1):
-        answers: list[Any] = Parallel()(calls)
-    return answers
+    questions = [asked(i, child) for i, child in enumerate(graph.topological_order())]
+    calls = [partial(measure, question) for question in questions if question is not None]
+    return {edge: effect for part in answers(calls, settings.n_jobs) for edge, effect in part.items()}
 
 
 def _edge_record(

@@ -24,7 +24,7 @@ from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.errors import LearningError
 from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.completion import complete
-from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, Effort, Fitted, Inputs, fit, left_out, logistic
+from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME, Effort, Fitted, Inputs, drawn, fit, left_out, logistic
 from care_core.learn.outcomes import causes_of, find_stages, groups_that_move_together, inputs_of
 from care_core.learn.relative import ENOUGH_PARTS, missions_of, relative
 from care_core.learn.screening import screen_options
@@ -215,13 +215,12 @@ def started_from(
     """
     if len(y) < FEWEST:
         return source
-    if len(y) > effort.points:
-        keep = np.sort(rng.choice(len(y), effort.points, replace=False))
-        x, y, groups = x[keep], y[keep], groups[keep]
+    kept = drawn(len(y), effort, rng)
+    x, y, groups = x[kept], y[kept], groups[kept]
     moved = _moved(source, x, y, inputs, groups)
     if len(y) < MIN_ROWS or len(np.unique(groups)) < ENOUGH_PARTS or np.ptp(y) == 0:
         return moved.mechanism
-    beside = _with_regression(source, x, y, inputs, groups, rng, effort)
+    beside = _with_regression(source, x, y, inputs, groups, effort)
     return moved.mechanism if moved.loss <= beside.loss else beside.mechanism
 
 
@@ -273,16 +272,13 @@ def _with_regression(
     y: FloatArray,
     inputs: Inputs,
     groups: NDArray[np.int64],
-    rng: np.random.Generator,
     effort: Effort,
 ) -> Fitted:
     """A share of the source's prediction, and a regression of what that leaves."""
     before = source.latent(x[:, [inputs.names.index(name) for name in source.inputs]])
     coded = _coded(source, y)
     share = _share(before, coded)
-    rest = fit(
-        x, coded - share * before, inputs, binary=False, rng=rng, effort=effort, transform="identity", groups=groups
-    )
+    rest = fit(x, coded - share * before, inputs, binary=False, effort=effort, transform="identity", groups=groups)
     mechanism = rest.mechanism
     carried = dataclasses.replace(mechanism, transform=source.transform, binary=source.binary, prior=(source, share))
     if not source.binary:

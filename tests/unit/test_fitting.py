@@ -14,8 +14,7 @@ from care_core.learn.fitting import (
     WEAK,
     Effort,
     Inputs,
-    _negative_log_posterior,
-    _pairs,
+    _Posterior,
     best_transform,
     fit_mechanism,
 )
@@ -151,13 +150,13 @@ def test_the_transform_takes_the_skew_away(y: FloatArray, expected: str) -> None
 
 def test_the_gradient_is_the_gradient() -> None:
     points, targets = RNG(0).normal(size=(25, 3)), RNG(1).normal(size=25)
-    squared = _pairs(points)
+    posterior = _Posterior(points, targets)
 
     def value(theta: FloatArray) -> float:
-        return _negative_log_posterior(theta, squared, targets)[0]
+        return posterior(theta)[0]
 
     def gradient(theta: FloatArray) -> FloatArray:
-        return _negative_log_posterior(theta, squared, targets)[1]
+        return posterior(theta)[1]
 
     for seed in range(3):
         theta = RNG(seed).uniform(-1, 0.5, 6)

@@ -119,7 +119,7 @@ def grouped() -> tuple[FloatArray, FloatArray, np.ndarray[tuple[int], np.dtype[n
 def test_errors_of_left_out_groups_are_those_of_refitting_without_them() -> None:
     x, y, groups = grouped()
     inputs = Inputs.all_read(("a", "b"), np.zeros(2, dtype=bool))
-    m = fit(x, y, inputs, binary=False, rng=np.random.default_rng(0), effort=QUICK, transform="identity").mechanism
+    m = fit(x, y, inputs, binary=False, effort=QUICK, transform="identity").mechanism
     errors, error_sd = left_out(m.kernel, m.points, m.targets, groups)
     own = groups == 3
     rest, noise = m.points[~own], m.kernel.noise**2 + 1e-6
