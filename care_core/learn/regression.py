@@ -27,7 +27,8 @@ class Regressions:
     """
 
     def __init__(self, frame: pd.DataFrame) -> None:
-        self._columns = {str(name): frame[name].to_numpy(dtype=float) for name in frame}
+        self._frame = frame
+        self._columns: dict[str, FloatArray] = {}
         self._features: dict[tuple[str, bytes], FloatArray] = {}
         self._fits: dict[tuple[tuple[str, ...], bytes], _Design] = {}
 
@@ -40,18 +41,18 @@ class Regressions:
         Returns:
             Shape (len(names),).
         """
-        return self._p_of_each(names, target, ~np.isnan(self._columns[target]), names)
+        return self._p_of_each(names, target, ~np.isnan(self._column(target)), names)
 
     def p_of(self, name: str, given: Sequence[str], target: str) -> float:
         """The test of `p_of_each` for one variable beside given ones, on the runs that have it."""
-        runs = ~np.isnan(self._columns[target]) & ~np.isnan(self._columns[name])
+        runs = ~np.isnan(self._column(target)) & ~np.isnan(self._column(name))
         return float(self._p_of_each([name, *given], target, runs, [name])[0])
 
     def _p_of_each(
         self, names: Sequence[str], target: str, runs: NDArray[np.bool_], asked: Sequence[str]
     ) -> FloatArray:
         p = np.ones(len(asked))
-        y = normal_scores(self._columns[target][runs])
+        y = normal_scores(self._column(target)[runs])
         if len(y) < 2 * ROWS_PER_COLUMN or np.ptp(y) == 0:
             return p
         blocks = {name: self._block(name, runs) for name in names}
@@ -68,10 +69,15 @@ class Regressions:
                 p[i] = _f_test(left, beyond, design.rank)
         return p
 
+    def _column(self, name: str) -> FloatArray:
+        if name not in self._columns:
+            self._columns[name] = self._frame[name].to_numpy(dtype=float)
+        return self._columns[name]
+
     def _block(self, name: str, runs: NDArray[np.bool_]) -> FloatArray:
         key = name, np.packbits(runs).tobytes()
         if key not in self._features:
-            self._features[key] = features(self._columns[name][runs])
+            self._features[key] = features(self._column(name)[runs])
         return self._features[key]
 
     def _design(self, held: tuple[str, ...], runs: NDArray[np.bool_]) -> _Design:

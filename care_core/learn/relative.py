@@ -68,9 +68,9 @@ def configurations_of(frame: pd.DataFrame, schema: Schema) -> NDArray[np.int64]:
     apart as by `missions_of`: a robot never starts from quite the same place."""
     asked = [context.name for context in schema.asked]
     options = [option.name for option in schema.options if option.name in frame]
-    alike = frame[[*options, *asked]].round(dict.fromkeys(asked, 1)).to_numpy(dtype=float)
-    numbers = np.zeros(len(alike), dtype=np.int64)
-    for column in alike.T:
+    columns = [*frame[options].to_numpy(dtype=float).T, *frame[asked].round(1).to_numpy(dtype=float).T]
+    numbers = np.zeros(len(frame), dtype=np.int64)
+    for column in columns:
         if numbers.max(initial=0) + 1 == len(numbers):  # each run is its own already
             break
         codes, values = pd.factorize(column, use_na_sentinel=False)

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from care_core.causal.effects import Effect, acceptable_values, along, average_causal_effect
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import LEAST, FloatArray, Mechanism, solve, transformed
+from care_core.causal.mechanisms import JITTER, LEAST, FloatArray, Mechanism, transformed
 from care_core.causal.model import EdgeRecord, EffectRecord, Model, OutcomeRecord, PathRecord, Summary, Training
 from care_core.causal.paths import CausalPath, rank_paths
 from care_core.learn.bootstrap import Finding, Reaches
@@ -195,7 +195,8 @@ def _measure(
         sd = 0.5 * mechanism.scale if mechanism.binary else mechanism.scale
 
     # One kernel serves the fit and all its resamples: only the weights of the training points differ.
-    weights = np.column_stack([mechanism.weights, *(_reweighted(mechanism, rows) for rows in resamples.rows)])
+    among = mechanism.kernel.among(mechanism.points)
+    weights = np.column_stack([mechanism.weights, *(_reweighted(mechanism, among, rows) for rows in resamples.rows)])
     cross = mechanism.kernel(mechanism.scaled(stacked), mechanism.points)
     latent = mechanism.mean + mechanism.scale * (cross @ weights) + mechanism.known(stacked)[:, None]
 
@@ -208,11 +209,17 @@ def _measure(
     return {name: _Measured(whole[i], magnitudes[:, i]) for i, name in enumerate(names)}
 
 
-def _reweighted(mechanism: Mechanism, rows: NDArray[np.int64]) -> FloatArray:
-    """Weights of all training points, shape (n,), when the mechanism rests on a resample and its kernel is kept."""
+def _reweighted(mechanism: Mechanism, among: FloatArray, rows: NDArray[np.int64]) -> FloatArray:
+    """Weights of all training points, shape (n,), when the mechanism rests on a resample and its kernel is kept.
+
+    Args:
+        among: covariance of the training points with each other, shape (n, n).
+    """
     chosen = (rows % len(mechanism.targets))[: len(mechanism.targets)]
+    covariance = among[np.ix_(chosen, chosen)]
+    covariance[np.diag_indices_from(covariance)] += mechanism.kernel.noise**2 + JITTER
     weights = np.zeros(len(mechanism.targets))
-    np.add.at(weights, chosen, solve(mechanism.kernel, mechanism.points[chosen], mechanism.targets[chosen]))
+    np.add.at(weights, chosen, np.linalg.solve(covariance, mechanism.targets[chosen]))
     return weights
 
 
