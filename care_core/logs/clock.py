@@ -6,6 +6,7 @@ while they run (the ground station found its time server). The first is damage, 
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -25,8 +26,6 @@ STEP_S = 5.0
 PAUSE_S = 86_400.0
 """A longer step forward is a clock that was set, no pause."""
 _STEADY = 20  # records in a row that agree with each other say what the clock is
-
-_PIECE = 1 << 18
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,57 +56,84 @@ def find_clock(stamps_s: Floats, places: Offsets) -> tuple[Clock, NDArray[np.boo
         stamps_s: shape (n,), the stamps in seconds, in the order of the file.
         places: shape (n,), the byte at which each record begins.
     """
-    finite = np.isfinite(stamps_s)
-    impossible = ~finite
-    if impossible.any():
-        clock, beyond, jumps = find_clock(stamps_s[finite], places[finite])
-        impossible[np.flatnonzero(finite)[beyond]] = True
-        return clock, impossible, jumps
-    if not len(stamps_s):
-        return Clock(0.0, 0.0, np.empty(0, dtype=np.int64), np.empty(0)), impossible, []
-    runs = _runs(stamps_s)
-    steady = min(_STEADY, max(end - start for start, end in runs))
-    upcoming = _next_start(stamps_s, runs, steady)
+    clock, spans, jumps = clock_of([(stamps_s, places)])
+    impossible = ~np.isfinite(stamps_s)
+    for first, last in spans:
+        impossible[np.searchsorted(places, first) : np.searchsorted(places, last, side="right")] = True
+    return clock, impossible, jumps
+
+
+def clock_of(pieces: Iterable[tuple[Floats, Offsets]]) -> tuple[Clock, list[tuple[int, int]], list[Damage]]:
+    """As `find_clock`, of stamps that come piece by piece, as a large log is read: none is held. In place of a mask the
+    bytes of the first and last of records in a row whose stamps are impossible."""
+    runs, spans = _runs(pieces)
+    if not runs:
+        return Clock(0.0, 0.0, np.empty(0, dtype=np.int64), np.empty(0)), spans, []
+    steady = min(_STEADY, max(run.count for run in runs))
     shift, now, first_s = 0.0, -np.inf, np.nan
     shifts: list[tuple[int, float]] = []
     jumps = []
-    for (start, end), following in zip(runs, upcoming, strict=True):
-        begins, ends = float(stamps_s[start]) - shift, float(stamps_s[end - 1]) - shift
-        if end - start < steady:
+    for run, following in zip(runs, _next_start(runs, steady), strict=True):
+        begins, ends = run.begins_s - shift, run.ends_s - shift
+        if run.count < steady:
             if not _fits(begins, ends, now, following - shift):
-                impossible[start:end] = True
+                spans.append((run.first, run.last))
                 continue
         elif now > -np.inf and not -BACK_S <= begins - now <= PAUSE_S:
             jump_s = begins - now
             what = f"the clock of the log jumps by {jump_s:+.0f} s"
-            jumps.append(Damage(what, int(places[start]), now - first_s, is_jump=True))
+            jumps.append(Damage(what, run.first, now - first_s, is_jump=True))
             shift += jump_s
-            shifts.append((int(places[start]), shift))
+            shifts.append((run.first, shift))
             ends -= jump_s
         first_s = begins if np.isnan(first_s) else first_s
         now = max(now, ends)
     changes = np.array([place for place, _ in shifts], dtype=np.int64)
     clock = Clock(first_s, now, changes, np.array([amount for _, amount in shifts]))
-    return clock, impossible, jumps
+    return clock, sorted(spans), jumps
 
 
-def _runs(stamps_s: Floats) -> list[tuple[int, int]]:
-    """Stretches of the file, first and one past the last record, in which each stamp follows from the one before."""
-    cuts: list[int] = []
-    for low in range(0, len(stamps_s), _PIECE):
-        steps = np.diff(stamps_s[low : low + _PIECE + 1])
-        cuts += (np.flatnonzero((steps < -BACK_S) | (steps > STEP_S)) + (low + 1)).tolist()
-    bounds = [0, *cuts, len(stamps_s)]
-    return list(pairwise(bounds))
+@dataclass(slots=True)
+class _Run:
+    """Records in a row in which each stamp follows from the one before: how many, the bytes of the first and the last,
+    and their stamps."""
+
+    count: int
+    first: int
+    last: int
+    begins_s: float
+    ends_s: float
 
 
-def _next_start(stamps_s: Floats, runs: list[tuple[int, int]], steady: int) -> list[float]:
+def _runs(pieces: Iterable[tuple[Floats, Offsets]]) -> tuple[list[_Run], list[tuple[int, int]]]:
+    """The runs of the records whose stamps are numbers, and the places of the others, each twice."""
+    runs: list[_Run] = []
+    unknown: list[int] = []
+    for said_s, said_at in pieces:
+        finite = np.isfinite(said_s)
+        unknown += said_at[~finite].tolist()
+        stamps_s, places = said_s[finite], said_at[finite]
+        if not len(stamps_s):
+            continue
+        steps = np.diff(stamps_s, prepend=runs[-1].ends_s if runs else np.nan)
+        bounds = [*np.flatnonzero(~((steps >= -BACK_S) & (steps <= STEP_S))).tolist(), len(stamps_s)]
+        if bounds[0]:  # those ahead of the first break go on with the run of the piece before
+            end = bounds[0]
+            runs[-1].count += end
+            runs[-1].last, runs[-1].ends_s = int(places[end - 1]), float(stamps_s[end - 1])
+        for start, end in pairwise(bounds):
+            first, last = int(places[start]), int(places[end - 1])
+            runs.append(_Run(end - start, first, last, float(stamps_s[start]), float(stamps_s[end - 1])))
+    return runs, [(place, place) for place in unknown]
+
+
+def _next_start(runs: Sequence[_Run], steady: int) -> list[float]:
     """For each run the first stamp of the next steady one, of the next at all where none is, infinity at the end."""
     upcoming, following, is_steady = [], np.inf, False
-    for start, end in reversed(runs):
+    for run in reversed(runs):
         upcoming.append(following)
-        if end - start >= steady or not is_steady:
-            following, is_steady = float(stamps_s[start]), end - start >= steady
+        if run.count >= steady or not is_steady:
+            following, is_steady = run.begins_s, run.count >= steady
     return upcoming[::-1]
 
 

@@ -22,16 +22,20 @@ from care_core.errors import LogError
 from care_core.frozen import dataclass
 from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, shortest, wall_clock
 from care_core.logs.base import Channel, Kind, LazyColumns, LogFormat, Table, Wanted
-from care_core.logs.clock import Clock, find_clock
+from care_core.logs.clock import Clock, clock_of
 from care_core.logs.damage import summarised
-from care_core.logs.mapped import FileArray, Offsets
+from care_core.logs.mapped import Bytes, FileArray, Offsets, stored_in
 from care_core.run import Damage, Setting
 
+_HEADER = b"\xa3\x95"
 _FMT, _FMT_LENGTH = 0x80, 89
 _MAX_TYPES = 256
-_CHUNK = 1 << 22
+_PIECE = 1 << 18
+"""Records that are looked at together: what is made of them stays in the processor's cache."""
 _LONGEST_RECORD = 256
 """Bytes; the length of a record is one byte of its format."""
+_NEAR = 20
+"""Records before a gap among which one is looked for that says the time."""
 
 # Format character of a field -> numpy type of its bytes, divisor of the stored integer.
 _FIELD_TYPES: dict[str, tuple[str, float]] = {
@@ -91,7 +95,7 @@ class _Values:
                 missing = {key: field for key, field in wanted.items() if key not in self._held}
                 if len(offsets) * sum(field.dtype.itemsize for field in missing.values()) > limits.VALUES_BYTES:
                     missing = {asked: wanted[asked]}
-                read = self._data.fields(offsets, [(field.offset, field.dtype) for field in missing.values()])
+                (read,) = self._data.fields([(offsets, [(field.offset, field.dtype) for field in missing.values()])])
                 self._held |= zip(missing, read, strict=True)
                 self._bytes += sum(column.nbytes for column in read)
             found = self._held[asked] = self._held.pop(asked)  # what was asked for last goes last
@@ -174,42 +178,39 @@ class DataFlashLog:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._data = data = FileArray.open(path)
-        starts = _find_headers(data)
-        formats, redefined = _read_formats(data, starts)
-        starts, gaps = _follow_records(data, starts, formats)
+        starts, types = _find_headers(data)
+        formats, redefined = _read_formats(data, starts, types)
+        starts, types, gaps = _follow_records(len(data), starts, types, formats)
         self._formats = {found[-1].name: found for found in _by_name(formats)}
         self._values = _Values(data)
-        self._clock, starts, untimely = self._keep_time(data, starts)
-        types = data.at(starts + 2)
+        self._clock, lost, untimely = self._keep_time(data, starts, types)
+        if len(lost):
+            kept = ~np.isin(starts, lost)
+            starts, types = starts[kept], types[kept]
+        of_type = _of_each_type(starts, types)
+        none = np.empty(0, dtype=starts.dtype)
         self._offsets = {
-            declared.type: starts[types == declared.type] for found in self._formats.values() for declared in found
+            declared.type: of_type.get(declared.type, none) for found in self._formats.values() for declared in found
         }
-        if not np.any(types != _FMT):
+        if not of_type.keys() - {_FMT}:
             raise LogError("The log holds no message.", hint="It may have been cut off.", where=str(path))
         self.duration_s = self._clock.duration_s
-        self.damage = (*redefined, *untimely, *self._describe(data, starts, gaps))
+        self.damage = (*redefined, *untimely, *self._describe(data, starts, types, gaps))
 
     def channels(self) -> tuple[Channel, ...]:
         return self._channels
 
     @cached_property
     def _channels(self) -> tuple[Channel, ...]:
-        data = self._data
-        found = []
-        for name in sorted(self._formats):
-            count = self._count(name)
-            if count:
-                t = self._times(data, name, ends_only=True)
-                found.append(Channel.over(name, self._formats[name][-1].code, count, float(t[-1] - t[0])))
-        return tuple(found)
+        names = [name for name in sorted(self._formats) if self._count(name)]
+        return tuple(
+            Channel.over(name, self._formats[name][-1].code, self._count(name), float(t[-1] - t[0]))
+            for name, t in self._times(names, ends_only=True).items()
+        )
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        data = self._data
-        return {
-            name: Table(self._times(data, name), self._columns(data, name, fields))
-            for name, fields in wanted.items()
-            if name in self._formats and self._count(name)
-        }
+        times = self._times([name for name in wanted if name in self._formats and self._count(name)])
+        return {name: Table(t, self._columns(name, wanted[name])) for name, t in times.items()}
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
         return self._settings
@@ -240,16 +241,18 @@ class DataFlashLog:
         parts = []
         for number in self._types(name):
             declared = [form for form in self._formats[name] if form.type == number]
-            cuts = np.searchsorted(self._offsets[number], [form.byte for form in declared[1:]])
-            parts += list(zip(declared, np.split(self._offsets[number], cuts), strict=True))
+            offsets = self._offsets[number]
+            cuts = np.searchsorted(offsets, np.array([form.byte for form in declared[1:]], dtype=offsets.dtype))
+            parts += list(zip(declared, np.split(offsets, cuts), strict=True))
         return [(form, offsets) for form, offsets in parts if len(offsets)]
 
-    def _columns(self, data: FileArray, name: str, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
+    def _columns(self, name: str, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
         parts = self._parts(name)
         known = [field for field in fields if any(field in form.fields for form, _ in parts)]
         if len(parts) == 1:
             form, offsets = parts[0]
             return _RecordColumns(self._values, form, offsets, known)
+        data = self._data
         return {
             field: np.concatenate([
                 _decode(data, offsets, form.fields[field]) if field in form.fields else np.full(len(offsets), np.nan)
@@ -258,23 +261,23 @@ class DataFlashLog:
             for field in known
         }  # fmt: skip
 
-    def _times(self, data: FileArray, name: str, *, ends_only: bool = False) -> NDArray[np.float64]:
-        """Seconds of the records of a message, or of the first and last of those of each declaration."""
-        pieces = []
-        for form, all_offsets in self._parts(name):
-            offsets = all_offsets[[0, -1]] if ends_only else all_offsets
-            if form.time_field is not None and not ends_only:
-                name_of_time, ticks = form.time_field
-                stored = self._values.of(form, offsets, name_of_time)
-                stamps = _decoded(stored, form.fields[name_of_time]) / ticks
-                pieces.append(self._clock.seconds(stamps, offsets))
-            elif form.time_field is not None:
-                pieces.append(self._clock.seconds(_stamps(data, offsets, form), offsets))
-            elif form.type == _FMT:
-                pieces.append(np.full(len(offsets), np.nan))
-            else:
-                pieces.append(self._last_known_time(offsets))
-        return np.concatenate(pieces) if pieces else np.empty(0)
+    def _times(self, names: Iterable[str], *, ends_only: bool = False) -> dict[str, NDArray[np.float64]]:
+        """Seconds of the records of messages, or of the first and last of those of each declaration."""
+        found, timed = {}, []
+        for name in names:
+            parts = [(form, offsets[[0, -1]] if ends_only else offsets) for form, offsets in self._parts(name)]
+            t = found[name] = np.full(sum(len(offsets) for _, offsets in parts), np.nan)
+            ends = np.cumsum([len(offsets) for _, offsets in parts])
+            for (form, offsets), own in zip(parts, np.split(t, ends[:-1]), strict=True):
+                if form.time_field is not None:
+                    timed.append((form, offsets, own))
+                elif form.type != _FMT:
+                    own[:] = self._last_known_time(offsets)
+        for near, piece in self._data.windows([offsets for _, offsets, _ in timed], _LONGEST_RECORD):
+            for (form, offsets, own), (rows, inner) in zip(timed, near, strict=True):
+                if len(inner):
+                    own[rows] = self._clock.seconds(_stamps(piece, inner, form), offsets[rows])
+        return found
 
     def _last_known_time(self, offsets: Offsets) -> NDArray[np.float64]:
         """Time of the last stamped record before each of these bytes: old firmwares stamped few of their messages."""
@@ -284,62 +287,95 @@ class DataFlashLog:
 
     @cached_property
     def _timeline(self) -> tuple[Offsets, NDArray[np.float64]]:
-        data = self._data
-        starts = np.sort(np.concatenate(list(self._offsets.values())))
-        places, stamps = self._stamped(data, starts)
-        return places, self._clock.seconds(stamps, places)
+        starts = np.concatenate(list(self._offsets.values()))
+        types = np.repeat(
+            np.array(list(self._offsets), dtype=np.uint8), [len(offsets) for offsets in self._offsets.values()]
+        )
+        order = np.argsort(starts, kind="stable")
+        pieces = list(self._stamped(self._data, starts[order], types[order]))
+        if not pieces:
+            return np.empty(0, dtype=starts.dtype), np.empty(0)
+        places = np.concatenate([places for _, places in pieces])
+        return places, self._clock.seconds(np.concatenate([stamps for stamps, _ in pieces]), places)
 
-    def _stamped(self, data: FileArray, starts: Offsets) -> tuple[Offsets, NDArray[np.float64]]:
-        """Those of the records that carry a stamp, and their stamps in seconds."""
-        form_of = {form.type: form for found in self._formats.values() for form in found if form.time_field}
-        types = data.at(starts + 2)
-        timed = np.zeros(_MAX_TYPES, dtype=bool)
-        timed[list(form_of)] = True
-        places, types = starts[timed[types]], types[timed[types]]
-        stamps = np.empty(len(places))
-        for alike in _alike(form_of.values()):  # nearly always one group: a walk through a large log is long
-            own = np.isin(types, [form.type for form in alike])
-            stamps[own] = _stamps(data, places[own], alike[0])
-        return places, stamps
+    def _stamped(self, data: FileArray, starts: Offsets, types: Bytes) -> Iterator[tuple[NDArray[np.float64], Offsets]]:
+        """Of the records that carry a stamp, window by window: their stamps in seconds, and their places."""
+        groups = _alike(form for found in self._formats.values() for form in found)
+        for ((rows, near),), piece in data.windows([starts], _LONGEST_RECORD):
+            own = types[rows]
+            stamps, timed = np.empty(len(own)), np.zeros(len(own), dtype=bool)
+            for form, is_alike in groups:  # nearly always one
+                alike = is_alike[own]
+                stamps[alike] = _stamps(piece, near[alike], form)
+                timed |= alike
+            yield stamps[timed], starts[rows][timed]
 
-    def _keep_time(self, data: FileArray, starts: Offsets) -> tuple[Clock, Offsets, tuple[Damage, ...]]:
-        """The clock of the log, the records without those whose stamp is impossible, and what is wrong with time."""
-        places, stamps = self._stamped(data, starts)
-        clock, impossible, jumps = find_clock(stamps, places)
-        lost = [Damage("a record's time is impossible", byte) for byte in places[impossible].tolist()]
-        kept = starts[~np.isin(starts, places[impossible])] if lost else starts
-        return clock, kept, (*summarised(jumps, "clock jumps"), *summarised(lost, "records with an impossible time"))
+    def _keep_time(self, data: FileArray, starts: Offsets, types: Bytes) -> tuple[Clock, Offsets, tuple[Damage, ...]]:
+        """The clock of the log, the places of the records whose stamp is impossible, and what is wrong with time."""
+        clock, spans, jumps = clock_of(self._stamped(data, starts, types))
+        timed = [form.type for found in self._formats.values() for form in found if form.time_field]
+        lost = [np.empty(0, dtype=starts.dtype)]
+        for first, last in spans:
+            rows = slice(*np.searchsorted(starts, np.array([first, last + 1], dtype=starts.dtype)).tolist())
+            lost.append(starts[rows][np.isin(types[rows], timed)])
+        places = np.concatenate(lost)
+        damage = [Damage("a record's time is impossible", byte) for byte in places.tolist()]
+        return (
+            clock,
+            places,
+            (*summarised(jumps, "clock jumps"), *summarised(damage, "records with an impossible time")),
+        )
 
-    def _describe(self, data: FileArray, starts: Offsets, gaps: list[tuple[int, int]]) -> tuple[Damage, ...]:
+    def _describe(
+        self, data: FileArray, starts: Offsets, types: Bytes, gaps: list[tuple[int, int]]
+    ) -> tuple[Damage, ...]:
         form_of = {form.type: form for found in self._formats.values() for form in found}
 
         def time_at(byte: int) -> float | None:
-            before = starts[max(0, int(np.searchsorted(starts, byte)) - 20) : np.searchsorted(starts, byte)]
-            for offset in before[::-1]:
-                form = form_of[data.byte(int(offset) + 2)]
+            end = int(np.searchsorted(starts, np.array(byte, dtype=starts.dtype)))
+            for row in range(end - 1, max(end - _NEAR, 0) - 1, -1):
+                form = form_of[int(types[row])]
                 if form.time_field:
-                    place = np.array([offset])
-                    return float(self._clock.seconds(_stamps(data, place, form), place)[0])
+                    place = starts[row : row + 1]
+                    record = data.between(int(place[0]), int(place[0]) + form.length)
+                    return float(self._clock.seconds(_stamps(record, place - place, form), place)[0])
             return None
 
         found = [Damage(_gap_text(low, high, len(data)), low, time_at(low)) for low, high in gaps]
         return summarised(found, "damaged places")
 
 
-def _find_headers(data: FileArray) -> Offsets:
-    """Every place where the two header bytes stand with a type byte after them, true records or not."""
+def _find_headers(data: FileArray) -> tuple[Offsets, Bytes]:
+    """Every place where the two header bytes stand with a type byte after them, true records or not; and that byte."""
     # A log can hold millions of records: four bytes a place do for all but the largest.
     kind = np.int32 if len(data) < 1 << 31 else np.int64
-    found: list[Offsets] = [np.empty(0, dtype=kind)]
-    for low in range(0, len(data) - 2, _CHUNK):
-        piece = data.between(low, low + _CHUNK + 2)
-        found.append((np.flatnonzero((piece[:-2] == 0xA3) & (piece[1:-1] == 0x95)) + low).astype(kind))
-    return np.concatenate(found)
+    places, types = bytearray(), bytearray()  # they grow where they lie
+    for low, piece in data.pieces(2):
+        first = np.flatnonzero(piece[:-2] == _HEADER[0])
+        first = first[piece[first + 1] == _HEADER[1]]
+        places += (first + low).astype(kind).tobytes()
+        types += piece[first + 2].tobytes()
+    return np.frombuffer(places, dtype=kind), np.frombuffer(types, dtype=np.uint8)
 
 
-def _read_formats(data: FileArray, starts: Offsets) -> tuple[list[Format], list[Damage]]:
+def _of_each_type(starts: Offsets, types: Bytes) -> dict[int, Offsets]:
+    """The records of each type."""
+    found: dict[int, bytearray] = {}
+    for low in range(0, len(starts), _PIECE):
+        own = types[low : low + _PIECE]
+        order = np.argsort(own, kind="stable")
+        counts = np.bincount(own, minlength=_MAX_TYPES)
+        there = np.flatnonzero(counts).tolist()
+        for number, offsets in zip(there, np.split(starts[low : low + _PIECE][order], np.cumsum(counts[there])[:-1]),
+                                   strict=True):  # fmt: skip
+            found.setdefault(number, bytearray()).extend(offsets.tobytes())
+    return {number: np.frombuffer(offsets, dtype=starts.dtype) for number, offsets in found.items()}
+
+
+def _read_formats(data: FileArray, starts: Offsets, types: Bytes) -> tuple[list[Format], list[Damage]]:
     """Every distinct declaration in file order, and what is wrong with those that contradict an earlier one."""
-    places = starts[(data.at(starts + 2) == _FMT) & (starts + _FMT_LENGTH <= len(data))]
+    places = starts[types == _FMT]
+    places = places[places <= len(data) - _FMT_LENGTH]
     own = _to_format(_FMT, "FMT", _FMT_LENGTH, "BBnNZ", "Type,Length,Name,Format,Columns", 0)
     formats: dict[int, Format] = {_FMT: own}
     found, redefined = [own], []
@@ -379,48 +415,73 @@ def _by_name(formats: list[Format]) -> list[list[Format]]:
     return list(names.values())
 
 
-def _follow_records(data: FileArray, starts: Offsets, formats: list[Format]) -> tuple[Offsets, list[tuple[int, int]]]:
-    """The true records among the header places, and the gaps (first byte, byte after) between them.
+def _follow_records(
+    end: int, starts: Offsets, types: Bytes, formats: list[Format]
+) -> tuple[Offsets, Bytes, list[tuple[int, int]]]:
+    """The true records among the header places of a file that ends at a byte, with their types, and the gaps (first
+    byte, byte after) between them.
 
     Records follow each other without space, so only the places where they do not are walked one by one.
     """
-    types = data.at(starts + 2)
     lengths = np.zeros(_MAX_TYPES, dtype=np.uint8)
     for form in reversed(formats):
         lengths[form.type] = form.length
-    size = lengths[types]
+    size = np.frombuffer(bytearray(types).translate(lengths.tobytes()), dtype=np.uint8)
     declared: set[int] = set()
     for form in formats:
         # A first declaration holds from the start of the file, a later one from where it stands.
         if form.type in declared:
-            size[(types == form.type) & (starts >= form.byte)] = form.length
+            later = int(np.searchsorted(starts, np.array(form.byte, dtype=starts.dtype)))
+            size[later:][types[later:] == form.type] = form.length
         declared.add(form.type)
-    whole = (size > 0) & (starts <= len(data) - size.astype(starts.dtype))
-    starts, size = starts[whole], size[whole]
+    whole = size > 0
+    last = int(np.searchsorted(starts, np.array(max(end - _LONGEST_RECORD, 0), dtype=starts.dtype)))
+    whole[last:] &= starts[last:] <= end - size[last:].astype(np.int64)
+    if not whole.all():
+        starts, types, size = _moved(starts, whole), _moved(types, whole), _moved(size, whole)
     if not len(starts):
-        return starts, [(0, len(data))]
-    breaks = np.append(np.flatnonzero(np.diff(starts) != size[:-1]), len(starts) - 1)
-    ends = starts[breaks].astype(np.int64) + size[breaks]
+        return starts, types, [(0, end)]
+    breaks = np.append(_breaks(starts, size), len(starts) - 1)
+    ends = starts[breaks] + size[breaks].astype(starts.dtype)
     after = np.searchsorted(starts, ends)
-    meets = (ends == len(data)) | (starts[np.minimum(after, len(starts) - 1)] == ends)
+    meets = (ends == end) | (starts[np.minimum(after, len(starts) - 1)] == ends)
     confirmed = np.ones(len(starts), dtype=bool)
     confirmed[breaks[~meets]] = False
     keep = np.ones(len(starts), dtype=bool)
     gaps = [(0, int(starts[0]))] if starts[0] else []
     position = 0
-    for place, end, met, next_place in zip(breaks.tolist(), ends.tolist(), meets, after.tolist(), strict=True):
+    for place, over, met, next_place in zip(breaks.tolist(), ends.tolist(), meets, after.tolist(), strict=True):
         if place < position:
             continue
         position = next_place
         if not met:
             later = int(np.argmax(confirmed[place + 1 :])) + place + 1 if place + 1 < len(starts) else place
             position = later if confirmed[later] else len(starts)
-            resumed = int(starts[position]) if position < len(starts) else len(data)
-            was_cut = resumed < end
+            resumed = int(starts[position]) if position < len(starts) else end
+            was_cut = resumed < over
             keep[place] = not was_cut
-            gaps.append((int(starts[place]) if was_cut else end, resumed))
+            gaps.append((int(starts[place]) if was_cut else over, resumed))
         keep[place + 1 : position] = False
-    return starts[keep], gaps
+    return _moved(starts, keep), _moved(types, keep), gaps
+
+
+def _moved(column: NDArray[Any], keep: NDArray[np.bool_]) -> NDArray[Any]:
+    """The entries of a mask, moved to the front of the array: a large log's index is not held twice."""
+    at = 0
+    for low in range(0, len(column), _PIECE):
+        part = column[low : low + _PIECE][keep[low : low + _PIECE]]
+        column[at : at + len(part)] = part
+        at += len(part)
+    return column[:at]
+
+
+def _breaks(starts: Offsets, size: Bytes) -> NDArray[np.intp]:
+    """The records behind which, by their size, the next does not begin."""
+    found = []
+    for low in range(0, len(starts) - 1, _PIECE):
+        piece = starts[low : low + _PIECE + 1]
+        found.append(np.flatnonzero(np.diff(piece) != size[low : low + len(piece) - 1]) + low)
+    return np.concatenate([np.empty(0, dtype=np.intp), *found])
 
 
 def _gap_text(low: int, high: int, size: int) -> str:
@@ -432,7 +493,7 @@ def _gap_text(low: int, high: int, size: int) -> str:
 
 def _decode(data: FileArray, offsets: Offsets, field: RecordField) -> NDArray[Any]:
     """One field of the records at `offsets`: float64, or object for text and arrays."""
-    return _decoded(data.at(offsets + field.offset, field.dtype), field)
+    return _decoded(data.fields([(offsets, [(field.offset, field.dtype)])])[0][0], field)
 
 
 def _decoded(values: NDArray[Any], field: RecordField) -> NDArray[Any]:
@@ -444,23 +505,28 @@ def _decoded(values: NDArray[Any], field: RecordField) -> NDArray[Any]:
         rows[:] = [tuple(row) for row in values.tolist()]
         return rows
     with np.errstate(invalid="ignore"):  # flipped bits make signalling NaNs of floats
-        return np.asarray(values.astype(np.float64) / field.divisor)
+        found = values.astype(np.float64)
+        found /= field.divisor
+    return found
 
 
-def _stamps(data: FileArray, offsets: Offsets, form: Format) -> NDArray[np.float64]:
-    """Timestamps in seconds of records that have one."""
+def _stamps(piece: Bytes, places: Offsets, form: Format) -> NDArray[np.float64]:
+    """Timestamps in seconds of the records at places of a window, of a declaration that has one."""
     assert form.time_field is not None
     name, ticks = form.time_field
-    return np.asarray(_decode(data, offsets, form.fields[name]) / ticks, dtype=np.float64)
+    field = form.fields[name]
+    return np.asarray(_decoded(stored_in(piece, places, (field.offset, field.dtype)), field) / ticks, dtype=np.float64)
 
 
-def _alike(forms: Iterable[Format]) -> list[list[Format]]:
-    """Declarations with a timestamp, those together that keep it at the same place in the same way."""
-    found: dict[tuple[RecordField, float], list[Format]] = {}
-    for form in forms:
-        if form.time_field is not None:
-            name, ticks = form.time_field
-            found.setdefault((form.fields[name], ticks), []).append(form)
+def _alike(forms: Iterable[Format]) -> list[tuple[Format, NDArray[np.bool_]]]:
+    """Of the types with a timestamp, by their last declaration, those together that keep it at the same place in the
+    same way: one of them, and which they are."""
+    found: dict[tuple[RecordField, float], tuple[Format, NDArray[np.bool_]]] = {}
+    for form in {form.type: form for form in forms if form.time_field is not None}.values():
+        assert form.time_field is not None
+        name, ticks = form.time_field
+        key = (form.fields[name], ticks)
+        found.setdefault(key, (form, np.zeros(_MAX_TYPES, dtype=bool)))[1][form.type] = True
     return list(found.values())
 
 

@@ -19,6 +19,8 @@ from care_core.errors import LogError
 
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.integer[Any]]
+Stored = tuple[int, "np.dtype[Any]"]
+"""How many bytes behind a place something is stored, and its type."""
 
 _BLOCK = 1 << 12
 """Bytes read at least: the headers of neighbouring records lie close together."""
@@ -138,26 +140,31 @@ class FileArray:
             watch(low + len(found), self._size)
         return found
 
+    def pieces(self, more: int) -> Iterator[tuple[int, Bytes]]:
+        """The whole file piece by piece: where each begins, and its bytes with so many of the next, which may be
+        overwritten by the next."""
+        buffer = np.empty(_WINDOW + more if self._held is None else 0, dtype=np.uint8)
+        for low in range(0, self._size, _WINDOW):
+            high = min(low + _WINDOW + more, self._size)
+            yield low, self._filled(buffer[: high - low], low) if self._held is None else self._held[low:high]
+
     def byte(self, place: int) -> int:
         return int(self.between(place, place + 1)[0])
 
     def at(self, places: Offsets, dtype: DTypeLike = np.uint8) -> NDArray[Any]:
         """What is stored at places, shape (n,) and that of the type; past the end of the file are zeros."""
-        return self.fields(places, [(0, np.dtype(dtype))])[0]
+        return self.fields([(places, [(0, np.dtype(dtype))])])[0][0]
 
-    def fields(self, places: Offsets, kinds: Sequence[tuple[int, np.dtype[Any]]]) -> list[NDArray[Any]]:
-        """As `at`, of values that lie so many bytes behind the places: all from one walk through the file."""
-        found = [np.empty((len(places), *kind.shape), kind.base) for _, kind in kinds]
-        size = max(offset + kind.itemsize for offset, kind in kinds)
-        for first, last, low, piece in self.windows(places, size):
-            near = places[first:last] - low
-            for column, (offset, kind) in zip(found, kinds, strict=True):
-                inner = (kind.base.itemsize,) if kind.shape else ()
-                # A view of the type at every byte, from which indexing copies only the wanted.
-                everywhere: NDArray[Any] = np.ndarray(
-                    (len(piece) - size + 1, *kind.shape), kind.base, piece.data, offset, (1, *inner)
-                )
-                column[first:last] = everywhere[near]
+    def fields(self, wanted: Sequence[tuple[Offsets, Sequence[Stored]]]) -> list[list[NDArray[Any]]]:
+        """As `at`, for several lists of places, of each the values that lie so many bytes behind them: all from one
+        walk through the file."""
+        found = [[np.empty((len(places), *kind.shape), kind.base) for _, kind in kinds] for places, kinds in wanted]
+        size = max((offset + kind.itemsize for _, kinds in wanted for offset, kind in kinds), default=0)
+        for near, piece in self.windows([places for places, _ in wanted], size):
+            for columns, (_, kinds), (rows, inner) in zip(found, wanted, near, strict=True):
+                for column, kind in zip(columns, kinds, strict=True):
+                    if len(inner):
+                        column[rows] = stored_in(piece, inner, kind)
         return found
 
     def parts(self, lows: Offsets, highs: Offsets) -> list[bytes]:
@@ -170,26 +177,46 @@ class FileArray:
             found += [bytes(text[a:b]) for a, b in bounds]
         return found
 
-    def windows(self, places: Offsets, size: int) -> Iterator[tuple[int, int, int, Bytes]]:
-        """First and one past the last of the places that lie close together, where they begin, and the file's bytes
-        from there to `size` bytes past the last; they may be overwritten by the next."""
-        held = self._held
-        buffer = np.empty(_WINDOW + size if held is None else 0, dtype=np.uint8)
-        for first, last in _close(places, _WINDOW if held is None else self._size):
-            low, high = int(places[first]), int(places[last - 1]) + size
+    def windows(self, places: Sequence[Offsets], size: int) -> Iterator[tuple[list[tuple[slice, Offsets]], Bytes]]:
+        """A walk along lists of places: of each list the rows that lie in a window and where in it, and the window's
+        bytes with `size` past the last place, zeros past the end of the file; they may be overwritten by the next."""
+        buffer = np.empty(_WINDOW + size if self._held is None else 0, dtype=np.uint8)
+        first = [0] * len(places)
+        while ahead := [int(each[at]) for each, at in zip(places, first, strict=True) if at < len(each)]:
+            low = min(ahead)
+            last = [_until(each, low + _WINDOW - 1) for each in places]
+            near = [(slice(a, b), each[a:b] - low) for each, a, b in zip(places, first, last, strict=True)]
+            high = low + max(int(inner[-1]) for _, inner in near if len(inner)) + size
             there = min(high, self._size)
+            held = self._held
             piece = self._filled(buffer[: there - low], low) if held is None else held[low:there]
             if there < high:
                 piece = np.append(piece, np.zeros(high - there, dtype=np.uint8))
-            yield first, last, low, piece
+            yield near, piece
+            first = last
+
+
+def stored_in(piece: Bytes, places: Offsets, kind: Stored) -> NDArray[Any]:
+    """What is stored so many bytes behind places of a window."""
+    offset, dtype = kind
+    inner = (dtype.base.itemsize,) if dtype.shape else ()
+    # A view of the type at every byte, from which indexing copies only the wanted.
+    count = len(piece) - offset - dtype.itemsize + 1
+    everywhere: NDArray[Any] = np.ndarray((count, *dtype.shape), dtype.base, piece.data, offset, (1, *inner))
+    return everywhere[places]
+
+
+def _until(places: Offsets, last: int) -> int:
+    """How many places, in the order of the file, lie no further than a byte."""
+    # A number of the array's own type: of another, the whole array is converted each time.
+    bound = np.array(min(last, np.iinfo(places.dtype).max), dtype=places.dtype)
+    return int(np.searchsorted(places, bound, "right"))
 
 
 def _close(places: Offsets, window: int) -> Iterator[tuple[int, int]]:
     """First and one past the last of places, in the order of the file, that lie within so many bytes."""
     first = 0
     while first < len(places):
-        # A number of the array's own type: of another, the whole array is converted each time.
-        until = np.array(min(int(places[first]) + window, np.iinfo(places.dtype).max), dtype=places.dtype)
-        last = int(np.searchsorted(places, until, "right"))
+        last = _until(places, int(places[first]) + window)
         yield first, last
         first = last

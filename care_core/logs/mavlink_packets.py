@@ -210,12 +210,12 @@ def payloads(data: FileArray, start: Offsets) -> tuple[Offsets, NDArray[np.int64
 def _sums(data: FileArray, packets: Packets) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
     """CRC-16/MCRF4XX of packets without the byte that their message adds, and the checksums that they state."""
     marker = packets.start + STAMP_BYTES
-    pieces = [_sums_of(piece, (marker[first:last] - low)) for first, last, low, piece in data.windows(marker, _LONGEST)]
+    pieces = [_sums_of(piece, places) for ((_, places),), piece in data.windows([marker], _LONGEST)]
     none = np.empty(0, dtype=np.uint16)
     return np.concatenate([none, *(summed for summed, _ in pieces)]), np.concatenate([none, *(s for _, s in pieces)])
 
 
-def _sums_of(data: Bytes, marker: Offsets) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
+def _sums_of(data: Bytes, marker: NDArray[np.integer[Any]]) -> tuple[NDArray[np.uint16], NDArray[np.uint16]]:
     """The sums of packets whose markers stand at places of these bytes."""
     tail = marker + np.where(data[marker] == V2, 10, 6) + data[marker + 1]
     covered = tail - marker - 1
