@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_PIECE = 1 << 16
+"""Rows that are worked on together: what is made of them on the way stays in the processor's cache."""
+
+
+def pieces(count: int) -> Iterator[slice]:
+    """So many rows piece by piece: of a long log no more than one piece is held of what lies between two columns."""
+    return (slice(low, min(low + _PIECE, count)) for low in range(0, count, _PIECE))
 
 
 def six_digits(value: float) -> float:
@@ -19,3 +30,25 @@ def distinct(values: NDArray[Any]) -> NDArray[Any]:
     first = np.ones(len(ordered), dtype=bool)
     first[1:] = ordered[1:] != ordered[:-1]
     return ordered[first]
+
+
+def ascending(values: Floats) -> Floats:
+    """The values in order; themselves where they are, as times nearly always."""
+    return values if np.all(values[:-1] <= values[1:]) else np.sort(values)
+
+
+def pauses(series: Iterable[Floats], longer_than: float) -> tuple[Floats, Floats]:
+    """Where for longer than so much no value of any of several series lies: the last value before each such place, and
+    the first behind it, ascending. The series are never put together: they may be large."""
+    starts, ends = [np.empty(0)], [np.empty(0)]
+    for values in series:
+        if len(values):
+            ordered = ascending(values)
+            cuts = np.flatnonzero(np.diff(ordered) > longer_than)
+            starts.append(ordered[np.concatenate(([0], cuts + 1))])
+            ends.append(ordered[np.append(cuts, len(ordered) - 1)])
+    start, end = np.concatenate(starts), np.concatenate(ends)
+    order = np.argsort(start, kind="stable")
+    before, after = np.maximum.accumulate(end[order])[:-1], start[order][1:]
+    apart = after - before > longer_than
+    return before[apart], after[apart]

@@ -11,7 +11,7 @@ import numpy as np
 
 from care_core.health.records import Moment
 from care_core.logs.base import Table
-from care_core.numbers import distinct
+from care_core.numbers import Floats, ascending, distinct, pauses
 from care_core.run import Damage, Setting, shown
 from care_core.vehicles import is_self_written
 
@@ -39,6 +39,8 @@ _TELEMETRY_RATE = re.compile(
 )
 """Rates that ground stations set by themselves when they connect."""
 _PAUSE_S, _GAP_MEDIANS, _IDLE_S = 2.0, 20.0, 60.0
+_CLEARLY = 3.0
+"""Where so many times as many steps as fit into a span would be too long, more than half of them are not."""
 _SWITCHED_WITHIN_S = 2.0
 
 
@@ -85,26 +87,38 @@ def parameter_changes(
 
 def gaps(tables: Iterable[Table], armed: Sequence[Span]) -> Iterator[Moment]:
     """The longest time in which nothing at all was recorded while armed, and while disarmed if it is long."""
-    stamps = [table.t[np.isfinite(table.t)] for table in tables if len(table) > _GAP_MEDIANS]
-    t = distinct(np.concatenate(stamps)) if stamps else np.empty(0)
-    steps = np.diff(t)
-    if not len(steps):
-        return
-    limit = max(_PAUSE_S, _GAP_MEDIANS * float(np.median(steps)))
+    stamps = [_known(table.t) for table in tables if len(table) > _GAP_MEDIANS]
+    limit = max(_PAUSE_S, _GAP_MEDIANS * _usual_step(stamps))
     edges = [edge for span in armed for edge in span]  # a log may be written while armed only
     flown, idle = [], []
-    for at in np.flatnonzero(steps > limit).tolist():
-        low, high = float(t[at]), float(t[at + 1])
+    for low, high in zip(*(ends.tolist() for ends in pauses(stamps, limit)), strict=True):
         is_switch = any(low - _SWITCHED_WITHIN_S <= edge <= high + _SWITCHED_WITHIN_S for edge in edges)
         if within(armed, low) and within(armed, high) and not is_switch:
             flown.append((low, high))
         elif high - low > _IDLE_S:
             idle.append((low, high))
-    for pauses, when in ((flown, " while armed"), (idle, "")):
-        if pauses:
-            start, end = max(pauses, key=lambda pause: pause[1] - pause[0])
-            more = f", the longest of {len(pauses)} gaps" if len(pauses) > 1 else ""
+    for lasted, when in ((flown, " while armed"), (idle, "")):
+        if lasted:
+            start, end = max(lasted, key=lambda pause: pause[1] - pause[0])
+            more = f", the longest of {len(lasted)} gaps" if len(lasted) > 1 else ""
             yield Moment(start, "log", f"nothing is recorded for {end - start:.1f} s{when}{more}", "the log")
+
+
+def _known(t: Floats) -> Floats:
+    known = np.isfinite(t)
+    return t if known.all() else t[known]
+
+
+def _usual_step(stamps: Sequence[Floats]) -> float:
+    """Median step of all times together; 0 where it is clearly too short to matter, which the longest series says."""
+    span_s = max((float(np.max(t)) for t in stamps if len(t)), default=0.0) - min(
+        (float(np.min(t)) for t in stamps if len(t)), default=0.0
+    )
+    count = int(np.count_nonzero(np.diff(ascending(max(stamps, key=len, default=np.empty(0))))))
+    if count * _PAUSE_S / _GAP_MEDIANS > _CLEARLY * span_s:
+        return 0.0
+    steps = np.diff(distinct(np.concatenate([np.empty(0), *stamps])))
+    return float(np.median(steps)) if len(steps) else 0.0
 
 
 def damage_of(damage: Sequence[Damage]) -> Iterator[Moment]:

@@ -96,6 +96,8 @@ class Table:
 
     def where(self, mask: NDArray[np.bool_] | slice) -> Table:
         """The messages of a mask, or of a range of rows."""
+        if not isinstance(mask, slice) and mask.all():
+            return self
         if isinstance(self.columns, LazyColumns):
             return Table(self.t[mask], self.columns.where(mask))
         return Table(self.t[mask], {name: column[mask] for name, column in self.columns.items()})

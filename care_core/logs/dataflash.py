@@ -114,7 +114,7 @@ class _RecordColumns(LazyColumns):
         form: Format,
         offsets: Offsets,
         names: Sequence[str],
-        rows: slice | NDArray[np.intp] = slice(None),
+        rows: slice | Offsets = slice(None),
     ) -> None:
         self._values, self._form, self._offsets, self._names, self._rows = values, form, offsets, names, rows
         self._texts: dict[str, NDArray[Any]] = {}
@@ -143,12 +143,12 @@ class _RecordColumns(LazyColumns):
         return self._form.fields[name].kind
 
     def where(self, mask: NDArray[np.bool_] | slice) -> _RecordColumns:
-        rows: slice | NDArray[np.intp]
+        rows: slice | Offsets
         if isinstance(self._rows, slice) and isinstance(mask, slice):
             left = range(len(self._offsets))[self._rows][mask]
             rows = slice(left.start, left.stop, left.step)
         else:
-            rows = np.arange(len(self._offsets))[self._rows][mask]
+            rows = np.arange(len(self._offsets), dtype=self._offsets.dtype)[self._rows][mask]
         part = _RecordColumns(self._values, self._form, self._offsets, self._names, rows)
         part._texts = {name: column[mask] for name, column in self._texts.items()}
         return part

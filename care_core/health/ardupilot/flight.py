@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from care_core.frozen import dataclass
 from care_core.health.ardupilot.signals import Floats, instances
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import pieces
 from care_core.run import Setting
 from care_core.vehicles import Vehicle, vehicle_of, way_of, with_said
 from care_core.vehicles.self_written import SIMULATOR_PREFIX
@@ -320,14 +321,24 @@ class Flight:
         table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
         if table is None:
             return None
-        has, wants = (_up(table[r], table[p]) for r, p in (("Roll", "Pitch"), ("DesRoll", "DesPitch")))
-        return table.t, np.degrees(np.arccos(np.clip((has * wants).sum(axis=0), -1.0, 1.0)))
+        columns = [table[field] for field in ("Roll", "Pitch", "DesRoll", "DesPitch")]
+        error = np.empty(len(table))
+        for rows in pieces(len(table)):
+            roll, pitch, wanted_roll, wanted_pitch = (column[rows] for column in columns)
+            aligned = (_up(roll, pitch) * _up(wanted_roll, wanted_pitch)).sum(axis=0)
+            error[rows] = np.degrees(np.arccos(np.clip(aligned, -1.0, 1.0)))
+        return table.t, error
 
     @cached_property
     def tilt(self) -> tuple[Floats, Floats] | None:
         """Time and lean from level (degrees)."""
         table = self.one("ATT", "Roll", "Pitch")
-        return None if table is None else (table.t, np.degrees(np.arccos(_up(table["Roll"], table["Pitch"])[2])))
+        if table is None:
+            return None
+        roll, pitch, lean = table["Roll"], table["Pitch"], np.empty(len(table))
+        for rows in pieces(len(table)):
+            lean[rows] = np.degrees(np.arccos(_up(roll[rows], pitch[rows])[2]))
+        return table.t, lean
 
     @cached_property
     def lost_control_s(self) -> float | None:

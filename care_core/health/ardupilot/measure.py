@@ -8,6 +8,7 @@ import numpy as np
 
 from care_core.health.ardupilot.flight import Mask, Span, runs
 from care_core.health.ardupilot.signals import Floats
+from care_core.numbers import pieces
 
 Calibration = Sequence[tuple[float, float]]
 """Points (how many times over the limit, probability that the part really failed), rising."""
@@ -26,7 +27,7 @@ def lasting(t: Floats, mask: Mask, for_s: float, gap_s: float = 1.0, records: in
     record."""
     if not mask.any():
         return []
-    step = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    step = float(np.median(np.diff(t), overwrite_input=True)) if len(t) > 1 else 0.0
     held = runs(t, mask, max(gap_s, 1.5 * step))
     counts = np.searchsorted(t[mask], [edge for span in held for edge in span], side="right").tolist()
     starts = np.searchsorted(t[mask], [span[0] for span in held], side="left").tolist()
@@ -42,10 +43,13 @@ def smooth(t: Floats, x: Floats, width_s: float) -> Floats:
     if len(t) < 3:
         return x
     n = _records(t, width_s)
-    padded = np.pad(x, n // 2, mode="edge")
-    total = np.cumsum(np.concatenate(([0.0], padded)))
-    mean: Floats = (total[n:] - total[:-n]) / n
-    return mean
+    total = np.empty(len(x) + n)
+    ahead = n // 2 + 1
+    total[0], total[1:ahead], total[ahead : ahead + len(x)], total[ahead + len(x) :] = 0.0, x[0], x, x[-1]
+    np.cumsum(total, out=total)
+    for rows in pieces(len(x)):  # a mean takes the place of the sum that nothing else needs any more
+        total[rows] = (total[rows.start + n : rows.stop + n] - total[rows]) / n
+    return total[: len(x)]
 
 
 def steady(t: Floats, x: Floats, width_s: float) -> Floats:
@@ -64,7 +68,7 @@ def steady(t: Floats, x: Floats, width_s: float) -> Floats:
 
 def _records(t: Floats, width_s: float) -> int:
     """How many of at least three records, an odd number, lie in a window of `width_s`."""
-    step = max(float(np.median(np.diff(t))), 1e-6)
+    step = max(float(np.median(np.diff(t), overwrite_input=True)), 1e-6)
     return min(max(round(width_s / step) | 1, 3), len(t) if len(t) % 2 else len(t) - 1)
 
 

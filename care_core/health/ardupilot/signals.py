@@ -6,13 +6,13 @@ the outputs are Chan1 or Mot1. Checks see instances of a message with today's fi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.logs.base import Table, Wanted
+from care_core.logs.base import Kind, Table, Wanted
 from care_core.numbers import distinct
 
 Floats = NDArray[np.float64]
@@ -80,27 +80,53 @@ def instances(tables: Mapping[str, Table], name: str) -> tuple[Table, ...]:
     return tuple(found)
 
 
+class _Today(Mapping[str, NDArray[Any]]):
+    """A table's columns under today's names and in today's units, made when they are asked for.
+
+    `sources` says of each name the column that it is and what that is divided by.
+    """
+
+    def __init__(self, table: Table, sources: Mapping[str, tuple[str, float]]) -> None:
+        self._table, self._sources = table, sources
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        source, divisor = self._sources[name]
+        column = self._table[source]
+        return column if divisor == 1 else column / divisor
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._sources  # the inherited way would decode the column
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._sources)
+
+    def __len__(self) -> int:
+        return len(self._sources)
+
+    def kind(self, name: str) -> Kind:
+        return self._table.kind(self._sources[name][0])
+
+    def where(self, mask: NDArray[np.bool_] | slice) -> _Today:
+        return _Today(self._table.where(mask), self._sources)
+
+
 def _renamed(name: str, table: Table) -> Table:
-    former = _FORMER.get(name, {})
-    columns: dict[str, NDArray[Any]] = {}
-    for field in table.columns:
-        columns[field] = table[field]
-    for field, olds in former.items():
-        old = next((old for old in olds if old in columns), None)
-        if field not in columns and old is not None:
-            columns[field] = columns[old]
-    if name == "BAT" and "Volt" in columns and _top(columns["Volt"]) > _CENTIVOLTS:
-        columns["Volt"] = columns["Volt"] / 100
-        if "Curr" in columns:
-            columns["Curr"] = columns["Curr"] / 100
+    sources = {field: (field, 1.0) for field in table.columns}
+    for field, olds in _FORMER.get(name, {}).items():
+        old = next((old for old in olds if old in sources), None)
+        if field not in sources and old is not None:
+            sources[field] = sources[old]
+    if name == "BAT" and "Volt" in sources and _top(table[sources["Volt"][0]]) > _CENTIVOLTS:
+        for field in sources.keys() & {"Volt", "Curr"}:
+            sources[field] = (sources[field][0], 100.0)
     if name == "CTUN":
-        for field in ("ThO", "ThI"):
-            if field in columns and _top(columns[field]) > _FULL_SCALE:
-                columns[field] = columns[field] / (_PERCENT if field in table.columns else 1000)
-        if "Alt" not in columns and "BAlt" in columns:
-            columns["Alt"] = columns["BAlt"]
+        for field in sources.keys() & {"ThO", "ThI"}:
+            if _top(table[sources[field][0]]) > _FULL_SCALE:
+                sources[field] = (sources[field][0], _PERCENT if field in table.columns else 1000.0)
+        if "Alt" not in sources and "BAlt" in sources:
+            sources["Alt"] = sources["BAlt"]
+    found = Table(table.t, _Today(table, sources))
     keep = np.isfinite(table.t)
-    found = Table(table.t, columns)
     return found if keep.all() else found.where(keep)
 
 

@@ -193,7 +193,8 @@ def _unasked(
     """Where a rate swings far more than is asked for, and how far it is off its demand at most."""
     error = table[rate] - table[wanted]
     level, demand = smooth(table.t, np.abs(error), 3.0), smooth(table.t, np.abs(table[wanted]), 3.0)
-    spans = lasting(table.t, where & (level > SWING_DPS) & ((level > OVER_DEMAND * demand) | exhausted), _SWING_S)
+    demand *= OVER_DEMAND
+    spans = lasting(table.t, where & (level > SWING_DPS) & ((level > demand) | exhausted), _SWING_S)
     swung = flight.during(spans, table.t)
     if not spans or not _to_and_fro(error[swung]):
         return [], 0.0

@@ -10,6 +10,7 @@ from care_core.health.ardupilot.flight import Flight, Mask
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding
 from care_core.logs.base import Wanted
+from care_core.numbers import pauses
 
 READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "POWR": ("Vcc",)}
 
@@ -31,22 +32,22 @@ def _holes(flight: Flight) -> Iterator[Finding]:
     streams = [table.t for name in _STEADY if (table := flight.one(name)) is not None and len(table) > 20]
     if not streams or flight.clock_jumps:
         return
-    t = np.sort(np.concatenate(streams))
-    steps = np.diff(t)
     limit = max(_HOLE_S, _TIMES * float(np.median(np.diff(streams[0]))))
-    holes = np.flatnonzero((steps > limit) & _inside(flight, t[:-1], t[1:]))
-    if len(holes):
-        total = float(steps[holes].sum())
+    low, high = pauses(streams, limit)
+    inside = _inside(flight, low, high)
+    low, high = low[inside], high[inside]
+    if len(low):
+        total = float((high - low).sum())
         if flight.is_telemetry:
             yield Finding(
-                "radio", "telemetry was interrupted", float(t[holes[0]]), float(t[holes[-1] + 1]), "info",
-                f"{len(holes)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
+                "radio", "telemetry was interrupted", float(low[0]), float(high[-1]), "info",
+                f"{len(low)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
                 "times of the telemetry", suspect="world", probability=0.3,
             )  # fmt: skip
             return
         yield Finding(
-            "log", f"the log has {len(holes)} hole{'s' * (len(holes) > 1)}", float(t[holes[0]]),
-            float(t[holes[-1] + 1]), "warning", f"{total:.1f} s without any record (limit {limit:.0f} s)",
+            "log", f"the log has {len(low)} hole{'s' * (len(low) > 1)}", float(low[0]),
+            float(high[-1]), "warning", f"{total:.1f} s without any record (limit {limit:.0f} s)",
             "times of ATT, RCOU, CTUN, IMU", probability=0.3,
         )  # fmt: skip
 

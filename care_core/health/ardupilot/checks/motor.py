@@ -19,6 +19,7 @@ from care_core.health.ardupilot.measure import Calibration, lasting, likely, smo
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Wanted
+from care_core.numbers import pieces
 from care_core.vehicles import Motor, motors_of
 
 READS: Wanted = {
@@ -84,11 +85,15 @@ def _outputs(flight: Flight) -> _Outputs | None:
     columns = [f"C{motor.output}" for motor in motors]
     if len(columns) < 3 or not all(column in table.columns for column in columns):
         return None
-    pwm = np.stack([table[column] for column in columns])
-    low, high = _range(flight, pwm)
+    share = np.empty((len(columns), len(table)))
+    for row, column in zip(share, columns, strict=True):
+        row[:] = table[column]
+    low, high = _range(flight, share)
     if not np.isfinite(high - low) or high - low < 100:
         return None
-    return _Outputs(motors, table.t, np.clip((pwm - low) / (high - low), 0.0, 1.0))
+    share -= low
+    share /= high - low
+    return _Outputs(motors, table.t, np.clip(share, 0.0, 1.0, out=share))
 
 
 def _nameless(columns: Mapping[str, Floats]) -> tuple[Motor, ...]:
@@ -111,7 +116,9 @@ def _range(flight: Flight, pwm: Floats) -> tuple[float, float]:
 def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
     """Rows in which the motors lift it, upright, and nothing else holds it: in the air, or where it never left the
     ground the first seconds of trying, before the integrators wind up."""
-    lifting = flight.watch(outputs.t) & (np.median(outputs.share, axis=0) > _LIFTING)
+    lifting = flight.watch(outputs.t)
+    for rows in pieces(len(outputs.t)):
+        lifting[rows] &= np.median(outputs.share[:, rows], axis=0) > _LIFTING
     lifting &= ~flight.during(flight.held, outputs.t)
     if flight.tilt is not None:
         lifting &= np.interp(outputs.t, *flight.tilt) < 60.0
@@ -122,8 +129,12 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
 
 def _excess(share: Floats) -> NDArray[np.float64]:
     """How far each motor stands above the middle of the others, shape (motors, n)."""
-    everyone = np.arange(len(share))
-    return np.stack([share[n] - np.median(share[everyone != n], axis=0) for n in everyone])
+    everyone, excess = np.arange(len(share)), np.empty(share.shape)
+    for rows in pieces(share.shape[1]):
+        piece = share[:, rows]
+        for n in everyone:
+            excess[n, rows] = piece[n] - np.median(piece[everyone != n], axis=0)
+    return excess
 
 
 def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
@@ -132,12 +143,17 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     if lifting.sum() < 8:
         return
     t = outputs.t[lifting]
-    excess = np.stack([smooth(t, row, 4.0) for row in _excess(outputs.share[:, lifting])])
-    order = np.sort(excess, axis=0)
+    excess = _excess(outputs.share[:, lifting])
+    is_alone = np.zeros(excess.shape, dtype=bool)
+    for row in excess:
+        row[:] = smooth(t, row, 4.0)
+    for rows in pieces(len(t)):
+        piece = excess[:, rows]
+        order = np.sort(piece, axis=0)
+        is_alone[:, rows] = (piece > ALONE) & (piece >= order[-1] - 1e-9) & (order[-2] < _NEXT * piece)
     best: tuple[float, int, float, float] | None = None
     for n, row in enumerate(excess):
-        alone = (row > ALONE) & (row >= order[-1] - 1e-9) & (order[-2] < _NEXT * row)
-        spans = lasting(t, alone, _LASTS_S, gap_s=3.0)
+        spans = lasting(t, is_alone[n], _LASTS_S, gap_s=3.0)
         if not spans:
             continue
         since = outputs.share[:, lifting][:, t >= spans[0][0]]
