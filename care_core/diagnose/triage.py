@@ -508,9 +508,10 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None) -> t
         notes.append(_if_hidden(case, fix))
     if not case.run.mission.fits and case.run.mission.mismatch not in notes:
         notes.append(case.run.mission.mismatch)
-    unread = [name for name in unread_options(case.profile.schema, case.run) if name in _off(case)]
+    unread = unread_options(case.profile.schema, case.run) & set(_off(case))
     if unread:
-        notes.append(f"no suspect, as no mode that reads it was entered: {', '.join(unread)}")
+        named = ", ".join(option.name for option in case.profile.schema.options if option.name in unread)
+        notes.append(f"no suspect, as no mode that reads it was entered: {named}")
     if case.world.assumed:
         names = sorted(case.world.assumed)
         shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")

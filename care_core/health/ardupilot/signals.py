@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.logs.base import Kind, Table, Wanted
+from care_core.logs.base import Kind, LazyColumns, Table, Wanted
 from care_core.numbers import distinct
 
 Floats = NDArray[np.float64]
@@ -80,7 +80,7 @@ def instances(tables: Mapping[str, Table], name: str) -> tuple[Table, ...]:
     return tuple(found)
 
 
-class _Today(Mapping[str, NDArray[Any]]):
+class _Today(LazyColumns):
     """A table's columns under today's names and in today's units, made when they are asked for.
 
     `sources` says of each name the column that it is and what that is divided by.
