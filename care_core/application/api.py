@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, choose, fitting, open_case, opened, read_case
+from care_core.application.case import Case, Progress, Request, choose, fitting, good_of, open_case, opened, read_case
 from care_core.errors import CareError, LogError
 
 if TYPE_CHECKING:
@@ -70,12 +70,17 @@ def what_if(asked: Case | Request | str | Path, changes: Mapping[str, float]) ->
 
 
 def verify(
-    report: str | Path, log: str | Path, profile: str | None = None, mission: int | None = None
+    report: str | Path,
+    log: str | Path,
+    profile: str | None = None,
+    mission: int | None = None,
+    reference: str | Path | None = None,
 ) -> VerifyDocument:
     """What became of a report's promise in the run of a later log.
 
     Args:
         profile: another than that of the report.
+        reference: the configuration that the run is judged against, as in the triage that wrote the report.
 
     Raises:
         CareError: the report is none or suggests no change, or the log cannot be read.
@@ -88,7 +93,8 @@ def verify(
     promise = promise_of(promised)
     with opened(Path(log)) as (found, sha256):
         chosen, _ = fitting(found, profile or profile_of(promised).name)
-        run, verification = verify_log(promise, found, chosen, mission, sha256)
+        good = good_of(None if reference is None else Path(reference), chosen)
+        run, verification = verify_log(promise, found, chosen, mission, sha256, good)
     return verify_document(promised, run, verification)
 
 

@@ -246,7 +246,7 @@ def _read(
 
     progress("reading the log", 0.2)
     profile = with_own_limits(profile, request.site)
-    good = _good(request, profile)
+    good = good_of(request.reference or request.since, profile)
     judged = read_and_judge(
         log, profile, configs=configs, thresholds=request.thresholds, mission=request.mission, good=good, sha256=sha256
     )
@@ -270,19 +270,19 @@ def with_own_limits(profile: Profile, site: Path | None) -> Profile:
     return profile if schema is profile.schema else replace(profile, schema=schema)
 
 
-def _good(request: Request, profile: Profile) -> Good | None:
-    """The configuration that the operator vouches for, None where none was named. Raises CareError."""
+def good_of(path: Path | None, profile: Profile) -> Good | None:
+    """The configuration that the operator vouches for, a file or that of a log; None where none was named. Raises
+    CareError."""
     from care_core.configs.driven import readable
     from care_core.configs.loading import read_configs, resolve
     from care_core.diagnose.reference import Good
     from care_core.logs.finding import is_log
     from care_core.logs.opening import open_log
 
-    path = request.reference or request.since
     if path is None:
         return None
     source = f"the configuration of {path.name}"
-    if request.reference is not None and not is_log(path):
+    if not is_log(path):
         parameters = (parameter for option in profile.schema.options for parameter in readable(option))
         return Good(resolve(read_configs((path,)), parameters), source)
     return Good({name: history[-1] for name, history in open_log(path).settings().items()}, source)

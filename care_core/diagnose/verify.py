@@ -12,6 +12,7 @@ from typing import Literal
 from care_core.configs.driven import option_value, readable, same_value
 from care_core.diagnose.judging import Judged, read_and_judge, thresholds_in_force
 from care_core.diagnose.records import ObjectiveResult, Status
+from care_core.diagnose.reference import Good
 from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema
@@ -116,7 +117,12 @@ class Verification:
 
 
 def verify_log(
-    promise: Promise, log: Log, profile: Profile, mission: int | None = None, sha256: Sha256 | None = None
+    promise: Promise,
+    log: Log,
+    profile: Profile,
+    mission: int | None = None,
+    sha256: Sha256 | None = None,
+    good: Good | None = None,
 ) -> tuple[Run, Verification]:
     """Compare one mission of a log, judged by the report's thresholds, with what was promised for it.
 
@@ -134,7 +140,7 @@ def verify_log(
         if before.threshold is not None and before.need is None
     }
     own = {name: bound.value for name, bound in wanted.items() if name not in usual or usual[name].value != bound.value}
-    judged = read_and_judge(log, profile, thresholds=own, mission=mission, sha256=sha256)
+    judged = read_and_judge(log, profile, thresholds=own, mission=mission, good=good, sha256=sha256)
     found = verify(promise, judged, schema, _doubt(promise, judged.run, schema))
     return judged.run, replace(found, notes=tuple(_notes(promise, judged.run, schema)))
 

@@ -19,6 +19,7 @@ from care_tui.commands.arguments import (
     Mission,
     Out,
     ProfileName,
+    Reference,
     Site,
     Thresholds,
     bounds,
@@ -40,6 +41,7 @@ def whatif(
     config: ConfigPaths = None,
     threshold: Thresholds = None,
     site: Site = None,
+    reference: Reference = None,
     mission: Mission = None,
     json: AsJson = False,
     out: Out = None,
@@ -51,7 +53,15 @@ def whatif(
 
     if not set_:
         raise UsageError("Nothing is asked.", hint="Change an option with --set OPTION=VALUE.", where="--set")
-    request = Request(log, profile, tuple(config or ()), thresholds=bounds(threshold or ()), site=site, mission=mission)
+    request = Request(
+        log,
+        profile,
+        tuple(config or ()),
+        thresholds=bounds(threshold or ()),
+        site=site,
+        reference=reference,
+        mission=mission,
+    )
     with Progress() as progress:
         question = read_case(request, progress).question
     answer = question.ask(dict(parse_change(text, question.schema) for text in set_))
@@ -63,6 +73,7 @@ def verify(
     report: Annotated[Path, typer.Argument(metavar="REPORT", help="The report, YAML or JSON.", show_default=False)],
     log: LogPath,
     profile: ProfileName = None,
+    reference: Reference = None,
     mission: Mission = None,
     json: AsJson = False,
     out: Out = None,
@@ -76,7 +87,7 @@ def verify(
         raise UsageError("That is the report itself.", hint="Name another file.", where=str(out))
     with Progress() as progress:
         progress("reading the log", 0.0)
-        document = care_core.verify(report, log, profile, mission)
+        document = care_core.verify(report, log, profile, mission, reference)
     if not no_history:
         verified = document.plain()
         mention(remember(lambda history: history.add_verification(verified)))

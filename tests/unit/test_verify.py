@@ -249,6 +249,22 @@ def test_a_run_that_still_fails_ends_with_1(care: Care, report: Path) -> None:
     assert document["worked"] is None
 
 
+def test_a_run_is_judged_against_the_reference_of_the_triage(care: Care, report: Path, tmp_path: Path) -> None:
+    """Who vouches for a slow landing is wanted no faster a mission, then and afterwards."""
+    slow = tmp_path / "ours.param"
+    slow.write_text("LAND_SPEED,16\n", encoding="utf-8")
+
+    def bound(*more: object) -> float:
+        _, out, _ = care("verify", report, SAMPLE, "--json", *more)
+        (time,) = (one for one in json.loads(out)["objectives"] if one["after"]["name"] == "mission_time")
+        return float(time["after"]["threshold"]["value"])
+
+    _, out, _ = care("triage", SAMPLE, "--reference", slow, "--json")
+    (judged,) = (one for one in json.loads(out)["objectives"] if one["name"] == "mission_time")
+    assert bound("--reference", slow) == judged["threshold"]["value"] > bound()
+    assert care("whatif", SAMPLE, "--set", "LAND_SPEED=40", "--reference", slow).code == 0
+
+
 def test_what_cannot_be_verified_is_refused(care: Care, report: Path, tmp_path: Path) -> None:
     assert care("verify", tmp_path / "none.yaml", SAMPLE).code == 2
     assert care("verify", report, tmp_path / "none.BIN").code == 4
