@@ -11,7 +11,7 @@ MEBIBYTE = 1 << 20
 HELD_BYTES = 4 * MEBIBYTE
 """Of a log held in memory as a whole. A larger one is read where it is asked for, again each time, from the system's
 cache of files: 60 ms a gigabyte."""
-VALUES_BYTES = 32 * MEBIBYTE
+VALUES_BYTES = 16 * MEBIBYTE
 """Of fields of a DataFlash log that are held as they are stored, beside what a check makes of them."""
 UNPACKED_BYTES, UNPACKED_RATIO = 256 * MEBIBYTE, 32
 """Laser scans pack 5:1, costmaps 30:1 and more, but no log is mostly empty costmaps."""

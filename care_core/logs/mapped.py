@@ -24,8 +24,9 @@ Stored = tuple[int, "np.dtype[Any]"]
 
 _BLOCK = 1 << 12
 """Bytes read at least: the headers of neighbouring records lie close together."""
-_WINDOW = 1 << 20
-"""Bytes read at most for records that lie apart: they stay in the processor's cache while they are picked out."""
+_WINDOW, _MOST_WINDOWS = 1 << 18, 8
+"""Bytes read at most for records that lie apart: they stay in the processor's cache while they are picked out. So many
+times more where several lists are looked for: of each, some hundreds of records at once."""
 
 
 WATCH: ContextVar[Callable[[int, int], None] | None] = ContextVar("WATCH", default=None)
@@ -162,9 +163,14 @@ class FileArray:
         size = max((offset + kind.itemsize for _, kinds in wanted for offset, kind in kinds), default=0)
         for near, piece in self.windows([places for places, _ in wanted], size):
             for columns, (_, kinds), (rows, inner) in zip(found, wanted, near, strict=True):
-                for column, kind in zip(columns, kinds, strict=True):
-                    if len(inner):
-                        column[rows] = stored_in(piece, inner, kind)
+                if not len(inner):
+                    continue
+                # The stretch with all of them is picked out once: that is what takes the time.
+                first = min(offset for offset, _ in kinds)
+                span = max(offset + kind.itemsize for offset, kind in kinds) - first
+                picked = stored_in(piece, inner, (first, np.dtype((np.void, span)))).view(np.uint8)
+                for column, (offset, kind) in zip(columns, kinds, strict=True):
+                    column[rows] = _every(picked, offset - first, kind, span)
         return found
 
     def parts(self, lows: Offsets, highs: Offsets) -> list[bytes]:
@@ -180,11 +186,12 @@ class FileArray:
     def windows(self, places: Sequence[Offsets], size: int) -> Iterator[tuple[list[tuple[slice, Offsets]], Bytes]]:
         """A walk along lists of places: of each list the rows that lie in a window and where in it, and the window's
         bytes with `size` past the last place, zeros past the end of the file; they may be overwritten by the next."""
-        buffer = np.empty(_WINDOW + size if self._held is None else 0, dtype=np.uint8)
+        window = _WINDOW * min(len(places), _MOST_WINDOWS)
+        buffer = np.empty(window + size if self._held is None else 0, dtype=np.uint8)
         first = [0] * len(places)
         while ahead := [int(each[at]) for each, at in zip(places, first, strict=True) if at < len(each)]:
             low = min(ahead)
-            last = [_until(each, low + _WINDOW - 1) for each in places]
+            last = [_until(each, low + window - 1) for each in places]
             near = [(slice(a, b), each[a:b] - low) for each, a, b in zip(places, first, last, strict=True)]
             high = low + max(int(inner[-1]) for _, inner in near if len(inner)) + size
             there = min(high, self._size)
@@ -198,19 +205,24 @@ class FileArray:
 
 def stored_in(piece: Bytes, places: Offsets, kind: Stored) -> NDArray[Any]:
     """What is stored so many bytes behind places of a window."""
-    offset, dtype = kind
-    inner = (dtype.base.itemsize,) if dtype.shape else ()
     # A view of the type at every byte, from which indexing copies only the wanted.
-    count = len(piece) - offset - dtype.itemsize + 1
-    everywhere: NDArray[Any] = np.ndarray((count, *dtype.shape), dtype.base, piece.data, offset, (1, *inner))
-    return everywhere[places]
+    return _every(piece, *kind, step=1)[places]
+
+
+def _every(piece: Bytes, offset: int, dtype: np.dtype[Any], step: int) -> NDArray[Any]:
+    """A view of what is stored in a window at a byte and after each so many more, shape (n,) and that of the type."""
+    inner = (dtype.base.itemsize,) if dtype.shape else ()
+    count = (len(piece) - offset - dtype.itemsize) // step + 1
+    found: NDArray[Any] = np.ndarray((count, *dtype.shape), dtype.base, piece.data, offset, (step, *inner))
+    return found
 
 
 def _until(places: Offsets, last: int) -> int:
     """How many places, in the order of the file, lie no further than a byte."""
+    if not len(places) or places[-1] <= last:
+        return len(places)
     # A number of the array's own type: of another, the whole array is converted each time.
-    bound = np.array(min(last, np.iinfo(places.dtype).max), dtype=places.dtype)
-    return int(np.searchsorted(places, bound, "right"))
+    return int(np.searchsorted(places, places.dtype.type(last), "right"))
 
 
 def _close(places: Offsets, window: int) -> Iterator[tuple[int, int]]:

@@ -46,10 +46,11 @@ def smooth(t: Floats, x: Floats, width_s: float) -> Floats:
     total = np.empty(len(x) + n)
     ahead = n // 2 + 1
     total[0], total[1:ahead], total[ahead : ahead + len(x)], total[ahead + len(x) :] = 0.0, x[0], x, x[-1]
+    del x  # nobody else holds it where it was made for this
     np.cumsum(total, out=total)
-    for rows in pieces(len(x)):  # a mean takes the place of the sum that nothing else needs any more
+    for rows in pieces(len(t)):  # a mean takes the place of the sum that nothing else needs any more
         total[rows] = (total[rows.start + n : rows.stop + n] - total[rows]) / n
-    return total[: len(x)]
+    return total[: len(t)]
 
 
 def steady(t: Floats, x: Floats, width_s: float) -> Floats:

@@ -144,7 +144,7 @@ def _swings(flight: Flight) -> Iterator[Finding]:
         return
     found = []
     for axis, wanted, name in (("R", "RDes", "roll"), ("P", "PDes", "pitch")):
-        spans, peak = _unasked(flight, table, axis, wanted, flown, _exhausted(table, f"{axis}Out", _ALL))
+        spans, peak = _unasked(flight, table, axis, wanted, flown, (f"{axis}Out", _ALL))
         if spans:
             found.append((peak, name, spans))
     if not found:
@@ -170,9 +170,7 @@ def _steering(flight: Flight) -> Iterator[Finding]:
     if flight.vehicle.kind != "rover" or table is None:
         return
     steered = flight.drives_itself(table.t)
-    spans, peak = _unasked(
-        flight, table, "TurnRate", "DesTurnRate", steered, _exhausted(table, "SteerOut", _ALL_STEERING)
-    )
+    spans, peak = _unasked(flight, table, "TurnRate", "DesTurnRate", steered, ("SteerOut", _ALL_STEERING))
     if not spans:
         return
     driven = flight.one("THR", "Speed")
@@ -188,17 +186,22 @@ def _steering(flight: Flight) -> Iterator[Finding]:
 
 
 def _unasked(
-    flight: Flight, table: Table, rate: str, wanted: str, where: Mask, exhausted: Mask
+    flight: Flight, table: Table, rate: str, wanted: str, where: Mask, limit: tuple[str, float]
 ) -> tuple[list[Span], float]:
-    """Where a rate swings far more than is asked for, and how far it is off its demand at most."""
-    error = table[rate] - table[wanted]
-    level, demand = smooth(table.t, np.abs(error), 3.0), smooth(table.t, np.abs(table[wanted]), 3.0)
-    demand *= OVER_DEMAND
-    spans = lasting(table.t, where & (level > SWING_DPS) & ((level > demand) | exhausted), _SWING_S)
-    swung = flight.during(spans, table.t)
-    if not spans or not _to_and_fro(error[swung]):
+    """Where a rate swings far more than is asked for, and how far it is off its demand at most.
+
+    `limit` names the controller's output and the most that the vehicle can give.
+    """
+    level = smooth(table.t, np.abs(table[rate] - table[wanted]), 3.0)
+    far = where & (level > SWING_DPS)
+    if not far.any():
         return [], 0.0
-    return spans, top(level[swung], 0.9)
+    over = level > OVER_DEMAND * smooth(table.t, np.abs(table[wanted]), 3.0)
+    spans = lasting(table.t, far & (over | _exhausted(table, *limit)), _SWING_S)
+    if not spans:
+        return [], 0.0
+    swung = flight.during(spans, table.t)
+    return (spans, top(level[swung], 0.9)) if _to_and_fro((table[rate] - table[wanted])[swung]) else ([], 0.0)
 
 
 def _exhausted(table: Table, output: str, most: float) -> Mask:

@@ -127,11 +127,12 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
     return lifting & (outputs.t < outputs.t[lifting][0] + _TRYING_S) if lifting.any() else lifting
 
 
-def _excess(share: Floats) -> NDArray[np.float64]:
-    """How far each motor stands above the middle of the others, shape (motors, n)."""
-    everyone, excess = np.arange(len(share)), np.empty(share.shape)
-    for rows in pieces(share.shape[1]):
-        piece = share[:, rows]
+def _excess(share: Floats, where: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """How far each motor stands above the middle of the others in the rows of a mask, shape (motors, n)."""
+    chosen = np.flatnonzero(where)
+    everyone, excess = np.arange(len(share)), np.empty((len(share), len(chosen)))
+    for rows in pieces(len(chosen)):
+        piece = share[:, chosen[rows]]
         for n in everyone:
             excess[n, rows] = piece[n] - np.median(piece[everyone != n], axis=0)
     return excess
@@ -143,7 +144,7 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     if lifting.sum() < 8:
         return
     t = outputs.t[lifting]
-    excess = _excess(outputs.share[:, lifting])
+    excess = _excess(outputs.share, lifting)
     is_alone = np.zeros(excess.shape, dtype=bool)
     for row in excess:
         row[:] = smooth(t, row, 4.0)
@@ -156,18 +157,19 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         spans = lasting(t, is_alone[n], _LASTS_S, gap_s=3.0)
         if not spans:
             continue
-        since = outputs.share[:, lifting][:, t >= spans[0][0]]
-        asked = _excess(since)[n]
+        since = lifting & (outputs.t >= spans[0][0])
+        share = outputs.share[:, since]
+        asked = _excess(outputs.share, since)[n]
         size = float(np.median(asked))
         stays = float((row[t >= spans[0][0]] > ALONE / 2).mean()) > _STAYS
         steady = size > max(0.7 * ALONE, _STEADY * float(np.std(asked)))
-        has_room = float(np.median(np.delete(since, n, axis=0))) < (_ROOM_FLYING if flight.flown else _ROOM)
+        has_room = float(np.median(np.delete(share, n, axis=0))) < (_ROOM_FLYING if flight.flown else _ROOM)
         if stays and steady and has_room and (best is None or size > best[0]):
             best = (size, n, spans[0][0], spans[-1][1])
     if best is None:
         return
     size, n, start, end = best
-    share = outputs.share[:, lifting][:, t >= start]
+    share = outputs.share[:, lifting & (outputs.t >= start)]
     limit = float((share[n] > _AT_LIMIT).mean())
     before = excess[n][t < start - 2.0]
     changed = len(before) >= 5 and float(np.median(before)) < size / 3
@@ -245,7 +247,7 @@ def _told(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         if match and any(start <= t <= end for start, end in flight.armed):
             motor = next((one for one in outputs.motors if one.number == int(match[1])), None)
             near = np.abs(outputs.t - t) < 5.0
-            excess = np.median(_excess(outputs.share[:, near]), axis=1) if near.any() else np.zeros(len(outputs.motors))
+            excess = np.median(_excess(outputs.share, near), axis=1) if near.any() else np.zeros(len(outputs.motors))
             own = float(excess[outputs.motors.index(motor)]) if motor is not None else 0.0
             is_alone = own > ALONE and float(np.sort(excess)[-2]) < _NEXT * own
             crowded = float(np.median(outputs.share[:, near])) > _ROOM if near.any() else True
