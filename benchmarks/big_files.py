@@ -27,6 +27,7 @@ import tempfile
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -235,7 +236,7 @@ def make_db3(path: Path, gb: float) -> None:
             bag.execute("insert into topics values (?, ?, ?, 'cdr', '')", (number, name, message.__msgtype__))
             raw = bytes(store.serialize_cdr(message, message.__msgtype__))
             times = range(SECOND_NS, SPAN_S * SECOND_NS, SECOND_NS // rate)
-            streams.append((time_ns, number, raw) for time_ns in times)
+            streams.append(zip(times, repeat(number), repeat(raw)))
         rows = ((number, time_ns, raw) for time_ns, number, raw in heapq.merge(*streams, key=lambda part: part[0]))
         bag.executemany("insert into messages (topic_id, timestamp, data) values (?, ?, ?)", rows)
 

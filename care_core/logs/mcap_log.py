@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from care_core.logs.base import LogFormat
 from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
 from care_core.logs.mapped import FileBytes, opened
 from care_core.logs.mcap_records import MAGIC, McapChunk, McapContents, locate, read_contents
+from care_core.logs.message_index import Places
 from care_core.logs.recording import recording_at
 from care_core.logs.ros_log import (
     BrokenRecordError,
@@ -21,9 +22,6 @@ from care_core.logs.ros_log import (
     RosLog,
     Source,
     check_room,
-    first_ns,
-    joined,
-    last_ns,
     piece_of,
     timed,
 )
@@ -54,62 +52,59 @@ class McapPart:
         self._file = PlainFile(path)
         with opened(self._file.path, MAGIC, _WHAT) as log:
             contents = read_contents(log)
-        self._chunks = contents.chunks
+        self._chunks, self._index = contents.chunks, contents.index
         self._checked: set[int] = set()
-        self.flaws = timed(contents.flaws, [(chunk.pos, last_ns(_times_ns(chunk))) for chunk in contents.chunks])
+        self.flaws = timed(contents.flaws, self._index)
         if self._file.is_cut:
             self.flaws["zstd"] = Flaw("the zstd file is cut short or broken")
         self.connections: Mapping[int, Connection] = contents.connections()
-        self.times_ns = joined(map(_times_ns, contents.chunks), contents.channels)
+        self.times_ns = self._index.times_of(contents.channels)
         self.metadata = _metadata(contents)
 
-    def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
-        """The messages of some channels, chunk by chunk."""
+    def messages(self, wanted: Places) -> Iterator[Message]:
+        """The wanted messages, chunk by chunk."""
         with opened(self._file.path, MAGIC, _WHAT) as log:
             unpack = Unpacker(len(log))
-            for chunk in self._chunks:
-                wanted = [number for number in chunk.index if number in numbers]
-                if wanted and (plain := self._open(chunk, wanted, log, unpack)):
-                    yield from self._of_chunk(chunk, wanted, unpack, *plain)
+            for at, rows in self._index.chosen(wanted):
+                if plain := self._open(at, self._index.needed(at, rows), log, unpack):
+                    yield from self._of_chunk(self._chunks[at], rows, unpack, *plain)
 
-    def _open(
-        self, chunk: McapChunk, wanted: Sequence[int], log: FileBytes, unpack: Unpacker
-    ) -> tuple[Source, int, int] | None:
+    def _open(self, at: int, needed: int, log: FileBytes, unpack: Unpacker) -> tuple[Source, int, int] | None:
+        chunk = self._chunks[at]
         key = f"chunk {chunk.pos}"
         try:
-            found = chunk.open(log, unpack, wanted)
+            found = chunk.open(log, unpack, needed)
         except BrokenRecordError as err:
-            self.flaws.setdefault(key, Flaw(str(err), chunk.pos, first_ns(_times_ns(chunk))))
+            self.flaws.setdefault(key, Flaw(str(err), chunk.pos, self._index.first_ns(at)))
             return None
         if unpack.takes_parts:  # what is not read cannot be summed up
             if not chunk.is_whole:
-                self.flaws.setdefault(key, Flaw("a chunk is cut short", chunk.pos, first_ns(_times_ns(chunk))))
+                self.flaws.setdefault(key, Flaw("a chunk is cut short", chunk.pos, self._index.first_ns(at)))
         elif chunk.pos not in self._checked:
             self._checked.add(chunk.pos)
             why = chunk.flaw(*found)
             if why:
-                self.flaws.setdefault(key, Flaw(why, chunk.pos, first_ns(_times_ns(chunk))))
+                self.flaws.setdefault(key, Flaw(why, chunk.pos, self._index.first_ns(at)))
         return found
 
     def _of_chunk(
-        self, chunk: McapChunk, wanted: Sequence[int], unpack: Unpacker, buffer: Source, begin: int, end: int
+        self, chunk: McapChunk, rows: NDArray[np.intp], unpack: Unpacker, buffer: Source, begin: int, end: int
     ) -> Iterator[Message]:
         left = end - begin
-        for number in wanted:
-            is_cdr = self.connections[number].encoding == "cdr"
-            for time_ns, offset in chunk.index[number].tolist():
-                try:
-                    pos, after = locate(buffer, begin, end, offset, number, time_ns)
-                    left -= after - pos
-                    check_room(left)
-                    # No CDR message begins so: the recorder packed each message by itself.
-                    if is_cdr and buffer[pos : pos + len(ZSTD_MAGIC)] == ZSTD_MAGIC:
-                        plain = unpack("zstd", buffer[pos:after])
-                        yield number, time_ns, plain, 0, len(plain)
-                    else:
-                        yield number, time_ns, *piece_of(buffer, pos, after)
-                except (BrokenRecordError, CannotUnpackError) as err:
-                    self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
+        cdr = {number for number, one in self.connections.items() if one.encoding == "cdr"}
+        for number, time_ns, offset in self._index.entries(rows):
+            try:
+                pos, after = locate(buffer, begin, end, offset, number, time_ns)
+                left -= after - pos
+                check_room(left)
+                # No CDR message begins so: the recorder packed each message by itself.
+                if number in cdr and buffer[pos : pos + len(ZSTD_MAGIC)] == ZSTD_MAGIC:
+                    plain = unpack("zstd", buffer[pos:after])
+                    yield number, time_ns, plain, 0, len(plain)
+                else:
+                    yield number, time_ns, *piece_of(buffer, pos, after)
+            except (BrokenRecordError, CannotUnpackError) as err:
+                self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
 
 
 def _metadata(contents: McapContents) -> Metadata:
@@ -125,8 +120,3 @@ def _metadata(contents: McapContents) -> Metadata:
         span_s = (counted.message_end_time - counted.message_start_time) / 1e9
         found.append(Metadata(duration_s=span_s, message_count=counted.message_count))
     return Metadata.merged(found)
-
-
-def _times_ns(chunk: McapChunk) -> dict[int, NDArray[np.int64]]:
-    """Log times per channel; one beyond the year 2262 wraps and is no believable time either way."""
-    return {number: entries["time"].astype(np.int64) for number, entries in chunk.index.items() if len(entries)}

@@ -9,7 +9,7 @@ from __future__ import annotations
 import struct
 import zlib
 from array import array
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any, NamedTuple
@@ -19,20 +19,21 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from numpy.typing import NDArray
 
 from care_core import limits
 from care_core.logs.compression import CannotUnpackError, Unpacker
 from care_core.logs.mapped import FileBytes
+from care_core.logs.message_index import ChunkIndex, MessageIndex
 from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Source
 
 MAGIC = b"\x89MCAP0\r\n"
 
-ENTRY = np.dtype([("time", "<u8"), ("offset", "<u8")])
-"""A message index's entry: log time in ns, offset of the message's record in the plain chunk."""
+ENTRY = np.dtype([("time", "<i8"), ("offset", "<u8")])
+"""A message index's entry: log time in ns (beyond the year 2262 it wraps and is no believable time either way), offset
+of the message's record in the plain chunk."""
 
 _RECORD = struct.Struct("<BQ")
-_MESSAGE = struct.Struct("<BQHIQQ")
+_MESSAGE = struct.Struct("<BQHIqQ")
 _CHUNK = struct.Struct("<QQQII")
 _FOOTER = struct.Struct("<QQI")
 _CHUNK_INDEX = struct.Struct("<QQQ")
@@ -44,7 +45,7 @@ _PIECE = 1 << 20
 
 @dataclass(frozen=True, slots=True, eq=False)
 class McapChunk:
-    """A chunk: where its packed records lie in the file, and per channel the entries of its messages."""
+    """A chunk: where its packed records lie in the file."""
 
     pos: int
     start: int
@@ -55,33 +56,25 @@ class McapChunk:
     """Bytes of the plain records."""
     checksum: int = 0
     """CRC-32 of the plain records, 0 where the recorder made none."""
-    index: dict[int, NDArray[Any]] = field(default_factory=dict)
+    index: ChunkIndex = field(default_factory=dict)
+    """What a walk meets of the messages in it, until the file's is made of it."""
 
-    def open(self, log: FileBytes, unpack: Unpacker, numbers: Collection[int] | None = None) -> tuple[Source, int, int]:
+    def open(self, log: FileBytes, unpack: Unpacker, needed: int = 0) -> tuple[Source, int, int]:
         """The plain records as (buffer, begin, end); what is there of a cut chunk. Raises BrokenRecordError.
 
         Args:
-            numbers: where a large file's chunk is asked for these channels alone, no more is unpacked than they need.
+            needed: of a large file's chunk no more is unpacked than so many bytes, where that is quicker; 0: all.
         """
         if not self.compression:
             return log, self.start, self.end
-        needed = self._needed(numbers) if numbers is not None and unpack.takes_parts else 0
         try:
-            if needed:
+            if unpack.takes_parts and 0 < 2 * needed < self.size:
                 plain = unpack.head(self.compression, log, self.start, self.end, needed)
                 return plain, 0, len(plain)
             plain = unpack(self.compression, log[self.start : self.end], self.size)
         except CannotUnpackError as err:
             raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
-
-    def _needed(self, numbers: Collection[int]) -> int:
-        """The bytes before the first message behind the last one of these channels; 0: all that there are."""
-        ends = [int(self.index[number]["offset"].max()) for number in numbers]
-        last = max(ends, default=0)
-        behind = [entries["offset"][entries["offset"] > last] for entries in self.index.values()]
-        needed = min((int(offsets.min()) for offsets in behind if len(offsets)), default=0)
-        return needed if 2 * needed < self.size else 0  # all at once is quicker
 
     def flaw(self, buffer: Source, begin: int, end: int) -> str:
         """Why the plain records cannot all be trusted, empty where they can."""
@@ -102,6 +95,7 @@ class McapContents:
     schemas: dict[int, records.Schema] = field(default_factory=dict)
     channels: dict[int, records.Channel] = field(default_factory=dict)
     chunks: list[McapChunk] = field(default_factory=list)
+    index: MessageIndex = field(init=False)
     metadata: list[records.Metadata] = field(default_factory=list)
     statistics: records.Statistics | None = None
     flaws: dict[str, Flaw] = field(default_factory=dict)
@@ -158,6 +152,9 @@ def read_contents(log: FileBytes) -> McapContents:
         contents.flaws["chunks"] = Flaw(f"{chunk_count - len(contents.chunks)} of {chunk_count} chunks are not found")
     contents.chunks.extend(loose.chunks(size))
     _complete(log, contents)
+    contents.index = MessageIndex([(chunk.pos, chunk.index) for chunk in contents.chunks], ENTRY)
+    for chunk in contents.chunks:
+        chunk.index.clear()  # held once
     return contents
 
 
@@ -185,7 +182,7 @@ class _Loose:
         if record.end - record.pos < _MESSAGE.size:
             raise BrokenRecordError("a message is too short")
         _, _, number, _, time_ns, _ = _MESSAGE.unpack(log[record.pos : record.pos + _MESSAGE.size])
-        self.times.setdefault(number, array("Q")).append(time_ns)
+        self.times.setdefault(number, array("q")).append(time_ns)
         self.offsets.setdefault(number, array("Q")).append(record.pos)
 
     def chunks(self, size: int) -> Iterator[McapChunk]:
@@ -217,7 +214,7 @@ def _take_index(log: FileBytes, record: _Record, chunk: McapChunk) -> None:
     if size % ENTRY.itemsize or size != record.end - record.start - _INDEX.size:
         raise BrokenRecordError("a message index of the wrong size")
     if size:
-        chunk.index[number] = np.frombuffer(log[record.start + _INDEX.size : record.end], ENTRY)
+        chunk.index[number] = log[record.start + _INDEX.size : record.end]
 
 
 def _take_described(log: Source, record: _Record, contents: McapContents) -> None:
@@ -277,12 +274,10 @@ def _complete(log: FileBytes, contents: McapContents) -> None:
             continue
         if not chunk.index:
             chunk.index.update(found)
-        left -= sum(map(len, found.values()))
+        left -= sum(map(len, found.values())) // ENTRY.itemsize
 
 
-def _scan(
-    chunk: McapChunk, log: FileBytes, contents: McapContents, unpack: Unpacker, most: int
-) -> dict[int, NDArray[Any]]:
+def _scan(chunk: McapChunk, log: FileBytes, contents: McapContents, unpack: Unpacker, most: int) -> ChunkIndex:
     """Index entries of a chunk's complete messages per channel; takes its schemas and channels on the way."""
     buffer, begin, end = chunk.open(log, unpack)
     times: dict[int, array[int]] = {}
@@ -300,7 +295,7 @@ def _scan(
                 raise BrokenRecordError("it holds more messages than a file of its size can")
             most -= 1
             _, _, number, _, time_ns, _ = _MESSAGE.unpack(buffer[pos : pos + _MESSAGE.size])
-            times.setdefault(number, array("Q")).append(time_ns)
+            times.setdefault(number, array("q")).append(time_ns)
             offsets.setdefault(number, array("Q")).append(pos - begin)
         elif record.op in (Opcode.SCHEMA, Opcode.CHANNEL):
             _take_described(buffer, record, contents)
@@ -308,10 +303,10 @@ def _scan(
     return {number: _entries(stamps, offsets[number]) for number, stamps in times.items()}
 
 
-def _entries(times: array[int], offsets: array[int]) -> NDArray[Any]:
+def _entries(times: array[int], offsets: array[int]) -> bytes:
     entries = np.empty(len(times), ENTRY)
     entries["time"], entries["offset"] = times, offsets
-    return entries
+    return entries.tobytes()
 
 
 def _summarised(log: FileBytes) -> list[int]:

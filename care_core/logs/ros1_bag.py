@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from care_core.errors import LogError
 from care_core.logs.base import LogFormat
 from care_core.logs.compression import Unpacker
 from care_core.logs.mapped import opened
+from care_core.logs.message_index import Places
 from care_core.logs.recording import recording_at
 from care_core.logs.ros1_records import MAGIC, BagChunk, BagContents, locate, read_contents
 from care_core.logs.ros_log import (
@@ -24,9 +24,6 @@ from care_core.logs.ros_log import (
     RosLog,
     Source,
     check_room,
-    first_ns,
-    joined,
-    last_ns,
     piece_of,
     timed,
 )
@@ -60,41 +57,36 @@ class Ros1Part:
         if self._contents.is_encrypted:
             raise LogError("The bag is encrypted.", hint="Decrypt it with 'rosbag decrypt' first.", where=str(path))
         self.connections: Mapping[int, Connection] = self._contents.connections
-        lasts = [(chunk.pos, last_ns(_times_ns(chunk))) for chunk in self._contents.chunks]
-        self.flaws = timed(self._contents.flaws, lasts)
-        self.times_ns = joined(map(_times_ns, self._contents.chunks), self._contents.connections)
+        self._index = self._contents.index
+        self.flaws = timed(self._contents.flaws, self._index)
+        self.times_ns = self._index.times_of(self._contents.connections)
 
-    def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
-        """The messages of some connections, chunk by chunk."""
+    def messages(self, wanted: Places) -> Iterator[Message]:
+        """The wanted messages, chunk by chunk."""
         with opened(self.path, MAGIC, "a ROS 1 bag of format 2.0") as bag:
             unpack = Unpacker(len(bag))
-            for chunk in self._contents.chunks:
-                wanted = [number for number in chunk.index if number in numbers]
-                if not wanted:
-                    continue
+            for at, rows in self._index.chosen(wanted):
+                chunk = self._contents.chunks[at]
                 try:
-                    plain = chunk.open(bag, unpack, wanted)
+                    plain = chunk.open(bag, unpack, self._index.needed(at, rows))
                 except BrokenRecordError as err:
-                    self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, first_ns(_times_ns(chunk))))
+                    self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, self._index.first_ns(at)))
                 else:
-                    yield from self._of_chunk(chunk, wanted, *plain)
+                    yield from self._of_chunk(chunk, rows, *plain)
 
     def _of_chunk(
-        self, chunk: BagChunk, wanted: Sequence[int], buffer: Source, begin: int, end: int
+        self, chunk: BagChunk, rows: NDArray[np.intp], buffer: Source, begin: int, end: int
     ) -> Iterator[Message]:
         left = end - begin
-        for number in wanted:
-            entries = chunk.index[number]
-            times = _entry_times_ns(entries).tolist()
-            for time_ns, offset in zip(times, entries["offset"].tolist(), strict=True):
-                try:
-                    pos, after = locate(buffer, begin, end, offset)
-                    left -= after - pos
-                    check_room(left)
-                except BrokenRecordError as err:
-                    self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
-                else:
-                    yield number, time_ns, *piece_of(buffer, pos, after)
+        for number, time_ns, offset in self._index.entries(rows):
+            try:
+                pos, after = locate(buffer, begin, end, offset)
+                left -= after - pos
+                check_room(left)
+            except BrokenRecordError as err:
+                self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, time_ns))
+            else:
+                yield number, time_ns, *piece_of(buffer, pos, after)
 
 
 def _check_one_run(path: Path, parts: Sequence[Ros1Part]) -> None:
@@ -108,12 +100,3 @@ def _check_one_run(path: Path, parts: Sequence[Ros1Part]) -> None:
         raise LogError(
             "The bags in the folder are separate recordings.", hint="Name one log file in it.", where=str(path)
         )
-
-
-def _times_ns(chunk: BagChunk) -> dict[int, NDArray[np.int64]]:
-    return {number: _entry_times_ns(entries) for number, entries in chunk.index.items() if len(entries)}
-
-
-def _entry_times_ns(entries: NDArray[Any]) -> NDArray[np.int64]:
-    times: NDArray[np.int64] = entries["seconds"].astype(np.int64) * 1_000_000_000 + entries["nanoseconds"]
-    return times

@@ -8,16 +8,15 @@ Format: wiki.ros.org/Bags/Format/2.0.
 from __future__ import annotations
 
 import struct
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from care_core import limits
 from care_core.logs.compression import CannotUnpackError, Unpacker
 from care_core.logs.mapped import FileBytes
+from care_core.logs.message_index import ChunkIndex, MessageIndex
 from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Source
 
 MAGIC = b"#ROSBAG V2.0\n"
@@ -44,33 +43,25 @@ class BagChunk:
     compression: str
     size: int = 0
     """Bytes of the plain data, 0 where the bag does not say."""
-    index: dict[int, NDArray[Any]] = field(default_factory=dict)
+    index: ChunkIndex = field(default_factory=dict)
+    """What a walk meets of the messages in it, until the bag's is made of it."""
 
-    def open(self, bag: FileBytes, unpack: Unpacker, numbers: Collection[int] | None = None) -> tuple[Source, int, int]:
+    def open(self, bag: FileBytes, unpack: Unpacker, needed: int = 0) -> tuple[Source, int, int]:
         """The chunk's plain data as (buffer, begin, end); what is there of a cut one. Raises BrokenRecordError.
 
         Args:
-            numbers: where a large bag's chunk is asked for these connections alone, no more is unpacked than they need.
+            needed: of a large bag's chunk no more is unpacked than so many bytes, where that is quicker; 0: all.
         """
         if self.compression == "none":
             return bag, self.start, self.end
-        needed = self._needed(numbers) if numbers is not None and unpack.takes_parts else 0
         try:
-            if needed:
+            if unpack.takes_parts and 0 < 2 * needed < self.size:
                 plain = unpack.head(self.compression, bag, self.start, self.end, needed)
                 return plain, 0, len(plain)
             plain = unpack(self.compression, bag[self.start : self.end], self.size)
         except CannotUnpackError as err:
             raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
-
-    def _needed(self, numbers: Collection[int]) -> int:
-        """The bytes before the first message behind the last one of these connections; 0: all that there are."""
-        ends = [int(self.index[number]["offset"].max()) for number in numbers if len(self.index[number])]
-        last = max(ends, default=0)
-        behind = [entries["offset"][entries["offset"] > last] for entries in self.index.values()]
-        needed = min((int(offsets.min()) for offsets in behind if len(offsets)), default=0)
-        return needed if 2 * needed < self.size else 0  # all at once is quicker
 
 
 @dataclass(slots=True)
@@ -79,6 +70,7 @@ class BagContents:
 
     connections: dict[int, Connection] = field(default_factory=dict)
     chunks: list[BagChunk] = field(default_factory=list)
+    index: MessageIndex = field(init=False)
     flaws: dict[str, Flaw] = field(default_factory=dict)
     is_encrypted: bool = False
 
@@ -131,6 +123,9 @@ def read_contents(bag: FileBytes) -> BagContents:
     elif (len(contents.connections) < connection_count or chunk_infos < chunk_count) and not contents.flaws:
         contents.flaws["end"] = Flaw("the end of its index is missing", size, cuts=True)
     _complete(bag, contents)
+    contents.index = MessageIndex([(chunk.pos, chunk.index) for chunk in contents.chunks], ENTRY)
+    for chunk in contents.chunks:
+        chunk.index.clear()  # held once
     return contents
 
 
@@ -180,7 +175,7 @@ def _take(bag: FileBytes, record: _Record, contents: BagContents) -> None:
         size = record.number(b"count") * ENTRY.itemsize
         if size != record.end - record.start:
             raise BrokenRecordError("an index record of the wrong size")
-        contents.chunks[-1].index[record.number(b"conn")] = np.frombuffer(bag[record.start : record.end], ENTRY)
+        contents.chunks[-1].index[record.number(b"conn")] = bag[record.start : record.end]
     elif record.op == _CONNECTION:
         _take_connection(bag, record, contents)
 
@@ -207,7 +202,7 @@ def _complete(bag: FileBytes, contents: BagContents) -> None:
             contents.flaws[f"chunk {chunk.pos}"] = Flaw(str(err), chunk.pos)
             continue
         if not chunk.index:
-            chunk.index.update({number: np.array(entries, ENTRY) for number, entries in found.items()})
+            chunk.index.update({number: np.array(entries, ENTRY).tobytes() for number, entries in found.items()})
         left -= sum(map(len, found.values()))
 
 

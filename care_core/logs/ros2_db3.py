@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
@@ -18,12 +19,19 @@ from care_core.errors import LogError
 from care_core.logs.base import LogFormat
 from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
 from care_core.logs.mapped import opened
+from care_core.logs.message_index import Places
 from care_core.logs.recording import recording_at
 from care_core.logs.ros_log import Connection, Flaw, Message, RosLog
 from care_core.logs.ros_metadata import Metadata, parse_metadata
 from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, StoredRow, is_blob, is_text, promised_size
 
 _WHAT = "a SQLite file"
+_SOUND = " AND ".join(f"typeof({column}) = 'integer'" for column in ("id", "topic_id", "timestamp"))
+_FETCHED = 10_000
+"""Rows without data that are fetched at a time."""
+_ASKED = 50_000
+"""Rows that one statement names, which may be a megabyte long: a table whose ids are no key is passed seldom."""
+_NONE = np.empty(0, np.int64)
 _STEPS = 100_000
 """Of SQLite, which walks a whole table by itself, between two chances to be interrupted: some ms."""
 _NOT_SOUND = (sqlite3.Error, UnicodeDecodeError)
@@ -74,37 +82,44 @@ class Db3Part:
         if self._file.is_cut:
             self.flaws["zstd"] = Flaw("the zstd file is cut short or broken")
         self.connections: Mapping[int, Connection] = contents.connections()
-        self.times_ns = {number: times for number, times in contents.times_ns.items() if number in self.connections}
+        known = [number for number in contents.messages if number in self.connections]
+        self._ids = {number: contents.messages[number][:, 0] for number in known}
+        self.times_ns = {number: contents.messages[number][:, 1] for number in known}
         self.metadata = Metadata.merged(
             [Metadata(distro=contents.distro), *(parse_metadata(text) for text in contents.metadata)]
         )
 
-    def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
-        """The messages of some topics; behind a place that SQLite cannot read, what the pages hold."""
-        last, unpack = -1, Unpacker(self._file.path.stat().st_size)
+    def messages(self, wanted: Places) -> Iterator[Message]:
+        """The wanted messages; behind a place that SQLite cannot read, what the pages hold."""
+        unpack = Unpacker(self._file.path.stat().st_size)
+        for number, time_ns, data in self._rows(wanted):
+            if number not in wanted:  # another row of the same id
+                continue
+            if not isinstance(data, bytes):
+                self.flaws.setdefault("row", Flaw("a message is not there", time_ns=time_ns))
+                continue
+            try:
+                plain = unpack("zstd", data) if data.startswith(ZSTD_MAGIC) else data
+            except CannotUnpackError as err:
+                self.flaws.setdefault("packed", Flaw(f"a packed message: {err}", time_ns=time_ns))
+            else:
+                yield number, time_ns, plain, 0, len(plain)
+
+    def _rows(self, wanted: Places) -> Iterator[list[Any]]:
+        """Topic id, record time and data of the wanted messages."""
+        ids = np.unique(np.concatenate([_NONE, *(self._ids[number][places] for number, places in wanted.items())]))
+        last = np.iinfo(np.int64).min
         try:
-            for row, number, time_ns, data in self._store.rows(numbers):
+            for row, *message in self._store.rows(ids):
                 last = row
-                yield from self._message(number, time_ns, data, unpack)
+                yield message
             return
         except _NOT_SOUND as err:
             salvaged = self._salvage(str(err))
-        for row, number, time_ns, data in salvaged.rows(numbers):
-            if row > last:
-                yield from self._message(number, time_ns, data, unpack)
+        for _, *message in salvaged.rows(ids[ids > last]):
+            yield message
 
-    def _message(self, number: int, time_ns: int, data: Any, unpack: Unpacker) -> Iterator[Message]:
-        if not isinstance(data, bytes):
-            self.flaws.setdefault("row", Flaw("a message is not there", time_ns=time_ns))
-            return
-        try:
-            plain = unpack("zstd", data) if data.startswith(ZSTD_MAGIC) else data
-        except CannotUnpackError as err:
-            self.flaws.setdefault("packed", Flaw(f"a packed message: {err}", time_ns=time_ns))
-        else:
-            yield number, time_ns, plain, 0, len(plain)
-
-    def _salvage(self, why: str) -> _SalvagedPages:
+    def _salvage(self, why: str) -> _Store:
         self._store = pages = _SalvagedPages(self._file.path)
         size = self._file.path.stat().st_size
         promised = promised_size(self._file.path)
@@ -124,7 +139,8 @@ class _Contents:
     """Language and text by type."""
     metadata: list[str] = field(default_factory=list)
     distro: str = ""
-    times_ns: dict[int, NDArray[np.int64]] = field(default_factory=dict)
+    messages: dict[int, NDArray[np.int64]] = field(default_factory=dict)
+    """Row id and record time in ns by topic id, of shape (n, 2), in the order of row ids."""
     is_bag: bool = True
 
     def connections(self) -> dict[int, Connection]:
@@ -134,15 +150,23 @@ class _Contents:
             made[number] = Connection(name, kind, definition, encoding, language if definition else "")
         return made
 
+    def take_messages(self, table: NDArray[np.int64]) -> None:
+        """Take row id, topic id and record time of messages, of shape (n, 3), in the order of row ids."""
+        ordered = table[np.argsort(table[:, 1], kind="stable")]
+        numbers, firsts = np.unique(ordered[:, 1], return_index=True)
+        each = np.split(ordered[:, ::2], firsts[1:])
+        self.messages = dict(zip(numbers.tolist(), each, strict=False))
+
 
 _DataRow = tuple[int, int, int, Any]
-"""StoredRow id, topic id, record time in ns, data."""
+"""Row id, topic id, record time in ns, data."""
 
 
 class _Store(Protocol):
     def contents(self) -> _Contents: ...
 
-    def rows(self, numbers: frozenset[int]) -> Iterator[_DataRow]: ...
+    def rows(self, ids: NDArray[np.int64]) -> Iterator[_DataRow]:
+        """The messages of these row ids, ascending; raises one of `_NOT_SOUND` behind the last that can be read."""
 
 
 class _Database:
@@ -201,28 +225,27 @@ class _Database:
                 contents.metadata = [str(text) for (text,) in rows("SELECT metadata FROM metadata ORDER BY id")]
             if "ros_distro" in columns["schema"]:
                 contents.distro = "".join(str(name) for (name,) in rows("SELECT ros_distro FROM schema"))
-            contents.times_ns = self._times(database)
+            contents.take_messages(self._heads(database))
             return contents
 
-    def rows(self, numbers: frozenset[int]) -> Iterator[_DataRow]:
-        places = ", ".join(str(number) for number in sorted(numbers))
+    def rows(self, ids: NDArray[np.int64]) -> Iterator[_DataRow]:
         with self._connected() as database:
-            yield from self._bounded(
-                database.execute(
-                    f"SELECT id, topic_id, timestamp, data FROM messages WHERE topic_id IN ({places})"
-                    " AND typeof(timestamp) = 'integer' ORDER BY id"
-                )
-            )
+            for first in range(0, len(ids), _ASKED):
+                places = ", ".join(map(str, ids[first : first + _ASKED].tolist()))
+                query = f"SELECT id, topic_id, timestamp, data FROM messages WHERE id IN ({places}) AND {_SOUND}"
+                yield from self._bounded(database.execute(f"{query} ORDER BY id"))
 
-    def _times(self, database: sqlite3.Connection) -> dict[int, NDArray[np.int64]]:
-        query = (
-            "SELECT topic_id, timestamp FROM messages"
-            " WHERE typeof(topic_id) = 'integer' AND typeof(timestamp) = 'integer' ORDER BY id"
-        )
-        pairs = np.fromiter(self._bounded(database.execute(query)), np.dtype((np.int64, 2)))
-        order = np.argsort(pairs[:, 0], kind="stable")
-        numbers, firsts = np.unique(pairs[order, 0], return_index=True)
-        return dict(zip(numbers.tolist(), np.split(pairs[order, 1], firsts[1:]), strict=False))
+    def _heads(self, database: sqlite3.Connection) -> NDArray[np.int64]:
+        """Row id, topic id and record time of every message, shape (n, 3)."""
+        asked = database.execute(f"SELECT id, topic_id, timestamp FROM messages WHERE {_SOUND} ORDER BY id")
+        left = _SHARED * self.size // _SMALLEST_ROW
+        found = [np.empty((0, 3), np.int64)]
+        while rows := asked.fetchmany(_FETCHED):
+            left -= len(rows)
+            if left < 0:
+                raise sqlite3.DatabaseError("its tree runs in circles")
+            found.append(np.array(rows, np.int64))
+        return np.concatenate(found)
 
     def _bounded(self, rows: Iterable[Any]) -> Iterator[Any]:
         left = _SHARED * self.size
@@ -262,47 +285,50 @@ class _SalvagedPages:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._ids = self._places = _NONE
 
     def contents(self) -> _Contents:
         contents = _Contents()
-        found: list[tuple[int, int, int]] = []
+        found = array("q")
         with opened(self.path, MAGIC, _WHAT) as log:
             pages = Pages(log)
             for row in pages.rows():
-                message = _message_head(pages, row)
+                message = _message_head(row)
                 if message is not None:
-                    found.append((row.id, *message))
+                    found.extend((row.id, *message, row.place))
                     continue
                 try:
                     _take_described(contents, row, pages.values(row))
                 except BrokenCellError:
                     continue
-        table = np.array(sorted(set(found)), np.int64).reshape(-1, 3)
-        for number in np.unique(table[:, 1]).tolist():
-            contents.times_ns[number] = table[table[:, 1] == number, 2]
+        table = np.frombuffer(found, np.int64).reshape(-1, 4)
+        self._ids, firsts = np.unique(table[:, 0], return_index=True)
+        self._places = table[firsts, 3]
+        contents.take_messages(np.unique(table[:, :3], axis=0))
         contents.is_bag = bool(contents.topics)
         return contents
 
-    def rows(self, numbers: frozenset[int]) -> Iterator[_DataRow]:
-        seen: set[int] = set()
+    def rows(self, ids: NDArray[np.int64]) -> Iterator[_DataRow]:
+        if not len(self._places):
+            self.contents()
         with opened(self.path, MAGIC, _WHAT) as log:
             pages = Pages(log)
-            for row in pages.rows():
-                message = _message_head(pages, row)
-                if message is None or message[0] not in numbers or row.id in seen:
+            for place in self._places[np.isin(self._ids, ids)].tolist():
+                row = pages.row(place)
+                message = _message_head(row)
+                if message is None:
                     continue
-                seen.add(row.id)
                 try:
                     yield row.id, *message, pages.values(row)[-1]
                 except BrokenCellError:
                     yield row.id, *message, None
 
 
-def _message_head(pages: Pages, row: StoredRow) -> tuple[int, int] | None:
+def _message_head(row: StoredRow) -> tuple[int, int] | None:
     """Topic id and record time of a row of `messages`, None for a row of another table."""
     if len(row.types) != _MESSAGE_COLUMNS or not is_blob(row.types[-1]) or row.types[0] != 0:
         return None
-    _, *numbers = pages.numbers(row)
+    _, *numbers = row.numbers()
     if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:
         return None
     return numbers[0], numbers[1]

@@ -5,7 +5,7 @@ The files (`Part`) know where messages lie; this module knows what they mean.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from functools import cached_property
@@ -20,6 +20,7 @@ from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.cdr_message import CdrDecoder
 from care_core.logs.json_message import json_decoder
 from care_core.logs.mapped import FileBytes
+from care_core.logs.message_index import MessageIndex, Places
 from care_core.logs.ros1_message import message_decoder
 from care_core.logs.ros_message import Buffer, Decoder, MalformedMessageError, short_name
 from care_core.logs.ros_metadata import Metadata
@@ -47,9 +48,6 @@ _STACKS = (
 
 Message = tuple[int, int, Buffer, int, int]
 """Connection number, record time in ns, and where the message lies: buffer, begin, end."""
-
-TimesNs = Mapping[int, NDArray[np.int64]]
-"""Record times by connection number."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,8 +113,8 @@ class Part(Protocol):
     def metadata(self) -> Metadata:
         """What the file itself says of the recording."""
 
-    def messages(self, numbers: frozenset[int]) -> Iterator[Message]:
-        """The messages of some connections, in any order."""
+    def messages(self, wanted: Places) -> Iterator[Message]:
+        """The wanted messages, in any order of the connections."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,17 +280,13 @@ class RosLog:
     def _gather(
         self, part: Part, decoders: Mapping[int, Decoder], at_most: Mapping[str, int]
     ) -> Mapping[int, _Gathered]:
-        gathered = {
-            number: _Gathered(decoder, self._stride(part, number, at_most)) for number, decoder in decoders.items()
-        }
-        if not gathered:
+        gathered = {number: _Gathered(decoder) for number, decoder in decoders.items()}
+        wanted = {number: self._wanted(part, number, at_most) for number in decoders if number in part.times_ns}
+        if not wanted:
             return gathered
-        low_ns, high_ns = self._low_ns, self._high_ns
         with_lists = {number for number, decoder in decoders.items() if not all(decoder.is_number)}
         left = most = limits.messages(part.path.stat().st_size)
-        for number, time_ns, buffer, pos, end in part.messages(frozenset(decoders)):
-            if not low_ns <= time_ns <= high_ns or gathered[number].skips():
-                continue
+        for number, time_ns, buffer, pos, end in part.messages(wanted):
             try:
                 values = decoders[number].decode(buffer, pos, end)
                 if number in with_lists:
@@ -304,10 +298,12 @@ class RosLog:
                 self._note_broken(part.connections[number].topic, str(err), time_ns)
         return gathered
 
-    def _stride(self, part: Part, number: int, at_most: Mapping[str, int]) -> int:
-        """Of how many messages of a publisher one is decoded."""
+    def _wanted(self, part: Part, number: int, at_most: Mapping[str, int]) -> NDArray[np.intp]:
+        """Which messages of a publisher are decoded, by their places among its record times."""
+        times_ns = part.times_ns[number]
         most = at_most.get(part.connections[number].topic, 0)
-        return -(-len(part.times_ns.get(number, ())) * len(self._parts) // most) if most > 0 else 1
+        stride = -(-len(times_ns) * len(self._parts) // most) if most > 0 else 1
+        return np.flatnonzero((times_ns >= self._low_ns) & (times_ns <= self._high_ns))[::stride]
 
     def _decoders(self, part: Part, wanted: Wanted) -> dict[int, Decoder]:
         """A decoder per connection that has wanted fields. Publishers of one type share it."""
@@ -421,16 +417,9 @@ class _Gathered:
     """Decoded messages of one connection as they come."""
 
     decoder: Decoder
-    stride: int = 1
     times_ns: list[int] = field(default_factory=list)
     rows: list[list[Any]] = field(default_factory=list)
     done: list[_Piece] = field(default_factory=list)
-    met: int = 0
-
-    def skips(self) -> bool:
-        """Whether the next message is one to leave out."""
-        self.met += 1
-        return self.stride > 1 and (self.met - 1) % self.stride != 0
 
     def add(self, time_ns: int, values: list[Any]) -> None:
         self.times_ns.append(time_ns)
@@ -446,43 +435,20 @@ class _Gathered:
         return self.done
 
 
-def timed(flaws: Mapping[str, Flaw], lasts: Sequence[tuple[int, int | None]]) -> dict[str, Flaw]:
-    """The flaws of a file with times: a place that has none is as late as the messages that lie before it.
-
-    Args:
-        lasts: byte and record time of the last message, None where it holds none, of each stretch of the file.
-    """
-    found = {}
-    for key, flaw in flaws.items():
-        before = [ns for byte, ns in lasts if ns is not None and flaw.byte is not None and byte < flaw.byte]
-        known = flaw.time_ns is not None or not before
-        found[key] = flaw if known else replace(flaw, time_ns=max(before))
-    return found
-
-
-def joined(indexes: Iterable[TimesNs], known: Container[int]) -> dict[int, NDArray[np.int64]]:
-    """The record times of each known connection out of the indexes of a file's chunks."""
-    parts: dict[int, list[NDArray[np.int64]]] = {}
-    for index in indexes:
-        for number, times in index.items():
-            if number in known:
-                parts.setdefault(number, []).append(times)
-    return {number: np.concatenate(times) for number, times in parts.items()}
-
-
-def first_ns(index: TimesNs) -> int | None:
-    """The earliest record time of a chunk, None where it holds no message."""
-    return min((int(times.min()) for times in index.values()), default=None)
-
-
-def last_ns(index: TimesNs) -> int | None:
-    """The latest record time of a chunk, None where it holds no message."""
-    return max((int(times.max()) for times in index.values()), default=None)
+def timed(flaws: Mapping[str, Flaw], index: MessageIndex) -> dict[str, Flaw]:
+    """The flaws of a file with times: a place that has none is as late as the messages that lie before it."""
+    return {
+        key: replace(flaw, time_ns=index.last_ns_before(flaw.byte))
+        if flaw.time_ns is None and flaw.byte is not None
+        else flaw
+        for key, flaw in flaws.items()
+    }
 
 
 def _first(part: Part, number: int) -> bytes:
     """The bytes of a connection's first message, none where it has none."""
-    for _, _, buffer, pos, end in part.messages(frozenset([number])):
+    wanted = {number: np.arange(len(part.times_ns[number]))} if number in part.times_ns else {}
+    for _, _, buffer, pos, end in part.messages(wanted):
         return buffer[pos:end]
     return b""
 

@@ -5,15 +5,22 @@ Source: sqlite.org/fileformat2.html. Only what a recorder writes is understood: 
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+
+import numpy as np
 
 from care_core.logs.mapped import FileBytes
 
 MAGIC = b"SQLite format 3\0"
 
 _LEAF = 0x0D
+_SIGN = 1 << 63
+_AT_ONCE = 1 << 20
+"""Bytes that are looked through at a time: whole pages."""
 _FIRST_PAGE_HEADER = 100
 _PAGE_HEADER = 8
 _PAGE_SIZES = tuple(1 << power for power in range(9, 17))
@@ -52,11 +59,26 @@ class StoredRow:
 
     id: int
     types: tuple[int, ...]
-    page: int
-    start: int
+    place: int
+    """The byte of the file at which it begins."""
     size: int
     head: int
     """Bytes of the payload before the first column."""
+    local: bytes
+    """What its page holds of the payload, and maybe more."""
+
+    def numbers(self) -> list[int | None]:
+        """The columns before the first text or blob, which lie in the row's own page."""
+        values: list[int | None] = []
+        pos = self.head
+        for kind in self.types:
+            if kind >= _FIRST_BLOB:
+                break
+            size = _size(kind)
+            value = _value(kind, self.local[pos : pos + size])
+            values.append(value if isinstance(value, int) else None)
+            pos += size
+        return values
 
 
 class Pages:
@@ -70,21 +92,30 @@ class Pages:
 
     def rows(self) -> Iterator[StoredRow]:
         """Every row of every table, in the order of the pages; what is no row is passed over."""
-        for page in range(len(self.log) // self.size):
-            base = page * self.size
-            header = base + (_FIRST_PAGE_HEADER if page == 0 else 0)
-            if self.log.byte(header) != _LEAF:
+        whole = len(self.log) // self.size * self.size
+        for begin in range(0, whole, _AT_ONCE):
+            block = self.log[begin : min(begin + _AT_ONCE, whole)]
+            kinds = np.frombuffer(block, np.uint8)[:: self.size] == _LEAF
+            kinds[0] |= begin == 0  # the file's own header comes first there
+            for page in np.flatnonzero(kinds).tolist():
+                yield from self._rows_of(block[page * self.size : (page + 1) * self.size], begin + page * self.size)
+
+    def row(self, place: int) -> StoredRow:
+        """The row that begins at a byte of the file. Raises BrokenCellError or IndexError where none does."""
+        begin = place - place % self.size
+        return self._row(self.log[begin : begin + self.size], place - begin, begin)
+
+    def _rows_of(self, page: bytes, begin: int) -> Iterator[StoredRow]:
+        header = _FIRST_PAGE_HEADER if begin == 0 else 0
+        first = header + _PAGE_HEADER
+        count = int.from_bytes(page[header + 3 : header + 5], "big")
+        if page[header] != _LEAF or first + _SMALLEST_CELL * count > self.size:
+            return
+        for (place,) in struct.iter_unpack(">H", page[first : first + 2 * count]):
+            try:
+                yield self._row(page, place, begin)
+            except (BrokenCellError, IndexError):
                 continue
-            count = int.from_bytes(self.log[header + 3 : header + 5], "big")
-            first = header + _PAGE_HEADER
-            if first + _SMALLEST_CELL * count > base + self.size:
-                continue
-            places = self.log[first : first + 2 * count]
-            for place in range(0, 2 * count, 2):
-                try:
-                    yield self._row(page, base + int.from_bytes(places[place : place + 2], "big"))
-                except (BrokenCellError, IndexError):
-                    continue
 
     def values(self, row: StoredRow) -> list[int | bytes | None]:
         """The columns of a row; text as its bytes. Raises BrokenCellError."""
@@ -100,32 +131,18 @@ class Pages:
             pos += size
         return values
 
-    def numbers(self, row: StoredRow) -> list[int | None]:
-        """The columns before the first text or blob, which lie in the row's own page."""
-        values: list[int | None] = []
-        pos = row.start + row.head
-        for kind in row.types:
-            if kind >= _FIRST_BLOB:
-                break
-            size = _size(kind)
-            value = _value(kind, self.log[pos : pos + size])
-            values.append(value if isinstance(value, int) else None)
-            pos += size
-        return values
-
-    def _row(self, page: int, pos: int) -> StoredRow:
-        size, pos = self._varint(pos)
-        rowid, start = self._varint(pos)
-        head, pos = self._varint(start)
-        if not 0 < head <= min(size, 9 * _MOST_COLUMNS) or pos < page * self.size:
+    def _row(self, page: bytes, pos: int, begin: int) -> StoredRow:
+        place = begin + pos
+        size, pos = _varint(page, pos)
+        rowid, start = _varint(page, pos)
+        head, pos = _varint(page, start)
+        if not 0 < head <= min(size, 9 * _MOST_COLUMNS):
             raise BrokenCellError("a row's header is broken")
-        types = []
-        while pos < start + head:
-            kind, pos = self._varint(pos)
-            types.append(kind)
-        if size > len(self.log) or len(types) > _MOST_COLUMNS or head + sum(_size(kind) for kind in types) != size:
+        types, length = _types(page[pos : start + head])
+        if size > len(self.log) or head + length != size:
             raise BrokenCellError("a row's header is broken")
-        return StoredRow(rowid, tuple(types), page, start, size, head)
+        rowid -= (rowid & _SIGN) << 1
+        return StoredRow(rowid, types, place, size, head, page[start : start + size])
 
     def _payload(self, row: StoredRow) -> bytes:
         """A row's payload, gathered over its overflow pages, whose chain may run in circles."""
@@ -134,13 +151,13 @@ class Pages:
             raise BrokenCellError("the rows are larger than the file")
         most = self.usable - 35
         if row.size <= most:
-            return self.log[row.start : row.start + row.size]
+            return row.local
         least = (self.usable - 12) * 32 // 255 - 23
         local = least + (row.size - least) % (self.usable - 4)
         local = local if local <= most else least
-        pieces = [self.log[row.start : row.start + local]]
+        pieces = [row.local[:local]]
         left = row.size - local
-        following = int.from_bytes(self.log[row.start + local : row.start + local + 4], "big")
+        following = int.from_bytes(row.local[local : local + 4], "big")
         while left > 0:
             base = (following - 1) * self.size
             if following < 2 or base + self.size > len(self.log):
@@ -150,14 +167,28 @@ class Pages:
             following = int.from_bytes(self.log[base : base + 4], "big")
         return b"".join(pieces)
 
-    def _varint(self, pos: int) -> tuple[int, int]:
-        value = 0
-        for place in range(8):
-            byte = self.log.byte(pos + place)
-            value = value << 7 | byte & 0x7F
-            if byte < 0x80:
-                return value, pos + place + 1
-        return value << 8 | self.log.byte(pos + 8), pos + 9
+
+def _varint(page: bytes, pos: int) -> tuple[int, int]:
+    """A number of up to nine bytes and where it ends. Raises IndexError."""
+    value = 0
+    for place in range(pos, pos + 8):
+        byte = page[place]
+        value = value << 7 | byte & 0x7F
+        if byte < 0x80:
+            return value, place + 1
+    return value << 8 | page[pos + 8], pos + 9
+
+
+@lru_cache(maxsize=1024)
+def _types(header: bytes) -> tuple[tuple[int, ...], int]:
+    """The serial types that a row's header lists, and the bytes that its columns take. Raises BrokenCellError."""
+    types, pos = [], 0
+    while pos < len(header):
+        kind, pos = _varint(header, pos)
+        types.append(kind)
+    if len(types) > _MOST_COLUMNS:
+        raise BrokenCellError("a row's header is broken")
+    return tuple(types), sum(map(_size, types))
 
 
 def _size(kind: int) -> int:
