@@ -45,12 +45,11 @@ class MessageIndex:
         return {number: self.times_ns[rows] for number, rows in self._rows.items() if number in known}
 
     def chosen(self, wanted: Places) -> Iterator[tuple[int, NDArray[np.intp]]]:
-        """Each chunk that holds wanted messages, and which of all messages these are, in the order of their bytes."""
+        """Each chunk that holds wanted messages, and which of all messages these are."""
         rows = np.sort(np.concatenate([np.empty(0, np.intp), *(self._rows[n][places] for n, places in wanted.items())]))
         edges = np.searchsorted(rows, self.bounds)
         for chunk in np.flatnonzero(np.diff(edges)).tolist():
-            inside = rows[edges[chunk] : edges[chunk + 1]]
-            yield chunk, inside[np.argsort(self.offsets[inside], kind="stable")]
+            yield chunk, rows[edges[chunk] : edges[chunk + 1]]
 
     def entries(self, rows: NDArray[np.intp]) -> Iterator[tuple[int, int, int]]:
         """Connection, record time in ns and offset of messages."""
@@ -61,7 +60,7 @@ class MessageIndex:
     def needed(self, chunk: int, rows: NDArray[np.intp]) -> int:
         """Bytes of a plain chunk up to the first message behind the last of these; 0: all that there are."""
         offsets = self.offsets[self.bounds[chunk] : self.bounds[chunk + 1]]
-        behind = offsets[offsets > self.offsets[rows[-1]]]
+        behind = offsets[offsets > self.offsets[rows].max()]
         return int(behind.min()) if len(behind) else 0
 
     def first_ns(self, chunk: int) -> int | None:
