@@ -47,7 +47,8 @@ NOISE, BINARY_NOISE = 0.02, 0.3
 """Least noise, as a share of the target's standard deviation. Yes-or-no outcomes near a limit go either way: a
 regression that reproduces every one of them has learned them by heart."""
 RESIDUAL_LEVELS = 101
-PAIRS = 4096
+CACHED = 65_536
+"""Numbers that fitting works on at a time, which then stay in the processor's cache."""
 MIN_ROWS = 20
 
 
@@ -286,9 +287,10 @@ def _pairs(points: FloatArray) -> FloatArray:
     """Squared distance of every pair of points by input, shape (p, n (n - 1) / 2): what is left of a symmetric matrix,
     in the order of its rows below the diagonal."""
     rows, others = _below(len(points))
-    columns = np.ascontiguousarray(points.T)
-    squared: FloatArray = (columns[:, rows] - columns[:, others]) ** 2
-    return squared
+    squared = np.empty((points.shape[1], len(rows)))
+    for column, distances in zip(points.T, squared, strict=True):
+        np.subtract(column[rows], column[others], out=distances)
+    return np.multiply(squared, squared, out=squared)
 
 
 class _Posterior:
@@ -308,7 +310,7 @@ class _Posterior:
         self._places = self._others * n + self._rows
         self._together, self._mean, self._one, self._other = np.empty((4, pairs))
         self._leaning = np.empty_like(squared)
-        self._part = np.empty_like(squared[:, :PAIRS])
+        self._part = np.empty((len(squared), max(1, CACHED // len(squared))))
 
     def __call__(self, log_theta: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient with respect to the logarithms of (relevances, additive, joint, noise)."""
@@ -337,13 +339,15 @@ class _Posterior:
         """The joint part of the kernel of every pair, the mean over the inputs of its parts, and each part times its
         squared distance. So many pairs at a time stay in the processor's cache."""
         rate = -0.5 * (relevance**2)[:, None]
-        for begin in range(0, len(self._mean), PAIRS):
-            some = slice(begin, begin + PAIRS)
+        p, width = self._part.shape
+        for begin in range(0, len(self._mean), width):
+            some = slice(begin, begin + width)
             squared = self._squared[:, some]
             part = np.multiply(squared, rate, out=self._part[:, : squared.shape[1]])
             part.sum(axis=0, out=self._together[some])
-            np.exp(part, out=part).mean(axis=0, out=self._mean[some])
+            np.exp(part, out=part).sum(axis=0, out=self._mean[some])
             np.multiply(part, squared, out=self._leaning[:, some])
+        self._mean /= p
         np.exp(self._together, out=self._together)
 
     def _covariance(self, additive: float, joint: float, noise: float) -> FloatArray:
