@@ -313,12 +313,12 @@ class DataFlashLog:
     def _keep_time(self, data: FileArray, starts: Offsets, types: Bytes) -> tuple[Clock, Offsets, tuple[Damage, ...]]:
         """The clock of the log, the places of the records whose stamp is impossible, and what is wrong with time."""
         clock, spans, jumps = clock_of(self._stamped(data, starts, types))
-        timed = [form.type for found in self._formats.values() for form in found if form.time_field]
-        lost = [np.empty(0, dtype=starts.dtype)]
-        for first, last in spans:
-            rows = slice(*np.searchsorted(starts, np.array([first, last + 1], dtype=starts.dtype)).tolist())
-            lost.append(starts[rows][np.isin(types[rows], timed)])
-        places = np.concatenate(lost)
+        is_timed = np.zeros(_MAX_TYPES, dtype=bool)
+        is_timed[[form.type for found in self._formats.values() for form in found if form.time_field]] = True
+        first, last = np.array(spans, dtype=starts.dtype).reshape(-1, 2).T
+        lows, highs = np.searchsorted(starts, first).tolist(), np.searchsorted(starts, last, "right").tolist()
+        lost = [starts[low:high][is_timed[types[low:high]]] for low, high in zip(lows, highs, strict=True)]
+        places = np.concatenate([np.empty(0, dtype=starts.dtype), *lost])
         damage = [Damage("a record's time is impossible", byte) for byte in places.tolist()]
         return (
             clock,
