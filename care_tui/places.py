@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -129,7 +130,12 @@ def as_path(typed: str) -> Path:
         from urllib.parse import unquote
 
         typed = unquote(typed.removeprefix("file://"))
-    return Path(typed).expanduser()
+    return at_home(typed)
+
+
+def at_home(typed: str) -> Path:
+    """A path in which `~` stands for somebody's folder; that of nobody stays as it was typed."""
+    return Path(os.path.expanduser(typed))
 
 
 def entries(typed: str) -> list[Path]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from care_core.errors import ConfigError, UsageError, nearest
-from care_tui.places import PLACES
+from care_tui.places import PLACES, at_home
 
 SERVER = "CARE_SERVER"
 """Environment variable that 'care serve' sets for the apps that it starts: its own process."""
@@ -97,7 +97,7 @@ def _checked(key: str, value: Any) -> Any:
         _must(isinstance(value, str), key, "the name of a theme")
     elif key == "places":
         _must(isinstance(value, list) and all(isinstance(place, str) for place in value), key, "a list of folders")
-        value = tuple(Path(place).expanduser() for place in value)
+        value = tuple(at_home(place) for place in value)
     elif key == "keys":
         mapping = isinstance(value, dict) and all(isinstance(part, str) for pair in value.items() for part in pair)
         _must(mapping, key, "a mapping of action to key")

@@ -46,7 +46,7 @@ def read(text: str, path: Path) -> dict[str, Setting]:
 def _number(name: str, text: str, where: str) -> float:
     try:
         return float(int(text, 16)) if text.lower().startswith("0x") else float(text)
-    except ValueError:
+    except (ValueError, OverflowError):
         raise ConfigError(
             f"The value of {name} is not a number: '{text}'.", hint="Correct the line.", where=where
         ) from None

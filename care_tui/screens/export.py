@@ -17,6 +17,7 @@ from care_core.application.case import SUFFIXES, Case
 from care_core.errors import CareError, UsageError
 from care_core.text import clean
 from care_tui.jobs import Engine, as_care_error
+from care_tui.places import at_home
 from care_tui.widgets.line_input import LineInput
 
 NAMES = ".yaml, .md, .html, .json, .xml or .patch"
@@ -63,7 +64,7 @@ class ExportDialog(ModalScreen[str | None]):
     @on(Input.Submitted)
     def _submit(self, event: Input.Submitted) -> None:
         event.stop()
-        self._export(Path(event.value.strip()).expanduser())
+        self._export(at_home(event.value.strip()))
 
     @work(exclusive=True, group="export")
     async def _export(self, path: Path) -> None:

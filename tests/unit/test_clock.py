@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from care_core.logs.clock import find_clock
+from care_core.logs.clock import clock_of, find_clock
 
 
 def places(n: int) -> NDArray[np.int64]:
@@ -68,3 +68,17 @@ def test_any_stamps_give_a_clock(stamps: list[float]) -> None:
     clock, impossible, _ = find_clock(np.array(stamps), places(len(stamps)))
     assert len(impossible) == len(stamps)
     assert clock.duration_s >= 0
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.lists(st.sampled_from([0.0, 0.1, 1.0, 7.0, -2.0, -90.0, 1e6, 1e13, np.nan]), max_size=80), st.integers(1, 9))
+def test_a_clock_found_piece_by_piece_is_the_same(steps: list[float], size: int) -> None:
+    stamps = 50.0 + np.cumsum(np.nan_to_num(steps))
+    stamps[np.isnan(steps)] = np.nan
+    at = places(len(stamps))
+    whole, impossible, jumps = find_clock(stamps, at)
+    clock, spans, found = clock_of((stamps[low : low + size], at[low : low + size]) for low in range(0, len(at), size))
+    assert (clock.first_s, clock.last_s, found) == (whole.first_s, whole.last_s, jumps)
+    np.testing.assert_array_equal(clock.places, whole.places)
+    lost = {place for first, last in spans for place in at.tolist() if first <= place <= last}
+    assert lost == set(at[impossible].tolist())
