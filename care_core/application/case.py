@@ -246,7 +246,7 @@ def _read(
 
     progress("reading the log", 0.2)
     profile = with_own_limits(profile, request.site)
-    good = good_of(request.reference or request.since, profile)
+    good = good_of(request.reference, profile) or _as_driven(request.since)
     judged = read_and_judge(
         log, profile, configs=configs, thresholds=request.thresholds, mission=request.mission, good=good, sha256=sha256
     )
@@ -277,15 +277,22 @@ def good_of(path: Path | None, profile: Profile) -> Good | None:
     from care_core.configs.loading import read_configs, resolve
     from care_core.diagnose.reference import Good
     from care_core.logs.finding import is_log
+
+    if path is None or is_log(path):
+        return _as_driven(path)
+    parameters = (parameter for option in profile.schema.options for parameter in readable(option))
+    return Good(resolve(read_configs((path,)), parameters), f"the configuration of {path.name}")
+
+
+def _as_driven(path: Path | None) -> Good | None:
+    """The configuration of a log, None where none was named. Raises CareError."""
+    from care_core.diagnose.reference import Good
     from care_core.logs.opening import open_log
 
     if path is None:
         return None
-    source = f"the configuration of {path.name}"
-    if not is_log(path):
-        parameters = (parameter for option in profile.schema.options for parameter in readable(option))
-        return Good(resolve(read_configs((path,)), parameters), source)
-    return Good({name: history[-1] for name, history in open_log(path).settings().items()}, source)
+    settings = {name: history[-1] for name, history in open_log(path).settings().items()}
+    return Good(settings, f"the configuration of {path.name}")
 
 
 def _diagnose(reading: Reading, request: Request, progress: Progress) -> Diagnosis:
