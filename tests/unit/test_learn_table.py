@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from care_core.errors import LearningError
 from care_core.learn.constraints import Constraints
-from care_core.learn.table import check_table, normal_scores, read_table
+from care_core.learn.relative import configurations_of
+from care_core.learn.table import check_table, normal_scores, read_table, varying
 from care_core.variables import Role
 from tests.simulated import schema_of
 
@@ -106,6 +107,19 @@ def test_scores_keep_order_ties_and_gaps(values: list[float]) -> None:
 def test_scores_ignore_any_monotonic_transformation() -> None:
     data = np.random.default_rng(0).normal(size=(50, 2))
     np.testing.assert_allclose(normal_scores(np.exp(3 * data)), normal_scores(data))
+
+
+def test_what_holds_one_value_or_none_does_not_vary() -> None:
+    frame = pd.DataFrame({"two": [1.0, 2.0, np.nan], "one": [3.0, 3.0, np.nan], "none": [np.nan] * 3})
+    assert varying(frame, frame) == ("two",)
+    assert varying(frame.iloc[:0], frame) == ()
+
+
+def test_runs_of_one_configuration_have_one_number() -> None:
+    schema = schema_of({"a": Role.OPTION, "b": Role.OPTION})
+    frame = pd.DataFrame({"a": [2.0, 2.0, 1.0, 2.0, 1.0], "b": [0.0, 0.0, 0.0, 1.0, -0.0]})
+    assert configurations_of(frame, schema).tolist() == [0, 0, 1, 2, 1]
+    assert configurations_of(frame.iloc[2:4], schema).tolist() == [0, 1]
 
 
 def test_constraints_say_why() -> None:

@@ -12,6 +12,7 @@ from care_core.causal.model import Model
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import (
     FEW_RUNS,
+    ask_total,
     causes_of,
     find_stages,
     fit_on,
@@ -19,6 +20,7 @@ from care_core.learn.outcomes import (
     fit_total,
     groups_that_move_together,
     met,
+    sought_of_objectives,
 )
 from care_core.learn.train import with_weak
 from care_core.profile.schema import Schema
@@ -173,6 +175,21 @@ def test_too_few_or_constant_values_give_no_mechanism() -> None:
     frame, rng = missions(), np.random.default_rng(0)
     assert fit_on([["gain"]], "time", frame.iloc[:15], SMALL, rng, effort=QUICK) is None
     assert fit_on([["gain"]], "time", frame.assign(time=3.0), SMALL, rng, effort=QUICK) is None
+
+
+def test_answers_are_the_same_in_any_order() -> None:
+    """What chance decides was drawn when a question was asked, so processes may share the answering."""
+    frame, rng, effort = missions(), np.random.default_rng(0), replace(QUICK, folds=2)
+    questions = [q for one in sought_of_objectives(frame, SMALL, GRAPH, rng, effort=effort) for q in one.questions]
+    error = ask_total("error", frame, SMALL, GRAPH, rng, effort=effort)
+    assert error is not None
+    assert error.folds
+    assert len(questions) == 3
+    asked = [*questions, error]
+    forwards, backwards = [q.answer() for q in asked], [q.answer() for q in asked[::-1]][::-1]
+    for one, other in zip(forwards, backwards, strict=True):
+        assert np.array_equal(one.weights, other.weights)
+        assert np.array_equal(one.calibration, other.calibration)
 
 
 def test_objectives_that_nearly_repeat_each_other_are_grouped() -> None:
