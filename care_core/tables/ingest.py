@@ -10,6 +10,7 @@ import csv
 import hashlib
 import io
 import json
+import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -76,18 +77,20 @@ def ingest(
     keys = {path: _key(path) for path in paths}
     done: dict[Path, list[TableRow] | Failed] = {path: known[key] for path, key in keys.items() if key in known}
     resumed, left = len(done), [path for path in paths if path not in done]
+    failed = sum(isinstance(answer, Failed) for answer in done.values())
     since = 0.0  # when the first answer came: until then the processes were started
     answers = each(partial(_read_one, schema=schema, read=read), left, workers=workers, limit_s=limit_s)
     with _writing(journal_of(out), _purpose(schema), known) as journal, closing(answers):
         for place, answer in answers:
             path = left[place]
-            done[path] = answer
+            done[path] = answer if isinstance(answer, Failed) else _shared(answer)
+            failed += isinstance(answer, Failed)
             if not isinstance(answer, Failed) or answer.is_final:
                 journal.write(_line(keys[path], answer))
                 journal.flush()
             since = since or time.monotonic()
             pace_s = (time.monotonic() - since) / max(len(done) - resumed - 1, 1)
-            progress(_said(done, len(paths), len(done) - resumed, pace_s), len(done) / len(paths))
+            progress(_said(len(done), failed, len(paths), len(done) - resumed, pace_s), len(done) / len(paths))
     return _collected(paths, done, resumed)
 
 
@@ -121,12 +124,17 @@ def _collected(paths: Sequence[Path], done: Mapping[Path, list[TableRow] | Faile
     return found
 
 
-def _said(done: Mapping[Path, list[TableRow] | Failed], count: int, now: int, pace_s: float) -> str:
-    failed = sum(isinstance(answer, Failed) for answer in done.values())
-    read = f"read {len(done)} of {count} logs, {failed} failed"
+def _shared(rows: list[TableRow]) -> list[TableRow]:
+    """The rows with one string a variable for all: each that came from a process or a file has brought its own, which
+    take half of its memory."""
+    return [{sys.intern(name): value for name, value in row.items()} for row in rows]
+
+
+def _said(done: int, failed: int, count: int, now: int, pace_s: float) -> str:
+    read = f"read {done} of {count} logs, {failed} failed"
     if now < _PACE_LOGS:
         return read
-    left_s = pace_s * (count - len(done))
+    left_s = pace_s * (count - done)
     left = f"{left_s / 60:.0f} min" if left_s >= 90 else f"{left_s:.0f} s"
     return f"{read}, about {left} left"
 
@@ -166,7 +174,7 @@ def _read_journal(path: Path, purpose: Mapping[str, str]) -> dict[str, list[Tabl
             break
     if not entries or entries[0] != purpose:
         return {}
-    return {e["log"]: e["rows"] if "rows" in e else Failed(e["failure"], is_final=True) for e in entries[1:]}
+    return {e["log"]: _shared(e["rows"]) if "rows" in e else Failed(e["failure"], is_final=True) for e in entries[1:]}
 
 
 @contextmanager
