@@ -10,8 +10,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO
 
-import numpy as np
-
 from care_core import limits
 from care_core.errors import LogError
 from care_core.logs.mapped import FileBytes
@@ -23,10 +21,6 @@ _BLOCK = 1 << 14
 
 _AT_ONCE = 1 << 20
 """Bytes unpacked at a time of what is slow to unpack: 46 ms of bz2."""
-
-_KEPT = 31 << 20
-"""glibc returns what is freed to the system where no larger block was freed before (mallopt(3): M_MMAP_THRESHOLD, at
-most 32 MB). Taking the pages of each chunk anew costs ten times as much as unpacking lz4. Untouched, it needs none."""
 
 _DISK_MARGIN = 64 << 20
 
@@ -42,7 +36,6 @@ class Unpacker:
         self._most = limits.unpacked_bytes(file_size)
         self._left = self._most
         self._takes_parts = file_size > limits.WHOLE_BYTES
-        np.empty(_KEPT, np.uint8)  # freed at once
 
     @property
     def takes_parts(self) -> bool:

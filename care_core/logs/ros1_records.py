@@ -29,7 +29,7 @@ _SIZE = struct.Struct("<I")
 _TIME = struct.Struct("<II")
 _LONGEST_HEADER = 1 << 16
 _USUAL_RECORD_HEADER = 64
-"""Bytes; that of a message has 46."""
+"""Bytes; that of a message has 46, of an index record 55."""
 _MOST_AHEAD = 16
 """Records that are looked at for the message that an index entry means."""
 _IS_MESSAGE = b"\x04\x00\x00\x00op=\x02"
@@ -241,13 +241,16 @@ def _complete_records(buffer: Source, pos: int, end: int) -> Iterator[_Record]:
 
 
 def _read_record(buffer: Source, pos: int, end: int) -> _Record:
+    record = buffer[pos : min(pos + _USUAL_RECORD_HEADER, end)]
     try:
-        (header_size,) = _SIZE.unpack(buffer[pos : pos + 4])
+        (header_size,) = _SIZE.unpack_from(record)
         start = pos + 8 + int(header_size)
         if start > end:
             raise BrokenRecordError("a record header is cut short")
-        fields = _fields(buffer[pos + 4 : start - 4])
-        (data_size,) = _SIZE.unpack(buffer[start - 4 : start])
+        if start - pos > len(record):
+            record = buffer[pos:start]
+        fields = _fields(record[4 : start - 4 - pos])
+        (data_size,) = _SIZE.unpack_from(record, start - 4 - pos)
     except struct.error as err:
         raise BrokenRecordError("a record header is cut short") from err
     if b"op" not in fields:

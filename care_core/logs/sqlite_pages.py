@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,8 +53,7 @@ class BrokenCellError(Exception):
     """Bytes that are no row. Stays inside the reader."""
 
 
-@dataclass(frozen=True, slots=True)
-class StoredRow:
+class StoredRow(NamedTuple):
     """A row of some table: its id, the columns' serial types, and where its payload begins."""
 
     id: int
