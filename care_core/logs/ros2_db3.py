@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
-from array import array
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -289,22 +288,26 @@ class _SalvagedPages:
 
     def contents(self) -> _Contents:
         contents = _Contents()
-        found = array("q")
+        found = [np.empty((0, 4), np.int64)]
         with opened(self.path, MAGIC, _WHAT) as log:
             pages = Pages(log)
-            for row in pages.rows():
-                message = _message_head(row)
-                if message is not None:
-                    found.extend((row.id, *message, row.place))
-                    continue
-                try:
-                    _take_described(contents, row, pages.values(row))
-                except BrokenCellError:
-                    continue
-        table = np.frombuffer(found, np.int64).reshape(-1, 4)
+            for plain, others in pages.rows():
+                found.append(plain)
+                for row in others:
+                    message = _message_head(row)
+                    if message is not None:
+                        found.append(np.array([[row.id, *message, row.place]], np.int64))
+                        continue
+                    with suppress(BrokenCellError):
+                        _take_described(contents, row, pages.values(row))
+        table = np.concatenate(found)
+        table = table[np.lexsort(table.T[::-1])]
+        is_new = np.ones(len(table), bool)  # what was given up is still there
+        is_new[1:] = np.any(np.diff(table[:, :3], axis=0) != 0, axis=1)
+        contents.take_messages(table[is_new, :3])
+        table = table[np.lexsort((table[:, 3], table[:, 0]))]
         self._ids, firsts = np.unique(table[:, 0], return_index=True)
         self._places = table[firsts, 3]
-        contents.take_messages(np.unique(table[:, :3], axis=0))
         contents.is_bag = bool(contents.topics)
         return contents
 

@@ -5,13 +5,14 @@ Source: sqlite.org/fileformat2.html. Only what a recorder writes is understood: 
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_core.logs.mapped import FileBytes
 
@@ -19,7 +20,7 @@ MAGIC = b"SQLite format 3\0"
 
 _LEAF = 0x0D
 _SIGN = 1 << 63
-_AT_ONCE = 1 << 20
+_AT_ONCE = 1 << 22
 """Bytes that are looked through at a time: whole pages."""
 _FIRST_PAGE_HEADER = 100
 _PAGE_HEADER = 8
@@ -31,7 +32,11 @@ _SMALLEST_CELL = 8
 _SHARED = 2
 """So many times the bytes of a file may be in its rows: pages that were given up are still there."""
 _INTEGER_SIZES = {0: 0, 1: 1, 2: 2, 3: 3, 4: 4, 5: 6, 6: 8, 8: 0, 9: 0}
+_INTEGER_LENGTHS = np.array([_INTEGER_SIZES.get(kind, -1) if kind else -1 for kind in range(256)])
+"""By serial type, -1 for what is none."""
 _FIRST_BLOB, _FIRST_TEXT = 12, 13
+_LONGEST_HEAD = 64
+"""Bytes from where a row begins to the end of its integers, and more."""
 
 
 def promised_size(path: Path) -> int:
@@ -89,32 +94,40 @@ class Pages:
         self.usable = self.size - (log.byte(20) if len(log) > _FIRST_PAGE_HEADER else 0)
         self._left = _SHARED * len(log)
 
-    def rows(self) -> Iterator[StoredRow]:
-        """Every row of every table, in the order of the pages; what is no row is passed over."""
+    def rows(self) -> Iterator[tuple[NDArray[np.int64], list[StoredRow]]]:
+        """The rows of every table, some pages at a time: of those that begin as `_plain_rows` says row id, the two
+        integers and the byte of the file, shape (n, 4), and the others; what is no row is passed over."""
         whole = len(self.log) // self.size * self.size
         for begin in range(0, whole, _AT_ONCE):
-            block = self.log[begin : min(begin + _AT_ONCE, whole)]
-            kinds = np.frombuffer(block, np.uint8)[:: self.size] == _LEAF
-            kinds[0] |= begin == 0  # the file's own header comes first there
-            for page in np.flatnonzero(kinds).tolist():
-                yield from self._rows_of(block[page * self.size : (page + 1) * self.size], begin + page * self.size)
+            size = min(_AT_ONCE, whole - begin)
+            block = self.log[begin : begin + size + _LONGEST_HEAD].ljust(size + _LONGEST_HEAD, b"\0")
+            there = np.frombuffer(block, np.uint8)
+            cells = self._cells(there[:size], is_first=begin == 0)
+            plain, others = _plain_rows(there, cells, self.size, len(self.log))
+            plain[:, 3] += begin
+            found = []
+            for place in others.tolist():
+                with suppress(BrokenCellError, IndexError):
+                    found.append(self._row(block, place, begin))
+            yield plain, found
 
     def row(self, place: int) -> StoredRow:
         """The row that begins at a byte of the file. Raises BrokenCellError or IndexError where none does."""
         begin = place - place % self.size
         return self._row(self.log[begin : begin + self.size], place - begin, begin)
 
-    def _rows_of(self, page: bytes, begin: int) -> Iterator[StoredRow]:
-        header = _FIRST_PAGE_HEADER if begin == 0 else 0
-        first = header + _PAGE_HEADER
-        count = int.from_bytes(page[header + 3 : header + 5], "big")
-        if page[header] != _LEAF or first + _SMALLEST_CELL * count > self.size:
-            return
-        for (place,) in struct.iter_unpack(">H", page[first : first + 2 * count]):
-            try:
-                yield self._row(page, place, begin)
-            except (BrokenCellError, IndexError):
-                continue
+    def _cells(self, block: NDArray[np.uint8], *, is_first: bool) -> NDArray[np.int64]:
+        """Where rows begin in a block of pages, shape (n,)."""
+        pages = np.arange(0, len(block), self.size)
+        headers = pages.copy()
+        headers[0] += _FIRST_PAGE_HEADER * is_first
+        counts = _pairs(block, headers + 3)
+        room = pages + self.size - headers - _PAGE_HEADER
+        leaves = np.flatnonzero((block[headers] == _LEAF) & (_SMALLEST_CELL * counts <= room))
+        counts = counts[leaves]
+        ordinals = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+        inside = _pairs(block, np.repeat(headers[leaves] + _PAGE_HEADER, counts) + 2 * ordinals)
+        return (np.repeat(pages[leaves], counts) + inside)[inside < self.size]
 
     def values(self, row: StoredRow) -> list[int | bytes | None]:
         """The columns of a row; text as its bytes. Raises BrokenCellError."""
@@ -130,8 +143,10 @@ class Pages:
             pos += size
         return values
 
-    def _row(self, page: bytes, pos: int, begin: int) -> StoredRow:
-        place = begin + pos
+    def _row(self, block: bytes, pos: int, begin: int) -> StoredRow:
+        """The row at a place of a block of pages, which begins at a byte of the file."""
+        place, page = begin + pos, block[pos - pos % self.size : pos - pos % self.size + self.size]
+        pos %= self.size
         size, pos = _varint(page, pos)
         rowid, start = _varint(page, pos)
         head, pos = _varint(page, start)
@@ -165,6 +180,49 @@ class Pages:
             left -= self.usable - 4
             following = int.from_bytes(self.log[base : base + 4], "big")
         return b"".join(pieces)
+
+
+def _plain_rows(
+    block: NDArray[np.uint8], cells: NDArray[np.int64], page_size: int, most: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Of rows that begin at cells, those of a key, two integers and a blob that lie as usual: row id, the integers and
+    the cell, shape (n, 4); and the cells of the others. No row takes more than `most` bytes."""
+    size, pos = _varints(block, cells)
+    ids, start = _varints(block, pos)
+    blob, pos = _varints(block, start + 4)
+    head, key, first, second = (block[start + place] for place in range(4))
+    sizes = _INTEGER_LENGTHS[first], _INTEGER_LENGTHS[second]
+    end = pos + np.abs(sizes[0]) + np.abs(sizes[1])
+    is_plain = (head == pos - start) & (key == 0) & (sizes[0] >= 0) & (sizes[1] >= 0)
+    is_plain &= (blob >= _FIRST_BLOB) & (blob % 2 == 0) & (size == end - start + (blob - _FIRST_BLOB) // 2)
+    is_plain &= (size <= most) & (ids >= 0) & (end <= cells - cells % page_size + page_size)
+    pos, kinds = pos[is_plain], (first[is_plain], second[is_plain])
+    numbers = _integers(block, pos, kinds[0]), _integers(block, pos + sizes[0][is_plain], kinds[1])
+    return np.column_stack([ids[is_plain], *numbers, cells[is_plain]]), cells[~is_plain]
+
+
+def _varints(block: NDArray[np.uint8], places: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The numbers at places, -1 where they are longer than five bytes, and where they end."""
+    values, pos = np.zeros(len(places), np.int64), places.copy()
+    goes_on = np.ones(len(places), bool)
+    for _ in range(5):
+        byte = block[pos]
+        values = np.where(goes_on, values << 7 | byte & 0x7F, values)
+        pos += goes_on
+        goes_on &= byte >= 0x80
+    return np.where(goes_on, -1, values), pos
+
+
+def _integers(block: NDArray[np.uint8], places: NDArray[np.int64], kinds: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """The integers of some serial types that are stored at places."""
+    stored = block[places[:, None] + np.arange(8)].view(">i8")[:, 0].astype(np.int64)
+    values: NDArray[np.int64] = stored >> (64 - 8 * np.maximum(_INTEGER_LENGTHS[kinds], 1))
+    return np.where(kinds >= 8, kinds.astype(np.int64) - 8, values)
+
+
+def _pairs(block: NDArray[np.uint8], places: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The numbers of two bytes at places."""
+    return block[places].astype(np.int64) << 8 | block[places + 1]
 
 
 def _varint(page: bytes, pos: int) -> tuple[int, int]:

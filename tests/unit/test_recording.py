@@ -16,7 +16,8 @@ from care_core.logs.compression import CannotUnpackError, PlainFile, Unpacker
 from care_core.logs.digest import log_digest
 from care_core.logs.finding import find_logs
 from care_core.logs.opening import open_log
-from tests.ros_samples import MESSAGES, WANTED, is_same, leaves, value_at, write_bag
+from care_core.logs.ros_log import RosLog
+from tests.ros_samples import MESSAGES, WANTED, is_same, leaves, value_at, write_bag, write_db3, write_mcap
 
 
 def write_split(folder: Path, names: tuple[str, ...]) -> None:
@@ -158,3 +159,21 @@ def test_settings_and_digest_of_a_folder_in_a_table_of_runs(recorded: Path) -> N
     folder = recorded / "logs" / "ros2_db3" / "split_5_files"
     assert find_logs([folder]) == (folder,)
     assert len(log_digest(folder)) == 64
+
+
+@pytest.mark.parametrize("container", ["bag", "mcap", "db3"])
+def test_of_many_messages_every_third_is_decoded(tmp_path: Path, container: str) -> None:
+    file = tmp_path / f"log.{container}"
+    if container == "db3":
+        write_db3(tmp_path / "folder").rename(file)
+    else:
+        (write_bag if container == "bag" else write_mcap)(file)
+    log = open_log(file)
+    assert isinstance(log, RosLog)
+    whole, some = log.read(WANTED), log.read(WANTED, {"/imu": MESSAGES // 3})
+    assert len(some["/imu"]) == MESSAGES // 3
+    for topic, table in some.items():
+        step = 3 if topic == "/imu" else 1
+        assert table.t.tolist() == whole[topic].t[::step].tolist()
+        assert all(is_same(column[0], whole[topic][path][0]) for path, column in table.columns.items())
+        assert all(is_same(column[-1], whole[topic][path][::step][-1]) for path, column in table.columns.items())
