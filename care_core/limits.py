@@ -11,8 +11,9 @@ MEBIBYTE = 1 << 20
 HELD_BYTES = 4 * MEBIBYTE
 """Of a log held in memory as a whole. A larger one is read where it is asked for, again each time, from the system's
 cache of files: 60 ms a gigabyte."""
-VALUES_BYTES = 16 * MEBIBYTE
-"""Of fields of a DataFlash log that are held as they are stored, beside what a check makes of them."""
+VALUES_BYTES, LEAST_VALUES_BYTES, VALUES_SHARE = 16 * MEBIBYTE, MEBIBYTE, 4
+"""Of fields of a DataFlash log that are held as they are stored, beside what a check makes of them: one byte of four
+of the log, within these bounds."""
 UNPACKED_BYTES, UNPACKED_RATIO = 256 * MEBIBYTE, 32
 """Laser scans pack 5:1, costmaps 30:1 and more, but no log is mostly empty costmaps."""
 WHOLE_BYTES = 256 * MEBIBYTE
@@ -43,6 +44,11 @@ INTEGER_DIGITS = 300
 
 MODEL_BYTES = 64 * MEBIBYTE
 """Of a profile's arrays; the bundled ones stay below 3 MB."""
+
+
+def values_bytes(size: int) -> int:
+    """The most bytes of fields that are held of a DataFlash log of `size` bytes."""
+    return min(max(size // VALUES_SHARE, LEAST_VALUES_BYTES), VALUES_BYTES)
 
 
 def unpacked_bytes(packed: int) -> int:

@@ -77,31 +77,44 @@ class Format:
 
 
 class _Values:
-    """Fields of all records of a declaration as they are stored. Those that were asked for last are held, up to
-    `limits.VALUES_BYTES`: every check reads what it looks at, and a walk through a large log is long."""
+    """Fields of all records of a declaration as they are stored. Those that were asked for last are held, up to what
+    `limits.values_bytes` allows: every check reads what it looks at, and a walk through a large log is long."""
 
     def __init__(self, data: FileArray) -> None:
         self._data = data
         self._held: dict[tuple[int, int, int], NDArray[Any]] = {}
-        self._bytes = 0
+        self._bytes, self._most = 0, limits.values_bytes(len(data))
         self._lock = Lock()  # the app's threads share a log
 
-    def of(self, form: Format, offsets: Offsets, name: str, among: Iterable[str] = ()) -> NDArray[Any]:
-        """The field of the records at `offsets`, shape (n,); those `among` which it is come by the same walk."""
-        wanted = {(form.type, form.byte, form.fields[one].offset): form.fields[one] for one in (name, *among)}
+    def of(self, form: Format, offsets: Offsets, name: str, among: Sequence[str]) -> NDArray[Any]:
+        """The field of the records at `offsets`, shape (n,); of those `among` which it is as many as may be held come
+        by the same walk, the next first."""
+        at = among.index(name)
+        wanted = {
+            (form.type, form.byte, form.fields[one].offset): form.fields[one] for one in (*among[at:], *among[:at])
+        }
         asked = next(iter(wanted))
         with self._lock:
             if asked not in self._held:
-                missing = {key: field for key, field in wanted.items() if key not in self._held}
-                if len(offsets) * sum(field.dtype.itemsize for field in missing.values()) > limits.VALUES_BYTES:
-                    missing = {asked: wanted[asked]}
-                (read,) = self._data.fields([(offsets, [(field.offset, field.dtype) for field in missing.values()])])
-                self._held |= zip(missing, read, strict=True)
-                self._bytes += sum(column.nbytes for column in read)
+                self._read(offsets, {key: field for key, field in wanted.items() if key not in self._held})
             found = self._held[asked] = self._held.pop(asked)  # what was asked for last goes last
-            while len(self._held) > 1 and self._bytes > limits.VALUES_BYTES:
-                self._bytes -= self._held.pop(next(iter(self._held))).nbytes
         return found
+
+    def _read(self, offsets: Offsets, missing: Mapping[tuple[int, int, int], RecordField]) -> None:
+        """Read the first of the fields, and those behind it that may be held together, in place of the oldest."""
+        chosen: dict[tuple[int, int, int], RecordField] = {}
+        size = 0
+        for key, field in missing.items():
+            own = len(offsets) * field.dtype.itemsize
+            if chosen and size + own > self._most:
+                break
+            chosen[key] = field
+            size += own
+        while self._held and self._bytes + size > self._most:
+            self._bytes -= self._held.pop(next(iter(self._held))).nbytes
+        (read,) = self._data.fields([(offsets, [(field.offset, field.dtype) for field in chosen.values()])])
+        self._held |= zip(chosen, read, strict=True)
+        self._bytes += size
 
 
 class _RecordColumns(LazyColumns):
