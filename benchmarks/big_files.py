@@ -10,8 +10,8 @@ db3 of the same sensors; a DataFlash log. Bags, MCAP files and the db3 also with
 sample, which are Python's own. Of packed chunks as much may be read as lies in chunks that hold something wanted: all,
 where each holds a little of everything, since nobody unpacks the middle of a chunk. The peer reads the index and every
 message of the topics that triage reads, with rosbags or mcap, and decodes none; of a file without its index the peer is
-`cat`. `stopped` is how long a triage takes to end after Ctrl+C in the middle of its work. Every process is cold, the
-file in the cache where it fits.
+`cat`, once of a file in the cache and once from the disk. `stopped` is how long a triage takes to end after Ctrl+C in
+the middle of its work. Every process is cold, the file in the cache where it fits and nothing else is said.
 """
 
 from __future__ import annotations
@@ -99,8 +99,13 @@ class Case:
     is_indexed: bool = True
 
 
-def run_once(command: Sequence[str]) -> Cost:
-    """What one run of a command costs. Raises where it ends otherwise than a triage may."""
+def run_once(command: Sequence[str], forgotten: Path | None = None) -> Cost:
+    """What one run of a command costs, with a file that the system's cache was told to forget. Raises where it ends
+    otherwise than a triage may."""
+    if forgotten is not None:
+        with forgotten.open("rb") as stream:
+            os.fsync(stream.fileno())
+            os.posix_fadvise(stream.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
     started, before = time.perf_counter(), os.times()
     peak_kb = read = 0
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=INSTALLED) as process:
@@ -122,9 +127,10 @@ def run_once(command: Sequence[str]) -> Cost:
     return Cost(seconds, cpu_s, peak_kb * 1024 / MB, read / MB)
 
 
-def median_of(command: Sequence[str], runs: int) -> Cost:
+def median_of(command: Sequence[str], runs: int, forgotten: Path | None = None) -> Cost:
     """The medians of so many runs after a first one."""
-    return Cost(*map(statistics.median, zip(*[run_once(command) for _ in range(runs + 1)][1:], strict=True)))
+    costs = [run_once(command, forgotten) for _ in range(runs + 1)][1:]
+    return Cost(*map(statistics.median, zip(*costs, strict=True)))
 
 
 def stop_s(path: Path, after_s: float) -> float:
@@ -343,6 +349,13 @@ def report(case: Case, path: Path, runs: int, start: Cost) -> None:
         most = max(MOST_SHARE, packed_share(path, topics) if is_packed else 0.0)
         why = " (the packed chunks that hold what is wanted)" if most > MOST_SHARE else ""
         bars.append((f"{share:.2%} of its bytes read, at most {most:.0%}{why}", round(share, 2) <= round(most, 2)))
+    if case.peer[0] == "cat":
+        cold, read = (median_of([*words, str(path)], runs, forgotten=path) for words in (TRIAGE, case.peer))
+        print(f"  from the disk: {cold.seconds:.2f} s, the peer {read.seconds:.2f} s")
+        slower = cold.seconds / read.seconds
+        bars.append(
+            (f"{slower:.2f} times the peer's seconds from the disk, at most {MOST_RATIO:g}", slower <= MOST_RATIO)
+        )
     for bar, is_kept in bars:
         print(f"  {'kept  ' if is_kept else 'MISSED'} {bar}", flush=True)
 
