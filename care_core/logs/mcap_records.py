@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any, NamedTuple
@@ -19,6 +18,7 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from numpy.typing import NDArray
 
 from care_core import limits
 from care_core.logs.compression import CannotUnpackError, Unpacker
@@ -34,6 +34,8 @@ of the message's record in the plain chunk."""
 
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<BQHIqQ")
+_STORED = np.dtype({"names": ["channel", "time"], "formats": ["<u2", "<i8"], "offsets": [9, 15], "itemsize": 31})
+"""What of a message's record goes into an index."""
 _CHUNK = struct.Struct("<QQQII")
 _FOOTER = struct.Struct("<QQI")
 _CHUNK_INDEX = struct.Struct("<QQQ")
@@ -41,6 +43,8 @@ _SIZE = struct.Struct("<Q")
 _INDEX = struct.Struct("<HI")
 _LONGEST_NAME = 64
 _PIECE = 1 << 20
+_STRETCH = 1 << 16
+"""Bytes of messages that are taken at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,16 +133,18 @@ class _Record(NamedTuple):
 def read_contents(log: FileBytes) -> McapContents:
     """Walk over a file's records; behind a broken one, go on where the summary says that the next chunk is."""
     contents = McapContents()
-    loose = _Loose()
+    loose = _Messages()
     pos, size = len(MAGIC), len(log)
     while pos < size and not contents.is_closed:
         try:
             record = _read_record(log, pos, size)
+            if record.op == Opcode.MESSAGE and record.end - pos < _MESSAGE.size:
+                raise BrokenRecordError("a message is too short")
             if record.op == Opcode.MESSAGE:
-                loose.add(log, record)
+                pos = loose.take(log, pos, size)
             else:
                 _take(log, record, contents)
-            pos = record.end
+                pos = record.end
         except BrokenRecordError as err:
             resumed = next((known for known in _summarised(log) if known > pos), None)
             contents.flaws[f"record {pos}"] = Flaw(str(err), pos, cuts=resumed is None)
@@ -150,7 +156,8 @@ def read_contents(log: FileBytes) -> McapContents:
     chunk_count = contents.statistics.chunk_count if contents.statistics else 0
     if len(contents.chunks) < chunk_count and not contents.flaws:
         contents.flaws["chunks"] = Flaw(f"{chunk_count - len(contents.chunks)} of {chunk_count} chunks are not found")
-    contents.chunks.extend(loose.chunks(size))
+    if loose.count:
+        contents.chunks.append(McapChunk(0, 0, size, is_whole=True, index=loose.index()))
     _complete(log, contents)
     contents.index = MessageIndex([(chunk.pos, chunk.index) for chunk in contents.chunks], ENTRY)
     for chunk in contents.chunks:
@@ -171,24 +178,46 @@ def locate(buffer: Source, begin: int, end: int, offset: int, number: int, time_
     return pos + _MESSAGE.size, after
 
 
-class _Loose:
-    """Messages outside chunks, as entries per channel: their offsets count from the beginning of the file."""
+class _Messages:
+    """Messages that a walk meets, whose offsets count from a place."""
 
-    def __init__(self) -> None:
-        self.times: dict[int, array[int]] = {}
-        self.offsets: dict[int, array[int]] = {}
+    def __init__(self, begin: int = 0) -> None:
+        self._begin = begin
+        self._channels: list[NDArray[np.uint16]] = []
+        self._entries: list[NDArray[Any]] = []
+        self.count = 0
 
-    def add(self, log: FileBytes, record: _Record) -> None:
-        if record.end - record.pos < _MESSAGE.size:
-            raise BrokenRecordError("a message is too short")
-        _, _, number, _, time_ns, _ = _MESSAGE.unpack(log[record.pos : record.pos + _MESSAGE.size])
-        self.times.setdefault(number, array("q")).append(time_ns)
-        self.offsets.setdefault(number, array("Q")).append(record.pos)
+    def take(self, source: Source, pos: int, end: int) -> int:
+        """Take complete messages that follow each other from a record on, some at a time; where the next one begins."""
+        low, piece = (0, source) if isinstance(source, bytes) else (pos, source[pos : min(pos + _STRETCH, end)])
+        at, stop = pos - low, end - low
+        last = min(at + _STRETCH, len(piece), stop) - _MESSAGE.size
+        head, least, message, header_of = _RECORD.size, _MESSAGE.size, int(Opcode.MESSAGE), _RECORD.unpack_from
+        places: list[int] = []
+        while at <= last:
+            op, size = header_of(piece, at)
+            after = at + head + size
+            if op != message or head + size < least or after > stop:
+                break
+            places.append(at)
+            at = after
+        if places:
+            everywhere = np.ndarray((len(piece) - _MESSAGE.size + 1,), _STORED, piece, 0, (1,))
+            stored, entries = everywhere[places], np.empty(len(places), ENTRY)
+            entries["time"], entries["offset"] = stored["time"], np.array(places) + (low - self._begin)
+            self._channels.append(stored["channel"])
+            self._entries.append(entries)
+            self.count += len(places)
+        return low + at
 
-    def chunks(self, size: int) -> Iterator[McapChunk]:
-        if self.times:
-            index = {number: _entries(times, self.offsets[number]) for number, times in self.times.items()}
-            yield McapChunk(0, 0, size, is_whole=True, index=index)
+    def index(self) -> ChunkIndex:
+        """The entries of each channel, in the order in which these come first."""
+        if not self.count:
+            return {}
+        channels, entries = np.concatenate(self._channels), np.concatenate(self._entries)
+        numbers, firsts, counts = np.unique(channels, return_index=True, return_counts=True)
+        parts = np.split(entries[np.argsort(channels, kind="stable")], np.cumsum(counts)[:-1])
+        return {int(numbers[one]): parts[one].tobytes() for one in np.argsort(firsts).tolist()}
 
 
 def _take(log: FileBytes, record: _Record, contents: McapContents) -> None:
@@ -280,8 +309,7 @@ def _complete(log: FileBytes, contents: McapContents) -> None:
 def _scan(chunk: McapChunk, log: FileBytes, contents: McapContents, unpack: Unpacker, most: int) -> ChunkIndex:
     """Index entries of a chunk's complete messages per channel; takes its schemas and channels on the way."""
     buffer, begin, end = chunk.open(log, unpack)
-    times: dict[int, array[int]] = {}
-    offsets: dict[int, array[int]] = {}
+    found = _Messages(begin)
     pos = begin
     while pos < end:
         try:
@@ -291,22 +319,14 @@ def _scan(chunk: McapChunk, log: FileBytes, contents: McapContents, unpack: Unpa
         if record.end > end:
             break
         if record.op == Opcode.MESSAGE and record.end - pos >= _MESSAGE.size:
-            if not most:
+            pos = found.take(buffer, pos, end)
+            if found.count > most:
                 raise BrokenRecordError("it holds more messages than a file of its size can")
-            most -= 1
-            _, _, number, _, time_ns, _ = _MESSAGE.unpack(buffer[pos : pos + _MESSAGE.size])
-            times.setdefault(number, array("q")).append(time_ns)
-            offsets.setdefault(number, array("Q")).append(pos - begin)
-        elif record.op in (Opcode.SCHEMA, Opcode.CHANNEL):
+            continue
+        if record.op in (Opcode.SCHEMA, Opcode.CHANNEL):
             _take_described(buffer, record, contents)
         pos = record.end
-    return {number: _entries(stamps, offsets[number]) for number, stamps in times.items()}
-
-
-def _entries(times: array[int], offsets: array[int]) -> bytes:
-    entries = np.empty(len(times), ENTRY)
-    entries["time"], entries["offset"] = times, offsets
-    return entries.tobytes()
+    return found.index()
 
 
 def _summarised(log: FileBytes) -> list[int]:
