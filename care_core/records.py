@@ -124,7 +124,8 @@ def _any_of(readers: list[_Reader]) -> _Reader:
             try:
                 return one(value)
             except UnfitError as err:
-                unfit.append(err)
+                # Its traceback holds this call and all that led to it, for as long as the error is held here.
+                unfit.append(err.with_traceback(None))
         raise max(unfit, key=lambda err: len(err.where))
 
     return read

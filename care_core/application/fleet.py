@@ -75,6 +75,7 @@ def triage_all(sources: Sequence[Source], asked: Request, cluster: Cluster, prog
 
     workers = min(cluster.workers or os.cpu_count() or 1, len(sources))
     rows: dict[int, Row] = {}
+    unread = 0
     progress("starting workers", 0.0)
     with connected(cluster.scheduler, workers=workers, memory=cluster.memory) as client:
         began = time.monotonic()
@@ -82,8 +83,10 @@ def triage_all(sources: Sequence[Source], asked: Request, cluster: Cluster, prog
         with closing(each(client, work, sources, limit_s=cluster.limit_s)) as answers:
             for place, answer in answers:
                 source = sources[place]
-                rows[place] = unreadable(source.name, answer.reason) if isinstance(answer, Failed) else answer
-                progress(_said(rows, len(sources), time.monotonic() - began), len(rows) / len(sources))
+                row = unreadable(source.name, answer.reason) if isinstance(answer, Failed) else answer
+                rows[place] = row
+                unread += row.status == "unreadable"
+                progress(_said(len(rows), unread, len(sources), time.monotonic() - began), len(rows) / len(sources))
     return tuple(rows[place] for place in range(len(sources)))
 
 
@@ -111,11 +114,10 @@ def _silent(_step: str, _share: float) -> None:
     pass
 
 
-def _said(rows: dict[int, Row], count: int, took_s: float) -> str:
-    failed = sum(row.status == "unreadable" for row in rows.values())
-    rate = len(rows) / max(took_s, 1e-3)
-    told = f"triaged {len(rows)} of {count} logs, {failed} unreadable, {rate:.2g} a second"
-    if len(rows) < _PACE_LOGS:
+def _said(done: int, unread: int, count: int, took_s: float) -> str:
+    rate = done / max(took_s, 1e-3)
+    told = f"triaged {done} of {count} logs, {unread} unreadable, {rate:.2g} a second"
+    if done < _PACE_LOGS:
         return told
-    left_s = (count - len(rows)) / rate
+    left_s = (count - done) / rate
     return f"{told}, about {f'{left_s / 60:.0f} min' if left_s >= 90 else f'{left_s:.0f} s'} left"
