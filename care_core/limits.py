@@ -11,7 +11,7 @@ MEBIBYTE = 1 << 20
 HELD_BYTES = 4 * MEBIBYTE
 """Of a log held in memory as a whole. A larger one is read where it is asked for, again each time, from the system's
 cache of files: 60 ms a gigabyte."""
-VALUES_BYTES, LEAST_VALUES_BYTES, VALUES_SHARE = 16 * MEBIBYTE, MEBIBYTE, 4
+VALUES_BYTES, LEAST_VALUES_BYTES, VALUES_SHARE = 20 * MEBIBYTE, MEBIBYTE, 4
 """Of fields of a DataFlash log that are held as they are stored, beside what a check makes of them: one byte of four
 of the log, within these bounds."""
 UNPACKED_BYTES, UNPACKED_RATIO = 256 * MEBIBYTE, 32

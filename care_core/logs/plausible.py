@@ -79,18 +79,22 @@ _ENOUGH = 20
 def plausible(tables: Mapping[str, Table]) -> dict[str, Table]:
     """The tables without dead ones, and without the rows in which a field is beyond its limits, steps back in time, or
     leaps away for one sample."""
-    dead = dead_sources(tables)
-    return {name: _cleaned(name, table) for name, table in tables.items() if name not in dead}
+    return {name: _cleaned(name, table) for name, table in tables.items() if not _is_dead(name, table)}
 
 
 def dead_sources(tables: Mapping[str, Table]) -> dict[str, str]:
     """Tables of something that moves, but whose values never change, each with the reason in words."""
     return {
         name: f"{name} says the same throughout the log, so it measures nothing"
-        for name, fields in MOVING.items()
-        if name in tables and len(tables[name]) >= _ENOUGH and set(fields) <= tables[name].columns.keys()
-        and not any(is_alive(tables[name][field]) for field in fields)
-    }  # fmt: skip
+        for name in MOVING
+        if name in tables and _is_dead(name, tables[name])
+    }
+
+
+def _is_dead(name: str, table: Table) -> bool:
+    fields = MOVING.get(name, ())
+    is_told = len(fields) > 0 and len(table) >= _ENOUGH and set(fields) <= table.columns.keys()
+    return is_told and not any(is_alive(table[field]) for field in fields)
 
 
 def is_alive(values: Floats) -> bool:
