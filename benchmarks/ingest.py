@@ -337,7 +337,7 @@ CASES = (
     Case("six.BIN", make_bin(6_000_000), DECODE_BIN, "pymavlink", 0.8),
     Case("hundred.BIN", make_bin(100_000_000), DECODE_BIN, "pymavlink", 2.0),
     Case("robot.bag", make_bag, DECODE_BAG, "rosbags", 0.8),
-    Case("robot.mcap", make_mcap, DECODE_MCAP, "mcap and rosbags", 3.0),
+    Case("robot.mcap", make_mcap, DECODE_MCAP, "mcap and rosbags", 0.8),
 )
 MOST_ANONYMOUS_MB = 300
 MOST_MB_PER_MB = 0.5

@@ -209,7 +209,7 @@ class World:
 
     def _continuous(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
         mechanism, after = self.model.mechanisms[outcome.mechanism], self._next(outcome, configs)
-        low, high = (restored(after.quantile(mechanism, share), mechanism.transform) for share in INTERVAL)
+        low, high = restored(after.quantiles(mechanism, INTERVAL), mechanism.transform)
         return Predicted(restored(after.mean, mechanism.transform), low, high, self.p_ok(outcome.objective, configs))
 
     def _next(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> _Next:
@@ -317,17 +317,19 @@ class _Next:
         return np.asarray(self.weights @ self.centre)
 
     def share_below(self, mechanism: Mechanism, values: FloatArray) -> FloatArray:
-        """Distribution function, shape (m,)."""
+        """Distribution function, shape (m,); of values (..., 1, m) of shape (..., m)."""
         below: FloatArray = self.weights @ mechanism.share_below((values - self.centre) / self.sd)
         return below
 
-    def quantile(self, mechanism: Mechanism, share: float) -> FloatArray:
-        """By halving, shape (m,): between the least and the largest of those of the single shares."""
-        each = self.centre + mechanism.error_quantile(share) * self.sd
-        low, high = each.min(axis=0), each.max(axis=0)
-        for _ in range(_HALVINGS if len(each) > 1 else 0):
+    def quantiles(self, mechanism: Mechanism, shares: Sequence[float]) -> FloatArray:
+        """Of so many shares, shape (len(shares), m), by halving: between the least and the largest of those of the
+        single shares of noise."""
+        each = self.centre + np.array([mechanism.error_quantile(share) for share in shares])[:, None, None] * self.sd
+        low, high = each.min(axis=1), each.max(axis=1)
+        wanted = np.array(shares)[:, None]
+        for _ in range(_HALVINGS if len(self.weights) > 1 else 0):
             middle = (low + high) / 2
-            beyond = self.share_below(mechanism, middle) >= share
+            beyond = self.share_below(mechanism, middle[:, None]) >= wanted
             low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
         return np.asarray((low + high) / 2)
 

@@ -123,20 +123,17 @@ def multicopter_cruise_time(given: Given) -> FloatArray:
     count = np.maximum(given["legs"], 1)
     length = given["path_length"] / count
     climbing, descending = given["climbing_legs"], given["descending_legs"]
-    groups = (
-        (count - climbing - descending, np.zeros_like(length), np.full_like(length, np.inf)),
-        (climbing, given["climb"] / np.maximum(climbing, 1), given["climb_speed"]),
-        (descending, given["descent"] / np.maximum(descending, 1), given["descent_speed"]),
-    )
-    time, ramps, top = np.zeros_like(length), np.zeros_like(length), np.zeros_like(length)
-    for legs, rise, limit in groups:
-        for flat in _two_lengths(length, given["leg_variation"]):
-            way = np.hypot(flat, rise)
-            fastest = np.minimum(speed * way / flat, limit * way / np.maximum(rise, _TINY))
-            peak, ramp = _ramps(way, fastest, acceleration, jerk, _lag(given))
-            time += legs / 2 * (way / peak + ramp)
-            ramps += legs / 2 * ramp
-            top += legs / 2 * peak
+    # Level, climbing and descending legs, (3, 1, n), of two lengths, (2, n).
+    legs = np.array([count - climbing - descending, climbing, descending])[:, None] / 2
+    rise = np.array(
+        [np.zeros_like(length), given["climb"] / np.maximum(climbing, 1), given["descent"] / np.maximum(descending, 1)]
+    )[:, None]
+    limit = np.array([np.full_like(length, np.inf), given["climb_speed"], given["descent_speed"]])[:, None]
+    flat = np.array(_two_lengths(length, given["leg_variation"]))
+    way = np.hypot(flat, rise)
+    fastest = np.minimum(speed * way / flat, limit * way / np.maximum(rise, _TINY))
+    peak, ramp = _ramps(way, fastest, acceleration, jerk, _lag(given))
+    time, ramps, top = ((legs * part).sum(axis=(0, 1)) for part in (way / peak + ramp, ramp, peak))
     overlap = 2 * _blend(given["radius"], given["corner_turn"], top / count, acceleration, jerk, 2 * acceleration)
     return np.asarray(time - given["flown_corners"] * np.minimum(overlap, ramps / count))
 
