@@ -13,7 +13,7 @@ from care_core.causal.counterfactual import Config, World
 from care_core.causal.graph import Edge
 from care_core.causal.mechanisms import FloatArray, columns
 from care_core.causal.model import EffectRecord, Model
-from care_core.causal.paths import CausalPath, rank_paths
+from care_core.causal.paths import CausalPath, Ways
 from care_core.configs.driven import same_value
 from care_core.diagnose.records import PathNode
 from care_core.diagnose.symptoms import NOTHING, pointers
@@ -153,10 +153,10 @@ def best_paths(
     def met(weight: Mapping[Edge, float]) -> dict[Edge, float]:
         return {e: v for e, v in weight.items() if mediators is None or e[1] in mediators or e[1] == objective}
 
-    weights = (met(felt), met(whole), felt, whole)
+    ways = [Ways(model.graph, weight) for weight in (met(felt), met(whole), felt, whole)]
     found: dict[str, CausalPath] = {}
     for option in options:
-        paths = next(filter(None, (rank_paths(model.graph, objective, [option], w, top=1) for w in weights)), None)
+        paths = next(filter(None, (way.ranked(objective, [option], top=1) for way in ways)), None)
         if paths:
             effects = [model.edges[edge].effect for edge in paths[0].edges]
             found[option] = CausalPath(paths[0].nodes, sum(effects) / len(effects))
