@@ -348,7 +348,7 @@ def report(case: Case, path: Path, runs: int, start: Cost) -> None:
         is_packed = any(packing in case.name for packing in ("lz4", "zstd"))
         most = max(MOST_SHARE, packed_share(path, topics) if is_packed else 0.0)
         why = " (the packed chunks that hold what is wanted)" if most > MOST_SHARE else ""
-        bars.append((f"{share:.2%} of its bytes read, at most {most:.0%}{why}", round(share, 2) <= round(most, 2)))
+        bars.append((f"{share:.2%} of its bytes read, at most {most:.0%}{why}", share <= most))
     if case.peer[0] == "cat":
         cold, read = (median_of([*words, str(path)], runs, forgotten=path) for words in (TRIAGE, case.peer))
         print(f"  from the disk: {cold.seconds:.2f} s, the peer {read.seconds:.2f} s")
