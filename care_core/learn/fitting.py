@@ -50,6 +50,9 @@ RESIDUAL_LEVELS = 101
 CACHED = 65_536
 """Numbers that fitting works on at a time, which then stay in the processor's cache."""
 MIN_ROWS = 20
+MANY_RUNS = 1000
+"""From so many runs on folds begin where all runs led, for a fifth of the runs moves little. Of fewer, runs left out have
+a hand in that: of 196 missions of rovers intervals of 80 % held 71 % and not 76 %."""
 
 
 Rows = NDArray[np.int64] | slice
@@ -216,13 +219,14 @@ def tested_on_runs_left_out(
         return mechanism
     read = np.zeros(len(inputs.names), dtype=bool)
     read[mechanism.reads] = True
-    # They begin where all runs led, and half the steps end as near to the best as all from the middle would.
-    again = replace(effort, iterations=effort.iterations // 2)
+    start, again = None, effort
+    if len(y) >= MANY_RUNS:  # half the steps from there end as near to the best as all from the middle would
+        start, again = mechanism.kernel, replace(effort, iterations=effort.iterations // 2)
     errors = np.empty(len(y))
     for out, kept in folds:
         others = fit(
             x[~out][kept], y[~out][kept], replace(inputs, read=read), binary=False, effort=again,
-            transform=mechanism.transform, groups=groups[~out][kept], start=mechanism.kernel,
+            transform=mechanism.transform, groups=groups[~out][kept], start=start,
         ).mechanism  # fmt: skip
         sd = np.sqrt(others.latent_sd(x[out]) ** 2 + others.noise_sd**2)
         errors[out] = (transformed(y[out], mechanism.transform) - others.latent(x[out])) / sd
