@@ -51,8 +51,8 @@ CACHED = 65_536
 """Numbers that fitting works on at a time, which then stay in the processor's cache."""
 MIN_ROWS = 20
 MANY_RUNS = 1000
-"""From so many runs on folds begin where all runs led, for a fifth of the runs moves little. Of fewer, runs left out have
-a hand in that: of 196 missions of rovers intervals of 80 % held 71 % and not 76 %."""
+"""From so many runs on folds begin where all runs led, for a fifth of the runs moves little. Of fewer, runs left out
+have a hand in that: of 196 missions of rovers intervals of 80 % held 71 % and not 76 %."""
 
 
 Rows = NDArray[np.int64] | slice
