@@ -109,7 +109,8 @@ class Summary:
 
     def percentile(self, value: float) -> float:
         """Share (0 to 1) of the training runs with a smaller value."""
-        return float(np.interp(value, self.quantiles, np.linspace(0, 1, len(self.quantiles))))
+        share = np.interp(value, self.quantiles, np.linspace(0, 1, len(self.quantiles)))
+        return float(np.clip(share, 0, 1))  # between quantiles that hardly differ its slope is infinite
 
     def share_meeting(self, bound: Threshold) -> float:
         """Share (0 to 1) of the training runs that kept a threshold, by the quantiles; kept off 0 and 1."""
