@@ -109,8 +109,11 @@ class Summary:
 
     def percentile(self, value: float) -> float:
         """Share (0 to 1) of the training runs with a smaller value."""
-        share = np.interp(value, self.quantiles, np.linspace(0, 1, len(self.quantiles)))
-        return float(np.clip(share, 0, 1))  # between quantiles that hardly differ its slope is infinite
+        levels = np.linspace(0, 1, len(self.quantiles))
+        above = int(np.searchsorted(self.quantiles, value, side="right"))
+        # Between quantiles that hardly differ the slope is infinite, so a share stays within their levels.
+        least, most = levels[max(above - 1, 0)], levels[min(above, len(levels) - 1)]
+        return float(np.clip(np.interp(value, self.quantiles, levels), least, most))
 
     def share_meeting(self, bound: Threshold) -> float:
         """Share (0 to 1) of the training runs that kept a threshold, by the quantiles; kept off 0 and 1."""

@@ -246,6 +246,7 @@ def test_a_missing_file_says_to_train(folder: Path, name: str) -> None:
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=21, max_size=21).map(sorted), st.floats(-2e6, 2e6), st.floats(0, 1e6))
 @example([*[0.0] * 20, 2.2250738585e-313], 0.0, 5e-324)
+@example([*[0.0] * 19, 2.2250738585e-313, 2.0], 5e-324, 1.0)
 def test_a_percentile_is_a_share_that_never_falls(quantiles: list[float], value: float, more: float) -> None:
     summary = Summary(count=9, mean=0, sd=1, quantiles=tuple(quantiles))
     assert 0 <= summary.percentile(value) <= summary.percentile(value + more) <= 1
