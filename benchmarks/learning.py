@@ -29,7 +29,7 @@ from causallearn.utils.PCUtils.BackgroundKnowledge import BackgroundKnowledge
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.graph import CausalGraph
-from care_core.causal.paths import rank_paths
+from care_core.causal.paths import Ways
 from care_core.files import bundled
 from care_core.learn.bootstrap import support
 from care_core.learn.constraints import ALWAYS
@@ -116,7 +116,7 @@ def paths(shared: Path, limit: float) -> None:
         f"paths: {len(sources)} options, {len(metrics)} metrics, all {len(edges)} edges, {len(sources) << 40:.1e} paths"
     )
     with _measured("the ten best"):
-        rank_paths(graph, "y", sources, weight, top=10)
+        Ways(graph, weight).ranked("y", sources, 10)
 
 
 @contextlib.contextmanager

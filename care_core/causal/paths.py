@@ -24,13 +24,6 @@ class CausalPath:
         return tuple(zip(self.nodes, self.nodes[1:], strict=False))
 
 
-def rank_paths(
-    graph: CausalGraph, objective: str, sources: Collection[str], weight: Mapping[Edge, float], top: int
-) -> tuple[CausalPath, ...]:
-    """The `top` directed paths from a source to the objective with the largest mean edge effect; see `Ways`."""
-    return Ways(graph, weight).ranked(objective, sources, top)
-
-
 @dataclass(frozen=True, eq=False)
 class Ways:
     """The edges of a graph that carry an effect, ready to be asked for paths many times over.

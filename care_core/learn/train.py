@@ -15,7 +15,7 @@ from care_core.causal.effects import Effect, acceptable_values, along, average_c
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import JITTER, LEAST, FloatArray, Mechanism, transformed
 from care_core.causal.model import EdgeRecord, EffectRecord, Model, OutcomeRecord, PathRecord, Summary, Training
-from care_core.causal.paths import CausalPath, rank_paths
+from care_core.causal.paths import CausalPath, Ways
 from care_core.learn.bootstrap import Finding, Reaches
 from care_core.learn.bootstrap import support as measure_support
 from care_core.learn.fitting import METRIC, MIN_ROWS, OUTCOME
@@ -368,7 +368,7 @@ def _paths(
 ) -> dict[str, tuple[PathRecord, ...]]:
     """Alg. 2: the top paths of each objective, with the interval of their mean edge effect over resamples, which have a
     path as often as its rarest edge at most."""
-    weight = {edge: measured.effect.magnitude for edge, measured in edges.items()}
+    ways = Ways(graph, {edge: measured.effect.magnitude for edge, measured in edges.items()})
     options = {option.name for option in schema.options}
 
     def record(path: CausalPath, objective: str) -> PathRecord:
@@ -386,9 +386,7 @@ def _paths(
         )
 
     return {
-        objective.name: tuple(
-            record(path, objective.name) for path in rank_paths(graph, objective.name, options, weight, top=TOP_PATHS)
-        )
+        objective.name: tuple(record(path, objective.name) for path in ways.ranked(objective.name, options, TOP_PATHS))
         for objective in schema.objectives
         if objective.name in graph.nodes
     }

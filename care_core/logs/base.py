@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -51,6 +51,18 @@ Kind = Literal["number", "text", "other"]
 
 class LazyColumns(Mapping[str, Any]):
     """Columns that a reader decodes only when they are asked for, and then only the rows that are left."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = names
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names  # the inherited way would decode the column
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
     @abstractmethod
     def where(self, mask: NDArray[np.bool_] | slice) -> Mapping[str, NDArray[Any]]: ...

@@ -129,7 +129,8 @@ class _RecordColumns(LazyColumns):
         names: Sequence[str],
         rows: slice | Offsets = slice(None),
     ) -> None:
-        self._values, self._form, self._offsets, self._names, self._rows = values, form, offsets, names, rows
+        super().__init__(names)
+        self._values, self._form, self._offsets, self._rows = values, form, offsets, rows
         self._texts: dict[str, NDArray[Any]] = {}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
@@ -142,15 +143,6 @@ class _RecordColumns(LazyColumns):
         if field.dtype.kind == "S":
             self._texts[name] = column
         return column
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._names  # the inherited way would decode the column
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
 
     def kind(self, name: str) -> Kind:
         return self._form.fields[name].kind

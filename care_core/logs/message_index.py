@@ -53,9 +53,7 @@ class MessageIndex:
 
     def entries(self, rows: NDArray[np.intp]) -> Iterator[tuple[int, int, int]]:
         """Connection, record time in ns and offset of messages."""
-        return zip(
-            self.numbers[rows].tolist(), self.times_ns[rows].tolist(), self.offsets[rows].tolist(), strict=True
-        )  # fmt: skip
+        return zip(self.numbers[rows].tolist(), self.times_ns[rows].tolist(), self.offsets[rows].tolist(), strict=True)
 
     def needed(self, chunk: int, rows: NDArray[np.intp]) -> int:
         """Bytes of a plain chunk up to the first message behind the last of these; 0: all that there are."""

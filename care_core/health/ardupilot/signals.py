@@ -6,7 +6,7 @@ the outputs are Chan1 or Mot1. Checks see instances of a message with today's fi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -87,21 +87,13 @@ class _Today(LazyColumns):
     """
 
     def __init__(self, table: Table, sources: Mapping[str, tuple[str, float]]) -> None:
+        super().__init__(tuple(sources))
         self._table, self._sources = table, sources
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         source, divisor = self._sources[name]
         column = self._table[source]
         return column if divisor == 1 else column / divisor
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._sources  # the inherited way would decode the column
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._sources)
-
-    def __len__(self) -> int:
-        return len(self._sources)
 
     def kind(self, name: str) -> Kind:
         return self._table.kind(self._sources[name][0])
