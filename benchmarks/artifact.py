@@ -21,7 +21,7 @@ import statsmodels.api as sm
 from scipy.stats import levene
 from sklearn.preprocessing import scale
 
-from care_core.causal.mechanisms import FloatArray
+from care_core.causal.kernel import FloatArray
 from care_core.learn.fault_files import FaultFile, read_faults
 from care_core.learn.naming import SLOPES
 from care_core.profile.schema import Schema

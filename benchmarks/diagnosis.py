@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from care_core.causal.abduction import Kinship, next_passes
 from care_core.causal.counterfactual import World
-from care_core.causal.mechanisms import FloatArray
+from care_core.causal.kernel import FloatArray
 from care_core.causal.model import UNKNOWN_PERSISTENCE
 from care_core.diagnose.judging import read_and_judge, world_of
 from care_core.diagnose.ranking import deviating

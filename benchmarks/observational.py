@@ -29,7 +29,7 @@ from joblib import Parallel, delayed
 
 from benchmarks.diagnosis import abducted
 from care_core.causal.counterfactual import World
-from care_core.causal.mechanisms import FloatArray
+from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
 from care_core.diagnose.ranking import deviating, suspects
 from care_core.diagnose.reference import profile_config

@@ -19,7 +19,8 @@ import numpy as np
 import pandas as pd
 
 from care_core.application.training import evaluation_as_text
-from care_core.causal.mechanisms import FloatArray, Mechanism
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import Mechanism
 from care_core.learn.completion import complete
 from care_core.learn.evaluation import evaluate
 from care_core.learn.fault_files import read_faults

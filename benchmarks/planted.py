@@ -30,7 +30,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from benchmarks.diagnosis import abducted
-from care_core.causal.mechanisms import FloatArray
+from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
 from care_core.diagnose.judging import judge, world_of
 from care_core.diagnose.ranking import deviating

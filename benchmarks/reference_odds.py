@@ -20,7 +20,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.counterfactual import World
-from care_core.causal.mechanisms import FloatArray
+from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model, Training
 from care_core.collect.sampling import points
 from care_core.collect.space import Axis, Space

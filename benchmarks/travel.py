@@ -28,7 +28,7 @@ from threadpoolctl import threadpool_limits
 
 from benchmarks.diagnosis import abducted
 from care_core.causal.counterfactual import World
-from care_core.causal.mechanisms import FloatArray
+from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model, Training
 from care_core.diagnose.judging import Judged, read_and_judge, world_of
 from care_core.diagnose.ranking import deviating

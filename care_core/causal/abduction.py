@@ -22,7 +22,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from care_core.causal.mechanisms import At, FloatArray
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import At
 from care_core.frozen import dataclass
 
 _Z = np.linspace(-6.0, 6.0, 2401)

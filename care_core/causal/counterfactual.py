@@ -15,8 +15,10 @@ from typing import Literal
 import numpy as np
 
 from care_core.causal.abduction import FARTHEST, Kinship, by_mediators, kinship, next_passes, next_value
-from care_core.causal.mechanisms import LEAST, TAIL, At, FloatArray, Mechanism, columns, restored, transformed
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import LEAST, TAIL, At, Mechanism, columns, restored, transformed
 from care_core.causal.model import UNKNOWN_PERSISTENCE, Mediation, Model, OutcomeRecord, Persistence, StageRecord
+from care_core.causal.places import Places
 from care_core.frozen import dataclass
 from care_core.run import is_known
 from care_core.variables import Threshold, Variable
@@ -69,9 +71,10 @@ class World:
     wary_from: Config | None = None
     """Where set, each mechanism counts as bad as it may be (90 %) at other configurations, given what it does at this
     one: what training did not show between the two is not taken for granted."""
+    places: Places = field(default_factory=Places, repr=False)
+    """What mechanisms say whatever this run did: worlds that are made of this one ask for most of it again."""
     _told: dict[str, _Answers] = field(default_factory=dict, init=False, repr=False)
     """What was worked out already: the search asks for most configurations many times over."""
-    _asked: dict[tuple[str, bool], At] = field(default_factory=dict, init=False, repr=False)
 
     def predict(self, objective: str, configs: Sequence[Config]) -> Predicted:
         """The objective under each configuration, given what this run met."""
@@ -122,9 +125,7 @@ class World:
 
     def _ignorance(self, key: str, configs: Sequence[Config]) -> FloatArray:
         mechanism = self.model.mechanisms[key]
-        x = columns(configs, mechanism.inputs)
-        ignorance: FloatArray = self._once(f"ignorance/{key}", x, lambda rows: (mechanism.ignorance(rows),))[0]
-        return ignorance
+        return self.places.at(mechanism, columns(configs, mechanism.inputs)).ignorance
 
     def _groups(self, names: Mapping[str, FloatArray]) -> list[list[str]]:
         together = [[name for name in group if name in names] for group in self.model.training.moves_together]
@@ -168,7 +169,7 @@ class World:
         mechanism = self.model.mechanisms[stage.mechanism]
 
         def ask(x: FloatArray) -> tuple[FloatArray]:
-            there = mechanism.at(x)
+            there = self.places.at(mechanism, x)
             chance = _chance(there, stage.passes, -self._worse(stage.mechanism, there))
             if not passed:
                 return (chance,)
@@ -177,12 +178,13 @@ class World:
             expected = float(_chance(here, stage.passes)[0])
             return (np.clip(next_passes(kin, chance, expected, passed), TAIL, 1 - TAIL),)
 
-        probability: FloatArray = self._once(f"{objective}/{stage.mechanism}", columns(configs, mechanism.inputs), ask)[
-            0
-        ]
+        x = columns(configs, mechanism.inputs)
+        probability: FloatArray = self._once(f"{objective}/{stage.mechanism}", mechanism, x, ask)[0]
         return probability
 
-    def _once(self, key: str, x: FloatArray, ask: Callable[[FloatArray], tuple[FloatArray, ...]]) -> FloatArray:
+    def _once(
+        self, key: str, mechanism: Mechanism, x: FloatArray, ask: Callable[[FloatArray], tuple[FloatArray, ...]]
+    ) -> FloatArray:
         """What `ask` answers for each row of x, asked once for each that is new: an array of each of its answers.
 
         Args:
@@ -192,7 +194,7 @@ class World:
             Shape (k, m).
         """
         told = self._told.setdefault(key, {})
-        rows = [row.tobytes() for row in x]
+        rows = mechanism.felt(x)
         new = {row: i for i, row in enumerate(rows) if row not in told}
         if new:
             told.update(zip(new, zip(*ask(x[list(new.values())]), strict=True), strict=True))
@@ -223,7 +225,7 @@ class World:
         bad = 1.0 if bound is None or bound.op in ("<=", "<") else -1.0
 
         def ask(x: FloatArray) -> tuple[FloatArray, ...]:
-            there = mechanism.at(x)
+            there = self.places.at(mechanism, x)
             latent = there.latent + bad * self._worse(outcome.mechanism, there)
             if not len(seen):
                 return latent, np.sqrt(there.variance + mechanism.noise_at(x) ** 2)
@@ -232,7 +234,7 @@ class World:
             pairs = [next_value(kin.sharing(share), latent, float(here.latent[0]), seen) for share in shares]
             return tuple(part for pair in pairs for part in pair)
 
-        told = self._once(outcome.objective, columns(configs, mechanism.inputs), ask)
+        told = self._once(outcome.objective, mechanism, columns(configs, mechanism.inputs), ask)
         centre, sd = told[0::2], told[1::2]
         if len(seen):
             return _Next(centre, sd, weights)
@@ -241,11 +243,8 @@ class World:
 
     def _at(self, key: str, config: Config) -> At:
         """A mechanism at this run's configuration or at the one that is known, which every question asks about."""
-        asked = key, config is self.config
-        if asked not in self._asked:
-            mechanism = self.model.mechanisms[key]
-            self._asked[asked] = mechanism.at(columns([config], mechanism.inputs))
-        return self._asked[asked]
+        mechanism = self.model.mechanisms[key]
+        return self.places.at(mechanism, columns([config], mechanism.inputs))
 
     def _worse(self, key: str, there: At) -> FloatArray:
         """What a mechanism may do beyond what it is expected to, from the configuration that is known; shape (m,)."""
@@ -280,10 +279,10 @@ class World:
         here, persistence = self._at(metric, self.config), self._persistence(metric)
 
         def ask(rows: FloatArray) -> tuple[FloatArray, ...]:
-            kin = kinship(here.mechanism.at(rows), here, persistence)
+            kin = kinship(self.places.at(here.mechanism, rows), here, persistence)
             return kin.variance, kin.covariance
 
-        variance, covariance = self._once(f"on its way/{metric}", x, ask)
+        variance, covariance = self._once(f"on its way/{metric}", here.mechanism, x, ask)
         return replace(kinship(here, here, persistence), variance=variance, covariance=covariance)
 
     def _behind_the_end(self) -> frozenset[str]:

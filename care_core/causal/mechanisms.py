@@ -17,17 +17,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.causal.kernel import Factor, FloatArray, Kernel, Levels
 from care_core.causal.nominal import Nominal
 from care_core.frozen import dataclass
 
-FloatArray = NDArray[np.float64]
 Transform = Literal["identity", "log", "log1p"]
 LEAST: Mapping[Transform, float] = {"identity": -np.inf, "log": 0.0, "log1p": -1.0}
 """Every value that a transform can take lies above this."""
-BLOCK = 300_000
-"""Largest number of floats in one block of pairwise distances, which then stays in the processor's cache: changes no
-number."""
-SLICE = 64
 JITTER = 1e-6
 TAIL = 0.01
 """Probabilities are kept this far from 0 and 1: no table of a few hundred runs supports more."""
@@ -45,79 +41,6 @@ def restored(values: FloatArray, transform: Transform) -> FloatArray:
     if transform == "log":
         return np.exp(values)
     return np.expm1(values) if transform == "log1p" else values
-
-
-@dataclass(frozen=True, eq=False)
-class Kernel:
-    """The covariance above on scaled inputs. `relevance`: shape (p,); amplitudes, `noise`: standard deviations."""
-
-    relevance: FloatArray
-    additive: float
-    joint: float
-    noise: float
-    idle: int = 0
-    """Inputs that were found to explain nothing and left out: each adds an e_j of 1."""
-
-    def __call__(self, a: FloatArray, b: FloatArray) -> FloatArray:
-        """Covariance of the noise-free values. a: (m, p), b: (n, p) -> (m, n)."""
-        rows = max(1, BLOCK // max(1, b.size))
-        covariance = np.empty((len(a), len(b)))
-        for i in range(0, len(a), rows):
-            covariance[i : i + rows] = self._block(a[i : i + rows], b)
-        return covariance
-
-    def among(self, points: FloatArray) -> FloatArray:
-        """Covariance of points with each other, shape (n, n): half the work of calling it, and the same numbers."""
-        n = len(points)
-        covariance = np.empty((n, n))
-        for i in range(0, n, SLICE):
-            rows = slice(i, i + SLICE)
-            covariance[rows, i:] = self(points[rows], points[i:])
-            covariance[i:, rows] = covariance[rows, i:].T
-        return covariance
-
-    def _block(self, a: FloatArray, b: FloatArray) -> FloatArray:
-        scale = self.relevance * np.sqrt(0.5)
-        exponents = (a * scale).T[:, :, None] - (b * scale).T[:, None, :]  # (p, m, n): sums over p run along rows
-        np.multiply(exponents, exponents, out=exponents)
-        np.negative(exponents, out=exponents)
-        joint: FloatArray = exponents.sum(axis=0)
-        each = np.exp(exponents, out=exponents).sum(axis=0) + self.idle
-        np.exp(joint, out=joint)
-        joint *= self.joint**2
-        joint += each * (self.additive**2 / max(1, len(self.relevance) + self.idle))
-        return joint
-
-    @property
-    def variance(self) -> float:
-        """Prior variance of a noise-free value."""
-        return self.additive**2 + self.joint**2
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Factor:
-    """The Cholesky factor of a covariance, to be asked for L^-1 b: what is explained is the square of that.
-
-    numpy solves no triangular system, so the inverses of its blocks on the diagonal are kept beside it.
-    """
-
-    lower: FloatArray
-    diagonal: tuple[FloatArray, ...]
-
-    @classmethod
-    def of(cls, covariance: FloatArray) -> Factor:
-        """Of a positive definite matrix, shape (n, n)."""
-        lower: FloatArray = np.linalg.cholesky(covariance).astype(np.float64, copy=False)
-        starts = range(0, len(lower), SLICE)
-        return cls(lower, tuple(np.asarray(np.linalg.inv(lower[i : i + SLICE, i : i + SLICE])) for i in starts))
-
-    def whitened(self, rows: FloatArray) -> FloatArray:
-        """L^-1 of each row. rows: (m, n) -> (m, n)."""
-        solved = np.empty_like(rows)
-        for i, inverse in zip(range(0, len(self.lower), SLICE), self.diagonal, strict=True):
-            block = slice(i, i + SLICE)
-            solved[:, block] = (rows[:, block] - solved[:, :i] @ self.lower[block, :i].T) @ inverse.T
-        return solved
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,9 +101,14 @@ class Mechanism:
         return scaled
 
     @cached_property
+    def levels(self) -> Levels:
+        """Of the training inputs."""
+        return Levels.of(self.points)
+
+    @cached_property
     def training(self) -> Factor:
         """Of the covariance of the training outcomes."""
-        covariance = self.kernel.among(self.points)
+        covariance = self.kernel.among(self.levels)
         covariance[np.diag_indices_from(covariance)] += self.kernel.noise**2 + JITTER
         return Factor.of(covariance)
 
@@ -200,20 +128,31 @@ class Mechanism:
         """What physics and the other platform's mechanism say, shape (m,); zero without either."""
         return self.at(x).known
 
+    def felt(self, x: FloatArray) -> list[bytes]:
+        """Of each row of x (m, p) the values of the inputs that anything reads: rows with the same have one answer."""
+        return [row.tobytes() for row in x[:, self._felt]]
+
+    @cached_property
+    def _felt(self) -> NDArray[np.int64]:
+        names = {self.inputs[place] for place in self.reads}
+        names.update(() if self.nominal is None else self.nominal.inputs)
+        names.update(() if self.averaging is None else (self.averaging.count,))
+        names.update(() if self.prior is None else self.prior[0].inputs)
+        return np.array([place for place, name in enumerate(self.inputs) if name in names], dtype=np.int64)
+
     def columns(self, x: FloatArray, names: Sequence[str]) -> FloatArray:
         """Those of the inputs, of x (m, p)."""
         return x[:, [self.inputs.index(name) for name in names]]
 
     def ignorance(self, x: FloatArray) -> FloatArray:
         """How little the training data say there: posterior over prior variance, 0 (known) to 1 (nothing known)."""
-        share: FloatArray = self.latent_sd(x) ** 2 / max(self._prior_variance, 1e-12)
-        return np.clip(share, 0.0, 1.0)
+        return self.at(x).ignorance
 
     @property
-    def _prior_variance(self) -> float:
+    def prior_variance(self) -> float:
         """Of a noise-free value before any run, on the transformed scale."""
         own = self.scale**2 * self.kernel.variance
-        return own if self.prior is None else own + self.prior[1] ** 2 * self.prior[0]._prior_variance
+        return own if self.prior is None else own + self.prior[1] ** 2 * self.prior[0].prior_variance
 
     @property
     def noise_sd(self) -> float:
@@ -293,8 +232,13 @@ class At:
     def variance(self) -> FloatArray:
         """Its square, shape (m,)."""
         m = self.mechanism
-        own: FloatArray = m.scale**2 * np.maximum(m.kernel.variance - (self._half**2).sum(axis=1), 1e-12)
+        own: FloatArray = m.scale**2 * np.maximum(m.kernel.variance - (self.half**2).sum(axis=1), 1e-12)
         return own if self._prior is None else own + self._prior[1] ** 2 * self._prior[0].variance
+
+    @property
+    def ignorance(self) -> FloatArray:
+        """Posterior over prior variance, 0 (known) to 1 (nothing known), shape (m,)."""
+        return np.clip(self.variance / max(self.mechanism.prior_variance, 1e-12), 0.0, 1.0)
 
     @cached_property
     def known(self) -> FloatArray:
@@ -313,7 +257,7 @@ class At:
         """
         m = self.mechanism
         prior = 2 * (m.kernel.variance - m.kernel(self._z, here._z)[:, 0])
-        explained = ((self._half - here._half) ** 2).sum(axis=1)
+        explained = ((self.half - here.half) ** 2).sum(axis=1)
         sd: FloatArray = m.scale * np.sqrt(np.maximum(prior - explained, 1e-12))
         if self._prior is None or here._prior is None:
             return sd
@@ -326,7 +270,7 @@ class At:
         """
         m = self.mechanism
         between = m.kernel(self._z, here._z)[:, 0]
-        own: FloatArray = m.scale**2 * (between - self._half @ here._half[0])
+        own: FloatArray = m.scale**2 * (between - self.half @ here.half[0])
         if self._prior is None or here._prior is None:
             return own
         return own + self._prior[1] ** 2 * self._prior[0].covariance(here._prior[0])
@@ -338,10 +282,10 @@ class At:
     @cached_property
     def _cross(self) -> FloatArray:
         """Covariances with the training runs, shape (m, n)."""
-        return self.mechanism.kernel(self._z, self.mechanism.points)
+        return self.mechanism.kernel(self._z, self.mechanism.levels)
 
     @cached_property
-    def _half(self) -> FloatArray:
+    def half(self) -> FloatArray:
         """The same, whitened: products of its rows are covariances that the training runs explain."""
         return self.mechanism.training.whitened(self._cross)
 
@@ -356,7 +300,7 @@ class At:
 
 def solve(kernel: Kernel, points: FloatArray, targets: FloatArray) -> FloatArray:
     """Weights of the posterior mean, shape (n,), for scaled points (n, p) and targets (n,)."""
-    covariance = kernel(points, points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
+    covariance = kernel.among(points) + np.eye(len(points)) * (kernel.noise**2 + JITTER)
     return np.asarray(np.linalg.solve(covariance, targets))
 
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import TAIL, FloatArray, Mechanism, columns
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import TAIL, Mechanism, columns
 from care_core.frozen import dataclass
 from care_core.variables import Threshold
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from care_core.causal.counterfactual import Config, World
 from care_core.causal.graph import Edge
-from care_core.causal.mechanisms import FloatArray, columns
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import columns
 from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, Ways
 from care_core.configs.driven import same_value

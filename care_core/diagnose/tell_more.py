@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from care_core.causal.counterfactual import World
-from care_core.causal.mechanisms import FloatArray
+from care_core.causal.kernel import FloatArray
 from care_core.diagnose.fixes import candidate_values
 from care_core.diagnose.ranking import Suspect
 from care_core.diagnose.records import Experiment, Fault

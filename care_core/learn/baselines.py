@@ -13,7 +13,8 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.ensemble import ExtraTreesClassifier, GradientBoostingClassifier
 
-from care_core.causal.mechanisms import FloatArray, columns
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import columns
 from care_core.profile.schema import Schema
 from care_core.variables import Variable
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.optimize import minimize
 
-from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism, Transform, solve, transformed
+from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.mechanisms import JITTER, Mechanism, Transform, solve, transformed
 from care_core.causal.nominal import Nominal
 from care_core.errors import LearningError
 

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from care_core.causal.abduction import FARTHEST
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import LEAST, FloatArray, Mechanism, transformed
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import LEAST, Mechanism, transformed
 from care_core.causal.model import Mediation, OutcomeRecord
 from care_core.learn.fitting import left_out
 from care_core.learn.relative import left_out_together

@@ -16,7 +16,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import Averaging, FloatArray, Mechanism, transformed
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import Averaging, Mechanism, transformed
 from care_core.causal.model import OutcomeRecord, StageRecord
 from care_core.causal.nominal import Nominal
 from care_core.learn.fitting import (

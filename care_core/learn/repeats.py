@@ -14,7 +14,8 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from care_core.causal.mechanisms import JITTER, LEAST, FloatArray, Mechanism, transformed
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import JITTER, LEAST, Mechanism, transformed
 from care_core.causal.model import UNKNOWN_PERSISTENCE, OutcomeRecord, Persistence
 from care_core.learn.outcomes import find_stages
 from care_core.learn.relative import configurations_of

@@ -12,7 +12,7 @@ from sklearn.metrics import roc_auc_score
 
 from care_core.causal.counterfactual import World
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import FloatArray
+from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model, SkillRecord, Training
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, groups_that_move_together, met

@@ -13,7 +13,8 @@ from threadpoolctl import threadpool_limits
 
 from care_core.causal.effects import Effect, acceptable_values, along, average_causal_effect
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import JITTER, LEAST, FloatArray, Mechanism, transformed
+from care_core.causal.kernel import FloatArray
+from care_core.causal.mechanisms import JITTER, LEAST, Mechanism, transformed
 from care_core.causal.model import EdgeRecord, EffectRecord, Model, OutcomeRecord, PathRecord, Summary, Training
 from care_core.causal.paths import CausalPath, Ways
 from care_core.learn.bootstrap import Finding, Reaches

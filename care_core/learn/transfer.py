@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import LEAST, FloatArray, Kernel, Mechanism, solve, transformed
+from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.mechanisms import LEAST, Mechanism, solve, transformed
 from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.errors import LearningError
 from care_core.learn.bootstrap import Finding, Reaches

@@ -18,7 +18,8 @@ import numpy as np
 
 from care_core import limits
 from care_core.causal.graph import CausalGraph
-from care_core.causal.mechanisms import Averaging, FloatArray, Kernel, Mechanism, Transform
+from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.mechanisms import Averaging, Mechanism, Transform
 from care_core.causal.model import (
     EdgeRecord,
     EffectRecord,

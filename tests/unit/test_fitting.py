@@ -7,7 +7,8 @@ import pytest
 from scipy.optimize import check_grad
 from threadpoolctl import threadpool_limits
 
-from care_core.causal.mechanisms import JITTER, FloatArray, Kernel, Mechanism
+from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.mechanisms import JITTER, Mechanism
 from care_core.errors import LearningError
 from care_core.learn.fitting import (
     RELEVANCE_SCALE,

@@ -6,19 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from care_core.causal import mechanisms
-from care_core.causal.mechanisms import (
-    LEAST,
-    TAIL,
-    FloatArray,
-    Kernel,
-    Mechanism,
-    Transform,
-    columns,
-    restored,
-    solve,
-    transformed,
-)
+from care_core.causal import kernel as kernels
+from care_core.causal.kernel import FloatArray, Kernel
+from care_core.causal.mechanisms import LEAST, TAIL, Mechanism, Transform, columns, restored, solve, transformed
 
 SETTINGS = st.floats(-1e3, 1e3)
 
@@ -99,7 +89,7 @@ def test_far_away_the_model_falls_back_to_the_mean_and_knows_nothing() -> None:
 def test_blocks_bound_memory_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
     m, x = mechanism(), np.random.default_rng(1).uniform(1, 2, size=(50, 2))
     whole = m.latent(x)
-    monkeypatch.setattr(mechanisms, "BLOCK", 100)
+    monkeypatch.setattr(kernels, "BLOCK", 100)
     np.testing.assert_allclose(m.latent(x), whole)
 
 
@@ -124,3 +114,26 @@ def test_points_among_themselves_are_the_same_numbers(n: int) -> None:
     points = np.random.default_rng(n).normal(size=(n, 5))
     kernel = Kernel(np.array([0.1, 0.5, 1.0, 2.0, 0.0]), 0.7, 0.4, 0.1)
     np.testing.assert_array_equal(kernel.among(points), kernel(points, points))
+
+
+def covariance(kernel: Kernel, a: FloatArray, b: FloatArray) -> FloatArray:
+    """The formula of the kernel, word by word."""
+    each = np.exp(-(((a[:, None] - b) * kernel.relevance) ** 2) / 2)
+    additive = (each.sum(axis=2) + kernel.idle) / (len(kernel.relevance) + kernel.idle)
+    return np.asarray(kernel.additive**2 * additive + kernel.joint**2 * each.prod(axis=2))
+
+
+@given(
+    arrays(float, (7, 3), elements=st.sampled_from([-2.0, -0.0, 0.0, 0.5, 1.25])),
+    arrays(float, (4, 3), elements=st.floats(-3, 3)),
+    st.integers(0, 2),
+)
+def test_values_that_many_points_share_change_no_covariance(b: FloatArray, a: FloatArray, idle: int) -> None:
+    kernel = Kernel(np.array([0.3, 1.0, 2.0]), 0.7, 0.4, 0.1, idle)
+    np.testing.assert_allclose(kernel(a, b), covariance(kernel, a, b), rtol=1e-12)
+    np.testing.assert_allclose(kernel.among(b), covariance(kernel, b, b), rtol=1e-12)
+
+
+def test_a_kernel_of_no_inputs_is_a_constant() -> None:
+    kernel = Kernel(np.zeros(0), 0.5, 0.0, 0.1, idle=1)
+    np.testing.assert_allclose(kernel.among(np.zeros((3, 0))), np.full((3, 3), 0.25))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from care_core.causal.mechanisms import FloatArray, Kernel
+from care_core.causal.kernel import FloatArray, Kernel
 from care_core.learn import mediation
 from care_core.learn.fitting import Effort, left_out
 from care_core.learn.outcomes import fit_outcomes, fit_total

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from care_core.causal.mechanisms import FloatArray
+from care_core.causal.kernel import FloatArray
 from care_core.learn.fitting import Effort, Inputs, fit, left_out
 from care_core.learn.outcomes import fit_total, inputs_of, met
 from care_core.learn.relative import left_out_together, missions_of, needs, relative

@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from care_core.causal import places as module
+from care_core.causal.kernel import Factor, FloatArray
+from care_core.causal.mechanisms import Averaging
+from care_core.causal.places import Places
+from tests.unit.test_mechanisms import mechanism
+
+X = np.random.default_rng(3).uniform(1, 2, size=(6, 2))
+
+
+def test_places_that_were_asked_of_answer_as_the_mechanism_does() -> None:
+    m, places = mechanism(), Places()
+    here = places.at(m, X[:1])
+    for rows in ([0, 1, 2], [2, 0, 0, 3], [1], [3, 2, 1, 0]):
+        there, alone = places.at(m, X[rows]), m.at(X[rows])
+        np.testing.assert_allclose(there.latent, alone.latent, rtol=1e-12)
+        np.testing.assert_allclose(there.variance, alone.variance, rtol=1e-9)
+        np.testing.assert_allclose(there.ignorance, alone.ignorance, rtol=1e-9)
+        np.testing.assert_allclose(there.covariance(here), alone.covariance(m.at(X[:1])), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(there.change_sd(here), alone.change_sd(m.at(X[:1])), rtol=1e-6)
+
+
+def test_no_place_is_worked_out_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    original = Factor.whitened
+
+    def whitened(self: Factor, rows: FloatArray) -> FloatArray:
+        asked.append(len(rows))
+        return original(self, rows)
+
+    monkeypatch.setattr(Factor, "whitened", whitened)
+    m, places = mechanism(), Places()
+    for rows in ([0, 1], [1, 0, 2], [2], [0, 1, 2, 2]):
+        assert places.at(m, X[rows]).variance.shape == (len(rows),)
+    assert asked == [2, 1]
+
+
+def test_what_nothing_reads_makes_no_other_place() -> None:
+    m = replace(mechanism(), inputs=("a", "b", "unread"))
+    assert len(set(m.felt(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 4.0], [1.0, 2.5, 3.0]])))) == 2
+    counted = replace(m, averaging=Averaging("unread", 5.0, 0.5))
+    assert len(set(counted.felt(np.array([[1.0, 2.0, 3.0], [1.0, 2.0, 4.0]])))) == 2
+
+
+def test_only_so_many_places_are_held(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST", 2)
+    m, places = mechanism(), Places()
+    for rows in ([0, 1], [2, 3, 1], [3, 2, 1, 0, 3]):
+        np.testing.assert_allclose(places.at(m, X[rows]).latent, m.latent(X[rows]), rtol=1e-12)
