@@ -2,7 +2,8 @@
 
 The standard library writes seven functions for each frozen record and compiles them one by one, half a millisecond a
 record; a triage needs 140 of them before it begins. Only `__init__` has to be a record's own: the others are the same
-for all, and told here once. All that reads records (`fields`, `replace`, `is_dataclass`) finds what it expects.
+for all, and told here once, and it is written when the first record is made. All that reads records (`fields`,
+`replace`, `is_dataclass`) finds what it expects.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def _quick(cls: type[T] | None = None, /, *, eq: bool = True, **options: Any) ->
     cls.__doc__ = said or cls.__name__  # else its signature is worked out to say so
     made: Any = standard(cls, init=False, repr=False, eq=False, **options)
     made.__doc__ = said
-    made.__init__ = _init(made)
+    made.__init__ = _init_when_needed(made)
     made.__setattr__, made.__delattr__ = _refuse_to_set, _refuse_to_delete
     if "__repr__" not in own:
         made.__repr__ = _repr
@@ -41,6 +42,16 @@ def _quick(cls: type[T] | None = None, /, *, eq: bool = True, **options: Any) ->
     if options.get("slots"):  # else unpickling would set attributes one by one
         made.__getstate__, made.__setstate__ = _state, _restore
     return made
+
+
+def _init_when_needed(cls: Any) -> Any:
+    """Writes the record's own `__init__` when the first one is made: of half of them a triage makes none."""
+
+    def __init__(self: Any, *values: Any, **named: Any) -> None:  # noqa: N807
+        cls.__init__ = _init(cls)
+        cls.__init__(self, *values, **named)
+
+    return __init__
 
 
 def _init(cls: Any) -> Any:

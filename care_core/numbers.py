@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +30,41 @@ def distinct(values: NDArray[Any]) -> NDArray[Any]:
     first = np.ones(len(ordered), dtype=bool)
     first[1:] = ordered[1:] != ordered[:-1]
     return ordered[first]
+
+
+def median(values: ArrayLike, axis: int | None = None, *, in_place: bool = False) -> Any:
+    """The median as `numpy.median` answers it, which imports masked arrays to ask whether it was given one: 20 ms.
+
+    Args:
+        in_place: an array of the caller's that nobody needs in its order, which saves a copy.
+    """
+    array = np.ravel(values) if axis is None else np.asarray(values)
+    along = 0 if axis is None else axis
+    count = array.shape[along]
+    if not count:
+        return np.full(np.delete(array.shape, along), np.nan)[()]
+    places = ((count - 1) // 2, count // 2, -1)  # NaN comes last
+    if in_place:
+        array.partition(places, along)
+    else:
+        array = np.partition(array, places, along)
+    last = array.take(-1, along)
+    return np.where(last == last, array.take(places[:2], along).mean(along), np.nan)[()]
+
+
+def quantile(values: ArrayLike, share: float) -> float:
+    """A quantile as `numpy.quantile` answers it, between two values in proportion; NaN of none, and of any NaN."""
+    array = np.ravel(values)
+    if not len(array):
+        return np.nan
+    place = share * (len(array) - 1)
+    low = int(place)
+    high = min(low + 1, len(array) - 1)
+    ordered = np.partition(array, (low, high, -1))
+    if ordered[-1] != ordered[-1]:
+        return np.nan
+    below, above, part = float(ordered[low]), float(ordered[high]), place - low
+    return below + (above - below) * part if part < 0.5 else above - (above - below) * (1 - part)
 
 
 def ascending(values: Floats) -> Floats:

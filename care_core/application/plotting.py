@@ -13,6 +13,7 @@ from care_core.application.signal_words import is_position, words_of
 from care_core.application.signals import Line as Values
 from care_core.application.signals import Signal, Source, lines_of, signals_of, type_name, whole_of
 from care_core.application.viewing import log_of
+from care_core.numbers import median
 from care_core.report.marks import Mark, marks_of
 from care_core.report.plots import Band, Drawn, Limit, Line, Plot, Point
 
@@ -186,7 +187,7 @@ def _segments(
         order = np.argsort(t, kind="stable")
         t, values = t[order], values[order]
     steps = np.diff(t)
-    longest = max(_LONGEST_GAP * float(np.median(steps)) if len(steps) else 0.0, _LEAST_GAP * (span[1] - span[0]))
+    longest = max(_LONGEST_GAP * float(median(steps)) if len(steps) else 0.0, _LEAST_GAP * (span[1] - span[0]))
     is_end = steps > longest
     if wrap is not None:
         is_end |= np.abs(np.diff(values)) > wrap / 2

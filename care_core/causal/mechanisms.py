@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from care_core.causal.kernel import Factor, FloatArray, Kernel, Levels
 from care_core.causal.nominal import Nominal
 from care_core.frozen import dataclass
+from care_core.numbers import quantile
 
 Transform = Literal["identity", "log", "log1p"]
 LEAST: Mapping[Transform, float] = {"identity": -np.inf, "log": 0.0, "log1p": -1.0}
@@ -185,7 +186,7 @@ class Mechanism:
     def error_quantile(self, share: float) -> float:
         """Continuous targets: that quantile of the standardised error."""
         if share not in self._quantiles:
-            self._quantiles[share] = float(np.quantile(self.calibration, share))
+            self._quantiles[share] = quantile(self.calibration, share)
         return self._quantiles[share]
 
     @cached_property

@@ -11,13 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from care_core.causal.counterfactual import World
 from care_core.configs.driven import same_value
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.tolerance import FEW, Quantile, upper_quantile
 from care_core.health.records import Health
+from care_core.numbers import median
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.run import ProfileChoice, is_known
@@ -49,7 +48,7 @@ class Proposal:
     @property
     def middle(self) -> float:
         """Of what was seen."""
-        return float(np.median(self.seen))
+        return float(median(self.seen))
 
     @property
     def op(self) -> Op:
@@ -181,7 +180,7 @@ def _spread(objective: Variable, runs: Sequence[Judged], profile: Profile, *, re
         low, high = float(predicted.low[0]), float(predicted.high[0])
         if low > 0 and math.isfinite(high):
             spreads.append(math.log(high / low) / _OF_80_PERCENT)
-    return float(np.median(spreads)) if spreads else None
+    return float(median(spreads)) if spreads else None
 
 
 def _quantile(objective: Variable, values: Sequence[float], spread: float | None) -> Quantile | None:

@@ -13,6 +13,7 @@ from care_core.extract.ardupilot.series import register, series
 from care_core.extract.flight import NEEDS
 from care_core.extract.registry import Args, Mission, extractor, merge_needs, one_of
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import median, quantile
 from care_core.run import Unavailable, Value
 from care_core.vehicles import is_skid_steered
 
@@ -83,12 +84,12 @@ def turning_time(mission: Mission, args: Args) -> Value:
     is_turning = np.abs(turned["TurnRate"]) > _TURNING_DEG_S
     is_standing = np.interp(turned.t, driven.t, standing.astype(float)) > 0.5
     chosen = is_turning & (is_standing if args.get("how", "spot") == "spot" else ~is_standing)
-    return float(np.median(np.diff(turned.t)) * chosen.sum())
+    return float(median(np.diff(turned.t)) * chosen.sum())
 
 
 def _usual_speed(driven: Table) -> float:
     """The speed that is passed for a quarter of the way's time: that between the turns."""
-    return float(np.percentile(np.abs(driven["Speed"]), 75))
+    return quantile(np.abs(driven["Speed"]), 0.75)
 
 
 # --- the vehicle ------------------------------------------------------------------------------------------------
@@ -110,7 +111,7 @@ def full_throttle_speed(mission: Mission, args: Args) -> Value:
     pushing = driven.where(driven["ThrOut"] > 0)
     if len(pushing) < _MIN_STEADY:
         return Unavailable("the throttle says nothing of the speed", "record THR")
-    return float(np.median(pushing["Speed"] / pushing["ThrOut"]) * 100.0)
+    return float(median(pushing["Speed"] / pushing["ThrOut"]) * 100.0)
 
 
 @extractor("energy_per_metre", needs=merge_needs((NEEDS, _SPEED, _BATTERY)), unit="J/m")
@@ -123,7 +124,7 @@ def energy_per_metre(mission: Mission, args: Args) -> Value:
     if isinstance(battery, Unavailable):
         return battery
     power = np.interp(driven.t, battery.t, battery["Volt"] * battery["Curr"])
-    value = float(np.median(power / driven["Speed"]))
+    value = float(median(power / driven["Speed"]))
     return value if value > 0 else Unavailable("the battery's current was never above 0", "calibrate the monitor")
 
 

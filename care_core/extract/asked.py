@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from care_core.extract.registry import Args, Mission, extractor, has, missing, one_of
 from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import median
 from care_core.run import Unavailable, Value
 
 Floats = NDArray[np.float64]
@@ -245,14 +246,14 @@ _BATTERY: Wanted = {"BAT": ("Inst", "Instance", "Volt", "Curr", "Res")}
 def hover_power(mission: Mission, args: Args) -> Value:
     """Median electric power while airborne: what the vehicle takes to stay up, with its load."""
     table = _in_the_air(mission, "Volt", "Curr")
-    return table if isinstance(table, Unavailable) else float(np.median(table["Volt"] * table["Curr"]))
+    return table if isinstance(table, Unavailable) else float(median(table["Volt"] * table["Curr"]))
 
 
 @extractor("internal_resistance", needs=_BATTERY, unit="ohm")
 def internal_resistance(mission: Mission, args: Args) -> Value:
     """Median of the battery's resistance while airborne, as the battery monitor estimates it."""
     table = _in_the_air(mission, "Res")
-    return table if isinstance(table, Unavailable) else float(np.median(table["Res"]))
+    return table if isinstance(table, Unavailable) else float(median(table["Res"]))
 
 
 def _in_the_air(mission: Mission, *fields: str) -> Table | Unavailable:

@@ -20,6 +20,7 @@ from care_core.extract.modes import MODES, kind_flown, modes_in_force
 from care_core.extract.registry import Mission, has, merge_needs
 from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import median
 from care_core.run import Unavailable
 
 NEEDS: Wanted = merge_needs(
@@ -92,7 +93,7 @@ class Track:
     def filled_in(self) -> Track:
         """The same track at `FILL_S` or closer: cubic Hermite between positions, velocities by central differences."""
         steps = np.diff(self.t)
-        if len(steps) < 2 or not FILL_S < np.median(steps) <= FILLABLE_S or (steps <= 0).any():
+        if len(steps) < 2 or not FILL_S < median(steps) <= FILLABLE_S or (steps <= 0).any():
             return self
         t = np.union1d(self.t, np.arange(self.t[0], self.t[-1], FILL_S))
         return Track(

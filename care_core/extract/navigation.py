@@ -34,6 +34,7 @@ from care_core.extract.drive import (
 from care_core.extract.goals import ROSOUT, rosout
 from care_core.extract.goals_asked import PER_GOAL, PER_METRE, divided, goals_asked
 from care_core.extract.registry import Args, Mission, extractor, missing, numeric, one_of
+from care_core.numbers import quantile
 from care_core.run import Unavailable, Value
 
 _CRAWL_M = 0.3
@@ -385,14 +386,14 @@ def drive_speed(drive: Drive, odometry: Odometry, args: Args) -> Value:
 @of_drive(_moving)
 def top_speed(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """95th percentile of the forward speed."""
-    return float(np.percentile(np.abs(odometry.speed), 95))
+    return quantile(np.abs(odometry.speed), 0.95)
 
 
 @extractor("top_turn_rate", needs={}, parts=("goals", "odometry"), unit="rad/s")
 @of_drive(_moving)
 def top_turn_rate(drive: Drive, odometry: Odometry, args: Args) -> Value:
     """95th percentile of the turn rate."""
-    return float(np.percentile(np.abs(odometry.turn), 95))
+    return quantile(np.abs(odometry.turn), 0.95)
 
 
 @extractor("drive_acceleration", needs={}, parts=("goals", "odometry"), unit="m/s^2")
@@ -403,7 +404,7 @@ def drive_acceleration(drive: Drive, odometry: Odometry, args: Args) -> Value:
     usable = (step_s > 0) & (step_s <= 1.0)
     if not usable.any():
         return _TOO_SHORT
-    return float(np.percentile(np.abs(np.diff(odometry.speed)[usable] / step_s[usable]), 99))
+    return quantile(np.abs(np.diff(odometry.speed)[usable] / step_s[usable]), 0.99)
 
 
 @extractor(
@@ -510,7 +511,7 @@ def command_interval(drive: Drive, commands: Commands, args: Args) -> Value:
     """Time between commands while a goal is active: the controller's real period and, at the top, its stalls."""
     inside = [np.diff(commands.t[(commands.t >= leg.sent_s) & (commands.t <= leg.end_s)]) for leg in drive.legs]
     intervals = np.concatenate(inside)
-    return float(np.percentile(intervals, float(args.get("percentile", 50)))) if len(intervals) else _TOO_SHORT
+    return quantile(intervals, float(args.get("percentile", 50)) / 100) if len(intervals) else _TOO_SHORT
 
 
 # Recoveries and messages

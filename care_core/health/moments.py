@@ -11,7 +11,7 @@ import numpy as np
 
 from care_core.health.records import Moment
 from care_core.logs.base import Table
-from care_core.numbers import Floats, ascending, distinct, pauses
+from care_core.numbers import Floats, ascending, distinct, median, pauses
 from care_core.run import Damage, Setting, shown
 from care_core.vehicles import is_self_written
 
@@ -118,7 +118,7 @@ def _usual_step(stamps: Sequence[Floats]) -> float:
     if count * _PAUSE_S / _GAP_MEDIANS > _CLEARLY * span_s:
         return 0.0
     steps = np.diff(distinct(np.concatenate([np.empty(0), *stamps])))
-    return float(np.median(steps)) if len(steps) else 0.0
+    return float(median(steps)) if len(steps) else 0.0
 
 
 def damage_of(damage: Sequence[Damage]) -> Iterator[Moment]:

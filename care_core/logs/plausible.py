@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.logs.base import Table
-from care_core.numbers import distinct
+from care_core.numbers import distinct, median
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -153,7 +153,7 @@ def _stamps_doubt(tables: Mapping[str, Table], start_s: float, end_s: float) -> 
                 paces[name] = pace
     if not paces or any(1 / APART <= pace <= APART for pace in paces.values()):
         return ""
-    pace = float(np.median(list(paces.values())))
+    pace = float(median(list(paces.values())))
     names = " and ".join(sorted(paces))
     return f"the log's clock or the robot's is wrong: by the stamps of {names} {pace:.3g} s pass in each of its seconds"
 
@@ -162,7 +162,7 @@ def is_simulated(t: Floats, stamp: Floats) -> bool:
     """Whether messages recorded at `t` were stamped, `stamp`, by the clock of a simulation, both of shape (n,) in s."""
     behind = t - stamp
     known = behind[np.isfinite(behind)]
-    return len(known) > 0 and float(np.median(known)) > _SIMULATED_S
+    return len(known) > 0 and float(median(known)) > _SIMULATED_S
 
 
 def kept_its_rate(text: str) -> bool:

@@ -22,6 +22,7 @@ from care_core.errors import LogError
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.clock import PAUSE_S, find_clock
 from care_core.logs.damage import summarised
+from care_core.numbers import median
 from care_core.run import Damage, Setting
 
 MESSAGES = "logged_messages"
@@ -193,7 +194,7 @@ def _number(value: float) -> float:
 
 def _first_us(ulog: Any, stamps: Iterable[NDArray[Any]]) -> float:
     """Second 0 of the log: its header's stamp, unless the records lie elsewhere."""
-    middle = float(np.median([float(np.median(part)) for part in stamps]))
+    middle = float(median([float(median(part)) for part in stamps]))
     first = float(ulog.start_timestamp)
     return first if 0 <= middle - first <= PAUSE_S * 1e6 else middle
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from care_core.health.ardupilot.measure import smooth
 from care_core.health.moments import gaps
 from care_core.logs.base import Table
-from care_core.numbers import pauses
+from care_core.numbers import Floats, median, pauses, quantile
 
 TIMES = st.lists(st.integers(0, 60).map(float), max_size=40)
 
@@ -43,3 +47,34 @@ def test_a_smoothed_row_is_the_mean_of_a_window(values: list[float], width_s: fl
     total = np.cumsum(np.concatenate(([0.0], np.pad(x, n // 2, mode="edge"))))
     np.testing.assert_array_equal(smooth(t, x, width_s), (total[n:] - total[:-n]) / n)
     np.testing.assert_array_equal(x, kept)
+
+
+ROWS = arrays(np.float64, st.tuples(st.integers(1, 9), st.integers(1, 4)), elements=st.floats(allow_infinity=False))
+
+
+@given(ROWS, st.sampled_from([None, 0, 1]))
+def test_a_median_is_the_one_that_numpy_answers(values: Floats, axis: int | None) -> None:
+    with np.errstate(all="ignore"):
+        expected = np.median(values, axis=axis)
+        np.testing.assert_array_equal(median(values, axis=axis), expected)
+        np.testing.assert_array_equal(
+            median(values.copy(), axis=axis or 0, in_place=True), np.median(values, axis or 0)
+        )
+
+
+@given(arrays(np.float64, st.integers(1, 30), elements=st.floats(allow_infinity=False)), st.floats(0, 1))
+def test_a_quantile_is_the_one_that_numpy_answers(values: Floats, share: float) -> None:
+    with np.errstate(all="ignore"):
+        np.testing.assert_array_equal(quantile(values, share), np.quantile(values, share))
+
+
+def test_nothing_has_no_median() -> None:
+    assert np.isnan(median([]))
+    assert np.isnan(quantile([], 0.5))
+    assert np.isnan(median(np.empty((0, 3)), axis=0)).tolist() == [True] * 3
+
+
+@pytest.mark.parametrize("values", [[3, 1, 2, 4], np.array([1, 2], dtype=np.uint8), np.array([1.5, 0.1], np.float32)])
+def test_whole_and_single_numbers_too(values: Any) -> None:
+    assert median(values) == np.median(values)
+    assert quantile(values, 0.3) == pytest.approx(float(np.quantile(values, 0.3)))

@@ -11,7 +11,7 @@ from care_core.extract.ardupilot.phases import PHASE_ARGS, flight_of, span_of_ph
 from care_core.extract.flight import NEEDS
 from care_core.extract.registry import Args, Mission, extractor, merge_needs, missing, one_of
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import distinct
+from care_core.numbers import distinct, quantile
 from care_core.run import Unavailable, Value
 
 Floats = NDArray[np.float64]
@@ -65,7 +65,7 @@ def statistic(values: Floats, stat: str) -> Value:
         "min": np.min,
         "std": np.std,
         "rms": lambda x: np.sqrt(np.mean(x**2)),
-        "peak": lambda x: np.percentile(x, 95),
+        "peak": lambda x: quantile(x, 0.95),
     }
     if not len(values):
         return Unavailable("the vehicle was never under way")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from care_core.frozen import dataclass
 from care_core.health.ardupilot.signals import Floats, instances
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import pieces
+from care_core.numbers import median, pieces
 from care_core.run import Setting
 from care_core.vehicles import Vehicle, vehicle_of, way_of, with_said
 from care_core.vehicles.self_written import SIMULATOR_PREFIX
@@ -272,7 +272,7 @@ class Flight:
             if table is not None and len(table) > 1 and np.ptp(table[column]) > 0:
                 start = self.armed[0][0] if self.armed else 0.0
                 before = table[column][table.t <= start + 1.0]
-                zero = float(np.median(before[-20:])) if len(before) else float(table[column][0])
+                zero = float(median(before[-20:])) if len(before) else float(table[column][0])
                 return table.t, table[column] - (zero if abs(zero) < 50 or name == "CTUN" else 0.0)
         return None
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from care_core.health.ardupilot.flight import Mask, Span, runs
 from care_core.health.ardupilot.signals import Floats
-from care_core.numbers import pieces
+from care_core.numbers import median, pieces, quantile
 
 Calibration = Sequence[tuple[float, float]]
 """Points (how many times over the limit, probability that the part really failed), rising."""
@@ -27,7 +27,7 @@ def lasting(t: Floats, mask: Mask, for_s: float, gap_s: float = 1.0, records: in
     record."""
     if not mask.any():
         return []
-    step = float(np.median(np.diff(t), overwrite_input=True)) if len(t) > 1 else 0.0
+    step = float(median(np.diff(t), in_place=True)) if len(t) > 1 else 0.0
     held = runs(t, mask, max(gap_s, 1.5 * step))
     counts = np.searchsorted(t[mask], [edge for span in held for edge in span], side="right").tolist()
     starts = np.searchsorted(t[mask], [span[0] for span in held], side="left").tolist()
@@ -63,13 +63,13 @@ def steady(t: Floats, x: Floats, width_s: float) -> Floats:
         few = slice(None, None, n // _DOZENS)
         return np.interp(t, t[few], steady(t[few], x[few], width_s))
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(x, n // 2, mode="edge"), n)
-    middle: Floats = np.median(windows, axis=1)
+    middle: Floats = median(windows, axis=1)
     return middle
 
 
 def _records(t: Floats, width_s: float) -> int:
     """How many of at least three records, an odd number, lie in a window of `width_s`."""
-    step = max(float(np.median(np.diff(t), overwrite_input=True)), 1e-6)
+    step = max(float(median(np.diff(t), in_place=True)), 1e-6)
     return min(max(round(width_s / step) | 1, 3), len(t) if len(t) % 2 else len(t) - 1)
 
 
@@ -94,4 +94,4 @@ def aligned(t: Floats, other_t: Floats, x: Floats) -> Floats:
 def top(x: Floats, share: float = 0.975) -> float:
     """A value that only few exceed; NaN where there is none."""
     known = x[np.isfinite(x)]
-    return float(np.quantile(known, share)) if len(known) else float("nan")
+    return quantile(known, share) if len(known) else float("nan")

@@ -18,6 +18,7 @@ from care_core.health.ros.diagnostics import reports
 from care_core.health.ros.recording import ERROR, FATAL, WARN, Floats, Recording
 from care_core.health.ros.silence import ends_early
 from care_core.logs.ros_message import short_name
+from care_core.numbers import quantile
 
 GOALS, MESSAGES, DIAGNOSTICS, CHANGES = 12, 14, 6, 5
 """Lines of each sort at most."""
@@ -221,7 +222,7 @@ def _motion(recording: Recording) -> Iterator[Moment]:
             yield Moment(began_s, "motion", "the robot moves for the first time", odometry.topic)
             if odometry.stands_still:
                 went = odometry.way_m
-            words = f"drove {went:.1f} m in all, {np.percentile(np.abs(odometry.speed), 99):.2f} m/s at most"
+            words = f"drove {went:.1f} m in all, {quantile(np.abs(odometry.speed), 0.99):.2f} m/s at most"
             yield Moment(float(odometry.t[-1]), "motion", words, odometry.topic)
     for battery in recording.batteries:
         words = f"battery {battery.voltage[0]:.1f} V at first, {battery.voltage[-1]:.1f} V at last"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from care_core.health.ros.recording import Bools, Commands, Floats, Odometry, Recording
+from care_core.numbers import median
 
 ANSWER_S = 1.0
 """Within this time a drive follows: a step of 1 m/s at 1 m/s^2."""
@@ -60,7 +61,7 @@ def following(recording: Recording) -> Following | None:
 def beside(odometry: Odometry, commands: Commands) -> Following:
     first = np.searchsorted(commands.t, odometry.t - ANSWER_S, "right") - 1
     last = np.searchsorted(commands.t, odometry.t, "right")
-    usual_s = float(np.median(np.diff(commands.t)))
+    usual_s = float(median(np.diff(commands.t)))
     stale_s = max(_STALE_S, _THIN * usual_s)
     asked = (first >= 0) & (last > 0)
     asked &= odometry.t - commands.t[np.maximum(last - 1, 0)] <= stale_s

@@ -15,6 +15,7 @@ from care_core.health.ros import plan
 from care_core.health.ros.goals import Goal, goals_of
 from care_core.logs.base import Channel, Table
 from care_core.logs.ros_log import RosLog
+from care_core.numbers import median, quantile
 from care_core.run import Damage, Setting
 
 Floats = NDArray[np.float64]
@@ -161,8 +162,8 @@ class Recording:
             if len(times) < STREAM_MESSAGES:
                 continue
             pauses = np.diff(times)
-            usual = float(np.median(pauses))
-            if usual > 0 and float(np.percentile(pauses, 90)) <= STEADY * usual:
+            usual = float(median(pauses))
+            if usual > 0 and quantile(pauses, 0.9) <= STEADY * usual:
                 found[topic] = usual
         return found
 
@@ -284,7 +285,7 @@ def _when(table: Table) -> Floats:
     if stamp is None:
         return table.t
     late: Floats = table.t - stamp
-    usual = float(np.percentile(late, 10))
+    usual = quantile(late, 0.1)
     return stamp + usual if float(np.mean(late - usual < PUNCTUAL_S)) >= MOSTLY else table.t
 
 
@@ -303,13 +304,13 @@ def _scans(topic: str, table: Table) -> Scans | None:
     if not set(plan.FIELDS[plan.SCAN]) <= set(table.columns):
         return None
     sizes = np.array([len(one) for one in table["ranges"]])
-    rays = int(np.median(sizes))
+    rays = int(median(sizes))
     good = sizes == rays
     if rays < 2 or not good.any():
         return None
     raw = table["ranges"][good]
     ranges = np.stack(list(raw)).astype(np.float32)
-    low, high = float(np.median(table["range_min"])), float(np.median(table["range_max"]))
+    low, high = float(median(table["range_min"])), float(median(table["range_max"]))
     with np.errstate(invalid="ignore", over="ignore"):
         # A range beyond its limits is none (REP 117); some drivers give the highest one for no return.
         ranges[~((ranges >= low) & (ranges < high * (1 - 1e-6)))] = np.nan
@@ -332,7 +333,7 @@ def _battery(topic: str, table: Table) -> Battery | None:
     drawn = current[good]
     # sensor_msgs/BatteryState says negative when discharging; many drivers give the magnitude.
     measured = drawn[np.isfinite(drawn)]
-    drawn = -drawn if len(measured) and np.median(measured) < 0 else drawn
+    drawn = -drawn if len(measured) and median(measured) < 0 else drawn
     return Battery(topic, table.t[good], voltage[good], drawn)
 
 

@@ -17,6 +17,7 @@ from care_core.health.ardupilot.measure import lasting, smooth, top
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import median
 
 READS: Wanted = {
     "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
@@ -89,7 +90,7 @@ def _upside_down(flight: Flight) -> Iterator[Finding]:
     turned = len(before) > 0 and float(np.min(before)) < UPSIDE_DOWN_DEG / 2
     yield Finding(
         "attitude", "the vehicle turned over" if turned else "the vehicle is upside down", start, end, "critical",
-        f"its upper side points {float(np.median(tilt[flight.during(spans, t)])):.0f} degrees away from the sky"
+        f"its upper side points {float(median(tilt[flight.during(spans, t)])):.0f} degrees away from the sky"
         + ("" if turned else " from the start: it lies so, or AHRS_ORIENTATION is not how the board is mounted"),
         "ATT.Roll, Pitch", suspect="world" if turned else "parameter", probability=0.5,
     )  # fmt: skip
@@ -175,7 +176,7 @@ def _steering(flight: Flight) -> Iterator[Finding]:
         return
     driven = flight.one("THR", "Speed")
     swung = np.zeros(0) if driven is None else np.abs(driven["Speed"][flight.during(spans, driven.t)])
-    stays = len(swung) > 0 and spans[-1][1] - spans[0][0] > _GETS_ON_S and float(np.median(swung)) < STANDS_MS
+    stays = len(swung) > 0 and spans[-1][1] - spans[0][0] > _GETS_ON_S and float(median(swung)) < STANDS_MS
     end = "; the vehicle does not get on" if stays else ""
     yield Finding(
         "tuning", "the steering oscillates", spans[0][0], spans[-1][1], "critical" if stays else "warning",

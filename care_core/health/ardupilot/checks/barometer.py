@@ -16,6 +16,7 @@ from care_core.health.ardupilot.measure import Calibration, aligned, lasting, li
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import median, quantile
 from care_core.vehicles import flies
 
 READS: Wanted = {
@@ -56,7 +57,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     tests: list[tuple[Floats, str]] = [(_noise(flight, t, height) / NOISE_M, "jumps by {:.1f} m from record to record")]
     for other in baros[1:]:
         apart = height - aligned(t, other.t, other["Alt"])
-        apart -= np.median(apart[: max(len(t) // 20, 3)])
+        apart -= median(apart[: max(len(t) // 20, 3)])
         tests.append((np.abs(smooth(t, apart, 3.0)) / APART_M, "is {:.1f} m off the second barometer"))
     drift = _drift(flight, first)
     if drift is not None:
@@ -71,7 +72,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     start = min(spans[0][0] for spans, *_ in broken)
     end = max(spans[-1][1] for spans, *_ in broken)
-    peaks = [float(np.quantile(over[(t >= spans[0][0]) & (t <= spans[-1][1])], 0.9)) for spans, over, *_ in broken]
+    peaks = [quantile(over[(t >= spans[0][0]) & (t <= spans[-1][1])], 0.9) for spans, over, *_ in broken]
     said = "; ".join(
         f"{words.format(peak * limit)} (limit {limit:g} m)"
         for peak, (_, _, words, limit) in zip(peaks, broken, strict=True)
@@ -97,10 +98,10 @@ def _contradicted(flight: Flight) -> Iterator[Finding]:
         return
     at, distance = at[near], distance[near]
     apart = np.interp(at, t, height) - distance
-    apart = smooth(at, apart - np.median(apart[: max(len(apart) // 20, 3)]), 3.0)
+    apart = smooth(at, apart - median(apart[: max(len(apart) // 20, 3)]), 3.0)
     spans = lasting(at, np.abs(apart) > APART_M, _LASTS_S, gap_s=5.0)
     if spans:
-        most = float(np.quantile(np.abs(apart)[np.abs(apart) > APART_M], 0.9))
+        most = quantile(np.abs(apart)[np.abs(apart) > APART_M], 0.9)
         yield Finding(
             "barometer", "barometer and range finder are at odds", spans[0][0], spans[-1][1], "info",
             f"they moved {most:.1f} m apart within {_LOW_M:g} m of the ground (limit {APART_M:g} m)",
@@ -146,7 +147,7 @@ def _drift(flight: Flight, first: Table) -> Floats | None:
     nearest = np.interp(first.t, good.t, good.t, left=-np.inf, right=np.inf)
     apart = np.where(np.abs(nearest - first.t) < 3.0, apart, np.nan)
     zero = apart[np.isfinite(apart)][: max(len(apart) // 20, 3)]
-    return smooth(first.t, np.nan_to_num(apart - np.median(zero)), 5.0) if len(zero) else None
+    return smooth(first.t, np.nan_to_num(apart - median(zero)), 5.0) if len(zero) else None
 
 
 def _severity(flight: Flight, start: float, over: float) -> Severity:

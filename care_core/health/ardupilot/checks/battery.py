@@ -17,6 +17,7 @@ from care_core.health.ardupilot.measure import Calibration, lasting, likely, smo
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import median, quantile
 
 READS: Wanted = {"BAT": ("Volt", "Curr"), "POWR": ("Vcc",)}
 
@@ -53,7 +54,7 @@ def cells_of(flight: Flight, highest_v: float) -> int:
 
 def _pack(flight: Flight, table: Table) -> Iterator[Finding]:
     t, volts = table.t, table["Volt"]
-    cells = cells_of(flight, float(np.quantile(volts, 0.99)))
+    cells = cells_of(flight, quantile(volts, 0.99))
     rest = _at_rest(flight, t, volts)
     watched = flight.watch(t)
     failsafe = _failsafe(flight)
@@ -103,7 +104,7 @@ def _at_rest(flight: Flight, t: Floats, volts: Floats) -> float | None:
         lifting = at[(throttle > 0.05) & flight.during(flight.armed, at)]
         until = float(lifting[0]) if len(lifting) else until
     before = volts[t <= until]
-    return float(np.median(before[-50:])) if len(before) >= 2 else None
+    return float(median(before[-50:])) if len(before) >= 2 else None
 
 
 def _failsafe(flight: Flight) -> float | None:
@@ -122,7 +123,7 @@ def _load(table: Table, start: float, end: float) -> str:
     if "Curr" not in table.columns:
         return ""
     part = table["Curr"][(table.t >= start) & (table.t <= end)]
-    return f" at {np.median(part):.0f} A" if len(part) and np.median(part) > 0.5 else ""
+    return f" at {median(part):.0f} A" if len(part) and median(part) > 0.5 else ""
 
 
 def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
@@ -138,8 +139,8 @@ def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
     odd = ""
     if np.ptp(known) == 0:
         odd = f"the voltage stays at {known[0]:.2f} V in flight"
-    elif float(np.median(known)) < _ALIVE_V:
-        odd = f"{np.median(known):.2f} V drive no vehicle: nothing is connected to it, or its scale is wrong"
+    elif float(median(known)) < _ALIVE_V:
+        odd = f"{median(known):.2f} V drive no vehicle: nothing is connected to it, or its scale is wrong"
     elif len(amps) and np.isfinite(amps).any() and float(np.nanmedian(amps)) < -0.5:
         odd = f"the current reads {np.nanmedian(amps):.1f} A"
     if odd:

@@ -16,6 +16,7 @@ from care_core.health.ardupilot.flight import STANDS_MS, Flight
 from care_core.health.ardupilot.measure import lasting
 from care_core.health.records import Finding
 from care_core.logs.base import Wanted
+from care_core.numbers import median
 
 READS: Wanted = {"THR": ("ThrOut", "Speed"), "STER": ("TurnRate",)}
 
@@ -51,7 +52,7 @@ def _held(flight: Flight) -> Iterator[Finding]:
     if flight.held and flight.tilt is not None:
         start, end = flight.held[0][0], flight.held[-1][1]
         t, tilt = flight.tilt
-        lean = float(np.median(tilt[flight.during(flight.held, t)]))
+        lean = float(median(tilt[flight.during(flight.held, t)]))
         lasted = sum(b - a for a, b in flight.held)
         yield Finding(
             "blocked", "something holds it: it leans and does not move", start, end, "critical",

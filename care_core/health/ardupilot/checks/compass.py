@@ -17,6 +17,7 @@ from care_core.health.ardupilot.measure import Calibration, aligned, lasting, le
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import median, quantile
 
 AXES = ("MagX", "MagY", "MagZ")
 READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",), "PARM": ("Name", "Value")}
@@ -96,7 +97,7 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
         apart = np.stack([compasses[0][axis] - aligned(t, other.t, other[axis]) for axis in AXES])
         if not np.isfinite(apart).all(axis=0).any():
             continue
-        early = np.median(apart[:, : max(len(t) // 10, 3)], axis=1)
+        early = median(apart[:, : max(len(t) // 10, 3)], axis=1)
         moved = smooth(t, length(apart - early[:, None]), 2.0)
         level = smooth(t, np.hypot(apart[0], apart[1]), 2.0)
         over = np.maximum(level / APART, moved / MOVED)
@@ -107,9 +108,9 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             continue
         start, end = spans[0][0], spans[-1][1]
         inside = (t >= start) & (t <= end)
-        ratio = float(np.median(over[inside]))
-        has_moved = float(np.median(moved[inside])) / MOVED > float(np.median(level[inside])) / APART
-        size = float(np.median((moved if has_moved else level)[inside]))
+        ratio = float(median(over[inside]))
+        has_moved = float(median(moved[inside])) / MOVED > float(median(level[inside])) / APART
+        size = float(median((moved if has_moved else level)[inside]))
         worse = _odd_one(compasses, n)
         yield Finding(
             "compass", f"compass {worse} is disturbed", start, end, _gravity(flight, start, worse == 1),
@@ -174,7 +175,7 @@ def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     base, slope = _line(x, y)
     with np.errstate(invalid="ignore"):
         match = float(np.corrcoef(x, y)[0, 1])
-    share = abs(slope) * float(np.quantile(x, 0.95)) / max(base, 1.0)
+    share = abs(slope) * quantile(x, 0.95) / max(base, 1.0)
     if share > GREY and abs(match) > 0.6:
         yield Finding(
             "compass", "the motors' currents disturb the compass", float(first.t[usable][0]), float(first.t[-1]),

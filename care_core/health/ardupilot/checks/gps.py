@@ -17,6 +17,7 @@ from care_core.health.ardupilot.measure import Calibration, lasting, likely
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import quantile
 
 READS: Wanted = {
     "GPS": ("Status", "NSats", "HDop", "Lat", "Lng", "Spd", "GCrs", "GMS"),
@@ -101,7 +102,7 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     t = fixed.t
     off, dt = _unexplained(fixed)
     limit = JUMP_M + 0.25 * ACCELERATION * np.minimum(dt, 1.5) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
-    limit = np.maximum(limit, _TIMES_USUAL * float(np.quantile(off, 0.9)))  # a velocity that never fits tells nothing
+    limit = np.maximum(limit, _TIMES_USUAL * quantile(off, 0.9))  # a velocity that never fits tells nothing
     beyond = np.flatnonzero((off > limit) & (dt < 3.0) & (dt > 0.01))
     if not len(beyond):
         return
@@ -177,7 +178,7 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
     t, sats = table.t, table["NSats"]
     if len(t) < 3 or not (table["Status"] >= _FIX).any():
         return
-    usual = float(np.quantile(flight.one("GPS", "NSats")["NSats"], 0.9))  # type: ignore[index]
+    usual = quantile(flight.one("GPS", "NSats")["NSats"], 0.9)  # type: ignore[index]
     few = lasting(t, sats < FEWEST, 2.0) or lasting(t, (sats <= FEWEST) & (sats <= usual - FALL), 2.0)
     if few:
         start, end = few[0][0], few[-1][1]

@@ -18,6 +18,7 @@ from care_core.health.ardupilot.measure import Calibration, aligned, lasting, le
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import median, quantile
 
 GYROS, ACCELEROMETERS = ("GyrX", "GyrY", "GyrZ"), ("AccX", "AccY", "AccZ")
 READS: Wanted = {
@@ -90,15 +91,15 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
         return
     start, end = _beginning(t, over, spans[0]), spans[-1][1]
     inside = (t >= spans[0][0]) & (t <= end)
-    ratio = float(np.quantile(over[inside], 0.9))
+    ratio = quantile(over[inside], 0.9)
     is_noise = float(np.max((noise / limit)[inside])) > 1.0
-    size = float(np.quantile((noise if is_noise else offset)[inside], 0.9))
-    allowed = float(np.median(limit[inside])) if is_noise else OFFSET_DPS
+    size = quantile((noise if is_noise else offset)[inside], 0.9)
+    allowed = float(median(limit[inside])) if is_noise else OFFSET_DPS
     severity = _severity(flight, ratio, start)
     yield Finding(
         "imu", "the gyros are noisy" if is_noise else "the gyros disagree", start, end, severity,
         f"gyros 1 and 2 differ by {size:.2g} degrees/s on every axis (limit {allowed:.2g} at a vibration of "
-        f"{float(np.median(vibration[inside])):.1f} m/s^2)"
+        f"{float(median(vibration[inside])):.1f} m/s^2)"
         if is_noise else f"gyros 1 and 2 differ by {size:.1f} degrees/s (limit {OFFSET_DPS:g})",
         "IMU.GyrX, GyrY, GyrZ of both; AP_Arming allows 5 degrees/s at rest", probability=likely(ratio, _CALIBRATION),
         mission_lost=_LOST if is_noise and severity == "warning" else None,
@@ -113,7 +114,7 @@ def _turning(table: Table) -> Floats:
 
 def _beginning(t: Floats, over: Floats, span: Span) -> float:
     """When what fills a span first rose to a third of it: it may stay below the limit for long."""
-    third = float(np.median(over[(t >= span[0]) & (t <= span[1])])) / 3
+    third = float(median(over[(t >= span[0]) & (t <= span[1])])) / 3
     before = [start for start, end in lasting(t, over > third, _LASTS_S, gap_s=5.0) if start <= span[0] <= end]
     return min([span[0], *before])
 
@@ -154,7 +155,7 @@ def _accelerometers(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
         inside = (t >= spans[0][0]) & (t <= spans[-1][1])
         yield Finding(
             "imu", "the accelerometers disagree", spans[0][0], spans[-1][1], "warning",
-            f"accelerometers 1 and 2 differ by {np.median(apart[inside]):.1f} m/s^2 (limit {OFFSET_ACC:g} beside what "
+            f"accelerometers 1 and 2 differ by {median(apart[inside]):.1f} m/s^2 (limit {OFFSET_ACC:g} beside what "
             "vibration explains)",
             "IMU.AccX, AccY, AccZ of both; ARMING_ACCTHRESH 0.75 m/s^2 at rest", probability=0.7,
         )  # fmt: skip

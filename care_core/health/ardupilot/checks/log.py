@@ -10,7 +10,7 @@ from care_core.health.ardupilot.flight import Flight, Mask
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding
 from care_core.logs.base import Wanted
-from care_core.numbers import pauses
+from care_core.numbers import median, pauses
 
 READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "POWR": ("Vcc",)}
 
@@ -32,7 +32,7 @@ def _holes(flight: Flight) -> Iterator[Finding]:
     streams = [table.t for name in _STEADY if (table := flight.one(name)) is not None and len(table) > 20]
     if not streams or flight.clock_jumps:
         return
-    limit = max(_HOLE_S, _TIMES * float(np.median(np.diff(streams[0]))))
+    limit = max(_HOLE_S, _TIMES * float(median(np.diff(streams[0]))))
     low, high = pauses(streams, limit)
     inside = _inside(flight, low, high)
     low, high = low[inside], high[inside]
@@ -67,11 +67,11 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         return
     if flight.arm_changes and not flight.arm_changes[-1][1]:
         return  # it was disarmed with its last record
-    high = flight.height is not None and float(np.median(flight.height[1][-3:])) > _HIGH_M
-    up = flight.throttle is not None and float(np.median(flight.throttle[1][-3:])) > 0.2
+    high = flight.height is not None and float(median(flight.height[1][-3:])) > _HIGH_M
+    up = flight.throttle is not None and float(median(flight.throttle[1][-3:])) > 0.2
     if not (flight.is_copter and high and (up or flight.throttle is None)):
         return
-    height = f" {float(np.median(flight.height[1][-3:])):.0f} m up" if flight.height is not None else ""
+    height = f" {float(median(flight.height[1][-3:])):.0f} m up" if flight.height is not None else ""
     sagging = _supply_falls(flight)
     yield Finding(
         "battery" if sagging else "log", "power was lost in the air" if sagging else "the log ends in the air",
@@ -87,5 +87,5 @@ def _supply_falls(flight: Flight) -> str:
     if table is None or len(table) < 10:
         return ""
     volts = np.where(table["Vcc"] > 100, table["Vcc"] / 1000, table["Vcc"])
-    usual, last = float(np.median(volts)), float(np.min(volts[-3:]))
+    usual, last = float(median(volts)), float(np.min(volts[-3:]))
     return f"Vcc fell from {usual:.2f} to {last:.2f} V" if usual - last > _FALLS_V and last > 1.0 else ""

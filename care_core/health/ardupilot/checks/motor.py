@@ -19,7 +19,7 @@ from care_core.health.ardupilot.measure import Calibration, lasting, likely, smo
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Wanted
-from care_core.numbers import pieces
+from care_core.numbers import median, pieces, quantile
 from care_core.vehicles import Motor, motors_of
 
 READS: Wanted = {
@@ -118,7 +118,7 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
     ground the first seconds of trying, before the integrators wind up."""
     lifting = flight.watch(outputs.t)
     for rows in pieces(len(outputs.t)):
-        lifting[rows] &= np.median(outputs.share[:, rows], axis=0) > _LIFTING
+        lifting[rows] &= median(outputs.share[:, rows], axis=0) > _LIFTING
     lifting &= ~flight.during(flight.held, outputs.t)
     if flight.tilt is not None:
         lifting &= np.interp(outputs.t, *flight.tilt) < 60.0
@@ -134,7 +134,7 @@ def _excess(share: Floats, where: NDArray[np.bool_]) -> NDArray[np.float64]:
     for rows in pieces(len(chosen)):
         piece = share[:, chosen[rows]]
         for n in everyone:
-            excess[n, rows] = piece[n] - np.median(piece[everyone != n], axis=0)
+            excess[n, rows] = piece[n] - median(piece[everyone != n], axis=0)
     return excess
 
 
@@ -160,10 +160,10 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         since = lifting & (outputs.t >= spans[0][0])
         share = outputs.share[:, since]
         asked = _excess(outputs.share, since)[n]
-        size = float(np.median(asked))
+        size = float(median(asked))
         stays = float((row[t >= spans[0][0]] > ALONE / 2).mean()) > _STAYS
         steady = size > max(0.7 * ALONE, _STEADY * float(np.std(asked)))
-        has_room = float(np.median(np.delete(share, n, axis=0))) < (_ROOM_FLYING if flight.flown else _ROOM)
+        has_room = float(median(np.delete(share, n, axis=0))) < (_ROOM_FLYING if flight.flown else _ROOM)
         if stays and steady and has_room and (best is None or size > best[0]):
             best = (size, n, spans[0][0], spans[-1][1])
     if best is None:
@@ -172,13 +172,13 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     share = outputs.share[:, lifting & (outputs.t >= start)]
     limit = float((share[n] > _AT_LIMIT).mean())
     before = excess[n][t < start - 2.0]
-    changed = len(before) >= 5 and float(np.median(before)) < size / 3
+    changed = len(before) >= 5 and float(median(before)) < size / 3
     over = size / ALONE
     yield _finding(
         outputs.motors[n], "lost thrust" if changed or over > 2 else "works harder than the others", start, end,
         _severity(flight, limit, size) if changed or over > 2 else "warning",
-        f"it is asked for {100 * np.median(share[n]):.0f} % where the others are at "
-        f"{100 * np.median(np.delete(share, n, axis=0)):.0f} % (limit: {100 * ALONE:.0f} points above them)"
+        f"it is asked for {100 * median(share[n]):.0f} % where the others are at "
+        f"{100 * median(np.delete(share, n, axis=0)):.0f} % (limit: {100 * ALONE:.0f} points above them)"
         + ("; before, they were even" if changed else "")
         + (f"; at its limit {100 * limit:.0f} % of the time" if limit > 0.05 else ""),
         _SOURCE, likely(over, _CALIBRATION if changed or over > 2 else _ALWAYS),
@@ -210,13 +210,13 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     asked = next((rows for rows in near if rows.sum() >= 3), near[-1])
     if not asked.any():
         return
-    share = np.median(outputs.share[:, asked], axis=1)
+    share = median(outputs.share[:, asked], axis=1)
     # A motor pushes its own corner up: where it gives nothing, that corner goes down.
     towards = np.array([-(motor.roll * roll + motor.pitch * pitch) for motor in outputs.motors]) / np.hypot(roll, pitch)
     score = np.where(towards > 0.15, share, -1.0)
     n = int(np.argmax(score + 0.2 * towards))
     others = np.delete(share, n)
-    if score[n] < 0.6 or share[n] - float(np.median(others)) < _CLEARLY:
+    if score[n] < 0.6 or share[n] - float(median(others)) < _CLEARLY:
         return
     most = np.argmax(outputs.share[:, asked], axis=0) == n
     if most.mean() < 0.6:  # asked for in turn with others: an oscillation
@@ -224,7 +224,7 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     begin = outputs.t[(outputs.share[n] > _AT_LIMIT) & (outputs.t > lost - 2.0) & (outputs.t <= lost + 1.0)]
     yield _finding(
         outputs.motors[n], "gave no thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0, "critical",
-        f"asked for {100 * share[n]:.0f} % (others {100 * np.median(others):.0f} %), yet the vehicle fell towards it: "
+        f"asked for {100 * share[n]:.0f} % (others {100 * median(others):.0f} %), yet the vehicle fell towards it: "
         f"{roll:+.0f} degrees of roll and {pitch:+.0f} of pitch off the demand",
         f"{_SOURCE}, and ATT", 0.85 if near[0].sum() > 3 else 0.6,
     )  # fmt: skip
@@ -236,7 +236,7 @@ def _was_calm(flight: Flight, lost: float) -> bool:
     if error is None:
         return False
     before = error[1][(error[0] >= lost - 6.0) & (error[0] <= lost - 0.6)]
-    return len(before) < 2 or float(np.quantile(before, 0.8)) < _CALM_DEG
+    return len(before) < 2 or quantile(before, 0.8) < _CALM_DEG
 
 
 def _told(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
@@ -247,10 +247,10 @@ def _told(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         if match and any(start <= t <= end for start, end in flight.armed):
             motor = next((one for one in outputs.motors if one.number == int(match[1])), None)
             near = np.abs(outputs.t - t) < 5.0
-            excess = np.median(_excess(outputs.share, near), axis=1) if near.any() else np.zeros(len(outputs.motors))
+            excess = median(_excess(outputs.share, near), axis=1) if near.any() else np.zeros(len(outputs.motors))
             own = float(excess[outputs.motors.index(motor)]) if motor is not None else 0.0
             is_alone = own > ALONE and float(np.sort(excess)[-2]) < _NEXT * own
-            crowded = float(np.median(outputs.share[:, near])) > _ROOM if near.any() else True
+            crowded = float(median(outputs.share[:, near])) > _ROOM if near.any() else True
             if motor is not None and not crowded and is_alone:
                 severity: Severity = "critical" if flight.impact_s is not None else "warning"
                 yield _finding(motor, "lost thrust", t, flight.end_s, severity, f"the firmware says: {text}",
@@ -265,13 +265,13 @@ def _stopped(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         return
     t = speeds[0].t
     rpm = np.stack([np.interp(t, one.t, one["RPM"]) for one in speeds])
-    usual = np.median(rpm, axis=0)
+    usual = median(rpm, axis=0)
     for n, row in enumerate(rpm):
         spans = lasting(t, (row < 0.3 * usual) & (usual > 1000) & flight.watch(t), 0.5)
         if spans and n < len(outputs.motors):
             yield _finding(outputs.motors[n], "stopped", spans[0][0], spans[-1][1], "critical",
-                           f"its controller reports {np.median(row[t >= spans[0][0]]):.0f} turns a minute, the others "
-                           f"{np.median(usual):.0f}", "ESC.RPM", 0.95)  # fmt: skip
+                           f"its controller reports {median(row[t >= spans[0][0]]):.0f} turns a minute, the others "
+                           f"{median(usual):.0f}", "ESC.RPM", 0.95)  # fmt: skip
             return
 
 

@@ -14,6 +14,7 @@ from care_core.health.ardupilot.flight import Flight, Span
 from care_core.health.ardupilot.measure import lasting, smooth
 from care_core.health.records import Finding, Severity, Suspect
 from care_core.logs.base import Wanted
+from care_core.numbers import median
 
 READS: Wanted = {"CTUN": ("ThO", "Alt", "DAlt", "CRt", "DCRt"), "MOTB": ("ThLimit", "LiftMax")}
 
@@ -44,7 +45,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         start, end = full[0][0], full[-1][1]
         below = _below(flight, start, end)
         begin = min([start, *[a for a, _ in high]])
-        hover = float(np.median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
+        hover = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
         lasted = sum(b - a for a, b in full)
         grounded = not flight.flown and lasted > _GROUNDED_S
         lost = flight.impact_s is not None or any(code for _, code in flight.errors(_FAILSAFE_BATT))
@@ -57,8 +58,8 @@ def find(flight: Flight) -> Iterator[Finding]:
             + f"; {100 * hover:.0f} % before that" + why,
             "CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875", suspect=suspect, probability=_PROBABILITY[suspect],
         )  # fmt: skip
-    elif high and sum(b - a for a, b in high) > 0.3 * float(flown.sum()) * float(np.median(np.diff(t))):
-        share = float(np.median(level[flown]))
+    elif high and sum(b - a for a, b in high) > 0.3 * float(flown.sum()) * float(median(np.diff(t))):
+        share = float(median(level[flown]))
         suspect, why = _by_option(flight)
         yield Finding(
             "thrust", f"hovering takes {100 * share:.0f} % of the throttle", high[0][0], high[-1][1], "warning",
@@ -90,5 +91,5 @@ def _below(flight: Flight, start: float, end: float) -> float:
     if table is None or not np.any(table["DAlt"]):
         return 0.0
     part = table.between(start, end)
-    gap = float(np.median(part["DAlt"] - part["Alt"])) if len(part) else 0.0
+    gap = float(median(part["DAlt"] - part["Alt"])) if len(part) else 0.0
     return gap if gap > _BELOW_M else 0.0

@@ -15,6 +15,7 @@ from care_core.health.ardupilot.flight import Flight
 from care_core.health.ardupilot.measure import Calibration, lasting, length, likely, roughness, smooth, steady, top
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import quantile
 
 READS: Wanted = {
     "VIBE": ("VibeX", "VibeY", "VibeZ", "Clip"),
@@ -56,7 +57,7 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
     level = np.maximum(np.maximum(table["VibeX"], table["VibeY"]), table["VibeZ"])[calm]
     level = steady(t, np.where(np.isfinite(level), level, 0.0), _LASTS_S)  # not a blow, which fades within a second
     aloft = flight.during(flight.flown, t)  # on the ground its motors idle, which says nothing of what it was
-    before = float(np.quantile(level[aloft] if aloft.any() else level, 0.05))
+    before = quantile(level[aloft] if aloft.any() else level, 0.05)
     upset = _upset(flight)
     limit = ROSE if before < ROSE / _TIMES or upset else FELT
     spans = lasting(t, level > limit, _LASTS_S)

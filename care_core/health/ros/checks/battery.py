@@ -10,6 +10,7 @@ from care_core.health.records import Finding, Severity
 from care_core.health.ros import plan
 from care_core.health.ros.checks.drive import obeys
 from care_core.health.ros.recording import Battery, Recording
+from care_core.numbers import median, quantile
 
 DROP, DROP_IN_S = 0.08, 5.0
 """Share of the voltage lost within this time, with the load's own part taken out. A charged battery, lead-acid or
@@ -46,14 +47,14 @@ def _drops(recording: Recording, battery: Battery) -> Iterator[Finding]:
         return
     first = np.searchsorted(t, t - DROP_IN_S)
     fell = open_circuit[first] - open_circuit
-    limit = DROP * float(np.median(battery.voltage[: max(5, len(t) // 20)]))
+    limit = DROP * float(median(battery.voltage[: max(5, len(t) // 20)]))
     for row in np.flatnonzero(fell > limit):
         after = open_circuit[row:]
         # A drop stays: one sample that reads low is a bad reading.
-        if len(after) >= 5 and float(np.percentile(after, 80)) < open_circuit[first[row]] - 0.7 * limit:
+        if len(after) >= 5 and quantile(after, 0.8) < open_circuit[first[row]] - 0.7 * limit:
             steps = np.diff(open_circuit[first[row] : row + 1])
             at = float(t[first[row] + 1 + int(np.argmin(steps))])
-            before, now = float(battery.voltage[first[row]]), float(np.median(battery.voltage[row : row + 5]))
+            before, now = float(battery.voltage[first[row]]), float(median(battery.voltage[row : row + 5]))
             # A robot that drives on as commanded was not stopped by it.
             severity: Severity = "warning" if obeys(recording, at) else recording.severity(at, "critical")
             yield Finding(
@@ -72,6 +73,6 @@ def _resistance(battery: Battery) -> float:
     if np.count_nonzero(known) < 10:
         return 0.0
     ratios = -step_v[known] / step_a[known]
-    resistance = float(np.median(ratios[np.abs(step_a[known]) >= np.median(np.abs(step_a[known]))]))
-    nominal = float(np.median(battery.voltage))
+    resistance = float(median(ratios[np.abs(step_a[known]) >= median(np.abs(step_a[known]))]))
+    nominal = float(median(battery.voltage))
     return resistance if 0 < resistance < 0.1 * nominal else 0.0

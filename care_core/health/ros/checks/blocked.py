@@ -9,6 +9,7 @@ import numpy as np
 from care_core.health.records import Finding
 from care_core.health.ros.checks import laser
 from care_core.health.ros.recording import Floats, Odometry, Recording, Scans
+from care_core.numbers import median
 
 BEFORE_S, AT_MOST_S = 0.8, 3.0
 """Scans are compared with one so much earlier."""
@@ -38,7 +39,7 @@ def check(recording: Recording) -> Iterator[Finding]:
             stuck_s = _stuck(odometry, at)
             if stuck_s is None or not any(goal.failed and goal.end_s >= at for goal in recording.goals):
                 continue
-            far, wide = float(np.median(points[:, 0])), float(np.ptp(points[:, 1]))
+            far, wide = float(median(points[:, 0])), float(np.ptp(points[:, 1]))
             yield Finding(
                 "blocked", "something appeared in the robot's way", at, float(odometry.t[-1]),
                 recording.severity(at), f"{wide:.1f} m wide, {far:.1f} m ahead, where the laser saw free space before;"

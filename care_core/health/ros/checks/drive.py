@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from care_core.health.records import Finding
 from care_core.health.ros.following import Following, following
 from care_core.health.ros.recording import Battery, Bools, Floats, Recording
+from care_core.numbers import median
 
 STANDS_S = 5.0
 """A drive that stands so long against its commands has failed or is held. In 301 healthy missions: 1.5 s at most."""
@@ -78,7 +79,7 @@ def _standing(recording: Recording, asked: Following, long: list[tuple[float, fl
     start, end = long[0][0], long[-1][1]
     total_s = sum(stop - begin for begin, stop in long)
     inside = (asked.odometry.t >= start) & (asked.odometry.t <= long[0][1])
-    wanted = float(np.median(np.abs(asked.wanted_speed[inside])))
+    wanted = float(median(np.abs(asked.wanted_speed[inside])))
     told = f"commanded {wanted:.2f} m/s" if wanted > 0 else "commanded to turn"
     evidence = f"{told} for {total_s:.0f} s, odometry stands"
     pushing = next((one for battery in recording.batteries if (one := _pushes(battery, asked, long)) is not None), None)
@@ -126,7 +127,7 @@ def _stopping(recording: Recording, still: list[tuple[float, float]], source: st
         near = (starts >= start) & (starts < start + STOPS_IN_S)
         if np.count_nonzero(near) >= STOPS and float(stood_s[near].sum()) >= STOPPED_S:
             later = starts >= start
-            evidence = (f"{np.count_nonzero(later)} standstills of {np.median(stood_s[later]):.1f} s"
+            evidence = (f"{np.count_nonzero(later)} standstills of {median(stood_s[later]):.1f} s"
                         " while commands to move go on")  # fmt: skip
             yield Finding("commands", "commands reach the drive only now and then", start, still[-1][1],
                           recording.severity(start), evidence, source, probability=0.9)  # fmt: skip
@@ -151,7 +152,7 @@ def _slow(recording: Recording, asked: Following, stood: Bools, source: str) -> 
         return
     rows = np.concatenate([np.arange(first, last) for first, last in found])
     speeds, demands = np.abs(odometry.speed[asks]), np.abs(wanted[asks])
-    reached, demanded = float(np.median(speeds[rows])), float(np.median(demands[rows]))
+    reached, demanded = float(median(speeds[rows])), float(median(demands[rows]))
     # It was weak since it last was clearly faster, though before a higher speed was asked for nobody could see.
     faster = np.flatnonzero(speeds[: found[0][0]] > 1.3 * reached)
     lasting = slow & np.append(slow[1:], False) & (demands > 1.3 * reached)
@@ -174,12 +175,12 @@ def _pulling(recording: Recording, asked: Following, source: str) -> Iterator[Fi
     pull: Floats = (odometry.turn[rows] - (asked.turn_high + asked.turn_low)[rows] / 2) / speed
     windows = sliding_window_view(pull, PULL_SAMPLES)[PULL_BEFORE:]
     shares = sliding_window_view(speed / asked.wanted_speed[rows], PULL_SAMPLES)[PULL_BEFORE:]
-    middles = np.median(windows, axis=1)
+    middles = median(windows, axis=1)
     agrees = np.mean(np.sign(windows) == np.sign(middles)[:, None], axis=1)
-    fits = (np.abs(middles) >= PULL_RADPM) & (agrees >= PULL_AGREE) & (np.median(shares, axis=1) < SLOWER)
+    fits = (np.abs(middles) >= PULL_RADPM) & (agrees >= PULL_AGREE) & (median(shares, axis=1) < SLOWER)
     for number in np.flatnonzero(fits).tolist():
         first, middle = number + PULL_BEFORE, float(middles[number])
-        if float(np.median(pull[:first])) * np.sign(middle) < PULL_RADPM / 2:
+        if float(median(pull[:first])) * np.sign(middle) < PULL_RADPM / 2:
             # It began where the sum of what is beyond half of it turns upwards.
             above = np.cumsum(pull[: first + PULL_SAMPLES] * np.sign(middle) - abs(middle) / 2)
             start = float(t[int(np.argmin(above))])

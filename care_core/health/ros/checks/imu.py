@@ -10,6 +10,7 @@ from care_core.health.records import Finding
 from care_core.health.ros import plan
 from care_core.health.ros.recording import Floats, Recording, believable
 from care_core.logs.base import Table
+from care_core.numbers import median
 
 SHOCK_MPS2 = 25.0
 """Beyond gravity. Kerbs and rough ground give a wheeled robot 5 to 15 m/s^2; a collision gives tens."""
@@ -31,10 +32,10 @@ def check(recording: Recording) -> Iterator[Finding]:
 def _felt(recording: Recording, topic: str, table: Table) -> Iterator[Finding]:
     felt = np.sqrt(sum(believable(table[f"linear_acceleration.{axis}"], HARDEST_MPS2) ** 2 for axis in "xyz"))
     good = np.isfinite(felt)
-    if not good.any() or not _GRAVITY[0] <= float(np.median(felt[good])) <= _GRAVITY[1]:
+    if not good.any() or not _GRAVITY[0] <= float(median(felt[good])) <= _GRAVITY[1]:
         return
     t, tilt = table.t, _tilt(table)
-    hits = np.flatnonzero(good & (np.abs(felt - np.median(felt[good])) > SHOCK_MPS2))
+    hits = np.flatnonzero(good & (np.abs(felt - median(felt[good])) > SHOCK_MPS2))
     tips = np.flatnonzero(tilt > TIP_DEG)
     if not len(hits) and not len(tips):
         return
@@ -56,6 +57,6 @@ def _tilt(table: Table) -> Floats:
     if not np.all(np.abs(length[np.isfinite(length)] - 1) < 0.1) or not np.isfinite(length).all():
         return np.zeros(len(table))
     up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
-    first = np.median(up[: max(5, len(up) // 50)], axis=0)
+    first = median(up[: max(5, len(up) // 50)], axis=0)
     angle: Floats = np.degrees(np.arccos(np.clip(up @ (first / np.linalg.norm(first)), -1, 1)))
     return angle

@@ -13,6 +13,7 @@ from care_core.health.records import Finding
 from care_core.health.ros import plan
 from care_core.health.ros.recording import Recording, Scans, stretches
 from care_core.health.ros.silence import ends_early
+from care_core.numbers import median, quantile
 
 NOISE_M, NOISE_RISES = 0.1, 4.0
 """Noise between neighbouring rays, and how much higher it must be than before. Data sheets: 0.03 to 0.05 m (UST-10LX,
@@ -85,14 +86,14 @@ def _noisy(recording: Recording, scans: Scans) -> Iterator[Finding]:
     if np.count_nonzero(known) < 8:
         return
     t, noise = scans.t[known], _medians(bent[known]) / _SECOND_DIFFERENCE
-    quiet = float(np.percentile(noise, 10)) if noise[0] > NOISE_M else float(np.median(noise[:5]))
+    quiet = quantile(noise, 0.1) if noise[0] > NOISE_M else float(median(noise[:5]))
     loud = noise > max(NOISE_M, NOISE_RISES * quiet)
     found = [
         one for one in stretches(t, loud, 3.5 * _period(scans)) if np.count_nonzero((t >= one[0]) & (t <= one[1])) >= 5
     ]
     if found:
         start, end = found[0][0], found[-1][1]
-        level = float(np.median(noise[loud]))
+        level = float(median(noise[loud]))
         yield Finding(
             "laser", "the laser is noisy", start, end, recording.severity(start),
             f"ranges scatter by {level:.2f} m from ray to ray, {quiet:.3f} m before",
@@ -111,17 +112,17 @@ def _medians(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _blind(recording: Recording, scans: Scans) -> Iterator[Finding]:
     seen = np.isfinite(scans.ranges).mean(axis=1)
-    if float(np.median(seen[: max(5, len(seen) // 10)])) < SEEING:
+    if float(median(seen[: max(5, len(seen) // 10)])) < SEEING:
         return
     for start, end in stretches(scans.t, seen <= BLIND, 2.5 * _period(scans)):
         if end - start >= BLIND_S:
             yield Finding(
                 "laser", "the laser sees nothing", start, end, recording.severity(start),
-                f"{np.median(seen):.0%} of its rays return usually, at most {BLIND:.0%} for {end - start:.0f} s",
+                f"{median(seen):.0%} of its rays return usually, at most {BLIND:.0%} for {end - start:.0f} s",
                 scans.topic, probability=0.7,
             )  # fmt: skip
             return
 
 
 def _period(scans: Scans) -> float:
-    return float(np.median(np.diff(scans.t))) if len(scans.t) > 1 else 1.0
+    return float(median(np.diff(scans.t))) if len(scans.t) > 1 else 1.0

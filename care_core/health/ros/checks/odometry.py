@@ -15,6 +15,7 @@ from care_core.health.ros import plan
 from care_core.health.ros.recording import STREAM_MESSAGES, Floats, Odometry, Recording
 from care_core.logs.base import Table
 from care_core.logs.plausible import STAMP, never_moved
+from care_core.numbers import median, quantile
 
 JUMP_M = 0.3
 """A position that steps further than speed and time allow. The largest such step of 301 healthy missions: 0.07 m."""
@@ -106,7 +107,7 @@ def _steps(odometry: Odometry) -> tuple[Floats, Floats, Floats]:
 
 def _jumps(recording: Recording, odometry: Odometry) -> Iterator[Finding]:
     went, _, most = _steps(odometry)
-    top = float(np.percentile(np.hypot(odometry.speed, odometry.sideways), 99))
+    top = quantile(np.hypot(odometry.speed, odometry.sideways), 0.99)
     excess = went - np.maximum(most, np.where(odometry.dt > _PAUSE_S, top * odometry.dt, 0.0))
     rows = np.flatnonzero(excess > JUMP_M)
     if not len(rows):
@@ -150,7 +151,7 @@ def _drifting(
     most_share: float,
 ) -> Iterator[Finding]:
     """The drift that some rows show, if position and speed agreed before it and disagree to the end."""
-    typical = float(np.median(share[rows]))
+    typical = float(median(share[rows]))
     bend = _bend(extra, way, typical, rows[0])
     agreed = way[bend] >= AGREED_M and abs(extra[bend]) < most_share / 2 * way[bend]
     later = extra[-1] - extra[bend]

@@ -12,6 +12,7 @@ from care_core.health.records import Finding, FindingKind, Severity
 from care_core.health.ros import plan
 from care_core.health.ros.recording import WARN, Recording, Said
 from care_core.logs.plausible import APART, STAMP, is_simulated, kept_its_rate, stamps_pace
+from care_core.numbers import median
 
 SHARE = 0.1
 """Of the time, with a message a second counted as all of it: loops that miss now and then are no fault."""
@@ -74,7 +75,7 @@ def _lags(recording: Recording) -> Iterator[Finding]:
     off = {topic: pace for topic, pace in paces.items() if not 1 / APART <= pace <= APART}
     if not off:
         return
-    pace = float(np.median(list(off.values())))
+    pace = float(median(list(off.values())))
     evidence = (
         f"{counted(len(off), 'topic')} with stamps at {min(off.values()):.2f} to {max(off.values()):.2f} s a second"
         f" (limits {1 / APART:.2f} and {APART})"

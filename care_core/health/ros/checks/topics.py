@@ -12,6 +12,7 @@ from care_core.health.ros import plan
 from care_core.health.ros.recording import WARN, Floats, Recording
 from care_core.health.ros.silence import ends_early
 from care_core.logs.recording import RENAMED
+from care_core.numbers import median
 
 OUTAGE_S, OUTAGE_PERIODS = 5.0, 10.0
 """A pause this long, and so many periods long, in several streams at once is an outage. Of 301 healthy missions, some
@@ -87,7 +88,7 @@ def _outage(recording: Recording) -> Iterator[Finding]:
 def _comes_in_a_burst(times: Floats, after_s: float) -> bool:
     """Whether messages come much faster than usual when a topic returns."""
     back = times[(times >= after_s - OUTAGE_S) & (times <= after_s + OUTAGE_S)]
-    usual = float(np.median(np.diff(times)))
+    usual = float(median(np.diff(times)))
     return int(np.count_nonzero(np.diff(back) < 0.2 * usual)) >= 5
 
 
