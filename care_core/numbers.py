@@ -43,13 +43,13 @@ def median(values: ArrayLike, axis: int | None = None, *, in_place: bool = False
     count = array.shape[along]
     if not count:
         return np.full(np.delete(array.shape, along), np.nan)[()]
-    places = ((count - 1) // 2, count // 2, -1)  # NaN comes last
+    middle = range((count - 1) // 2, count // 2 + 1)
     if in_place:
-        array.partition(places, along)
+        array.partition((*middle, -1), along)
     else:
-        array = np.partition(array, places, along)
-    last = array.take(-1, along)
-    return np.where(last == last, array.take(places[:2], along).mean(along), np.nan)[()]
+        array = np.partition(array, (*middle, -1), along)
+    last = array.take(-1, along)  # NaN comes last
+    return np.where(last == last, array.take(middle, along).mean(along), np.nan)[()]
 
 
 def quantile(values: ArrayLike, share: float) -> float:
