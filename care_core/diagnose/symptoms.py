@@ -35,6 +35,9 @@ class Pointer:
 
 
 NOTHING = Pointer(0.0, None)
+ROUNDING = 1e-9
+"""Standard deviations that an option moves no metric by: the same sum in another order differs by less, and where
+nothing moves a metric, who is to be blamed for it would be drawn by lot."""
 
 
 def pointers(
@@ -78,7 +81,8 @@ def _split(
         return {}
     moved = {}
     for name, there in zip(names, back, strict=True):
-        moved[name] = max(0.0, float(np.sign(off)) * (here - there) / scale)
+        step = float(np.sign(off)) * (here - there) / scale
+        moved[name] = step if step > ROUNDING else 0.0
         if (name, metric) in known:
             moved[name] += UNLEARNED * world.variables[name].distance(reference[name], world.config[name])
     whole = sum(moved.values())

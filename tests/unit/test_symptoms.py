@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from care_core.diagnose import symptoms
 from care_core.diagnose.ranking import suspects
 from care_core.diagnose.symptoms import pointers
 from care_core.profile.store import Profile
@@ -31,6 +34,14 @@ def test_the_metric_that_is_off_points_at_what_moved_it(
 def test_a_run_like_the_reference_points_at_nothing(planted: Profile) -> None:
     found = pointers(planted_world(planted), "time", NAMES, (), ())
     assert {pointer.share for pointer in found.values()} == {0.0}
+
+
+def test_last_digits_point_at_nobody(planted: Profile, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A metric that this run's wind moved, and no option: sums in another order differ in their last digits."""
+    here = planted_world(planted)
+    off = replace(here, observed={**here.observed, "hold_s": 500.0})
+    monkeypatch.setattr(symptoms, "_latent", lambda _, configs: [1.0 - 1e-15 * i for i in range(len(configs))])
+    assert {pointer.share for pointer in pointers(off, "time", NAMES, (), ()).values()} == {0.0}
 
 
 def test_a_check_that_refused_the_mission_outweighs_every_metric(planted: Profile) -> None:
