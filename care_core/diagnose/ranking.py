@@ -17,7 +17,7 @@ from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, Ways
 from care_core.configs.driven import same_value
 from care_core.diagnose.records import PathNode
-from care_core.diagnose.symptoms import NOTHING, pointers
+from care_core.diagnose.symptoms import NOTHING, ROUNDING, pointers
 from care_core.frozen import dataclass
 from care_core.run import Evidence, Run, is_known
 from care_core.variables import Role
@@ -193,7 +193,7 @@ def _shapley(names: Sequence[str], worth: Callable[[Sequence[frozenset[str]]], F
     for order, chain in zip(orders, chains, strict=True):
         shares[list(order)] += np.diff([value[subset] for subset in chain])
     mean: FloatArray = shares / len(orders)
-    return mean
+    return np.where(np.abs(mean) > ROUNDING, mean, 0.0)
 
 
 def _orders(count: int) -> list[tuple[int, ...]]:

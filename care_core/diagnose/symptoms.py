@@ -36,8 +36,8 @@ class Pointer:
 
 NOTHING = Pointer(0.0, None)
 ROUNDING = 1e-9
-"""Standard deviations that an option moves no metric by: the same sum in another order differs by less, and where
-nothing moves a metric, who is to be blamed for it would be drawn by lot."""
+"""What is less is nothing: the same sum in another order differs by as much. Where no option moves a metric, the last
+digits would draw lots for the one to be blamed."""
 
 
 def pointers(
