@@ -52,6 +52,11 @@ def median(values: ArrayLike, axis: int | None = None, *, in_place: bool = False
     return np.where(last == last, array.take(middle, along).mean(along), np.nan)[()]
 
 
+def known_median(values: Floats) -> float:
+    """The median of those that are not NaN, NaN where there are none."""
+    return float(median(values[values == values]))
+
+
 def quantile(values: ArrayLike, share: float) -> float:
     """A quantile as `numpy.quantile` answers it, between two values in proportion; NaN of none, and of any NaN."""
     array = np.ravel(values)

@@ -20,7 +20,7 @@ from care_core.extract.modes import MODES, kind_flown, modes_in_force
 from care_core.extract.registry import Mission, has, merge_needs
 from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median
+from care_core.numbers import distinct, known_median, median
 from care_core.run import Unavailable
 
 NEEDS: Wanted = merge_needs(
@@ -95,7 +95,7 @@ class Track:
         steps = np.diff(self.t)
         if len(steps) < 2 or not FILL_S < median(steps) <= FILLABLE_S or (steps <= 0).any():
             return self
-        t = np.union1d(self.t, np.arange(self.t[0], self.t[-1], FILL_S))
+        t = distinct(np.concatenate((self.t, np.arange(self.t[0], self.t[-1], FILL_S))))
         return Track(
             t, _hermite(t, self.t, self.north), _hermite(t, self.t, self.east), np.interp(t, self.t, self.height)
         )
@@ -211,7 +211,7 @@ def waypoint_offsets(waypoints: Sequence[Waypoint], expected: Sequence[Sequence[
 def metres_between(lat: Floats, lng: Floats) -> float:
     """Diagonal in metres of the area that positions, in degrees, each of shape (n,), lie in."""
     north, east = (float(np.ptp(one[np.isfinite(one)])) * _METRES_PER_DEGREE for one in (lat, lng))
-    return math.hypot(north, east * math.cos(math.radians(float(np.nanmedian(lat)))))
+    return math.hypot(north, east * math.cos(math.radians(known_median(lat))))
 
 
 def messages(table: Table | None, start_s: float = -math.inf, end_s: float = math.inf) -> list[tuple[float, str]]:

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from care_core.health.ardupilot.measure import smooth
 from care_core.health.moments import gaps
 from care_core.logs.base import Table
-from care_core.numbers import Floats, median, pauses, quantile
+from care_core.numbers import Floats, known_median, median, pauses, quantile
 
 TIMES = st.lists(st.integers(0, 60).map(float), max_size=40)
 
@@ -66,6 +66,11 @@ def test_a_median_is_the_one_that_numpy_answers(values: Floats, axis: int | None
 def test_a_quantile_is_the_one_that_numpy_answers(values: Floats, share: float) -> None:
     with np.errstate(all="ignore"):
         np.testing.assert_array_equal(quantile(values, share), np.quantile(values, share))
+
+
+def test_a_median_of_what_is_known() -> None:
+    assert known_median(np.array([np.nan, 3.0, 1.0, np.nan, 7.0])) == 3.0
+    assert np.isnan(known_median(np.array([np.nan])))
 
 
 def test_nothing_has_no_median() -> None:

@@ -17,7 +17,7 @@ from care_core.health.ardupilot.measure import Calibration, lasting, likely, smo
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median, quantile
+from care_core.numbers import known_median, median, quantile
 
 READS: Wanted = {"BAT": ("Volt", "Curr"), "POWR": ("Vcc",)}
 
@@ -141,8 +141,8 @@ def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
         odd = f"the voltage stays at {known[0]:.2f} V in flight"
     elif float(median(known)) < _ALIVE_V:
         odd = f"{median(known):.2f} V drive no vehicle: nothing is connected to it, or its scale is wrong"
-    elif len(amps) and np.isfinite(amps).any() and float(np.nanmedian(amps)) < -0.5:
-        odd = f"the current reads {np.nanmedian(amps):.1f} A"
+    elif len(amps) and np.isfinite(amps).any() and known_median(amps) < -0.5:
+        odd = f"the current reads {known_median(amps):.1f} A"
     if odd:
         span = flight.flown[0][0], flight.flown[-1][1]
         yield Finding(

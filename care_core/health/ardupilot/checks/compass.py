@@ -17,7 +17,7 @@ from care_core.health.ardupilot.measure import Calibration, aligned, lasting, le
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import median, quantile
+from care_core.numbers import known_median, median, quantile
 
 AXES = ("MagX", "MagY", "MagZ")
 READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",), "PARM": ("Name", "Value")}
@@ -130,7 +130,7 @@ def _odd_one(compasses: list[Table], other: int) -> int:
 
         def from_third(table: Table) -> float:
             gaps = (aligned(t, table.t, table[axis]) - aligned(t, third.t, third[axis]) for axis in AXES)
-            return float(np.nanmedian(length(gaps)))
+            return known_median(length(gaps))
 
         return 1 if from_third(compasses[0]) >= from_third(compasses[other - 1]) else other
     sd = [float(np.nanstd(length(table[axis] for axis in AXES))) for table in (compasses[0], compasses[other - 1])]

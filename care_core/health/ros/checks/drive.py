@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from care_core.health.records import Finding
 from care_core.health.ros.following import Following, following
 from care_core.health.ros.recording import Battery, Bools, Floats, Recording
-from care_core.numbers import median
+from care_core.numbers import known_median, median
 
 STANDS_S = 5.0
 """A drive that stands so long against its commands has failed or is held. In 301 healthy missions: 1.5 s at most."""
@@ -107,7 +107,7 @@ def _pushes(battery: Battery, asked: Following, long: list[tuple[float, float]])
     drives, idles = (speed > 0.1) & ~held, (speed < 0.01) & (turn < 0.01) & ~held
     if min(np.count_nonzero(one) for one in (held, drives, idles)) < 3:
         return None
-    drawn, idle, driving = (float(np.nanmedian(battery.current[one])) for one in (held, idles, drives))
+    drawn, idle, driving = (known_median(battery.current[one]) for one in (held, idles, drives))
     return (drawn, idle, driving) if driving > 1.2 * idle > 0 else None
 
 
