@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,7 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from care_core.causal import kernel as kernels
 from care_core.causal.kernel import FloatArray, Kernel
-from care_core.causal.mechanisms import LEAST, TAIL, Mechanism, Transform, columns, restored, solve, transformed
+from care_core.causal.mechanisms import JITTER, LEAST, TAIL, Mechanism, Transform, columns, restored, solve, transformed
 
 SETTINGS = st.floats(-1e3, 1e3)
 
@@ -132,6 +134,21 @@ def test_values_that_many_points_share_change_no_covariance(b: FloatArray, a: Fl
     kernel = Kernel(np.array([0.3, 1.0, 2.0]), 0.7, 0.4, 0.1, idle)
     np.testing.assert_allclose(kernel(a, b), covariance(kernel, a, b), rtol=1e-12)
     np.testing.assert_allclose(kernel.among(b), covariance(kernel, b, b), rtol=1e-12)
+
+
+def test_runs_of_the_same_inputs_count_as_one_outcome_and_no_less() -> None:
+    """Against the formula with every run for itself (Rasmussen and Williams 2006, Eqs. 2.25 and 2.26)."""
+    alone = mechanism()
+    points = alone.points[np.random.default_rng(2).integers(0, 6, 30)]
+    m = replace(alone, points=points, weights=solve(alone.kernel, points, alone.targets))
+    z = np.random.default_rng(3).normal(size=(5, 2))
+    x = np.column_stack((z[:, 0] * m.sd[0] + m.centre[0], np.exp(z[:, 1] * m.sd[1] + m.centre[1])))
+    noisy = covariance(m.kernel, points, points) + (m.kernel.noise**2 + JITTER) * np.eye(30)
+    cross = covariance(m.kernel, z, points)
+    left = m.kernel.variance - np.einsum("mn,nm->m", cross, np.linalg.solve(noisy, cross.T))
+    np.testing.assert_allclose(m.latent(x), m.mean + m.scale * cross @ np.linalg.solve(noisy, m.targets), rtol=1e-9)
+    np.testing.assert_allclose(m.latent_sd(x), m.scale * np.sqrt(left), rtol=1e-7)
+    assert len(m.training.counts) == 6
 
 
 def test_a_kernel_of_no_inputs_is_a_constant() -> None:
