@@ -7,6 +7,7 @@ It is the sum of an additive part (each option acts alone) and a joint part (opt
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +20,8 @@ BLOCK = 300_000
 """Largest number of floats in one block of pairwise distances, which then stays in the processor's cache: changes no
 number."""
 SLICE = 64
+FEW = 256
+"""Values of an input of which each pair's exponential is worked out once."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,9 +50,47 @@ class Levels:
         np.put_along_axis(place, order, (is_new.cumsum() - 1).reshape(columns.shape), axis=1)
         return cls(ascending[is_new], is_new.nonzero()[0], place)
 
+    def columns(self) -> Iterator[tuple[FloatArray, NDArray[np.intp]]]:
+        """Of each column its values, and where among them each point's stands."""
+        starts = np.searchsorted(self.column, np.arange(len(self.place) + 1)).tolist()
+        for place, (i, j) in zip(self.place, pairwise(starts), strict=True):
+            yield self.values[i:j], place - i
+
 
 def _levels(points: FloatArray | Levels) -> Levels:
     return points if isinstance(points, Levels) else Levels.of(points)
+
+
+def _alike(a: FloatArray, b: FloatArray) -> FloatArray:
+    """e_j of scaled values, of the shape that both have together."""
+    exponents = a - b
+    np.multiply(exponents, exponents, out=exponents)
+    np.negative(exponents, out=exponents)
+    return np.asarray(np.exp(exponents, out=exponents))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Column:
+    """One scaled input of n points. `table`: e_j of its values with each other, None where they are so many that it
+    saves nothing; `values` are then the points' own, shape (n,)."""
+
+    values: FloatArray
+    place: NDArray[np.intp]
+    table: FloatArray | None
+
+    @classmethod
+    def of(cls, values: FloatArray, place: NDArray[np.intp], scale: float) -> _Column:
+        values = values * scale
+        if len(values) > FEW:
+            return cls(values[place], place, None)
+        return cls(values, place, _alike(values[:, None], values))
+
+    def alike(self, i: int, rows: slice, out: FloatArray) -> None:
+        """e_j of the points from the i-th on with some, into an array of that shape."""
+        if self.table is None:
+            out[:] = _alike(self.values[i:, None], self.values[rows])
+        else:
+            self.table.take(self.place[rows], axis=1).take(self.place[i:], axis=0, out=out, mode="clip")
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,53 +110,47 @@ class Kernel:
         rows = max(1, BLOCK // max(1, levels.place.size))
         covariance = np.empty((len(a), levels.place.shape[1]))
         for i in range(0, len(a), rows):
-            block = a[i : i + rows]
-            alike = self._alike(levels.values, levels.column, block.T[levels.column])
-            covariance[i : i + rows] = self._covariance(alike, levels.place).T
+            covariance[i : i + rows] = self._block(a[i : i + rows], levels).T
         return covariance
 
     def among(self, points: FloatArray | Levels) -> FloatArray:
         """Covariance of n points with each other, shape (n, n): half the work of calling it, and the same numbers."""
         levels = _levels(points)
-        p, n = levels.place.shape
-        starts = np.searchsorted(levels.column, np.arange(p + 1))
-        columns = [slice(i, j) for i, j in pairwise(starts.tolist())]
-        tables = [self._table(levels.values[own], levels.column[own]) for own in columns]
+        n = levels.place.shape[1]
+        columns = [_Column.of(*one, scale) for one, scale in zip(levels.columns(), self._scale, strict=True)]
         covariance = np.empty((n, n))
         for i in range(0, n, SLICE):
             rows = slice(i, i + SLICE)
-            places = levels.place[:, rows] - starts[:-1, None]
-            alike = np.empty((len(levels.values), places.shape[1]))
-            for own, table, place in zip(columns, tables, places, strict=True):
-                table.take(place, axis=1, out=alike[own], mode="clip")
-            covariance[i:, rows] = self._covariance(alike, levels.place[:, i:])
+            shape = covariance[i:, rows].shape
+            joint, each, e = np.ones(shape), np.full(shape, float(self.idle)), np.empty(shape)
+            for column in columns:
+                column.alike(i, rows, out=e)
+                each += e
+                joint *= e
+            covariance[i:, rows] = self._sum(joint, each)
             covariance[rows, i:] = covariance[i:, rows].T
         return covariance
 
-    def _table(self, values: FloatArray, column: NDArray[np.intp]) -> FloatArray:
-        """e_j of the u values of one column with each other, shape (u, u)."""
-        return self._alike(values, column, np.broadcast_to(values, (len(values), len(values))))
-
-    def _alike(self, values: FloatArray, column: NDArray[np.intp], others: FloatArray) -> FloatArray:
-        """e_j of u values, each of one column, with the same column of m points: shape (u,), (u, m) -> (u, m)."""
-        scale = (self.relevance * np.sqrt(0.5))[column]
-        exponents = others * scale[:, None]
-        exponents -= (values * scale)[:, None]
-        np.multiply(exponents, exponents, out=exponents)
-        np.negative(exponents, out=exponents)
-        alike: FloatArray = np.exp(exponents, out=exponents)
-        return alike
-
-    def _covariance(self, alike: FloatArray, place: NDArray[np.intp]) -> FloatArray:
-        """Of n points with m others. alike: (u, m), place: (p, n) -> (n, m)."""
-        p, shape = len(place), (place.shape[1], alike.shape[1])
+    def _block(self, a: FloatArray, levels: Levels) -> FloatArray:
+        """Of n points with m others, a: (m, p) -> (n, m)."""
+        scale = self._scale[levels.column][:, None]
+        alike = _alike(a.T[levels.column] * scale, levels.values[:, None] * scale)
+        shape = levels.place.shape[1], len(a)
         joint, each, e = np.ones(shape), np.full(shape, float(self.idle)), np.empty(shape)
-        for column in place:
-            alike.take(column, axis=0, out=e, mode="clip")
+        for place in levels.place:
+            alike.take(place, axis=0, out=e, mode="clip")  # none is out of range: to say what then saves a copy
             each += e
             joint *= e
+        return self._sum(joint, each)
+
+    @property
+    def _scale(self) -> FloatArray:
+        return np.asarray(self.relevance * np.sqrt(0.5))
+
+    def _sum(self, joint: FloatArray, each: FloatArray) -> FloatArray:
+        """The covariance of the product of all e_j and their sum, in the place of the first."""
         joint *= self.joint**2
-        each *= self.additive**2 / max(1, p + self.idle)
+        each *= self.additive**2 / max(1, len(self.relevance) + self.idle)
         joint += each
         return joint
 

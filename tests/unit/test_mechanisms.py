@@ -111,7 +111,7 @@ def test_columns_follow_the_names() -> None:
     assert columns([], ["c", "a"]).shape == (0, 2)
 
 
-@pytest.mark.parametrize("n", [1, 63, 64, 130])
+@pytest.mark.parametrize("n", [1, 63, 64, 130, 300])
 def test_points_among_themselves_are_the_same_numbers(n: int) -> None:
     points = np.random.default_rng(n).normal(size=(n, 5))
     kernel = Kernel(np.array([0.1, 0.5, 1.0, 2.0, 0.0]), 0.7, 0.4, 0.1)
