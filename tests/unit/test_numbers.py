@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_core.health.ardupilot.measure import smooth
+from care_core.health.ardupilot.measure import means, smooth
 from care_core.health.moments import gaps
 from care_core.logs.base import Table
 from care_core.numbers import pauses
@@ -43,3 +43,15 @@ def test_a_smoothed_row_is_the_mean_of_a_window(values: list[float], width_s: fl
     total = np.cumsum(np.concatenate(([0.0], np.pad(x, n // 2, mode="edge"))))
     np.testing.assert_array_equal(smooth(t, x, width_s), (total[n:] - total[:-n]) / n)
     np.testing.assert_array_equal(x, kept)
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=60), st.lists(st.integers(0, 60), max_size=5), st.integers(0, 9)
+)
+def test_means_are_the_same_wherever_rows_are_cut(values: list[float], cuts: list[int], half: int) -> None:
+    x = np.array([values, values[::-1]])
+    whole = np.concatenate([*means([x], 2 * half + 1)], axis=1)
+    in_parts = np.concatenate([*means(np.split(x, sorted(cuts), axis=1), 2 * half + 1)], axis=1)
+    assert whole.shape == x.shape
+    np.testing.assert_array_equal(in_parts, whole)
