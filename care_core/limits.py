@@ -12,8 +12,8 @@ HELD_BYTES = 4 * MEBIBYTE
 """Of a log held in memory as a whole. A larger one is read where it is asked for, again each time, from the system's
 cache of files: 60 ms a gigabyte."""
 VALUES_BYTES, LEAST_VALUES_BYTES, VALUES_SHARE = 20 * MEBIBYTE, MEBIBYTE, 4
-"""Of fields of a DataFlash log that are held as they are stored, beside what a check makes of them: one byte of four
-of the log, within these bounds."""
+"""Of fields of a DataFlash log that are held as they are stored, beside what a check makes of them, and of the times of
+its records: one byte of four of the log each, within these bounds."""
 UNPACKED_BYTES, UNPACKED_RATIO = 256 * MEBIBYTE, 32
 """Laser scans pack 5:1, costmaps 30:1 and more, but no log is mostly empty costmaps."""
 WHOLE_BYTES = 256 * MEBIBYTE
@@ -47,7 +47,7 @@ MODEL_BYTES = 64 * MEBIBYTE
 
 
 def values_bytes(size: int) -> int:
-    """The most bytes of fields that are held of a DataFlash log of `size` bytes."""
+    """The most bytes of fields, and of times, that are held of a DataFlash log of `size` bytes."""
     return min(max(size // VALUES_SHARE, LEAST_VALUES_BYTES), VALUES_BYTES)
 
 

@@ -84,7 +84,7 @@ def pauses(series: Iterable[Floats], longer_than: float) -> tuple[Floats, Floats
     for values in series:
         if len(values):
             ordered = ascending(values)
-            cuts = np.flatnonzero(np.diff(ordered) > longer_than)
+            cuts = _leaps(ordered, longer_than)
             starts.append(ordered[np.concatenate(([0], cuts + 1))])
             ends.append(ordered[np.append(cuts, len(ordered) - 1)])
     start, end = np.concatenate(starts), np.concatenate(ends)
@@ -92,3 +92,12 @@ def pauses(series: Iterable[Floats], longer_than: float) -> tuple[Floats, Floats
     before, after = np.maximum.accumulate(end[order])[:-1], start[order][1:]
     apart = after - before > longer_than
     return before[apart], after[apart]
+
+
+def _leaps(ordered: Floats, longer_than: float) -> NDArray[np.intp]:
+    """The values behind which the next follows at a longer distance."""
+    found = [
+        np.flatnonzero(np.diff(ordered[rows.start : rows.stop + 1]) > longer_than) + rows.start
+        for rows in pieces(len(ordered) - 1)
+    ]
+    return np.concatenate([np.empty(0, dtype=np.intp), *found])

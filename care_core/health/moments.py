@@ -87,11 +87,14 @@ def parameter_changes(
 
 def gaps(tables: Iterable[Table], armed: Sequence[Span]) -> Iterator[Moment]:
     """The longest time in which nothing at all was recorded while armed, and while disarmed if it is long."""
-    stamps = [_known(table.t) for table in tables if len(table) > _GAP_MEDIANS]
-    limit = max(_PAUSE_S, _GAP_MEDIANS * _usual_step(stamps))
+    told = [table for table in tables if len(table) > _GAP_MEDIANS]
+    starts, ends = pauses(map(_known, told), _PAUSE_S)
+    limit = max(_PAUSE_S, _GAP_MEDIANS * _usual_step(told)) if len(starts) else _PAUSE_S
     edges = [edge for span in armed for edge in span]  # a log may be written while armed only
     flown, idle = [], []
-    for low, high in zip(*(ends.tolist() for ends in pauses(stamps, limit)), strict=True):
+    for low, high in zip(starts.tolist(), ends.tolist(), strict=True):
+        if high - low <= limit:
+            continue
         is_switch = any(low - _SWITCHED_WITHIN_S <= edge <= high + _SWITCHED_WITHIN_S for edge in edges)
         if within(armed, low) and within(armed, high) and not is_switch:
             flown.append((low, high))
@@ -104,20 +107,25 @@ def gaps(tables: Iterable[Table], armed: Sequence[Span]) -> Iterator[Moment]:
             yield Moment(start, "log", f"nothing is recorded for {end - start:.1f} s{when}{more}", "the log")
 
 
-def _known(t: Floats) -> Floats:
+def _known(table: Table) -> Floats:
+    t = table.t
     known = np.isfinite(t)
     return t if known.all() else t[known]
 
 
-def _usual_step(stamps: Sequence[Floats]) -> float:
-    """Median step of all times together; 0 where it is clearly too short to matter, which the longest series says."""
-    span_s = max((float(np.max(t)) for t in stamps if len(t)), default=0.0) - min(
-        (float(np.min(t)) for t in stamps if len(t)), default=0.0
-    )
-    count = int(np.count_nonzero(np.diff(ascending(max(stamps, key=len, default=np.empty(0))))))
-    if count * _PAUSE_S / _GAP_MEDIANS > _CLEARLY * span_s:
+def _usual_step(tables: Sequence[Table]) -> float:
+    """Median step of all times together; 0 where it is clearly too short to matter, which the longest series says. The
+    times of a large log are looked at one message after the other."""
+    first_s, last_s, longest, count = math.inf, -math.inf, 0, 0
+    for t in map(_known, tables):
+        if len(t):
+            first_s, last_s = min(first_s, float(np.min(t))), max(last_s, float(np.max(t)))
+        if len(t) > longest:
+            ordered = ascending(t)
+            longest, count = len(t), int(np.count_nonzero(ordered[1:] != ordered[:-1]))
+    if count * _PAUSE_S / _GAP_MEDIANS > _CLEARLY * (last_s - first_s):
         return 0.0
-    steps = np.diff(distinct(np.concatenate([np.empty(0), *stamps])))
+    steps = np.diff(distinct(np.concatenate([np.empty(0), *map(_known, tables)])))
     return float(median(steps)) if len(steps) else 0.0
 
 

@@ -50,7 +50,8 @@ Kind = Literal["number", "text", "other"]
 
 
 class LazyColumns(Mapping[str, Any]):
-    """Columns that a reader decodes only when they are asked for, and then only the rows that are left."""
+    """Columns that a reader decodes only when they are asked for, and then only the rows that are left; and the times
+    of the rows, likewise."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = names
@@ -64,8 +65,17 @@ class LazyColumns(Mapping[str, Any]):
     def __len__(self) -> int:
         return len(self._names)
 
+    @property
     @abstractmethod
-    def where(self, mask: NDArray[np.bool_] | slice) -> Mapping[str, NDArray[Any]]: ...
+    def count(self) -> int:
+        """Of rows."""
+
+    @property
+    @abstractmethod
+    def t(self) -> NDArray[np.float64]: ...
+
+    @abstractmethod
+    def where(self, mask: NDArray[np.bool_] | slice) -> LazyColumns: ...
 
     @abstractmethod
     def kind(self, name: str) -> Kind: ...
@@ -79,11 +89,22 @@ class Table:
     object (str) for text, object for whatever else the message holds. Arrays are read-only by convention.
     """
 
-    t: NDArray[np.float64]
+    times: NDArray[np.float64] | None
+    """None where the columns are lazy: those of a large log are not all held, see `t`."""
     columns: Mapping[str, NDArray[Any]]
 
+    @property
+    def t(self) -> NDArray[np.float64]:
+        if self.times is not None:
+            return self.times
+        assert isinstance(self.columns, LazyColumns)
+        return self.columns.t
+
     def __len__(self) -> int:
-        return len(self.t)
+        if self.times is not None:
+            return len(self.times)
+        assert isinstance(self.columns, LazyColumns)
+        return self.columns.count
 
     def __getitem__(self, field: str) -> NDArray[Any]:
         return self.columns[field]
@@ -101,17 +122,18 @@ class Table:
         """The messages with start_s <= t <= end_s."""
         import numpy as np
 
-        if np.all(self.t[:-1] <= self.t[1:]):  # in order, as nearly always: views instead of copies
-            low, high = np.searchsorted(self.t, start_s, "left"), np.searchsorted(self.t, end_s, "right")
+        t = self.t
+        if np.all(t[:-1] <= t[1:]):  # in order, as nearly always: views instead of copies
+            low, high = np.searchsorted(t, start_s, "left"), np.searchsorted(t, end_s, "right")
             return self.where(slice(int(low), int(high)))
-        return self.where((self.t >= start_s) & (self.t <= end_s))
+        return self.where((t >= start_s) & (t <= end_s))
 
     def where(self, mask: NDArray[np.bool_] | slice) -> Table:
         """The messages of a mask, or of a range of rows."""
         if not isinstance(mask, slice) and mask.all():
             return self
         if isinstance(self.columns, LazyColumns):
-            return Table(self.t[mask], self.columns.where(mask))
+            return Table(None, self.columns.where(mask))
         return Table(self.t[mask], {name: column[mask] for name, column in self.columns.items()})
 
 

@@ -8,11 +8,11 @@ operations: nothing here loops over messages.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from functools import cached_property
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property, partial
 from pathlib import Path
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,10 @@ from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters
 from care_core.logs.base import Channel, Kind, LazyColumns, LogFormat, Table, Wanted
 from care_core.logs.clock import Clock, clock_of
 from care_core.logs.damage import summarised
-from care_core.logs.mapped import Bytes, FileArray, Offsets, stored_in
+from care_core.logs.mapped import Bytes, FileArray, Offsets, give_back, stored_in
 from care_core.run import Damage, Setting
+
+Floats = NDArray[np.float64]
 
 _HEADER = b"\xa3\x95"
 _FMT, _FMT_LENGTH = 0x80, 89
@@ -76,61 +78,132 @@ class Format:
         return found if found is not None and self.fields[found[0]].kind == "number" else None
 
 
+Part: TypeAlias = "tuple[Format, Offsets]"
+"""A declaration and the places of its records."""
+
+
+class _Held:
+    """Arrays that were asked for last, each with the first of the rows that it holds, of at most so many bytes
+    together; a larger one is held alone."""
+
+    def __init__(self, most: int) -> None:
+        self.most = most
+        self.lock = Lock()  # the app's threads share a log
+        self._arrays: dict[tuple[int, ...], tuple[int, NDArray[Any]]] = {}
+        self._bytes = 0
+
+    def find(self, key: tuple[int, ...], rows: range) -> NDArray[Any] | None:
+        """The rows of what is held, None where not all of them are."""
+        if key not in self._arrays:
+            return None
+        first, array = self._arrays[key] = self._arrays.pop(key)  # what was asked for last goes last
+        if not rows:
+            return array[:0]
+        if not first <= rows[0] <= rows[-1] < first + len(array):
+            return None
+        return array[rows.start - first : rows.stop - first : rows.step]
+
+    def make_room(self, size: int) -> None:
+        """Let go of the oldest for so many bytes."""
+        while self._arrays and self._bytes + size > self.most:
+            self.drop(next(iter(self._arrays)))
+        give_back(size)
+
+    def drop(self, key: tuple[int, ...]) -> None:
+        if key in self._arrays:
+            self._bytes -= self._arrays.pop(key)[1].nbytes
+
+    def keep(self, key: tuple[int, ...], first: int, array: NDArray[Any]) -> None:
+        self._arrays[key] = (first, array)
+        self._bytes += array.nbytes
+
+
 class _Values:
-    """Fields of all records of a declaration as they are stored. Those that were asked for last are held, up to what
-    `limits.values_bytes` allows: every check reads what it looks at, and a walk through a large log is long."""
+    """Fields of the records of a declaration as they are stored. Those that were asked for last are held: every check
+    reads what it looks at, and a walk through a large log is long."""
 
     def __init__(self, data: FileArray) -> None:
         self._data = data
-        self._held: dict[tuple[int, int, int], NDArray[Any]] = {}
-        self._bytes, self._most = 0, limits.values_bytes(len(data))
-        self._lock = Lock()  # the app's threads share a log
+        self._held = _Held(limits.values_bytes(len(data)))
 
-    def of(self, form: Format, offsets: Offsets, name: str, among: Sequence[str]) -> NDArray[Any]:
-        """The field of the records at `offsets`, shape (n,); of those `among` which it is as many as may be held come
-        by the same walk, the next first."""
+    def of(self, form: Format, offsets: Offsets, rows: range, name: str, among: Sequence[str]) -> NDArray[Any]:
+        """The field in some of the records at `offsets`, shape (n,); of those `among` which it is as many as may be
+        held come by the same walk, the next first. Of all records, where all that may be held, else of these alone."""
         at = among.index(name)
         wanted = {
             (form.type, form.byte, form.fields[one].offset): form.fields[one] for one in (*among[at:], *among[:at])
         }
         asked = next(iter(wanted))
-        with self._lock:
-            if asked not in self._held:
-                self._read(offsets, {key: field for key, field in wanted.items() if key not in self._held})
-            found = self._held[asked] = self._held.pop(asked)  # what was asked for last goes last
+        with self._held.lock:
+            found = self._held.find(asked, rows)
+            if found is None:
+                whole = sum(field.dtype.itemsize for field in wanted.values()) * len(offsets) <= self._held.most
+                stretch = range(len(offsets)) if whole or not rows else range(rows[0], rows[-1] + 1)
+                missing = [key for key in wanted if self._held.find(key, rows) is None]
+                self._read(offsets, stretch, {key: wanted[key] for key in missing})
+                found = self._held.find(asked, rows)
+        assert found is not None
         return found
 
-    def _read(self, offsets: Offsets, missing: Mapping[tuple[int, int, int], RecordField]) -> None:
+    def _read(self, offsets: Offsets, rows: range, missing: Mapping[tuple[int, int, int], RecordField]) -> None:
         """Read the first of the fields, and those behind it that may be held together, in place of the oldest."""
         chosen: dict[tuple[int, int, int], RecordField] = {}
         size = 0
         for key, field in missing.items():
-            own = len(offsets) * field.dtype.itemsize
-            if chosen and size + own > self._most:
+            own = len(rows) * field.dtype.itemsize
+            if chosen and size + own > self._held.most:
                 break
             chosen[key] = field
             size += own
-        while self._held and self._bytes + size > self._most:
-            self._bytes -= self._held.pop(next(iter(self._held))).nbytes
-        (read,) = self._data.fields([(offsets, [(field.offset, field.dtype) for field in chosen.values()])])
-        self._held |= zip(chosen, read, strict=True)
-        self._bytes += size
+            self._held.drop(key)
+        self._held.make_room(size)
+        stored = [(field.offset, field.dtype) for field in chosen.values()]
+        (read,) = self._data.fields([(offsets[rows.start : rows.stop], stored)])
+        for key, values in zip(chosen, read, strict=True):
+            self._held.keep(key, rows.start, values)
+
+
+class _Times:
+    """Seconds of all records of the declarations of one reading: all come by one walk where all may be held, else one
+    by one, and those that were asked for last are held."""
+
+    def __init__(self, parts: Sequence[Part], read: Callable[[Sequence[Part]], list[Floats]], most: int) -> None:
+        self._read, self._held = read, _Held(most)
+        self._together = parts if sum(map(_seconds_bytes, parts)) <= most else ()
+
+    def of(self, part: Part) -> Floats:
+        """Those of one of the declarations, shape (n,)."""
+        rows = range(len(part[1]))
+        with self._held.lock:
+            found = self._held.find(_key(part), rows)
+            if found is None:
+                self._hold(self._together or [part])
+                found = self._held.find(_key(part), rows)
+        assert found is not None
+        return found
+
+    def _hold(self, parts: Sequence[Part]) -> None:
+        self._held.make_room(sum(map(_seconds_bytes, parts)))
+        for part, t in zip(parts, self._read(parts), strict=True):
+            self._held.keep(_key(part), 0, t)
 
 
 class _RecordColumns(LazyColumns):
-    """Columns of records of one layout. Numbers are made of what is stored each time they are asked for. Text is slow
-    to decode and rare, so it is kept."""
+    """Columns of records of one layout, whose times `seconds` answers. Numbers are made of what is stored each time
+    they are asked for. Text is slow to decode and rare, so it is kept."""
 
     def __init__(
         self,
         values: _Values,
+        seconds: Callable[[], Floats],
         form: Format,
         offsets: Offsets,
         names: Sequence[str],
-        rows: slice | Offsets = slice(None),
+        rows: range | Offsets | None = None,
     ) -> None:
         super().__init__(names)
-        self._values, self._form, self._offsets, self._rows = values, form, offsets, rows
+        self._values, self._seconds, self._form, self._offsets = values, seconds, form, offsets
+        self._rows = range(len(offsets)) if rows is None else rows
         self._texts: dict[str, NDArray[Any]] = {}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
@@ -139,22 +212,42 @@ class _RecordColumns(LazyColumns):
         if name not in self:
             raise KeyError(name)
         field = self._form.fields[name]
-        column = _decoded(self._values.of(self._form, self._offsets, name, self._names)[self._rows], field)
+        stretch, left = self._stretch
+        column = _decoded(self._values.of(self._form, self._offsets, stretch, name, self._names)[left], field)
         if field.dtype.kind == "S":
             self._texts[name] = column
         return column
+
+    @property
+    def _stretch(self) -> tuple[range, slice | Offsets]:
+        """A stretch of the records with all rows, and which of its records those are."""
+        rows = self._rows
+        if isinstance(rows, range):
+            return rows, slice(None)
+        first = int(rows[0]) if len(rows) else 0
+        return range(first, int(rows[-1]) + 1 if len(rows) else 0), rows - rows.dtype.type(first)
+
+    @property
+    def count(self) -> int:
+        return len(self._rows)
+
+    @property
+    def t(self) -> Floats:
+        stretch, left = self._stretch
+        return self._seconds()[stretch.start : stretch.stop : stretch.step][left]
 
     def kind(self, name: str) -> Kind:
         return self._form.fields[name].kind
 
     def where(self, mask: NDArray[np.bool_] | slice) -> _RecordColumns:
-        rows: slice | Offsets
-        if isinstance(self._rows, slice) and isinstance(mask, slice):
-            left = range(len(self._offsets))[self._rows][mask]
-            rows = slice(left.start, left.stop, left.step)
+        rows: range | Offsets
+        if isinstance(mask, slice):
+            rows = self._rows[mask]
+        elif isinstance(self._rows, range):
+            rows = np.arange(self._rows.start, self._rows.stop, self._rows.step, dtype=self._offsets.dtype)[mask]
         else:
-            rows = np.arange(len(self._offsets), dtype=self._offsets.dtype)[self._rows][mask]
-        part = _RecordColumns(self._values, self._form, self._offsets, self._names, rows)
+            rows = self._rows[mask]
+        part = _RecordColumns(self._values, self._seconds, self._form, self._offsets, self._names, rows)
         part._texts = {name: column[mask] for name, column in self._texts.items()}
         return part
 
@@ -208,14 +301,20 @@ class DataFlashLog:
     @cached_property
     def _channels(self) -> tuple[Channel, ...]:
         names = [name for name in sorted(self._formats) if self._count(name)]
-        return tuple(
-            Channel.over(name, self._formats[name][-1].code, self._count(name), float(t[-1] - t[0]))
-            for name, t in self._times(names, ends_only=True).items()
-        )
+        ends = {name: [(form, offsets[[0, -1]]) for form, offsets in self._parts(name)] for name in names}
+        times = iter(self._read_seconds([part for parts in ends.values() for part in parts]))
+        found = []
+        for name, parts in ends.items():
+            own = [next(times) for _ in parts]
+            span_s = float(own[-1][-1] - own[0][0])
+            found.append(Channel.over(name, self._formats[name][-1].code, self._count(name), span_s))
+        return tuple(found)
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
-        times = self._times([name for name in wanted if name in self._formats and self._count(name)])
-        return {name: Table(t, self._columns(name, wanted[name])) for name, t in times.items()}
+        parts = {name: self._parts(name) for name in wanted if name in self._formats and self._count(name)}
+        steady = [own[0] for own in parts.values() if len(own) == 1]
+        times = _Times(steady, self._read_seconds, limits.values_bytes(len(self._data)))
+        return {name: self._table(own, wanted[name], times) for name, own in parts.items()}
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
         return self._settings
@@ -241,7 +340,7 @@ class DataFlashLog:
     def _types(self, name: str) -> tuple[int, ...]:
         return tuple(dict.fromkeys(declared.type for declared in self._formats[name]))
 
-    def _parts(self, name: str) -> list[tuple[Format, Offsets]]:
+    def _parts(self, name: str) -> list[Part]:
         """The records of a message by the declaration that was in force, in file order."""
         parts = []
         for number in self._types(name):
@@ -251,37 +350,34 @@ class DataFlashLog:
             parts += list(zip(declared, np.split(offsets, cuts), strict=True))
         return [(form, offsets) for form, offsets in parts if len(offsets)]
 
-    def _columns(self, name: str, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
-        parts = self._parts(name)
+    def _table(self, parts: Sequence[Part], fields: Sequence[str], times: _Times) -> Table:
         known = [field for field in fields if any(field in form.fields for form, _ in parts)]
         if len(parts) == 1:
-            form, offsets = parts[0]
-            return _RecordColumns(self._values, form, offsets, known)
+            return Table(None, _RecordColumns(self._values, partial(times.of, parts[0]), *parts[0], known))
         data = self._data
-        return {
+        columns = {
             field: np.concatenate([
                 _decode(data, offsets, form.fields[field]) if field in form.fields else np.full(len(offsets), np.nan)
                 for form, offsets in parts
             ])
             for field in known
         }  # fmt: skip
+        return Table(np.concatenate(self._read_seconds(parts)), columns)
 
-    def _times(self, names: Iterable[str], *, ends_only: bool = False) -> dict[str, NDArray[np.float64]]:
-        """Seconds of the records of messages, or of the first and last of those of each declaration."""
-        found, timed = {}, []
-        for name in names:
-            parts = [(form, offsets[[0, -1]] if ends_only else offsets) for form, offsets in self._parts(name)]
-            t = found[name] = np.full(sum(len(offsets) for _, offsets in parts), np.nan)
-            ends = np.cumsum([len(offsets) for _, offsets in parts])
-            for (form, offsets), own in zip(parts, np.split(t, ends[:-1]), strict=True):
-                if form.time_field is not None:
-                    timed.append((form, offsets, own))
-                elif form.type != _FMT:
-                    own[:] = self._last_known_time(offsets)
+    def _read_seconds(self, parts: Sequence[Part]) -> list[Floats]:
+        """Seconds of records of several declarations."""
+        found, timed = [], []
+        for form, offsets in parts:
+            if form.time_field is not None:
+                t = np.empty(len(offsets))
+                timed.append((form, offsets, t))
+            else:
+                t = np.full(len(offsets), np.nan) if form.type == _FMT else self._last_known_time(offsets)
+            found.append(t)
         for near, piece in self._data.windows([offsets for _, offsets, _ in timed], _LONGEST_RECORD):
-            for (form, offsets, own), (rows, inner) in zip(timed, near, strict=True):
+            for (form, offsets, t), (rows, inner) in zip(timed, near, strict=True):
                 if len(inner):
-                    own[rows] = self._clock.seconds(_stamps(piece, inner, form), offsets[rows])
+                    t[rows] = self._clock.seconds(_stamps(piece, inner, form), offsets[rows])
         return found
 
     def _last_known_time(self, offsets: Offsets) -> NDArray[np.float64]:
@@ -350,6 +446,14 @@ class DataFlashLog:
         return summarised(found, "damaged places")
 
 
+def _key(part: Part) -> tuple[int, int]:
+    return part[0].type, part[0].byte
+
+
+def _seconds_bytes(part: Part) -> int:
+    return len(part[1]) * np.dtype(np.float64).itemsize
+
+
 def _find_headers(data: FileArray) -> tuple[Offsets, Bytes]:
     """Every place where the two header bytes stand with a type byte after them, true records or not; and that byte."""
     # A log can hold millions of records: four bytes a place do for all but the largest.
@@ -365,16 +469,16 @@ def _find_headers(data: FileArray) -> tuple[Offsets, Bytes]:
 
 def _of_each_type(starts: Offsets, types: Bytes) -> dict[int, Offsets]:
     """The records of each type."""
-    found: dict[int, bytearray] = {}
-    for low in range(0, len(starts), _PIECE):
-        own = types[low : low + _PIECE]
-        order = np.argsort(own, kind="stable")
-        counts = np.bincount(own, minlength=_MAX_TYPES)
-        there = np.flatnonzero(counts).tolist()
-        for number, offsets in zip(there, np.split(starts[low : low + _PIECE][order], np.cumsum(counts[there])[:-1]),
-                                   strict=True):  # fmt: skip
-            found.setdefault(number, bytearray()).extend(offsets.tobytes())
-    return {number: np.frombuffer(offsets, dtype=starts.dtype) for number, offsets in found.items()}
+    pieces = [slice(low, low + _PIECE) for low in range(0, len(starts), _PIECE)]
+    counts = np.array([np.bincount(types[rows], minlength=_MAX_TYPES) for rows in pieces]).reshape(-1, _MAX_TYPES)
+    total = counts.sum(axis=0)
+    found = {number: np.empty(total[number], dtype=starts.dtype) for number in np.flatnonzero(total).tolist()}
+    for rows, end, count in zip(pieces, np.cumsum(counts, axis=0), counts, strict=True):
+        order = np.argsort(types[rows], kind="stable")
+        there = np.flatnonzero(count).tolist()
+        for number, own in zip(there, np.split(starts[rows][order], np.cumsum(count[there])[:-1]), strict=True):
+            found[number][end[number] - count[number] : end[number]] = own
+    return found
 
 
 def _read_formats(data: FileArray, starts: Offsets, types: Bytes) -> tuple[list[Format], list[Damage]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -28,9 +30,11 @@ _WINDOW, _MOST_WINDOWS = 1 << 18, 8
 """Bytes read at most for records that lie apart: they stay in the processor's cache while they are picked out. So many
 times more where several lists are looked for: of each, some hundreds of records at once."""
 
-_KEPT = 31 << 20
-"""glibc returns what is freed to the system where no larger block was freed before (mallopt(3): M_MMAP_THRESHOLD, at
-most 32 MB). Taking the pages of each chunk anew costs ten times as much as unpacking lz4. Untouched, it needs none."""
+_MAPPED = 32 << 20
+"""glibc returns what is freed to the system where no larger block was freed before (mallopt(3): M_MMAP_THRESHOLD), and
+always above so many bytes."""
+_KEPT = _MAPPED - (1 << 20)
+"""Taking the pages of each chunk anew costs ten times as much as unpacking lz4. Untouched, it needs none."""
 
 WATCH: ContextVar[Callable[[int, int], None] | None] = ContextVar("WATCH", default=None)
 """Who is told, while files are read in this thread, the byte that was come to and the size of the file."""
@@ -205,6 +209,12 @@ class FileArray:
                 piece = np.append(piece, np.zeros(high - there, dtype=np.uint8))
             yield near, piece
             first = last
+
+
+def give_back(size: int) -> None:
+    """Give the system what was freed, ahead of so many bytes that never take its place."""
+    if size > _MAPPED and sys.platform == "linux" and (trim := getattr(ctypes.CDLL(None), "malloc_trim", None)):
+        trim(0)
 
 
 def stored_in(piece: Bytes, places: Offsets, kind: Stored) -> NDArray[Any]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from care_core import limits
 from care_core.application import pace as watched
@@ -20,6 +21,7 @@ from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 
 PICTURES, SMALL = 12, 5
+FLIGHT = Path(__file__).parents[2] / "samples" / "arducopter_failed.BIN"
 FIELDS = {"/odom": ("pose.pose.position.x",)}
 
 
@@ -221,3 +223,26 @@ def test_work_that_is_taken_back_ends_inside_a_file(tmp_path: Path, monkeypatch:
         inner("opening the log", 0.0)
         with pytest.raises(TakenBack):
             open_log(path)
+
+
+def test_what_is_held_of_a_dataflash_log_changes_no_value(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a log that is held whole and of one of which some bytes are: the same times and columns, of all rows, of a
+    stretch, of every third, of those of a mask, and of a stretch of these."""
+    wanted = {"ATT": ("Roll", "Pitch", "DesRoll"), "XKF4": ("C", "SV"), "MSG": ("Message",), "FMT": ("Name",)}
+    held = open_log(FLIGHT).read(wanted)
+    for name in ("HELD_BYTES", "VALUES_BYTES", "LEAST_VALUES_BYTES"):
+        monkeypatch.setattr(limits, name, 64)
+    read = open_log(FLIGHT).read(wanted)
+    assert read.keys() == held.keys() == wanted.keys()
+    for name, fields in wanted.items():
+        own, other = held[name], read[name]
+        mask = np.arange(len(own)) % 5 > 1
+        rows: list[slice | NDArray[np.bool_]] = [slice(None), slice(7, 20), slice(2, None, 3), slice(0, 0)]
+        rows += [mask, np.zeros(len(own), dtype=bool)]
+        pairs = [(own.where(some), other.where(some)) for some in rows]
+        pairs.append((own.where(mask).where(slice(3, 9)), other.where(mask).where(slice(3, 9))))
+        for one, two in pairs:
+            assert len(one) == len(two) == len(two.t)
+            np.testing.assert_array_equal(one.t, two.t)
+            for field in fields:
+                np.testing.assert_array_equal(one[field], two[field])

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from care_core.health.ardupilot.measure import smooth
+from care_core.health.ardupilot.measure import means, smooth
 from care_core.health.moments import gaps
 from care_core.logs.base import Table
 from care_core.numbers import Floats, known_median, median, pauses, quantile
@@ -83,3 +83,15 @@ def test_nothing_has_no_median() -> None:
 def test_whole_and_single_numbers_too(values: Any) -> None:
     assert median(values) == np.median(values)
     assert quantile(values, 0.3) == pytest.approx(float(np.quantile(values, 0.3)))
+
+
+@settings(deadline=None, max_examples=30)
+@given(
+    st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=60), st.lists(st.integers(0, 60), max_size=5), st.integers(0, 9)
+)
+def test_means_are_the_same_wherever_rows_are_cut(values: list[float], cuts: list[int], half: int) -> None:
+    x = np.array([values, values[::-1]])
+    whole = np.concatenate([*means([x], 2 * half + 1)], axis=1)
+    in_parts = np.concatenate([*means(np.split(x, sorted(cuts), axis=1), 2 * half + 1)], axis=1)
+    assert whole.shape == x.shape
+    np.testing.assert_array_equal(in_parts, whole)

@@ -106,14 +106,14 @@ def test_a_disarming_by_force_in_the_air_fails() -> None:
     level = HOME[1] + 1e-7 * np.sin(at)
     up = {"Lat": np.full_like(at, north(0)), "Lng": level, "RelHomeAlt": np.where(at > 12, 20.0, 0.0)}
     forced = table([(10.0, 1, 0), (70.0, 0, 1)], "ArmState", "Forced")
-    found = checks(flown(mode=5, ARM=forced, POS=replace(flight()["POS"], t=at, columns=up)))
+    found = checks(flown(mode=5, ARM=forced, POS=replace(flight()["POS"], times=at, columns=up)))
     assert found["landed"] == found["disarmed"] == 0.0
 
 
 def test_armed_on_the_ground_alone_is_neither_good_nor_bad() -> None:
     at = np.arange(0.0, 75.0, 0.5)
     still = {"Lat": np.full_like(at, north(0)), "Lng": HOME[1] + 1e-7 * np.sin(at), "RelHomeAlt": 0.01 * np.sin(at)}
-    found = checks(flown(mode=0, POS=replace(flight()["POS"], t=at, columns=still)))
+    found = checks(flown(mode=0, POS=replace(flight()["POS"], times=at, columns=still)))
     assert not is_known(found["took_off"])
     assert not is_known(found["landed"])
 
@@ -121,7 +121,7 @@ def test_armed_on_the_ground_alone_is_neither_good_nor_bad() -> None:
 def test_old_logs_tell_heights_otherwise_and_modes_by_name() -> None:
     at = np.arange(0.0, 75.0, 0.5)
     height = np.interp(at, [10, 20, 60, 70], [0, 30, 30, 0])
-    barometer = replace(flight()["POS"], t=at, columns={"BarAlt": 412.0 + height})
+    barometer = replace(flight()["POS"], times=at, columns={"BarAlt": 412.0 + height})
     named = table([(0.0, "STABILIZE")], "Mode")
     tables = flight(MODE=named, POS=None, CTUN=barometer)
     (mission,) = KIND.missions(tables, 75.0, {})
@@ -149,7 +149,7 @@ def test_motors_are_those_of_the_vehicle() -> None:
     """A hexacopter has six; its fifth at the limit is saturation, which four columns do not show."""
     at = np.arange(0.0, 75.0, 0.5)
     outputs = {f"C{n}": np.full_like(at, 1500.0) for n in range(1, 9)} | {"C5": np.full_like(at, 1960.0)}
-    tables = flight(RCOU=replace(flight()["POS"], t=at, columns=outputs))
+    tables = flight(RCOU=replace(flight()["POS"], times=at, columns=outputs))
     (mission,) = KIND.missions(tables, 75.0, {})
     assert value(mission, "motor_saturation") == 0.0
     hexa = {f"SERVO{n}_FUNCTION": 32.0 + n for n in range(1, 7)}

@@ -300,9 +300,10 @@ def _flown(flight: Flight) -> Iterator[Moment]:
 
 def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | None:
     """When a vehicle that flies was highest while armed, and how high."""
-    if flight.height is None or flight.vehicle.kind in ("rover", "sub"):
+    known = flight.height
+    if known is None or flight.vehicle.kind in ("rover", "sub"):
         return None
-    t, height = flight.height
+    t, height = known
     inside = np.flatnonzero((t >= start) & (t <= end) & np.isfinite(height))
     if not len(inside):
         return None
@@ -376,8 +377,8 @@ def _end(flight: Flight) -> Iterator[Moment]:
     if not is_armed:
         return
     where = ""
-    if flight.height is not None and flies(flight.vehicle.kind):
-        t, height = flight.height
+    if flies(flight.vehicle.kind) and (told := flight.height) is not None:
+        t, height = told
         known = np.isfinite(height)
         if known.any() and t[known][-1] > flight.end_s - 5.0 and height[known][-1] > _IN_AIR_M:
             where = f" in the air, {height[known][-1]:.0f} m up"

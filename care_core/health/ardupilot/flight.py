@@ -7,7 +7,7 @@ not hold is None or empty, and the checks that need it find nothing.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import field
 from functools import cached_property
 from typing import TypeVar
@@ -258,22 +258,30 @@ class Flight:
         up = np.flatnonzero(throttle[1] > 0.05)
         return ((float(throttle[0][up[0]]), float(throttle[0][up[-1]])),) if len(up) else ()
 
-    @cached_property
+    @property
     def throttle(self) -> tuple[Floats, Floats] | None:
-        """Time and throttle out (0 to 1) of the motors together."""
+        """Time and throttle out (0 to 1) of the motors together. Read each time: of a large log not all is held."""
         table = self.one("CTUN", "ThO")
         return None if table is None else (table.t, table["ThO"])
 
-    @cached_property
+    @property
     def height(self) -> tuple[Floats, Floats] | None:
         """Time and height (m) above where it was armed, as estimated by the vehicle."""
+        if self._height is None:
+            return None
+        table, column, zero = self._height
+        return table.t, table[column] - zero
+
+    @cached_property
+    def _height(self) -> tuple[Table, str, float] | None:
+        """The message and the field that tell the height, and what they say where it was armed."""
         for name, column in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt")):
             table = self.one(name, column)
             if table is not None and len(table) > 1 and np.ptp(table[column]) > 0:
                 start = self.armed[0][0] if self.armed else 0.0
                 before = table[column][table.t <= start + 1.0]
                 zero = float(median(before[-20:])) if len(before) else float(table[column][0])
-                return table.t, table[column] - (zero if abs(zero) < 50 or name == "CTUN" else 0.0)
+                return table, column, zero if abs(zero) < 50 or name == "CTUN" else 0.0
         return None
 
     @cached_property
@@ -281,16 +289,18 @@ class Flight:
         """Spans in the air: armed, and higher than a metre or lifted by more than half of what hovering takes."""
         if not self.is_copter:
             return self.armed
-        if self.throttle is None and self.height is None:
+        throttle, height = self.throttle, self.height
+        if throttle is None and height is None:
             return ()
-        t = self.throttle[0] if self.throttle is not None else self.height[0]  # type: ignore[index]
+        t = throttle[0] if throttle is not None else height[0]  # type: ignore[index]
         up = np.zeros(len(t), dtype=bool)
-        if self.height is not None:
-            up |= np.interp(t, *self.height) > _AIRBORNE_M
-        if self.throttle is not None:
-            up &= self.throttle[1] > 0.02
-            if self.height is None:
-                up |= self.throttle[1] > 0.25
+        if height is not None:
+            for rows in pieces(len(t)):
+                up[rows] = np.interp(t[rows], *height) > _AIRBORNE_M
+        if throttle is not None:
+            up &= throttle[1] > 0.02
+            if height is None:
+                up |= throttle[1] > 0.25
         spans: list[Span] = []
         for start, end in self.armed:
             spans += runs(t, up & (t >= start) & (t <= end), gap_s=3.0)
@@ -315,30 +325,25 @@ class Flight:
             inside |= (t >= start) & (t <= end)
         return inside
 
-    @cached_property
+    @property
     def lean_error(self) -> tuple[Floats, Floats] | None:
         """Time and angle (degrees) between the thrust direction wanted and the one there is."""
-        table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
-        if table is None:
-            return None
-        columns = [table[field] for field in ("Roll", "Pitch", "DesRoll", "DesPitch")]
-        error = np.empty(len(table))
-        for rows in pieces(len(table)):
-            roll, pitch, wanted_roll, wanted_pitch = (column[rows] for column in columns)
-            aligned = (_up(roll, pitch) * _up(wanted_roll, wanted_pitch)).sum(axis=0)
-            error[rows] = np.degrees(np.arccos(np.clip(aligned, -1.0, 1.0)))
-        return table.t, error
+        return None if self._lean_error is None else (self._lean_error[0].t, self._lean_error[1])
 
     @cached_property
+    def _lean_error(self) -> tuple[Table, Floats] | None:
+        table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+        return None if table is None else (table, np.concatenate([*map(_off_demand, parts(table))]))
+
+    @property
     def tilt(self) -> tuple[Floats, Floats] | None:
         """Time and lean from level (degrees)."""
+        return None if self._tilt is None else (self._tilt[0].t, self._tilt[1])
+
+    @cached_property
+    def _tilt(self) -> tuple[Table, Floats] | None:
         table = self.one("ATT", "Roll", "Pitch")
-        if table is None:
-            return None
-        roll, pitch, lean = table["Roll"], table["Pitch"], np.empty(len(table))
-        for rows in pieces(len(table)):
-            lean[rows] = np.degrees(np.arccos(_up(roll[rows], pitch[rows])[2]))
-        return table.t, lean
+        return None if table is None else (table, np.concatenate([*map(_off_level, parts(table))]))
 
     @cached_property
     def lost_control_s(self) -> float | None:
@@ -346,18 +351,22 @@ class Flight:
         back within limits before the end, the ground, or the disarming."""
         if self.vehicle.kind in _WINGED:
             return self._tumbled_s
-        if not self.is_copter or self.lean_error is None or self.tilt is None:
+        if not self.is_copter:
             return None
-        t, error = self.lean_error
-        off = (error > _OUT_OF_CONTROL_DEG) | (self.tilt[1] > _OVER_DEG)
         up = self.airborne
+        leans, off_demand = self.tilt, self.lean_error
+        if leans is None or off_demand is None:
+            return None
+        t, error = off_demand
+        off = (error > _OUT_OF_CONTROL_DEG) | (leans[1] > _OVER_DEG)
         before_flight = t < (up[0][0] if up else math.inf)
         matters = self.during(((start - 1.0, end) for start, end in up), t) | before_flight
         flying = self.during(up, t)
         held = (error < _HELD_DEG) & flying
         back = runs(t, held, gap_s=0.5)
+        height = self.height
         for start, end in runs(t, off & matters & self._is_driven(t)):
-            fell_s = self._fell_from(start)
+            fell_s = self._fell_from(start, height)
             until = start + _CRASH_CHECK_S if fell_s is None else fell_s
             stays = off[(t >= start) & (t <= until)].mean() > 0.6  # else it swings
             brief = end - start < 0.5 and end < t[-1] - 2.0 and end < self.armed[-1][1] - 2.0
@@ -373,9 +382,10 @@ class Flight:
     def _tumbled_s(self) -> float | None:
         """When a plane left its demand for good, to turn over, in a mode that levels it."""
         table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
-        if table is None or self.lean_error is None:
+        off_demand = self.lean_error
+        if table is None or off_demand is None:
             return None
-        t, error = self.lean_error
+        t, error = off_demand
         levels = ~np.isin(self.modes_at(t), tuple(_ROLLS))
         off = (error > _TUMBLING_DEG) & levels & self.during(self.armed, t)
         over = t[(np.abs(table["Roll"]) > UPSIDE_DOWN_DEG) & off]
@@ -384,19 +394,21 @@ class Flight:
                 return start
         return None
 
-    def _fell_from(self, start: float) -> float | None:
+    def _fell_from(self, start: float, height: tuple[Floats, Floats] | None) -> float | None:
         """When it was down, if it came down from a height sooner than the firmware's check takes to call it a crash:
         what the attitude does on the ground says nothing."""
-        if self.height is None or float(np.interp(start, *self.height)) < _GROUND_M:
+        if height is None or float(np.interp(start, *height)) < _GROUND_M:
             return None
         return next((b for a, b in self.airborne if a <= start <= b < start + _CRASH_CHECK_S), None)
 
     def _is_driven(self, t: Floats) -> Mask:
         """Where the motors were to lift it, in a mode in which not every attitude is meant."""
-        driven = self.during(self.armed, t)
-        if self.throttle is not None:
-            driven &= np.interp(t, *self.throttle) > _LIFTING
-        return np.asarray(driven & ~np.isin(self.modes_at(t), tuple(_ACRO)))
+        driven, throttle = self.during(self.armed, t), self.throttle
+        for rows in pieces(len(t)):
+            driven[rows] &= ~np.isin(self.modes_at(t[rows]), tuple(_ACRO))
+            if throttle is not None:
+                driven[rows] &= np.interp(t[rows], *throttle) > _LIFTING
+        return driven
 
     @cached_property
     def impact_s(self) -> float | None:
@@ -418,9 +430,10 @@ class Flight:
 
     def _flies_on(self, at: float) -> bool:
         """Whether it still climbs well after: what shook it, or brought it low, was not the end of the flight."""
-        if self.height is None:
+        known = self.height
+        if known is None:
             return False
-        t, height = self.height
+        t, height = known
         after = height[t >= at + _BACK_S]
         return len(after) > 0 and float(after.max()) - float(np.interp(at, t, height)) > _CLIMBS_M
 
@@ -439,9 +452,10 @@ class Flight:
         return float(table.t[hit][0]) if hit.any() else None
 
     def _ground_after(self, first: float) -> float | None:
-        if self.height is None:
+        known = self.height
+        if known is None:
             return None
-        t, height = self.height
+        t, height = known
         low = (t >= first) & (height < _GROUND_M)
         return float(t[low][0]) if low.any() else None
 
@@ -458,16 +472,17 @@ class Flight:
         """Spans well above the ground, before it was lost, in which a copter that was struck leans as it is told and
         yet stands: something holds it."""
         moved = self.one("GPS", "Spd")
-        if not self.is_copter or moved is None or self.tilt is None or self.lean_error is None or self.height is None:
+        if not self.is_copter or moved is None or not self.flown:
             return ()
-        if not self.flown:
+        tilt, error, height = self.tilt, self.lean_error, self.height
+        if tilt is None or error is None or height is None:
             return ()
         begin = self.flown[0][0]
         clips = (one.t[1:][(np.diff(one["Clip"]) > 0) & (one.t[1:] > begin)] for one in self.all("VIBE", "Clip"))
         blows = [*(float(t[0]) for t in clips if len(t)), self.shock_after(begin)]
         struck = min((t for t in blows if t is not None), default=math.inf)
-        leans = (np.interp(moved.t, *self.tilt) > _LEANS_DEG) & (np.interp(moved.t, *self.height) > _AIRBORNE_M)
-        leans &= np.interp(moved.t, *self.lean_error) < _HELD_DEG
+        leans = (np.interp(moved.t, *tilt) > _LEANS_DEG) & (np.interp(moved.t, *height) > _AIRBORNE_M)
+        leans &= np.interp(moved.t, *error) < _HELD_DEG
         stands = (moved["Spd"] < STANDS_MS) & (moved.t > struck) & self.during(self.flown, moved.t)
         return tuple((a, b) for a, b in runs(moved.t, leans & stands, gap_s=1.0) if b - a >= _HELD_S)
 
@@ -511,11 +526,25 @@ class Flight:
         if table is None:
             return None
         steady = self.during(self.airborne, table.t)
-        if self.tilt is not None:
-            steady &= np.interp(table.t, *self.tilt) < 25.0
+        if (tilt := self.tilt) is not None:
+            steady &= np.interp(table.t, *tilt) < 25.0
         if self.impact_s is not None:
             steady &= table.t < self.impact_s
         return steady
+
+
+def parts(table: Table) -> Iterator[Table]:
+    """The messages piece by piece: of a long log no more than one piece of a column is decoded."""
+    return (table.where(rows) for rows in pieces(len(table)))
+
+
+def _off_demand(part: Table) -> Floats:
+    aligned = (_up(part["Roll"], part["Pitch"]) * _up(part["DesRoll"], part["DesPitch"])).sum(axis=0)
+    return np.asarray(np.degrees(np.arccos(np.clip(aligned, -1.0, 1.0))))
+
+
+def _off_level(part: Table) -> Floats:
+    return np.asarray(np.degrees(np.arccos(_up(part["Roll"], part["Pitch"])[2])))
 
 
 def _up(roll: Floats, pitch: Floats) -> Floats:

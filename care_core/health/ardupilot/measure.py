@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -42,15 +42,40 @@ def smooth(t: Floats, x: Floats, width_s: float) -> Floats:
     """Mean over a window of `width_s` around each record, shape of x; at least three records wide."""
     if len(t) < 3:
         return x
-    n = _records(t, width_s)
-    total = np.empty(len(x) + n)
-    ahead = n // 2 + 1
-    total[0], total[1:ahead], total[ahead : ahead + len(x)], total[ahead + len(x) :] = 0.0, x[0], x, x[-1]
-    del x  # nobody else holds it where it was made for this
-    np.cumsum(total, out=total)
-    for rows in pieces(len(t)):  # a mean takes the place of the sum that nothing else needs any more
-        total[rows] = (total[rows.start + n : rows.stop + n] - total[rows]) / n
-    return total[: len(t)]
+    found, at = np.empty(len(x)), 0
+    for mean in means((x[rows] for rows in pieces(len(x))), records(t, width_s)):
+        found[at : at + len(mean)] = mean
+        at += len(mean)
+    return found
+
+
+def means(parts: Iterable[Floats], n: int) -> Iterator[Floats]:
+    """Means over n records, an odd number, around each of those that come part by part along the last axis; ahead of
+    the first and behind the last stands what these say. As many come out as go in, the last later: no more is held than
+    a window and a part."""
+    total = np.zeros(1)
+    for part in _framed(parts, n // 2):
+        if total.ndim < part.ndim:
+            total = np.zeros((*part.shape[:-1], 1))
+        following = np.concatenate((total[..., -1:], part), axis=-1)
+        np.cumsum(following, axis=-1, out=following)
+        total = np.concatenate((total, following[..., 1:]), axis=-1)
+        if total.shape[-1] > n:
+            yield (total[..., n:] - total[..., :-n]) / n
+            total = total[..., -n:]
+
+
+def _framed(parts: Iterable[Floats], count: int) -> Iterator[Floats]:
+    """The parts, with so many copies of the first record ahead of them and of the last behind."""
+    last = None
+    for part in parts:
+        if part.shape[-1]:
+            if last is None:
+                yield np.repeat(part[..., :1], count, axis=-1)
+            yield part
+            last = part[..., -1:]
+    if last is not None:
+        yield np.repeat(last, count, axis=-1)
 
 
 def steady(t: Floats, x: Floats, width_s: float) -> Floats:
@@ -58,7 +83,7 @@ def steady(t: Floats, x: Floats, width_s: float) -> Floats:
     only so many records are looked at that a window holds a few dozen."""
     if len(t) < 3:
         return x
-    n = _records(t, width_s)
+    n = records(t, width_s)
     if n > 2 * _DOZENS:
         few = slice(None, None, n // _DOZENS)
         return np.interp(t, t[few], steady(t[few], x[few], width_s))
@@ -67,7 +92,7 @@ def steady(t: Floats, x: Floats, width_s: float) -> Floats:
     return middle
 
 
-def _records(t: Floats, width_s: float) -> int:
+def records(t: Floats, width_s: float) -> int:
     """How many of at least three records, an odd number, lie in a window of `width_s`."""
     step = max(float(median(np.diff(t), in_place=True)), 1e-6)
     return min(max(round(width_s / step) | 1, 3), len(t) if len(t) % 2 else len(t) - 1)

@@ -95,6 +95,14 @@ class _Today(LazyColumns):
         column = self._table[source]
         return column if divisor == 1 else column / divisor
 
+    @property
+    def count(self) -> int:
+        return len(self._table)
+
+    @property
+    def t(self) -> Floats:
+        return self._table.t
+
     def kind(self, name: str) -> Kind:
         return self._table.kind(self._sources[name][0])
 
@@ -117,7 +125,7 @@ def _renamed(name: str, table: Table) -> Table:
                 sources[field] = (sources[field][0], _PERCENT if field in table.columns else 1000.0)
         if "Alt" not in sources and "BAlt" in sources:
             sources["Alt"] = sources["BAlt"]
-    found = Table(table.t, _Today(table, sources))
+    found = Table(None, _Today(table, sources))
     keep = np.isfinite(table.t)
     return found if keep.all() else found.where(keep)
 

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.health.ardupilot.checks.thrust import saturated
-from care_core.health.ardupilot.flight import STANDS_MS, UPSIDE_DOWN_DEG, Flight, Mask, Span
-from care_core.health.ardupilot.measure import lasting, smooth, top
+from care_core.health.ardupilot.flight import STANDS_MS, UPSIDE_DOWN_DEG, Flight, Mask, Span, parts
+from care_core.health.ardupilot.measure import lasting, means, records, top
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
 from care_core.logs.base import Table, Wanted
@@ -36,6 +36,8 @@ _LIES_S, _BEFORE_S = 5.0, 10.0
 SWING_DPS, OVER_DEMAND = 30.0, 3.0
 """degrees/s; how many times the demand's own movement."""
 _SWING_S, _ENOUGH = 5.0, 10
+_WINDOW_S = 3.0
+"""What is a swing of a rate comes and goes within it."""
 _ALL = 1.0
 """All that the motors have for one axis (AP_Motors.h: roll and pitch run from -1 to 1)."""
 _ALL_STEERING = 4500.0
@@ -139,8 +141,7 @@ def _swings(flight: Flight) -> Iterator[Finding]:
     table = flight.one("RATE", "R", "P", "RDes", "PDes")
     if table is None:
         return
-    t = table.t
-    flown = flight.during(flight.flown, t)
+    flown = flight.during(flight.flown, table.t)
     if flown.sum() < _ENOUGH:
         return
     found = []
@@ -193,23 +194,35 @@ def _unasked(
 
     `limit` names the controller's output and the most that the vehicle can give.
     """
-    level = smooth(table.t, np.abs(table[rate] - table[wanted]), 3.0)
-    far = where & (level > SWING_DPS)
+    if len(table) < 3:
+        return [], 0.0
+    n = records(table.t, _WINDOW_S)
+
+    def level() -> Iterator[Floats]:
+        return means((np.abs(part[rate] - part[wanted]) for part in parts(table)), n)
+
+    def demand() -> Iterator[Floats]:
+        return means((np.abs(part[wanted]) for part in parts(table)), n)
+
+    far = where & np.concatenate([swing > SWING_DPS for swing in level()])
     if not far.any():
         return [], 0.0
-    over = level > OVER_DEMAND * smooth(table.t, np.abs(table[wanted]), 3.0)
-    spans = lasting(table.t, far & (over | _exhausted(table, *limit)), _SWING_S)
+    over = [swing > OVER_DEMAND * asked for swing, asked in zip(level(), demand(), strict=True)]
+    spans = lasting(table.t, far & (np.concatenate(over) | _exhausted(table, n, *limit)), _SWING_S)
     if not spans:
         return [], 0.0
     swung = flight.during(spans, table.t)
-    return (spans, top(level[swung], 0.9)) if _to_and_fro((table[rate] - table[wanted])[swung]) else ([], 0.0)
+    if not _to_and_fro((table[rate] - table[wanted])[swung]):
+        return [], 0.0
+    return spans, top(np.concatenate(list(level()))[swung], 0.9)
 
 
-def _exhausted(table: Table, output: str, most: float) -> Mask:
+def _exhausted(table: Table, n: int, output: str, most: float) -> Mask:
     """Where the controller asks for more than the vehicle can give: then the demand swings with it."""
     if output not in table.columns:
         return np.zeros(len(table), dtype=bool)
-    return smooth(table.t, np.abs(table[output]), 3.0) > most
+    asked = means((np.abs(part[output]) for part in parts(table)), n)
+    return np.concatenate([level > most for level in asked])
 
 
 def _to_and_fro(error: Floats) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.health.ardupilot.flight import Flight, Mask
+from care_core.health.ardupilot.flight import Flight, Mask, parts
 from care_core.health.ardupilot.measure import Calibration, aligned, lasting, likely, roughness, smooth
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
@@ -90,14 +90,18 @@ def _contradicted(flight: Flight) -> Iterator[Finding]:
     ranger = _first(flight, ("RFND", "Dist"), ("CTUN", "SAlt"))
     if baro is None or ranger is None or not flies(flight.vehicle.kind):
         return
-    (_, t, height), (table, at, distance) = baro, ranger
-    near = (distance > _NO_RANGE_M) & (distance < _LOW_M) & _where_it_began(flight, at)
+    (heard, height), (table, distance) = baro, ranger
+    near = (table[distance] > _NO_RANGE_M) & (table[distance] < _LOW_M)
     if "Stat" in table.columns:
         near &= table["Stat"] == _RANGE_GOOD
-    if near.sum() < 20 or np.ptp(distance[near]) == 0:
+    if near.sum() < 20:
         return
-    at, distance = at[near], distance[near]
-    apart = np.interp(at, t, height) - distance
+    near &= _where_it_began(flight, table.t)
+    low = table.where(near)
+    if len(low) < 20 or np.ptp(low[distance]) == 0:
+        return
+    at = low.t
+    apart = np.interp(at, heard.t, heard[height]) - low[distance]
     apart = smooth(at, apart - median(apart[: max(len(apart) // 20, 3)]), 3.0)
     spans = lasting(at, np.abs(apart) > APART_M, _LASTS_S, gap_s=5.0)
     if spans:
@@ -110,13 +114,10 @@ def _contradicted(flight: Flight) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _first(flight: Flight, *places: tuple[str, str]) -> tuple[Table, Floats, Floats] | None:
-    """The first of these messages and fields that the log holds: the message, its times, the field's values."""
-    for name, field in places:
-        table = flight.one(name, field)
-        if table is not None:
-            return table, table.t, table[field]
-    return None
+def _first(flight: Flight, *places: tuple[str, str]) -> tuple[Table, str] | None:
+    """The first of these messages and fields that the log holds."""
+    told = ((flight.one(name, field), field) for name, field in places)
+    return next(((table, field) for table, field in told if table is not None), None)
 
 
 def _where_it_began(flight: Flight, t: Floats) -> Mask:
@@ -124,14 +125,21 @@ def _where_it_began(flight: Flight, t: Floats) -> Mask:
     track = flight.one("POS", "Lat", "Lng")
     if track is None:
         return np.ones(len(t), dtype=bool)
-    north = (track["Lat"] - track["Lat"][0]) * _METRES_PER_DEGREE
-    east = (track["Lng"] - track["Lng"][0]) * _METRES_PER_DEGREE * np.cos(np.radians(track["Lat"][0]))
-    return np.asarray(np.interp(t, track.t, np.hypot(north, east)) < _BEGAN_M)
+    first = track.where(slice(0, 1))
+    lat, lng = float(first["Lat"][0]), float(first["Lng"][0])
+
+    def away(part: Table) -> Floats:
+        north = (part["Lat"] - lat) * _METRES_PER_DEGREE
+        east = (part["Lng"] - lng) * _METRES_PER_DEGREE * np.cos(np.radians(lat))
+        return np.asarray(np.hypot(north, east))
+
+    return np.asarray(np.interp(t, track.t, np.concatenate([*map(away, parts(track))])) < _BEGAN_M)
 
 
 def _noise(flight: Flight, t: Floats, height: Floats) -> Floats:
     """Roughness of the height beside what the vehicle's own estimate explains, shape of `height`."""
-    moved = np.interp(t, *flight.height) if flight.height is not None else np.zeros(len(t))
+    known = flight.height
+    moved = np.interp(t, *known) if known is not None else np.zeros(len(t))
     return np.minimum(smooth(t, roughness(height - moved), 10.0), smooth(t, roughness(height), 10.0))
 
 

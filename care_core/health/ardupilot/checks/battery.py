@@ -99,8 +99,8 @@ def _pack(flight: Flight, table: Table) -> Iterator[Finding]:
 def _at_rest(flight: Flight, t: Floats, volts: Floats) -> float | None:
     """The voltage before motors draw anything: until they lift, or all of a log that never flew."""
     until = flight.armed[0][0] + 1.0 if flight.armed else flight.end_s
-    if flight.throttle is not None:
-        at, throttle = flight.throttle
+    if (driven := flight.throttle) is not None:
+        at, throttle = driven
         lifting = at[(throttle > 0.05) & flight.during(flight.armed, at)]
         until = float(lifting[0]) if len(lifting) else until
     before = volts[t <= until]

@@ -163,11 +163,12 @@ def _refused(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
 
 def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     """A field whose length follows the throttle."""
-    if flight.throttle is None:
+    driven = flight.throttle
+    if driven is None:
         return
     first = compasses[0]
     strength = length(first[axis] for axis in AXES)
-    throttle = np.interp(first.t, *flight.throttle)
+    throttle = np.interp(first.t, *driven)
     usable: Mask = np.isfinite(strength) & (strength > 1.0)
     if usable.sum() < 20 or np.ptp(throttle[usable]) < 0.15:
         return

@@ -64,14 +64,15 @@ def _tipped(flight: Flight, at: float) -> bool:
     span = next(((a, b) for a, b in flight.armed if a <= at <= b + 3), None)
     if span is None or not flight.is_copter:
         return False
-    if flight.height is not None:
-        t, height = flight.height
+    known, driven = flight.height, flight.throttle
+    if known is not None:
+        t, height = known
         before = height[(t >= span[0]) & (t <= at)]
         if len(before) and float(np.max(before)) > _LOW_M:
             return False
-    if flight.throttle is None:
-        return flight.height is not None
-    t, throttle = flight.throttle
+    if driven is None:
+        return known is not None
+    t, throttle = driven
     up = t[(t >= span[0]) & (t <= at) & (throttle > 0.15)]
     return bool(len(up)) and at - float(up[0]) < _TAKEOFF_S
 

@@ -29,11 +29,11 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _holes(flight: Flight) -> Iterator[Finding]:
-    streams = [table.t for name in _STEADY if (table := flight.one(name)) is not None and len(table) > 20]
+    streams = [table for name in _STEADY if (table := flight.one(name)) is not None and len(table) > 20]
     if not streams or flight.clock_jumps:
         return
-    limit = max(_HOLE_S, _TIMES * float(median(np.diff(streams[0]))))
-    low, high = pauses(streams, limit)
+    limit = max(_HOLE_S, _TIMES * float(median(np.diff(streams[0].t))))
+    low, high = pauses((table.t for table in streams), limit)
     inside = _inside(flight, low, high)
     low, high = low[inside], high[inside]
     if len(low):
@@ -67,16 +67,17 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         return
     if flight.arm_changes and not flight.arm_changes[-1][1]:
         return  # it was disarmed with its last record
-    high = flight.height is not None and float(median(flight.height[1][-3:])) > _HIGH_M
-    up = flight.throttle is not None and float(median(flight.throttle[1][-3:])) > 0.2
-    if not (flight.is_copter and high and (up or flight.throttle is None)):
+    throttle, height = flight.throttle, flight.height
+    if not flight.is_copter or height is None:
         return
-    height = f" {float(median(flight.height[1][-3:])):.0f} m up" if flight.height is not None else ""
+    last_m = float(median(height[1][-3:]))
+    if not last_m > _HIGH_M or not (throttle is None or float(median(throttle[1][-3:])) > 0.2):
+        return
     sagging = _supply_falls(flight)
     yield Finding(
         "battery" if sagging else "log", "power was lost in the air" if sagging else "the log ends in the air",
         flight.end_s, flight.end_s, "critical" if sagging else "warning",
-        f"armed{height} at the last record: " + (sagging or "power was lost or the recording was stopped"),
+        f"armed {last_m:.0f} m up at the last record: " + (sagging or "power was lost or the recording was stopped"),
         "EV, ARM, CTUN, POS, POWR", probability=0.7 if sagging else 0.4,
     )  # fmt: skip
 

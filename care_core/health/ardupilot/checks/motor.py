@@ -8,17 +8,18 @@ a second (thrust_loss_check of crash_check.cpp), and a controller with telemetry
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_core.frozen import dataclass
 from care_core.health.ardupilot.flight import Flight, Mask
-from care_core.health.ardupilot.measure import Calibration, lasting, likely, smooth
+from care_core.health.ardupilot.measure import Calibration, lasting, likely, means, records
 from care_core.health.ardupilot.signals import Floats
 from care_core.health.records import Finding, Severity
-from care_core.logs.base import Wanted
+from care_core.logs.base import Table, Wanted
 from care_core.numbers import median, pieces, quantile
 from care_core.vehicles import Motor, motors_of
 
@@ -38,6 +39,7 @@ _ROOM, _ROOM_FLYING = 0.7, 0.85
 """Peers above this share are near their limit themselves: then there is too little thrust, not one weak motor."""
 _STEADY = 2.0
 """Least ratio of the excess to its own swings: all motors of a vehicle that oscillates are up in turn."""
+_WINDOW_S = 4.0
 _STAYS = 0.7
 """A weak motor stays weak: for so much of the flight that is left."""
 _LASTS_S = 4.0
@@ -58,11 +60,24 @@ _SOURCE = "RCOU of each motor against the middle of the others"
 
 @dataclass(frozen=True, eq=False)
 class _Outputs:
-    """What the motors were asked for while lifting. `share` has shape (motors, n): 0 idle, 1 the most it may give."""
+    """What the motors were asked for, microseconds from the least to the most."""
 
     motors: tuple[Motor, ...]
-    t: Floats
-    share: NDArray[np.float64]
+    table: Table
+    least: float
+    most: float
+
+    @property
+    def t(self) -> Floats:
+        return self.table.t
+
+    def share(self, rows: Mask | slice) -> NDArray[np.float64]:
+        """What was asked in these rows, shape (motors, n): 0 idle, 1 the most it may give."""
+        part = self.table.where(rows)
+        share = np.array([part[_column(motor)] for motor in self.motors])
+        share -= self.least
+        share /= self.most - self.least
+        return np.clip(share, 0.0, 1.0, out=share)
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -82,18 +97,17 @@ def _outputs(flight: Flight) -> _Outputs | None:
     if table is None or not flight.is_copter:
         return None
     motors = motors_of(flight.settings, flight.outputs) or _nameless(table.columns)
-    columns = [f"C{motor.output}" for motor in motors]
+    columns = [_column(motor) for motor in motors]
     if len(columns) < 3 or not all(column in table.columns for column in columns):
         return None
-    share = np.empty((len(columns), len(table)))
-    for row, column in zip(share, columns, strict=True):
-        row[:] = table[column]
-    low, high = _range(flight, share)
+    low, high = _range(flight, float(np.max([np.max(table[column]) for column in columns])))
     if not np.isfinite(high - low) or high - low < 100:
         return None
-    share -= low
-    share /= high - low
-    return _Outputs(motors, table.t, np.clip(share, 0.0, 1.0, out=share))
+    return _Outputs(motors, table, low, high)
+
+
+def _column(motor: Motor) -> str:
+    return f"C{motor.output}"
 
 
 def _nameless(columns: Mapping[str, Floats]) -> tuple[Motor, ...]:
@@ -103,39 +117,47 @@ def _nameless(columns: Mapping[str, Floats]) -> tuple[Motor, ...]:
     return tuple(Motor(n, n, 0.0, 0.0, 0.0, 0.0, "") for n in used) if len(used) >= 4 else ()
 
 
-def _range(flight: Flight, pwm: Floats) -> tuple[float, float]:
-    """Pulse widths (microseconds) of an idle output and of the most that one may be asked for."""
+def _range(flight: Flight, seen: float) -> tuple[float, float]:
+    """Pulse widths (microseconds) of an idle output and of the most that one may be asked for, `seen` at most."""
     low = flight.setting("MOT_PWM_MIN") or flight.setting("RC3_MIN", "THR_MIN_PWM") or 1000.0
     high = flight.setting("MOT_PWM_MAX") or flight.setting("RC3_MAX") or 2000.0
     most = flight.setting("MOT_SPIN_MAX")
     top = low + (high - low) * (most if most is not None and 0.5 < most <= 1.0 else 1.0)
-    seen = float(np.max(pwm)) if pwm.size else top
     return low, min(top, max(seen, low + 0.6 * (high - low)))
 
 
 def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
     """Rows in which the motors lift it, upright, and nothing else holds it: in the air, or where it never left the
     ground the first seconds of trying, before the integrators wind up."""
-    lifting = flight.watch(outputs.t)
-    for rows in pieces(len(outputs.t)):
-        lifting[rows] &= median(outputs.share[:, rows], axis=0) > _LIFTING
-    lifting &= ~flight.during(flight.held, outputs.t)
-    if flight.tilt is not None:
-        lifting &= np.interp(outputs.t, *flight.tilt) < 60.0
+    t = outputs.t
+    lifting = flight.watch(t)
+    for rows in pieces(len(t)):
+        lifting[rows] &= median(outputs.share(rows), axis=0) > _LIFTING
+    lifting &= ~flight.during(flight.held, t)
+    if (tilt := flight.tilt) is not None:
+        lifting &= np.interp(t, *tilt) < 60.0
     if flight.flown:
-        return lifting & flight.during(flight.flown, outputs.t)
-    return lifting & (outputs.t < outputs.t[lifting][0] + _TRYING_S) if lifting.any() else lifting
+        return lifting & flight.during(flight.flown, t)
+    return lifting & (t < t[lifting][0] + _TRYING_S) if lifting.any() else lifting
 
 
-def _excess(share: Floats, where: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """How far each motor stands above the middle of the others in the rows of a mask, shape (motors, n)."""
-    chosen = np.flatnonzero(where)
-    everyone, excess = np.arange(len(share)), np.empty((len(share), len(chosen)))
-    for rows in pieces(len(chosen)):
-        piece = share[:, chosen[rows]]
-        for n in everyone:
-            excess[n, rows] = piece[n] - median(piece[everyone != n], axis=0)
-    return excess
+def _excess(outputs: _Outputs, where: Mask) -> Iterator[NDArray[np.float64]]:
+    """How far each motor stands above the middle of the others in the rows of a mask, piece by piece of them, shape
+    (motors, n)."""
+    everyone = np.arange(len(outputs.motors))
+    for rows in pieces(len(where)):
+        share = outputs.share(rows)[:, where[rows]]
+        yield np.array([share[n] - median(share[everyone != n], axis=0) for n in everyone])
+
+
+def _joined(parts: Iterable[NDArray[Any]]) -> NDArray[Any]:
+    """Pieces of shape (motors, n) as one array."""
+    return np.concatenate([*parts], axis=1)
+
+
+def _of_one(parts: Iterable[Floats], n: int) -> Floats:
+    """What pieces of shape (motors, n) hold of one motor."""
+    return np.concatenate([part[n] for part in parts])
 
 
 def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
@@ -144,24 +166,22 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     if lifting.sum() < 8:
         return
     t = outputs.t[lifting]
-    excess = _excess(outputs.share, lifting)
-    is_alone = np.zeros(excess.shape, dtype=bool)
-    for row in excess:
-        row[:] = smooth(t, row, 4.0)
-    for rows in pieces(len(t)):
-        piece = excess[:, rows]
+    window = records(t, _WINDOW_S)
+    is_alone, is_above = [], []
+    for piece in means(_excess(outputs, lifting), window):
         order = np.sort(piece, axis=0)
-        is_alone[:, rows] = (piece > ALONE) & (piece >= order[-1] - 1e-9) & (order[-2] < _NEXT * piece)
+        is_alone.append((piece > ALONE) & (piece >= order[-1] - 1e-9) & (order[-2] < _NEXT * piece))
+        is_above.append(piece > ALONE / 2)
     best: tuple[float, int, float, float] | None = None
-    for n, row in enumerate(excess):
-        spans = lasting(t, is_alone[n], _LASTS_S, gap_s=3.0)
+    for n, (alone, above) in enumerate(zip(_joined(is_alone), _joined(is_above), strict=True)):
+        spans = lasting(t, alone, _LASTS_S, gap_s=3.0)
         if not spans:
             continue
         since = lifting & (outputs.t >= spans[0][0])
-        share = outputs.share[:, since]
-        asked = _excess(outputs.share, since)[n]
+        share = outputs.share(since)
+        asked = _of_one(_excess(outputs, since), n)
         size = float(median(asked))
-        stays = float((row[t >= spans[0][0]] > ALONE / 2).mean()) > _STAYS
+        stays = float(above[t >= spans[0][0]].mean()) > _STAYS
         steady = size > max(0.7 * ALONE, _STEADY * float(np.std(asked)))
         has_room = float(median(np.delete(share, n, axis=0))) < (_ROOM_FLYING if flight.flown else _ROOM)
         if stays and steady and has_room and (best is None or size > best[0]):
@@ -169,9 +189,9 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     if best is None:
         return
     size, n, start, end = best
-    share = outputs.share[:, lifting & (outputs.t >= start)]
+    share = outputs.share(lifting & (outputs.t >= start))
     limit = float((share[n] > _AT_LIMIT).mean())
-    before = excess[n][t < start - 2.0]
+    before = _of_one(means(_excess(outputs, lifting), window), n)[t < start - 2.0]
     changed = len(before) >= 5 and float(median(before)) < size / 3
     over = size / ALONE
     yield _finding(
@@ -210,7 +230,8 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     asked = next((rows for rows in near if rows.sum() >= 3), near[-1])
     if not asked.any():
         return
-    share = median(outputs.share[:, asked], axis=1)
+    asked_of = outputs.share(asked)
+    share = median(asked_of, axis=1)
     # A motor pushes its own corner up: where it gives nothing, that corner goes down.
     towards = np.array([-(motor.roll * roll + motor.pitch * pitch) for motor in outputs.motors]) / np.hypot(roll, pitch)
     score = np.where(towards > 0.15, share, -1.0)
@@ -218,10 +239,11 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     others = np.delete(share, n)
     if score[n] < 0.6 or share[n] - float(median(others)) < _CLEARLY:
         return
-    most = np.argmax(outputs.share[:, asked], axis=0) == n
+    most = np.argmax(asked_of, axis=0) == n
     if most.mean() < 0.6:  # asked for in turn with others: an oscillation
         return
-    begin = outputs.t[(outputs.share[n] > _AT_LIMIT) & (outputs.t > lost - 2.0) & (outputs.t <= lost + 1.0)]
+    around = (outputs.t > lost - 2.0) & (outputs.t <= lost + 1.0)
+    begin = outputs.t[around][outputs.share(around)[n] > _AT_LIMIT]
     yield _finding(
         outputs.motors[n], "gave no thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0, "critical",
         f"asked for {100 * share[n]:.0f} % (others {100 * median(others):.0f} %), yet the vehicle fell towards it: "
@@ -247,10 +269,10 @@ def _told(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         if match and any(start <= t <= end for start, end in flight.armed):
             motor = next((one for one in outputs.motors if one.number == int(match[1])), None)
             near = np.abs(outputs.t - t) < 5.0
-            excess = median(_excess(outputs.share, near), axis=1) if near.any() else np.zeros(len(outputs.motors))
+            excess = median(_joined(_excess(outputs, near)), axis=1) if near.any() else np.zeros(len(outputs.motors))
             own = float(excess[outputs.motors.index(motor)]) if motor is not None else 0.0
             is_alone = own > ALONE and float(np.sort(excess)[-2]) < _NEXT * own
-            crowded = float(median(outputs.share[:, near])) > _ROOM if near.any() else True
+            crowded = float(median(outputs.share(near))) > _ROOM if near.any() else True
             if motor is not None and not crowded and is_alone:
                 severity: Severity = "critical" if flight.impact_s is not None else "warning"
                 yield _finding(motor, "lost thrust", t, flight.end_s, severity, f"the firmware says: {text}",

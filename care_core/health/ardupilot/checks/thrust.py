@@ -32,9 +32,10 @@ hence more than that where no option keeps the motors down."""
 
 def find(flight: Flight) -> Iterator[Finding]:
     """Saturation first, for it says more than a high hover throttle."""
-    if not flight.is_copter or flight.vehicle.kind == "heli" or flight.throttle is None:
+    driven = flight.throttle
+    if not flight.is_copter or flight.vehicle.kind == "heli" or driven is None:
         return  # what a helicopter records as throttle is its collective pitch
-    t, throttle = flight.throttle
+    t, throttle = driven
     flown = flight.during(flight.flown or flight.watched, t) & (throttle > 0.05)
     if flown.sum() < 5:
         return
@@ -70,9 +71,10 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 def saturated(flight: Flight) -> list[Span]:
     """When the motors give all that they have."""
-    if flight.throttle is None:
+    driven = flight.throttle
+    if driven is None:
         return []
-    t, throttle = flight.throttle
+    t, throttle = driven
     flown = flight.during(flight.flown or flight.watched, t)
     return lasting(t, flown & (throttle > FULL), _FULL_LASTS_S, gap_s=1.0)
 
