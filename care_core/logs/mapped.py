@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import SEEK_END, BytesIO, FileIO
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import Any, TypeVar
 from weakref import finalize
 
 import numpy as np
@@ -19,6 +21,7 @@ from care_core.errors import LogError
 
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.integer[Any]]
+Item = TypeVar("Item")
 Stored = tuple[int, "np.dtype[Any]"]
 """How many bytes behind a place something is stored, and its type."""
 
@@ -28,6 +31,8 @@ _WINDOW, _MOST_WINDOWS = 1 << 18, 8
 """Bytes read at most for records that lie apart: they stay in the processor's cache while they are picked out. So many
 times more where several lists are looked for: of each, some hundreds of records at once."""
 
+_AHEAD = 2
+"""So many stretches are fetched from the disk while one is worked on."""
 _KEPT = 31 << 20
 """glibc returns what is freed to the system where no larger block was freed before (mallopt(3): M_MMAP_THRESHOLD, at
 most 32 MB). Taking the pages of each chunk anew costs ten times as much as unpacking lz4. Untouched, it needs none."""
@@ -64,6 +69,24 @@ class FileBytes:
     def byte(self, place: int) -> int:
         """The byte at a place. Raises IndexError beyond the end."""
         return self[place : place + 1][0]
+
+    def announced(self, items: Iterable[Item], stretch: Callable[[Item], tuple[int, int]]) -> Iterator[Item]:
+        """The items, each after the system was told to fetch the stretches (low, high) of the next ones: the disk works
+        while this thread does, and brings nothing that was not asked for."""
+        ahead: deque[Item] = deque()
+        for item in items:
+            self._fetch(*stretch(item))
+            ahead.append(item)
+            if len(ahead) > _AHEAD:
+                yield ahead.popleft()
+        yield from ahead
+
+    def _fetch(self, low: int, high: int) -> None:
+        if low >= high or not hasattr(os, "posix_fadvise"):
+            return
+        # Otherwise it guesses from the places that are read what comes next, and fetches twice as much.
+        os.posix_fadvise(self._stream.fileno(), 0, 0, os.POSIX_FADV_RANDOM)
+        os.posix_fadvise(self._stream.fileno(), low, high - low, os.POSIX_FADV_WILLNEED)
 
     def _read(self, low: int, size: int) -> bytes:
         self._stream.seek(low)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,15 @@ Places = Mapping[int, NDArray[np.intp]]
 
 ChunkIndex = dict[int, bytes]
 """A chunk's index as it is stored: by connection number the entries of its messages."""
+
+
+class Chosen(NamedTuple):
+    """A chunk that holds wanted messages, and which of all messages these are."""
+
+    chunk: int
+    rows: NDArray[np.intp]
+    needed: int
+    """Bytes of the plain chunk up to the first message behind the last wanted one; 0: all that there are."""
 
 
 class MessageIndex:
@@ -44,19 +53,19 @@ class MessageIndex:
         """The record times of each known connection, in the order of the file."""
         return {number: self.times_ns[rows] for number, rows in self._rows.items() if number in known}
 
-    def chosen(self, wanted: Places) -> Iterator[tuple[int, NDArray[np.intp]]]:
-        """Each chunk that holds wanted messages, and which of all messages these are."""
+    def chosen(self, wanted: Places) -> Iterator[Chosen]:
+        """Each chunk that holds wanted messages."""
         rows = np.sort(np.concatenate([np.empty(0, np.intp), *(self._rows[n][places] for n, places in wanted.items())]))
         edges = np.searchsorted(rows, self.bounds)
         for chunk in np.flatnonzero(np.diff(edges)).tolist():
-            yield chunk, rows[edges[chunk] : edges[chunk + 1]]
+            own = rows[edges[chunk] : edges[chunk + 1]]
+            yield Chosen(chunk, own, self._needed(chunk, own))
 
     def entries(self, rows: NDArray[np.intp]) -> Iterator[tuple[int, int, int]]:
         """Connection, record time in ns and offset of messages."""
         return zip(self.numbers[rows].tolist(), self.times_ns[rows].tolist(), self.offsets[rows].tolist(), strict=True)
 
-    def needed(self, chunk: int, rows: NDArray[np.intp]) -> int:
-        """Bytes of a plain chunk up to the first message behind the last of these; 0: all that there are."""
+    def _needed(self, chunk: int, rows: NDArray[np.intp]) -> int:
         offsets = self.offsets[self.bounds[chunk] : self.bounds[chunk + 1]]
         behind = offsets[offsets > self.offsets[rows].max()]
         return int(behind.min()) if len(behind) else 0

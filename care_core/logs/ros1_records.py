@@ -58,13 +58,19 @@ class BagChunk:
         if self.compression == "none":
             return bag, self.start, self.end
         try:
-            if unpack.takes_parts and 0 < 2 * needed < self.size:
+            if unpack.takes_part(needed, self.size):
                 plain = unpack.head(self.compression, bag, self.start, self.end, needed)
                 return plain, 0, len(plain)
             plain = unpack(self.compression, bag[self.start : self.end], self.size)
         except CannotUnpackError as err:
             raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
+
+    def packed(self, unpack: Unpacker, needed: int = 0) -> tuple[int, int]:
+        """About where the bytes of the file lie that `open` unpacks, an empty stretch where it unpacks none."""
+        if self.compression == "none":
+            return self.start, self.start
+        return unpack.stretch(self.start, self.end, self.size, needed)
 
 
 @dataclass(slots=True)

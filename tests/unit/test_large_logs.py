@@ -112,6 +112,31 @@ def test_a_large_log_gives_the_same_from_few_of_its_bytes(
 
 
 @pytest.mark.parametrize(("name", "packed"), [("a.bag", "lz4"), ("a.mcap", "zstd")])
+@pytest.mark.parametrize("whole", [1000, limits.WHOLE_BYTES])
+def test_packed_chunks_are_fetched_while_the_one_before_is_unpacked(
+    name: str, packed: str, whole: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "WHOLE_BYTES", whole)
+    log = open_log(with_pictures(tmp_path / name, packed))
+    happened: list[tuple[str, int, int]] = []
+    original = FileBytes._read
+
+    def read(self: FileBytes, low: int, size: int) -> bytes:
+        happened.append(("read", low, low + size))
+        return original(self, low, size)
+
+    monkeypatch.setattr(FileBytes, "_read", read)
+    monkeypatch.setattr(FileBytes, "_fetch", lambda _, low, high: happened.append(("fetch", low, high)))
+    log.read(FIELDS)
+    fetched = [(low, high) for what, low, high in happened if what == "fetch"]
+    assert len(fetched) == PICTURES
+    first = next(i for i, (what, low, _) in enumerate(happened) if what == "read" and low)
+    assert len([what for what, *_ in happened[:first] if what == "fetch"]) > 1
+    for what, low, high in happened[first:]:
+        assert what == "fetch" or any(begin <= low and high <= end for begin, end in fetched)
+
+
+@pytest.mark.parametrize(("name", "packed"), [("a.bag", "lz4"), ("a.mcap", "zstd")])
 def test_a_chunk_that_is_broken_before_what_is_asked_for_is_told(
     name: str, packed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
