@@ -31,8 +31,8 @@ _WINDOW, _MOST_WINDOWS = 1 << 18, 8
 """Bytes read at most for records that lie apart: they stay in the processor's cache while they are picked out. So many
 times more where several lists are looked for: of each, some hundreds of records at once."""
 
-_AHEAD = 2
-"""So many stretches are fetched from the disk while one is worked on."""
+_AHEAD, _MOST_AHEAD = 2, 1 << 23
+"""So many stretches, and so many bytes of each, are fetched from the disk while one is worked on."""
 _KEPT = 31 << 20
 """glibc returns what is freed to the system where no larger block was freed before (mallopt(3): M_MMAP_THRESHOLD, at
 most 32 MB). Taking the pages of each chunk anew costs ten times as much as unpacking lz4. Untouched, it needs none."""
@@ -47,23 +47,24 @@ class FileBytes:
     def __init__(self, path: Path, stream: FileIO) -> None:
         self._path, self._stream = path, stream
         self._size = stream.seek(0, SEEK_END)
-        self._at, self._block = 0, b""
+        self._at, self._end, self._block = 0, 0, b""
         np.empty(_KEPT, np.uint8)  # freed at once
 
     def __len__(self) -> int:
         return self._size
 
     def __getitem__(self, place: slice) -> bytes:
+        low, high = place.start, place.stop
+        if low is not None and high is not None and self._at <= low <= high <= self._end:  # most of the time
+            return self._block[low - self._at : high - self._at]
         low, high, _ = place.indices(self._size)
         size = high - low
         if size <= 0:
             return b""
-        first = low - self._at
-        if first >= 0 and first + size <= len(self._block):
-            return self._block[first : first + size]
         if size > _BLOCK:
             return self._read(low, size)
-        self._at, self._block = low, self._read(low, min(_BLOCK, self._size - low))
+        self._block = self._read(low, min(_BLOCK, self._size - low))
+        self._at, self._end = low, low + len(self._block)
         return self._block[:size]
 
     def byte(self, place: int) -> int:
@@ -86,11 +87,10 @@ class FileBytes:
             return
         # Otherwise it guesses from the places that are read what comes next, and fetches twice as much.
         os.posix_fadvise(self._stream.fileno(), 0, 0, os.POSIX_FADV_RANDOM)
-        os.posix_fadvise(self._stream.fileno(), low, high - low, os.POSIX_FADV_WILLNEED)
+        os.posix_fadvise(self._stream.fileno(), low, min(high - low, _MOST_AHEAD), os.POSIX_FADV_WILLNEED)
 
     def _read(self, low: int, size: int) -> bytes:
-        self._stream.seek(low)
-        found = self._stream.read(size)
+        found = os.pread(self._stream.fileno(), size, low)
         if len(found) < size:
             raise cut_while_read(self._path)
         if (watch := WATCH.get()) is not None:

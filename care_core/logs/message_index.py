@@ -57,18 +57,25 @@ class MessageIndex:
         """Each chunk that holds wanted messages."""
         rows = np.sort(np.concatenate([np.empty(0, np.intp), *(self._rows[n][places] for n, places in wanted.items())]))
         edges = np.searchsorted(rows, self.bounds)
-        for chunk in np.flatnonzero(np.diff(edges)).tolist():
-            own = rows[edges[chunk] : edges[chunk + 1]]
-            yield Chosen(chunk, own, self._needed(chunk, own))
+        chunks = np.flatnonzero(np.diff(edges))
+        if len(chunks):
+            parts = np.split(rows, edges[chunks[1:]])
+            yield from map(Chosen, chunks.tolist(), parts, self._needed(chunks, rows, edges[chunks]).tolist())
 
     def entries(self, rows: NDArray[np.intp]) -> Iterator[tuple[int, int, int]]:
         """Connection, record time in ns and offset of messages."""
         return zip(self.numbers[rows].tolist(), self.times_ns[rows].tolist(), self.offsets[rows].tolist(), strict=True)
 
-    def _needed(self, chunk: int, rows: NDArray[np.intp]) -> int:
-        offsets = self.offsets[self.bounds[chunk] : self.bounds[chunk + 1]]
-        behind = offsets[offsets > self.offsets[rows].max()]
-        return int(behind.min()) if len(behind) else 0
+    def _needed(
+        self, chunks: NDArray[np.intp], rows: NDArray[np.intp], firsts: NDArray[np.intp]
+    ) -> NDArray[np.unsignedinteger[Any]]:
+        """Per chunk what `Chosen` says; its rows begin at each of `firsts`."""
+        none = np.iinfo(self.offsets.dtype).max
+        last = np.full(len(self._begins), none, self.offsets.dtype)
+        last[chunks] = np.maximum.reduceat(self.offsets[rows], firsts)
+        behind = np.where(self.offsets > np.repeat(last, np.diff(self.bounds)), self.offsets, none)
+        least = np.minimum.reduceat(behind, self.bounds[chunks])
+        return np.where(least == none, 0, least)
 
     def first_ns(self, chunk: int) -> int | None:
         """The earliest record time of a chunk, None where it holds no message."""

@@ -88,14 +88,10 @@ class _Record(NamedTuple):
     """A record: its header fields and where its data lies; `end` may be beyond the file's."""
 
     pos: int
+    op: int
     fields: dict[bytes, bytes]
     start: int
     end: int
-
-    @property
-    def op(self) -> int:
-        value = self.fields.get(b"op", b"")
-        return value[0] if len(value) == 1 else -1
 
     def number(self, name: bytes) -> int:
         value = self.fields.get(name, b"")
@@ -261,7 +257,8 @@ def _read_record(buffer: Source, pos: int, end: int) -> _Record:
         raise BrokenRecordError("a record header is cut short") from err
     if b"op" not in fields:
         raise BrokenRecordError("these bytes are no record")
-    return _Record(pos, fields, start, start + int(data_size))
+    op = fields[b"op"]
+    return _Record(pos, op[0] if len(op) == 1 else -1, fields, start, start + int(data_size))
 
 
 def _fields(header: bytes) -> dict[bytes, bytes]:
