@@ -58,7 +58,7 @@ class Ros2Db3(RosLog):
     def __init__(self, path: Path) -> None:
         """Read topics and record times. Raises LogError when it is no ROS 2 bag."""
         recording = recording_at(path)
-        parts = [Db3Part(file) for file in recording.files]
+        parts = [Db3Part(file, is_alone=len(recording.files) == 1) for file in recording.files]
         super().__init__(
             path, LogFormat.ROS2_DB3, parts,
             metadata=recording.metadata, missing=recording.missing, notes=recording.notes,
@@ -68,11 +68,11 @@ class Ros2Db3(RosLog):
 class Db3Part:
     """One SQLite file, fulfilling `Part`."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, is_alone: bool = True) -> None:
         self.path = path
         self._file = PlainFile(path)
         self.flaws: dict[str, Flaw] = {}
-        database = _Database(self._file.path)
+        database = _Database(self._file.path, stays_open=is_alone)
         self._store: _Store = database
         try:
             database.check_size()
@@ -174,10 +174,14 @@ class _Store(Protocol):
 
 
 class _Database:
-    """A sound SQLite file, read with SQLite; every method raises one of `_NOT_SOUND` for another."""
+    """A sound SQLite file, read with SQLite; every method raises one of `_NOT_SOUND` for another.
 
-    def __init__(self, path: Path) -> None:
+    Where it stays open, so do the pages that were read last: not those of hundreds of files of one recording.
+    """
+
+    def __init__(self, path: Path, *, stays_open: bool = False) -> None:
         self.path = path
+        self._stays_open = stays_open
         self.is_own = False
         self.size = path.stat().st_size
         journal = path.with_name(f"{path.name}-wal")
@@ -263,12 +267,15 @@ class _Database:
             yield row
 
     @cached_property
-    def _connection(self) -> sqlite3.Connection:
-        """Open for as long as this is in use, with the pages that were read last; the app's threads share it."""
+    def _kept(self) -> sqlite3.Connection:
+        database = self._connect()
+        finalize(self, database.close)
+        return database
+
+    def _connect(self) -> sqlite3.Connection:
         mode = "" if self.is_own else "?mode=ro&immutable=1"
         uri = f"{self.path.resolve().as_uri()}{mode}"
-        database = sqlite3.connect(uri, uri=True, check_same_thread=False)
-        finalize(self, database.close)
+        database = sqlite3.connect(uri, uri=True, check_same_thread=False)  # the app's threads share a log
         database.execute(f"PRAGMA cache_size = -{_CACHED_KIB}")
         database.set_authorizer(_authorised)
         database.text_factory = lambda raw: raw.decode("utf-8", "replace")
@@ -277,12 +284,16 @@ class _Database:
 
     @contextmanager
     def _connected(self) -> Iterator[sqlite3.Connection]:
+        database = self._kept if self._stays_open else self._connect()
         try:
-            yield self._connection
+            yield database
         except sqlite3.OperationalError as err:
             if str(err) == "interrupted":  # all that SQLite says of what the handler met
                 raise KeyboardInterrupt from err
             raise
+        finally:
+            if not self._stays_open:
+                database.close()
 
 
 def _authorised(action: int, what: str | None, name: str | None, _database: str | None, inside: str | None) -> int:

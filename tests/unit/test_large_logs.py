@@ -16,6 +16,8 @@ from care_core.application import pace as watched
 from care_core.application.pace import watching
 from care_core.logs.digest import SAMPLED, hashing, log_digest
 from care_core.logs.mapped import FileBytes
+from care_core.logs.mcap_records import ENTRY
+from care_core.logs.message_index import MessageIndex
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 
@@ -109,6 +111,25 @@ def test_a_large_log_gives_the_same_from_few_of_its_bytes(
     assert log.damage == ()
     # zstd gives nothing before a block of 128 kB is there, bz2 before one of 900 kB.
     assert sum(read_bytes) < {"bz2": 1.1, "zstd": 0.75}.get(packed, 0.3) * path.stat().st_size
+
+
+def test_a_chunk_is_needed_up_to_the_message_behind_the_last_wanted_one() -> None:
+    rng = np.random.default_rng(0)
+    chunks = []
+    for chunk in range(40):
+        places = rng.permutation(1000)[: rng.integers(0, 9) * (chunk % 3)].tolist()
+        index = {number: [(0, place) for place in places[number::2]] for number in range(2)}
+        chunks.append((chunk, {number: np.array(found, ENTRY).tobytes() for number, found in index.items()}))
+    index_of_all = MessageIndex(chunks, ENTRY)
+    count = len(index_of_all.times_of([1])[1])
+    chosen = list(index_of_all.chosen({1: np.sort(rng.permutation(count)[: count // 2])}))
+    assert sum(len(one.rows) for one in chosen) == count // 2
+    for one in chosen:
+        low, high = index_of_all.bounds[one.chunk : one.chunk + 2]
+        assert all(low <= row < high for row in one.rows)
+        last = max(index_of_all.offsets[one.rows])
+        assert one.needed == min((at for at in index_of_all.offsets[low:high] if at > last), default=0)
+    assert not list(index_of_all.chosen({}))
 
 
 @pytest.mark.parametrize(("name", "packed"), [("a.bag", "lz4"), ("a.mcap", "zstd")])
