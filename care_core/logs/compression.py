@@ -19,6 +19,9 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _BLOCK = 1 << 14
 """Packed bytes taken at a time: small, since a hostile block unpacks to thousands of times its size."""
 
+_FRAME_BLOCK = 1 << 17
+"""Bytes of a block of zstd at most, and mostly of lz4: nothing of a block comes out before its end."""
+
 _AT_ONCE = 1 << 20
 """Bytes unpacked at a time of what is slow to unpack: 46 ms of bz2."""
 
@@ -42,6 +45,16 @@ class Unpacker:
         """Whether the file is so large that a chunk is unpacked only as far as it is asked for."""
         return self._takes_parts
 
+    def stretch(self, start: int, end: int, size: int, needed: int) -> tuple[int, int]:
+        """About where the bytes of a chunk lie that are read to unpack the first `needed` of its `size`; 0: all."""
+        if not self.takes_part(needed, size):
+            return start, end
+        return start, min(end, start + (end - start) * needed // size + _FRAME_BLOCK)
+
+    def takes_part(self, needed: int, size: int) -> bool:
+        """Whether the first `needed` bytes of a chunk of `size` are unpacked alone, since that is quicker."""
+        return self._takes_parts and 0 < 2 * needed < size
+
     def head(self, compression: str, packed: FileBytes, start: int, end: int, wanted: int) -> bytes:
         """The first bytes, `wanted` at least where it has so many, of what lies packed between two places of a file.
 
@@ -53,10 +66,9 @@ class Unpacker:
         plain = bytearray()
         try:
             unpack = _unpacking(compression)
-            piece = _BLOCK
             while start < end and len(plain) < wanted:
-                plain += unpack(packed[start : min(start + piece, end)])
-                start, piece = start + piece, 2 * piece
+                plain += unpack(packed[start : min(start + _BLOCK, end)])
+                start += _BLOCK
         except (OSError, RuntimeError, EOFError, ValueError, MemoryError) as err:
             raise CannotUnpackError(f"a {compression} chunk cannot be unpacked") from err
         self._left -= len(plain)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from io import SEEK_END, BytesIO, FileIO
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import Any, TypeVar
 from weakref import finalize
 
 import numpy as np
@@ -21,6 +23,7 @@ from care_core.errors import LogError
 
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.integer[Any]]
+Item = TypeVar("Item")
 Stored = tuple[int, "np.dtype[Any]"]
 """How many bytes behind a place something is stored, and its type."""
 
@@ -35,6 +38,8 @@ _MAPPED = 32 << 20
 always above so many bytes."""
 _KEPT = _MAPPED - (1 << 20)
 """Taking the pages of each chunk anew costs ten times as much as unpacking lz4. Untouched, it needs none."""
+_AHEAD, _MOST_AHEAD = 2, 1 << 23
+"""So many stretches, and so many bytes of each, are fetched from the disk while one is worked on."""
 
 WATCH: ContextVar[Callable[[int, int], None] | None] = ContextVar("WATCH", default=None)
 """Who is told, while files are read in this thread, the byte that was come to and the size of the file."""
@@ -46,28 +51,47 @@ class FileBytes:
     def __init__(self, path: Path, stream: FileIO) -> None:
         self._path, self._stream = path, stream
         self._size = stream.seek(0, SEEK_END)
-        self._at, self._block = 0, b""
+        self._at, self._end, self._block = 0, 0, b""
         np.empty(_KEPT, np.uint8)  # freed at once
 
     def __len__(self) -> int:
         return self._size
 
     def __getitem__(self, place: slice) -> bytes:
+        low, high = place.start, place.stop
+        if low is not None and high is not None and self._at <= low <= high <= self._end:  # most of the time
+            return self._block[low - self._at : high - self._at]
         low, high, _ = place.indices(self._size)
         size = high - low
         if size <= 0:
             return b""
-        first = low - self._at
-        if first >= 0 and first + size <= len(self._block):
-            return self._block[first : first + size]
         if size > _BLOCK:
             return self._read(low, size)
-        self._at, self._block = low, self._read(low, min(_BLOCK, self._size - low))
+        self._block = self._read(low, min(_BLOCK, self._size - low))
+        self._at, self._end = low, low + len(self._block)
         return self._block[:size]
 
     def byte(self, place: int) -> int:
         """The byte at a place. Raises IndexError beyond the end."""
         return self[place : place + 1][0]
+
+    def announced(self, items: Iterable[Item], stretch: Callable[[Item], tuple[int, int]]) -> Iterator[Item]:
+        """The items, each after the system was told to fetch the stretches (low, high) of the next ones: the disk works
+        while this thread does, and brings nothing that was not asked for."""
+        ahead: deque[Item] = deque()
+        for item in items:
+            self._fetch(*stretch(item))
+            ahead.append(item)
+            if len(ahead) > _AHEAD:
+                yield ahead.popleft()
+        yield from ahead
+
+    def _fetch(self, low: int, high: int) -> None:
+        if low >= high or not hasattr(os, "posix_fadvise"):
+            return
+        # Otherwise it guesses from the places that are read what comes next, and fetches twice as much.
+        os.posix_fadvise(self._stream.fileno(), 0, 0, os.POSIX_FADV_RANDOM)
+        os.posix_fadvise(self._stream.fileno(), low, min(high - low, _MOST_AHEAD), os.POSIX_FADV_WILLNEED)
 
     def _read(self, low: int, size: int) -> bytes:
         self._stream.seek(low)

@@ -65,9 +65,10 @@ class McapPart:
         """The wanted messages, chunk by chunk."""
         with opened(self._file.path, MAGIC, _WHAT) as log:
             unpack = Unpacker(len(log))
-            for at, rows in self._index.chosen(wanted):
-                if plain := self._open(at, self._index.needed(at, rows), log, unpack):
-                    yield from self._of_chunk(self._chunks[at], rows, unpack, *plain)
+            chunks, chosen = self._chunks, self._index.chosen(wanted)
+            for at, rows, needed in log.announced(chosen, lambda one: chunks[one.chunk].packed(unpack, one.needed)):
+                if plain := self._open(at, needed, log, unpack):
+                    yield from self._of_chunk(chunks[at], rows, unpack, *plain)
 
     def _open(self, at: int, needed: int, log: FileBytes, unpack: Unpacker) -> tuple[Source, int, int] | None:
         chunk = self._chunks[at]

@@ -72,13 +72,19 @@ class McapChunk:
         if not self.compression:
             return log, self.start, self.end
         try:
-            if unpack.takes_parts and 0 < 2 * needed < self.size:
+            if unpack.takes_part(needed, self.size):
                 plain = unpack.head(self.compression, log, self.start, self.end, needed)
                 return plain, 0, len(plain)
             plain = unpack(self.compression, log[self.start : self.end], self.size)
         except CannotUnpackError as err:
             raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
+
+    def packed(self, unpack: Unpacker, needed: int = 0) -> tuple[int, int]:
+        """About where the bytes of the file lie that `open` unpacks, an empty stretch where it unpacks none."""
+        if not self.compression:
+            return self.start, self.start
+        return unpack.stretch(self.start, self.end, self.size, needed)
 
     def flaw(self, buffer: Source, begin: int, end: int) -> str:
         """Why the plain records cannot all be trusted, empty where they can."""

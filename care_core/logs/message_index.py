@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,15 @@ Places = Mapping[int, NDArray[np.intp]]
 
 ChunkIndex = dict[int, bytes]
 """A chunk's index as it is stored: by connection number the entries of its messages."""
+
+
+class Chosen(NamedTuple):
+    """A chunk that holds wanted messages, and which of all messages these are."""
+
+    chunk: int
+    rows: NDArray[np.intp]
+    needed: int
+    """Bytes of the plain chunk up to the first message behind the last wanted one; 0: all that there are."""
 
 
 class MessageIndex:
@@ -44,22 +53,29 @@ class MessageIndex:
         """The record times of each known connection, in the order of the file."""
         return {number: self.times_ns[rows] for number, rows in self._rows.items() if number in known}
 
-    def chosen(self, wanted: Places) -> Iterator[tuple[int, NDArray[np.intp]]]:
-        """Each chunk that holds wanted messages, and which of all messages these are."""
+    def chosen(self, wanted: Places) -> Iterator[Chosen]:
+        """Each chunk that holds wanted messages."""
         rows = np.sort(np.concatenate([np.empty(0, np.intp), *(self._rows[n][places] for n, places in wanted.items())]))
         edges = np.searchsorted(rows, self.bounds)
-        for chunk in np.flatnonzero(np.diff(edges)).tolist():
-            yield chunk, rows[edges[chunk] : edges[chunk + 1]]
+        chunks = np.flatnonzero(np.diff(edges))
+        if len(chunks):
+            parts = np.split(rows, edges[chunks[1:]])
+            yield from map(Chosen, chunks.tolist(), parts, self._needed(chunks, rows, edges[chunks]).tolist())
 
     def entries(self, rows: NDArray[np.intp]) -> Iterator[tuple[int, int, int]]:
         """Connection, record time in ns and offset of messages."""
         return zip(self.numbers[rows].tolist(), self.times_ns[rows].tolist(), self.offsets[rows].tolist(), strict=True)
 
-    def needed(self, chunk: int, rows: NDArray[np.intp]) -> int:
-        """Bytes of a plain chunk up to the first message behind the last of these; 0: all that there are."""
-        offsets = self.offsets[self.bounds[chunk] : self.bounds[chunk + 1]]
-        behind = offsets[offsets > self.offsets[rows].max()]
-        return int(behind.min()) if len(behind) else 0
+    def _needed(
+        self, chunks: NDArray[np.intp], rows: NDArray[np.intp], firsts: NDArray[np.intp]
+    ) -> NDArray[np.unsignedinteger[Any]]:
+        """Per chunk what `Chosen` says; its rows begin at each of `firsts`."""
+        none = np.iinfo(self.offsets.dtype).max
+        last = np.full(len(self._begins), none, self.offsets.dtype)
+        last[chunks] = np.maximum.reduceat(self.offsets[rows], firsts)
+        behind = np.where(self.offsets > np.repeat(last, np.diff(self.bounds)), self.offsets, none)
+        least = np.minimum.reduceat(behind, self.bounds[chunks])
+        return np.where(least == none, 0, least)
 
     def first_ns(self, chunk: int) -> int | None:
         """The earliest record time of a chunk, None where it holds no message."""

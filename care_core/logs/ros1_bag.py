@@ -65,10 +65,12 @@ class Ros1Part:
         """The wanted messages, chunk by chunk."""
         with opened(self.path, MAGIC, "a ROS 1 bag of format 2.0") as bag:
             unpack = Unpacker(len(bag))
-            for at, rows in self._index.chosen(wanted):
-                chunk = self._contents.chunks[at]
+            chunks = self._contents.chunks
+            chosen = self._index.chosen(wanted)
+            for at, rows, needed in bag.announced(chosen, lambda one: chunks[one.chunk].packed(unpack, one.needed)):
+                chunk = chunks[at]
                 try:
-                    plain = chunk.open(bag, unpack, self._index.needed(at, rows))
+                    plain = chunk.open(bag, unpack, needed)
                 except BrokenRecordError as err:
                     self.flaws.setdefault(f"chunk {chunk.pos}", Flaw(str(err), chunk.pos, self._index.first_ns(at)))
                 else:

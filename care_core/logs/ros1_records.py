@@ -58,13 +58,19 @@ class BagChunk:
         if self.compression == "none":
             return bag, self.start, self.end
         try:
-            if unpack.takes_parts and 0 < 2 * needed < self.size:
+            if unpack.takes_part(needed, self.size):
                 plain = unpack.head(self.compression, bag, self.start, self.end, needed)
                 return plain, 0, len(plain)
             plain = unpack(self.compression, bag[self.start : self.end], self.size)
         except CannotUnpackError as err:
             raise BrokenRecordError(str(err)) from err
         return plain, 0, len(plain)
+
+    def packed(self, unpack: Unpacker, needed: int = 0) -> tuple[int, int]:
+        """About where the bytes of the file lie that `open` unpacks, an empty stretch where it unpacks none."""
+        if self.compression == "none":
+            return self.start, self.start
+        return unpack.stretch(self.start, self.end, self.size, needed)
 
 
 @dataclass(slots=True)
@@ -82,14 +88,10 @@ class _Record(NamedTuple):
     """A record: its header fields and where its data lies; `end` may be beyond the file's."""
 
     pos: int
+    op: int
     fields: dict[bytes, bytes]
     start: int
     end: int
-
-    @property
-    def op(self) -> int:
-        value = self.fields.get(b"op", b"")
-        return value[0] if len(value) == 1 else -1
 
     def number(self, name: bytes) -> int:
         value = self.fields.get(name, b"")
@@ -255,7 +257,8 @@ def _read_record(buffer: Source, pos: int, end: int) -> _Record:
         raise BrokenRecordError("a record header is cut short") from err
     if b"op" not in fields:
         raise BrokenRecordError("these bytes are no record")
-    return _Record(pos, fields, start, start + int(data_size))
+    op = fields[b"op"]
+    return _Record(pos, op[0] if len(op) == 1 else -1, fields, start, start + int(data_size))
 
 
 def _fields(header: bytes) -> dict[bytes, bytes]:

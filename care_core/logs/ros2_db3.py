@@ -5,11 +5,14 @@ from __future__ import annotations
 import shutil
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Protocol
+from weakref import finalize
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +33,8 @@ _FETCHED = 10_000
 """Rows without data that are fetched at a time."""
 _ASKED = 50_000
 """Rows that one statement names, which may be a megabyte long: a table whose ids are no key is passed seldom."""
+_CACHED_KIB = 24 << 10
+"""Pages that SQLite keeps: all small messages of a short recording, which lie between the pictures."""
 _NONE = np.empty(0, np.int64)
 _STEPS = 100_000
 """Of SQLite, which walks a whole table by itself, between two chances to be interrupted: some ms."""
@@ -53,7 +58,7 @@ class Ros2Db3(RosLog):
     def __init__(self, path: Path) -> None:
         """Read topics and record times. Raises LogError when it is no ROS 2 bag."""
         recording = recording_at(path)
-        parts = [Db3Part(file) for file in recording.files]
+        parts = [Db3Part(file, is_alone=len(recording.files) == 1) for file in recording.files]
         super().__init__(
             path, LogFormat.ROS2_DB3, parts,
             metadata=recording.metadata, missing=recording.missing, notes=recording.notes,
@@ -63,11 +68,11 @@ class Ros2Db3(RosLog):
 class Db3Part:
     """One SQLite file, fulfilling `Part`."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, is_alone: bool = True) -> None:
         self.path = path
         self._file = PlainFile(path)
         self.flaws: dict[str, Flaw] = {}
-        database = _Database(self._file.path)
+        database = _Database(self._file.path, stays_open=is_alone)
         self._store: _Store = database
         try:
             database.check_size()
@@ -169,10 +174,14 @@ class _Store(Protocol):
 
 
 class _Database:
-    """A sound SQLite file, read with SQLite; every method raises one of `_NOT_SOUND` for another."""
+    """A sound SQLite file, read with SQLite; every method raises one of `_NOT_SOUND` for another.
 
-    def __init__(self, path: Path) -> None:
+    Where it stays open, so do the pages that were read last: not those of hundreds of files of one recording.
+    """
+
+    def __init__(self, path: Path, *, stays_open: bool = False) -> None:
         self.path = path
+        self._stays_open = stays_open
         self.is_own = False
         self.size = path.stat().st_size
         journal = path.with_name(f"{path.name}-wal")
@@ -235,38 +244,56 @@ class _Database:
                 yield from self._bounded(database.execute(f"{query} ORDER BY id"))
 
     def _heads(self, database: sqlite3.Connection) -> NDArray[np.int64]:
-        """Row id, topic id and record time of every message, shape (n, 3)."""
-        asked = database.execute(f"SELECT id, topic_id, timestamp FROM messages WHERE {_SOUND} ORDER BY id")
+        """Row id, topic id and record time of every message, shape (n, 3), in the order of row ids.
+
+        The last come first, so that the pages of the first are still there when messages are read in their order.
+        """
+        asked = database.execute(f"SELECT id, topic_id, timestamp FROM messages WHERE {_SOUND} ORDER BY id DESC")
         left = _SHARED * self.size // _SMALLEST_ROW
         found = [np.empty((0, 3), np.int64)]
         while rows := asked.fetchmany(_FETCHED):
             left -= len(rows)
             if left < 0:
                 raise sqlite3.DatabaseError("its tree runs in circles")
-            found.append(np.array(rows, np.int64))
-        return np.concatenate(found)
+            found.append(np.fromiter(chain.from_iterable(rows), np.int64, 3 * len(rows)).reshape(-1, 3))
+        return np.concatenate(found)[::-1]
 
     def _bounded(self, rows: Iterable[Any]) -> Iterator[Any]:
         left = _SHARED * self.size
         for row in rows:
-            left -= _SMALLEST_ROW + sum(len(value) for value in row if isinstance(value, (bytes, str)))
+            left -= _SMALLEST_ROW + sum([len(value) for value in row if isinstance(value, (bytes, str))])
             if left < 0:
                 raise sqlite3.DatabaseError("its tree runs in circles")
             yield row
 
+    @cached_property
+    def _kept(self) -> sqlite3.Connection:
+        database = self._connect()
+        finalize(self, database.close)
+        return database
+
+    def _connect(self) -> sqlite3.Connection:
+        mode = "" if self.is_own else "?mode=ro&immutable=1"
+        uri = f"{self.path.resolve().as_uri()}{mode}"
+        database = sqlite3.connect(uri, uri=True, check_same_thread=False)  # the app's threads share a log
+        database.execute(f"PRAGMA cache_size = -{_CACHED_KIB}")
+        database.set_authorizer(_authorised)
+        database.text_factory = lambda raw: raw.decode("utf-8", "replace")
+        database.set_progress_handler(lambda: 0, _STEPS)
+        return database
+
     @contextmanager
     def _connected(self) -> Iterator[sqlite3.Connection]:
-        mode = "" if self.is_own else "?mode=ro&immutable=1"
-        with closing(sqlite3.connect(f"{self.path.resolve().as_uri()}{mode}", uri=True)) as database:
-            database.set_authorizer(_authorised)
-            database.text_factory = lambda raw: raw.decode("utf-8", "replace")
-            database.set_progress_handler(lambda: 0, _STEPS)
-            try:
-                yield database
-            except sqlite3.OperationalError as err:
-                if str(err) == "interrupted":  # all that SQLite says of what the handler met
-                    raise KeyboardInterrupt from err
-                raise
+        database = self._kept if self._stays_open else self._connect()
+        try:
+            yield database
+        except sqlite3.OperationalError as err:
+            if str(err) == "interrupted":  # all that SQLite says of what the handler met
+                raise KeyboardInterrupt from err
+            raise
+        finally:
+            if not self._stays_open:
+                database.close()
 
 
 def _authorised(action: int, what: str | None, name: str | None, _database: str | None, inside: str | None) -> int:
@@ -284,7 +311,8 @@ class _SalvagedPages:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._ids = self._places = _NONE
+        self._heads = np.empty((0, 4), np.int64)
+        """Row id, topic id, record time and the byte of the file of each message, the first of its row id."""
 
     def contents(self) -> _Contents:
         contents = _Contents()
@@ -306,25 +334,21 @@ class _SalvagedPages:
         is_new[1:] = np.any(np.diff(table[:, :3], axis=0) != 0, axis=1)
         contents.take_messages(table[is_new, :3])
         table = table[np.lexsort((table[:, 3], table[:, 0]))]
-        self._ids, firsts = np.unique(table[:, 0], return_index=True)
-        self._places = table[firsts, 3]
+        self._heads = table[np.unique(table[:, 0], return_index=True)[1]]
         contents.is_bag = bool(contents.topics)
         return contents
 
     def rows(self, ids: NDArray[np.int64]) -> Iterator[_DataRow]:
-        if not len(self._places):
+        if not len(self._heads):
             self.contents()
         with opened(self.path, MAGIC, _WHAT) as log:
             pages = Pages(log)
-            for place in self._places[np.isin(self._ids, ids)].tolist():
-                row = pages.row(place)
-                message = _message_head(row)
-                if message is None:
-                    continue
+            for *message, place in self._heads[np.isin(self._heads[:, 0], ids)].tolist():
                 try:
-                    yield row.id, *message, pages.values(row)[-1]
+                    data = pages.last_value(pages.row(place))
                 except BrokenCellError:
-                    yield row.id, *message, None
+                    data = None
+                yield *message, data
 
 
 def _message_head(row: StoredRow) -> tuple[int, int] | None:

@@ -447,9 +447,12 @@ def timed(flaws: Mapping[str, Flaw], index: MessageIndex) -> dict[str, Flaw]:
 
 def _first(part: Part, number: int) -> bytes:
     """The bytes of a connection's first message, none where it has none."""
-    wanted = {number: np.arange(len(part.times_ns[number]))} if number in part.times_ns else {}
-    for _, _, buffer, pos, end in part.messages(wanted):
-        return buffer[pos:end]
+    count = len(part.times_ns.get(number, ()))
+    first, last = 0, 1  # the first is mostly there: few are asked for until one is
+    while first < count:
+        for _, _, buffer, pos, end in part.messages({number: np.arange(first, min(last, count))}):
+            return buffer[pos:end]
+        first, last = last, 2 * last
     return b""
 
 

@@ -143,6 +143,14 @@ class Pages:
             pos += size
         return values
 
+    def last_value(self, row: StoredRow) -> int | bytes | None:
+        """The last column of a row; text as its bytes. Raises BrokenCellError."""
+        payload = self._payload(row)
+        if len(payload) < row.size:
+            raise BrokenCellError("a row is cut short")
+        kind = row.types[-1]
+        return _value(kind, payload[row.size - _size(kind) :])
+
     def _row(self, block: bytes, pos: int, begin: int) -> StoredRow:
         """The row at a place of a block of pages, which begins at a byte of the file."""
         place, page = begin + pos, block[pos - pos % self.size : pos - pos % self.size + self.size]
@@ -210,6 +218,8 @@ def _varints(block: NDArray[np.uint8], places: NDArray[np.int64]) -> tuple[NDArr
         values = np.where(goes_on, values << 7 | byte & 0x7F, values)
         pos += goes_on
         goes_on &= byte >= 0x80
+        if not goes_on.any():
+            break
     return np.where(goes_on, -1, values), pos
 
 

@@ -17,6 +17,8 @@ from care_core.application import pace as watched
 from care_core.application.pace import watching
 from care_core.logs.digest import SAMPLED, hashing, log_digest
 from care_core.logs.mapped import FileBytes
+from care_core.logs.mcap_records import ENTRY
+from care_core.logs.message_index import MessageIndex
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 
@@ -111,6 +113,50 @@ def test_a_large_log_gives_the_same_from_few_of_its_bytes(
     assert log.damage == ()
     # zstd gives nothing before a block of 128 kB is there, bz2 before one of 900 kB.
     assert sum(read_bytes) < {"bz2": 1.1, "zstd": 0.75}.get(packed, 0.3) * path.stat().st_size
+
+
+def test_a_chunk_is_needed_up_to_the_message_behind_the_last_wanted_one() -> None:
+    rng = np.random.default_rng(0)
+    chunks = []
+    for chunk in range(40):
+        places = rng.permutation(1000)[: rng.integers(0, 9) * (chunk % 3)].tolist()
+        index = {number: [(0, place) for place in places[number::2]] for number in range(2)}
+        chunks.append((chunk, {number: np.array(found, ENTRY).tobytes() for number, found in index.items()}))
+    index_of_all = MessageIndex(chunks, ENTRY)
+    count = len(index_of_all.times_of([1])[1])
+    chosen = list(index_of_all.chosen({1: np.sort(rng.permutation(count)[: count // 2])}))
+    assert sum(len(one.rows) for one in chosen) == count // 2
+    for one in chosen:
+        low, high = index_of_all.bounds[one.chunk : one.chunk + 2]
+        assert all(low <= row < high for row in one.rows)
+        last = max(index_of_all.offsets[one.rows])
+        assert one.needed == min((at for at in index_of_all.offsets[low:high] if at > last), default=0)
+    assert not list(index_of_all.chosen({}))
+
+
+@pytest.mark.parametrize(("name", "packed"), [("a.bag", "lz4"), ("a.mcap", "zstd")])
+@pytest.mark.parametrize("whole", [1000, limits.WHOLE_BYTES])
+def test_packed_chunks_are_fetched_while_the_one_before_is_unpacked(
+    name: str, packed: str, whole: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "WHOLE_BYTES", whole)
+    log = open_log(with_pictures(tmp_path / name, packed))
+    happened: list[tuple[str, int, int]] = []
+    original = FileBytes._read
+
+    def read(self: FileBytes, low: int, size: int) -> bytes:
+        happened.append(("read", low, low + size))
+        return original(self, low, size)
+
+    monkeypatch.setattr(FileBytes, "_read", read)
+    monkeypatch.setattr(FileBytes, "_fetch", lambda _, low, high: happened.append(("fetch", low, high)))
+    log.read(FIELDS)
+    fetched = [(low, high) for what, low, high in happened if what == "fetch"]
+    assert len(fetched) == PICTURES
+    first = next(i for i, (what, low, _) in enumerate(happened) if what == "read" and low)
+    assert len([what for what, *_ in happened[:first] if what == "fetch"]) > 1
+    for what, low, high in happened[first:]:
+        assert what == "fetch" or any(begin <= low and high <= end for begin, end in fetched)
 
 
 @pytest.mark.parametrize(("name", "packed"), [("a.bag", "lz4"), ("a.mcap", "zstd")])

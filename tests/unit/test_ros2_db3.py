@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +53,31 @@ def test_definitions_missing_from_the_file(tmp_path: Path) -> None:
     with sqlite3.connect(file) as database:
         database.execute("DROP TABLE message_definitions")
     check(open_log(file))
+
+
+def test_first_messages_that_are_not_there(tmp_path: Path) -> None:
+    file = write_db3(tmp_path / "bag")
+    lost = 7
+    with sqlite3.connect(file) as database:
+        database.execute("DROP TABLE message_definitions")
+        database.execute("UPDATE messages SET data = '' WHERE id <= ?", (2 * lost,))
+    table = open_log(file).read(WANTED)["/imu"]
+    np.testing.assert_array_equal(table["linear_acceleration.x"], np.arange(lost, MESSAGES))
+
+
+def test_a_log_that_several_threads_read(tmp_path: Path) -> None:
+    log = open_log(write_db3(tmp_path / "bag"))
+    with ThreadPoolExecutor(4) as pool:
+        for read in [pool.submit(check, log) for _ in range(20)]:
+            read.result()
+
+
+def test_a_split_recording_holds_no_file_open(tmp_path: Path) -> None:
+    log, one = open_log(split(tmp_path)), open_log(write_db3(tmp_path / "bag"))
+    check(log)
+    check(one)
+    held = [os.path.realpath(f"/proc/self/fd/{name}") for name in os.listdir("/proc/self/fd")]
+    assert [Path(name).name for name in held if name.startswith(str(tmp_path))] == ["bag.db3"]
 
 
 def split(tmp_path: Path) -> Path:
