@@ -7,10 +7,10 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import local
 from typing import Any, Protocol
 from weakref import finalize
 
@@ -181,7 +181,7 @@ class _Database:
 
     def __init__(self, path: Path, *, stays_open: bool = False) -> None:
         self.path = path
-        self._stays_open = stays_open
+        self._stays_open, self._own = stays_open, local()
         self.is_own = False
         self.size = path.stat().st_size
         journal = path.with_name(f"{path.name}-wal")
@@ -266,16 +266,20 @@ class _Database:
                 raise sqlite3.DatabaseError("its tree runs in circles")
             yield row
 
-    @cached_property
+    @property
     def _kept(self) -> sqlite3.Connection:
-        database = self._connect()
-        finalize(self, database.close)
+        """The connection of this thread. Two threads on one would wait for each other: SQLite holds its lock while it
+        asks Python whether to go on, and Python its own while it waits for that of SQLite."""
+        if not hasattr(self._own, "database"):
+            self._own.database = self._connect()
+            finalize(self, self._own.database.close)
+        database: sqlite3.Connection = self._own.database
         return database
 
     def _connect(self) -> sqlite3.Connection:
         mode = "" if self.is_own else "?mode=ro&immutable=1"
         uri = f"{self.path.resolve().as_uri()}{mode}"
-        database = sqlite3.connect(uri, uri=True, check_same_thread=False)  # the app's threads share a log
+        database = sqlite3.connect(uri, uri=True, check_same_thread=False)  # the last of the app's threads closes it
         database.execute(f"PRAGMA cache_size = -{_CACHED_KIB}")
         database.set_authorizer(_authorised)
         database.text_factory = lambda raw: raw.decode("utf-8", "replace")

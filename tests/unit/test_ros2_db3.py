@@ -65,7 +65,9 @@ def test_first_messages_that_are_not_there(tmp_path: Path) -> None:
     np.testing.assert_array_equal(table["linear_acceleration.x"], np.arange(lost, MESSAGES))
 
 
-def test_a_log_that_several_threads_read(tmp_path: Path) -> None:
+def test_a_log_that_several_threads_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Often asked whether to go on, while others wait: neither lock may be held for the other."""
+    monkeypatch.setattr("care_core.logs.ros2_db3._STEPS", 50)
     log = open_log(write_db3(tmp_path / "bag"))
     with ThreadPoolExecutor(4) as pool:
         for read in [pool.submit(check, log) for _ in range(20)]:
