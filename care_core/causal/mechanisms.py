@@ -166,10 +166,6 @@ class Mechanism:
         """Those of the inputs, of x (m, p)."""
         return x[:, [self.inputs.index(name) for name in names]]
 
-    def ignorance(self, x: FloatArray) -> FloatArray:
-        """How little the training data say there: posterior over prior variance, 0 (known) to 1 (nothing known)."""
-        return self.at(x).ignorance
-
     @property
     def prior_variance(self) -> float:
         """Of a noise-free value before any run, on the transformed scale."""
@@ -259,7 +255,9 @@ class At:
 
     @property
     def ignorance(self) -> FloatArray:
-        """Posterior over prior variance, 0 (known) to 1 (nothing known), shape (m,)."""
+        """How little the training data say there: posterior over prior variance, 0 (known) to 1 (nothing known).
+
+        Shape (m,)."""
         return np.clip(self.variance / max(self.mechanism.prior_variance, 1e-12), 0.0, 1.0)
 
     @cached_property

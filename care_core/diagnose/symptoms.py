@@ -73,7 +73,7 @@ def _split(
         return {}
     reference = world.reference
     configs = [reference, world.config, *({**world.config, name: reference[name]} for name in names)]
-    expected, here, *back = _latent(mechanism, configs)
+    expected, here, *back = _latent(world, mechanism, configs)
     value = 2 * seen - 1 if mechanism.binary else float(transformed(np.array(seen), mechanism.transform))
     scale = _scale(world, metric, mechanism)
     off = (value - expected) / scale
@@ -97,5 +97,6 @@ def _scale(world: World, metric: str, mechanism: Mechanism) -> float:
     return max(summary.sd / summary.mean, mechanism.scale)
 
 
-def _latent(mechanism: Mechanism, configs: Sequence[Config]) -> list[float]:
-    return [float(value) for value in mechanism.latent(columns(configs, mechanism.inputs))]
+def _latent(world: World, mechanism: Mechanism, configs: Sequence[Config]) -> list[float]:
+    latent: list[float] = world.places.at(mechanism, columns(configs, mechanism.inputs)).latent.tolist()
+    return latent

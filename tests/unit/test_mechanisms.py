@@ -83,8 +83,8 @@ def test_a_change_is_known_better_than_the_values_it_lies_between() -> None:
 def test_far_away_the_model_falls_back_to_the_mean_and_knows_nothing() -> None:
     m = mechanism()
     near, far = np.array([[1.0, np.exp(0.5)]]), np.array([[1e4, 1e12]])
-    assert m.ignorance(near)[0] < 0.2
-    assert m.ignorance(far)[0] == pytest.approx(1.0)
+    assert m.at(near).ignorance[0] < 0.2
+    assert m.at(far).ignorance[0] == pytest.approx(1.0)
     assert m.latent(far)[0] == pytest.approx(m.mean)
 
 

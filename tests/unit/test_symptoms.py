@@ -40,7 +40,7 @@ def test_last_digits_point_at_nobody(planted: Profile, monkeypatch: pytest.Monke
     """A metric that this run's wind moved, and no option: sums in another order differ in their last digits."""
     here = planted_world(planted)
     off = replace(here, observed={**here.observed, "hold_s": 500.0})
-    monkeypatch.setattr(symptoms, "_latent", lambda _, configs: [1.0 - 1e-15 * i for i in range(len(configs))])
+    monkeypatch.setattr(symptoms, "_latent", lambda _world, _, configs: [1.0 - 1e-15 * i for i in range(len(configs))])
     assert {pointer.share for pointer in pointers(off, "time", NAMES, (), ()).values()} == {0.0}
 
 

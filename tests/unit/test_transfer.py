@@ -131,7 +131,7 @@ def test_what_the_source_does_not_know_a_carried_mechanism_does_not_know_either(
         assert carried.latent_sd(x)[0] >= source.latent_sd(x[:, places])[0]
         there, here = carried.at(x), carried.at(near)
         assert np.all(np.abs(there.covariance(here)) <= np.sqrt(there.variance * here.variance) * (1 + 1e-6))
-    assert carried.ignorance(near)[0] < carried.ignorance(far)[0]
+    assert carried.at(near).ignorance[0] < carried.at(far).ignorance[0]
 
 
 def test_many_runs_of_few_missions_are_no_regression(planted: Profile) -> None:
