@@ -17,8 +17,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from care_core.extract import ardupilot, navigation  # noqa: F401  they register their extractors
-from care_core.extract.registry import MISSION_KINDS, Mission, find_extractor, merge_needs
+import care_core.extract.read  # noqa: F401  registers every extractor
+from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor, merge_needs
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema, read_schema
 from care_core.run import Value, is_known

@@ -22,9 +22,9 @@ from pathlib import Path
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.examining import find, flight_of
+from care_core.ecosystems.findings import Finding
 from care_core.errors import LogError
-from care_core.health.ardupilot import find, flight_of
-from care_core.health.records import Finding
 from care_core.logs.opening import open_log
 
 RIGHT = {

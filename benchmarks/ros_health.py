@@ -20,9 +20,9 @@ from pathlib import Path
 
 import numpy as np
 
-from care_core.health.records import Finding
-from care_core.health.ros.examining import examine
-from care_core.health.ros.recording import Recording
+from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.ros.examining import examine
+from care_core.ecosystems.ros.recording import Recording
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 

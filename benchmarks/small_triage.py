@@ -46,7 +46,7 @@ began_all = time.process_time()
 import care_tui.start, care_tui.cli
 from care_core.application import case as cases
 import care_core.diagnose.judging as judging
-import care_core.health.examine as examining
+import care_core.ecosystems.examine as examining
 import care_tui.commands.diagnosing as diagnosing
 names = {
     "reading": [(cases, "choose"), (cases, "_read"), (examining, "examine")],

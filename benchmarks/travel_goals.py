@@ -26,8 +26,8 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import Mechanism
 from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.configs.driven import configuration, in_force
+from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.extract.read import mission_kind, reading_plan
-from care_core.extract.registry import Mission, find_extractor
 from care_core.files import bundled
 from care_core.learn.fitting import OUTCOME
 from care_core.learn.outcomes import fit_on

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.health.ardupilot import find
-from care_core.health.ardupilot.flight import Flight
-from care_core.health.records import Finding
+from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table
 from care_core.run import Setting
 

@@ -20,7 +20,7 @@ from care_core.diagnose.records import (
     PathNode,
     Prediction,
 )
-from care_core.health.records import Finding, Health, Moment
+from care_core.ecosystems.findings import Finding, Health, Moment
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.run import Damage, Evidence, Fit, LogInfo, MissionInfo, ProfileChoice, Run, Setting, Unavailable
 from care_core.variables import Change, Role, Threshold, Variable

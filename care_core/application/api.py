@@ -34,9 +34,9 @@ def inspect(log: str | Path) -> InspectDocument:
     Raises:
         LogError: the log cannot be read.
     """
+    from care_core.ecosystems.examine import examine
     from care_core.extract.coverage import try_on
     from care_core.extract.select import sound_profiles
-    from care_core.health.examine import examine
     from care_core.report.inspection import build_inspection
     from care_core.run import Fit, ProfileChoice
 

@@ -69,8 +69,8 @@ def _runs_of(log: Log, profile: Profile) -> tuple[list[Judged], list[Refused]]:
     """The good runs of a log, and the others with their reason. Raises CareError."""
     from care_core.diagnose.baseline import Refused, for_any_mission, refusal
     from care_core.diagnose.judging import judge
+    from care_core.ecosystems.examine import examine
     from care_core.extract.read import read_runs
-    from care_core.health.examine import examine
 
     schema = for_any_mission(profile.schema)
     health = examine(log)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix
     from care_core.diagnose.reference import Good
     from care_core.diagnose.whatif import Question
-    from care_core.health.records import Health
+    from care_core.ecosystems.findings import Health
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
     from care_core.profile.schema import Schema
@@ -134,8 +134,8 @@ def open_case(request: Request, progress: Progress) -> Case:
     """
     from care_core.application.pace import watching
     from care_core.configs.loading import read_configs
+    from care_core.ecosystems.examine import examine
     from care_core.errors import NoMissionError
-    from care_core.health.examine import examine
     from care_core.run import Fit
 
     configs = read_configs(request.configs)
@@ -160,7 +160,7 @@ def open_case(request: Request, progress: Progress) -> Case:
 def read_case(request: Request, progress: Progress) -> Reading:
     """The first half of the line: a judged run, whose faults nobody asked about. Raises CareError."""
     from care_core.configs.loading import read_configs
-    from care_core.health.examine import examine
+    from care_core.ecosystems.examine import examine
 
     configs = read_configs(request.configs)
     with opened(request.log) as (log, sha256):

@@ -97,7 +97,7 @@ def override_of(report: Path, configs: Sequence[str], alternative: int = 0, prof
     """
     from care_core.configs.formats import text_for, write_params
     from care_core.configs.loading import read_configs
-    from care_core.configs.yaml_tree import typed
+    from care_core.ecosystems.ros.yaml_tree import typed
     from care_core.run import Setting
 
     format = read_configs(configs)[0].format

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from care_core.configs.driven import readable
+from care_core.ecosystems.vehicles import vehicle_of
 from care_core.metadata import ardupilot, navigation
 from care_core.metadata.fact import Fact
 from care_core.run import Setting, shown
 from care_core.variables import Variable
-from care_core.vehicles import vehicle_of
 
 
 class Known(NamedTuple):

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from care_core.health.records import Finding
+    from care_core.ecosystems.findings import Finding
 
 MOST_PLOTS, FEWEST, MOST_OTHERS = 8, 6, 10
 """Plots that matter at most and, with others, at least; and how many more."""

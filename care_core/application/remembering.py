@@ -38,8 +38,8 @@ def remember_triage(diagnosis: Diagnosis) -> CareError | None:
 
 def about_run(run: Run) -> About:
     """What the history keeps of a run beside its document."""
+    from care_core.ecosystems.vehicles import is_self_written
     from care_core.history.store import About
-    from care_core.vehicles import is_self_written
 
     settings = {name: setting.value for name, setting in run.settings.items() if not is_self_written(name)}
     return About(run.log.robot, dict(run.mission.asked), run.log.facts.get("firmware", ""), settings)

@@ -17,7 +17,7 @@ from typing import Any, cast
 
 from care_core.application.case import Case
 from care_core.diagnose.records import Diagnosis
-from care_core.health.records import Moment
+from care_core.ecosystems.findings import Moment
 from care_core.variables import Variable
 
 NO_PLACE = "(position left out)"

@@ -139,7 +139,7 @@ def signals_of(case: Case) -> list[Signal]:
 
 def _read_by_profile(case: Case, present: Collection[str]) -> dict[Source, tuple[str, ...]]:
     """What the profile's extractors read, with the variables it is read for, those that matter most first."""
-    from care_core.extract.registry import find_extractor
+    from care_core.ecosystems.measures import find_extractor
 
     users: dict[Source, list[str]] = {}
     for variable in case.schema.variables.values() if case.schema else ():

@@ -11,10 +11,10 @@ from care_core.application.case import Case
 from care_core.errors import CareError
 
 if TYPE_CHECKING:
+    from care_core.ecosystems.vehicles import Kind
     from care_core.history.store import Triaged
     from care_core.logs.base import Log
     from care_core.run import FitVerdict
-    from care_core.vehicles import Kind
 
 TEXTS = {
     "MSG": ("Message",),
@@ -50,8 +50,8 @@ def log_of(case: Case) -> Log:
 
 def messages_of(case: Case) -> list[LogMessage]:
     """Everything that the log holds in words, and what was found in its numbers, in time order."""
+    from care_core.ecosystems.vehicles import vehicle_of
     from care_core.logs.telemetry import as_dataflash
-    from care_core.vehicles import vehicle_of
 
     log = as_dataflash(log_of(case))
     tables = log.read(TEXTS)
@@ -71,7 +71,7 @@ def messages_of(case: Case) -> list[LogMessage]:
 
 def _worded(channel: str, values: list[object], kind: Kind) -> tuple[str, str]:
     """Kind and words of a message of this channel."""
-    from care_core.vehicles import error_words, event_words, is_over
+    from care_core.ecosystems.vehicles import error_words, event_words, is_over
 
     if channel.startswith("/rosout"):
         level, name, text = (*values, "", "")[:3]
@@ -90,10 +90,10 @@ def _worded(channel: str, values: list[object], kind: Kind) -> tuple[str, str]:
 def what_would_fit(case: Case) -> list[str]:
     """What would make a profile fit the log of a case that none fits: by the one for this kind of log and vehicle that
     misses least, else a profile of its own."""
+    from care_core.ecosystems.vehicles import vehicle_of
     from care_core.extract.coverage import to_have, try_on, wrong_kind
     from care_core.extract.fit import is_other_vehicle
     from care_core.extract.select import sound_profiles
-    from care_core.vehicles import vehicle_of
 
     log = log_of(case)
     vehicle = vehicle_of(log.facts, log.settings())

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from care_core.configs.driven import same_value
 from care_core.configs.formats import ConfigFormat
 from care_core.configs.loading import ConfigFile, resolve
+from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.run import Setting, shown
-from care_core.vehicles.self_written import is_self_written
 
 
 @dataclass(frozen=True, slots=True)

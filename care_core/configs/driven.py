@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
+from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.run import Setting, shown
 from care_core.text import clean, clock
 from care_core.variables import Variable
-from care_core.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 
 SEVEN_DIGITS = 1e-6
 """Vehicles hold parameters in 32 bits (24 of mantissa: 6e-8 of a value), files and reports in seven digits (5e-7)."""
@@ -20,7 +20,7 @@ def same_value(a: float | str | None, b: float | str | None) -> bool:
         return a is b
     one, other = as_number(a), as_number(b)
     if one is None or other is None:
-        from care_core.configs.yaml_tree import plain  # YAML's parser, which few logs need
+        from care_core.ecosystems.ros.yaml_tree import plain  # YAML's parser, which few logs need
 
         return bool(plain(str(a).strip()) == plain(str(b).strip()))  # lists, however quoted
     return math.isclose(one, other, rel_tol=SEVEN_DIGITS, abs_tol=1e-12) or (math.isnan(one) and math.isnan(other))

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from care_core.configs import qgc_params
+from care_core.ecosystems.px4 import parameter_file as qgc_params
 from care_core.run import Setting
 from care_core.variables import Variable
 

@@ -122,7 +122,7 @@ def guesses(files: Sequence[ConfigFile], found: Mapping[str, Setting]) -> dict[s
     named: dict[str, list[str]] = {}
     for file in files:
         if file.format is ConfigFormat.ROS1_YAML:
-            from care_core.configs import ros1_yaml
+            from care_core.ecosystems.ros import ros1_yaml
 
             own = [p for p, s in found.items() if file.settings.get(s.name) is s and ros1_yaml.is_guess(s.name, p)]
             if own:

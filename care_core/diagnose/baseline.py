@@ -15,7 +15,7 @@ from care_core.causal.counterfactual import World
 from care_core.configs.driven import same_value
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.tolerance import FEW, Quantile, upper_quantile
-from care_core.health.records import Health
+from care_core.ecosystems.findings import Health
 from care_core.numbers import median
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile

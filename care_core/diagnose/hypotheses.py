@@ -19,8 +19,8 @@ from dataclasses import replace
 from care_core.causal.counterfactual import World
 from care_core.diagnose.ranking import Suspect as Option
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
-from care_core.health.records import Finding, Severity, Suspect
-from care_core.health.telling import LIKELY
+from care_core.ecosystems.findings import Finding, Severity, Suspect
+from care_core.ecosystems.ranking import LIKELY
 from care_core.profile.schema import Schema
 from care_core.run import Evidence, FitVerdict
 

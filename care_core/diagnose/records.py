@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import field
 from typing import Literal
 
+from care_core.ecosystems.findings import NOTHING_SEEN, Health, Severity
+from care_core.ecosystems.ranking import lost_by
 from care_core.frozen import dataclass
-from care_core.health.records import NOTHING_SEEN, Health, Severity
-from care_core.health.telling import lost_by
 from care_core.run import FitVerdict, MissionInfo, ProfileChoice, Run, shown
 from care_core.text import figures
 from care_core.variables import Change, Threshold, Variable

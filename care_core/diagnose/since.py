@@ -9,6 +9,7 @@ from pathlib import Path
 from care_core.configs.driven import readable, same_value
 from care_core.diagnose.judging import Judged, read_and_judge
 from care_core.diagnose.records import Cause, Diagnosis, Note, ParameterChange, Since
+from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.errors import CareError
 from care_core.extract.read import log_info
 from care_core.logs.base import Log
@@ -16,7 +17,6 @@ from care_core.logs.digest import log_digest
 from care_core.profile.store import Profile
 from care_core.run import LogInfo, Run, Setting
 from care_core.variables import Variable
-from care_core.vehicles.self_written import is_self_written
 
 
 def compare(judged: Judged, good: Log, profile: Profile) -> Since:

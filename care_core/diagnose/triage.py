@@ -39,8 +39,8 @@ from care_core.diagnose.ranking import (
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Hypothesis, Note, ObjectiveResult
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
+from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.frozen import dataclass
-from care_core.health.records import NOTHING_SEEN, Health
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
 from care_core.run import Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Setting, is_known, shown

@@ -10,9 +10,9 @@ from care_core.configs.driven import option_value
 from care_core.diagnose.fixes import change_notes, prediction
 from care_core.diagnose.judging import Judged, world_of
 from care_core.diagnose.records import ObjectiveResult, Prediction
+from care_core.ecosystems.findings import NOTHING_SEEN, Health
+from care_core.ecosystems.ranking import lost_by
 from care_core.errors import UsageError, nearest
-from care_core.health.records import NOTHING_SEEN, Health
-from care_core.health.telling import lost_by
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.run import ProfileChoice, Run, Setting

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 
 from care_core.configs.driven import readable
+from care_core.ecosystems.measures import find_extractor
 from care_core.errors import CareError
 from care_core.extract.read import mission_kind, read_runs, reading_plan
-from care_core.extract.registry import find_extractor
 from care_core.frozen import dataclass
 from care_core.logs.base import Log
 from care_core.logs.telemetry import as_dataflash

@@ -9,11 +9,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
+from care_core.ecosystems.vehicles.settings import code
+from care_core.ecosystems.vehicles.vehicle import vehicle_of
 from care_core.logs.base import Log, LogFormat
 from care_core.run import Robot, Setting
 from care_core.text import clean
-from care_core.vehicles.settings import code
-from care_core.vehicles.vehicle import vehicle_of
 
 _NOTES = (
     "robot", "robot_name", "robot_id", "serial", "serial_number", "vehicle_id", "vehicle_name", "vin", "hostname",

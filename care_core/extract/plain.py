@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from care_core.ecosystems.ardupilot.measures.mission import ArduPilotFlight
+from care_core.ecosystems.px4.missions import Px4Flight
+from care_core.ecosystems.ros.measures import actionlib, nav2
 from care_core.errors import NoMissionError
-from care_core.extract import actionlib, nav2
-from care_core.extract.ardupilot.mission import ArduPilotFlight
-from care_core.extract.px4 import Px4Flight
 from care_core.extract.read import read_runs
 from care_core.logs.base import Channel, Log, LogFormat
 from care_core.logs.digest import Sha256

@@ -9,22 +9,23 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+import care_core.ecosystems.ardupilot.measures
+import care_core.ecosystems.ardupilot.measures.requested
+import care_core.ecosystems.ardupilot.measures.rover
+import care_core.ecosystems.parameter
+import care_core.ecosystems.px4.missions
+
 # Importing them registers their extractors and mission kinds.
-import care_core.extract.actionlib
-import care_core.extract.ardupilot
-import care_core.extract.ardurover
-import care_core.extract.asked
-import care_core.extract.battery
-import care_core.extract.goals_asked
-import care_core.extract.laser
-import care_core.extract.nav2
-import care_core.extract.navigation
-import care_core.extract.parameter
-import care_core.extract.px4
-import care_core.extract.recording  # noqa: F401
+import care_core.ecosystems.ros.measures.actionlib
+import care_core.ecosystems.ros.measures.battery
+import care_core.ecosystems.ros.measures.laser
+import care_core.ecosystems.ros.measures.nav2
+import care_core.ecosystems.ros.measures.navigation
+import care_core.ecosystems.ros.measures.requested
+import care_core.ecosystems.whole_log  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
+from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
-from care_core.extract.registry import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
 from care_core.frozen import dataclass
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import Sha256, hashing

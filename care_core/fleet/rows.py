@@ -10,7 +10,7 @@ from care_core.causal.counterfactual import World, known_value
 from care_core.causal.model import Model
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Confidence, Diagnosis, Status, What
-from care_core.health.records import FindingKind, Severity
+from care_core.ecosystems.findings import FindingKind, Severity
 from care_core.run import FitVerdict, is_known
 from care_core.text import clean
 from care_core.variables import Op, Threshold

@@ -7,14 +7,14 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 
+from care_core.ecosystems.vehicles.parameters import spellings
+from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
+from care_core.ecosystems.vehicles.vehicle import Kind
 from care_core.lint.generic import found
 from care_core.lint.records import Document, Entry, Finding, Severity
 from care_core.metadata import ardupilot
 from care_core.metadata.ardupilot import Release
 from care_core.metadata.fact import Fact
-from care_core.vehicles.parameters import spellings
-from care_core.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
-from care_core.vehicles.vehicle import Kind
 
 _VEHICLE_LINE = re.compile(r"#.*\b(copter|helicopter|multirotor|plane|rover|sub|tracker|blimp)\b", re.IGNORECASE)
 _VERSION_LINE = re.compile(r"#.*?\b[Vv]?(?:ersion:?\s*)?(\d\.\d+)\b")

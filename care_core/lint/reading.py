@@ -8,10 +8,11 @@ from pathlib import Path
 
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from care_core.configs import qgc_params, yaml_tree
-from care_core.configs.ardupilot_param import FLAGS
 from care_core.configs.formats import ConfigFormat, format_of
 from care_core.configs.loading import text_of_file
+from care_core.ecosystems.ardupilot.parameter_file import FLAGS
+from care_core.ecosystems.px4 import parameter_file as qgc_params
+from care_core.ecosystems.ros import yaml_tree
 from care_core.errors import ConfigError
 from care_core.lint.records import Document, Entry, Finding, Severity
 from care_core.lint.rules import BY_ID

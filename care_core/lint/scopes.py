@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from care_core.configs.formats import ConfigFormat
-from care_core.configs.ros2_yaml import PARAMETERS
+from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.records import Document, Entry
 from care_core.metadata import navigation
 from care_core.metadata.navigation import Ros

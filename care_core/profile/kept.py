@@ -27,7 +27,7 @@ _CHECKING = (
     "../plain_yaml.py",
     "../limits.py",
     "../causal/nominal.py",
-    "../vehicles/vehicle.py",
+    "../ecosystems/vehicles/vehicle.py",
     "../logs/base.py",
     "schema.py",
     "schema_file.py",

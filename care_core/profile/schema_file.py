@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from care_core import plain_yaml
 from care_core.causal.nominal import nominal
+from care_core.ecosystems.vehicles import Kind as VehicleKind
 from care_core.errors import ProfileError, nearest
 from care_core.logs.base import LogFormat
 from care_core.profile.schema import EvidenceRule, Schema, Side
@@ -30,7 +31,6 @@ from care_core.variables import (
     ValueType,
     Variable,
 )
-from care_core.vehicles import Kind as VehicleKind
 
 
 class Strict(BaseModel):

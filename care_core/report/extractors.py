@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 import care_core.extract.read  # noqa: F401  (registers every extractor)
-from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Extractor
+from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Extractor
 from care_core.files import write_atomically
 from care_core.logs.base import Wanted
 

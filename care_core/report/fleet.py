@@ -11,13 +11,13 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Final, Literal
 
 from care_core.diagnose.records import Confidence, Status, What
+from care_core.ecosystems.findings import FindingKind, Severity
 from care_core.errors import UsageError
 from care_core.fleet.rows import Explained, Row, distinct
 from care_core.fleet.shared import FEWEST, Kind, Pattern, Since, Trait, Unit
 from care_core.fleet.sources import INSTALL
 from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
 from care_core.fleet.together import Fleet
-from care_core.health.records import FindingKind, Severity
 from care_core.numbers import six_digits
 from care_core.report.document import estimate, plain_number
 from care_core.report.published import Strict

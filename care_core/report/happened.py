@@ -10,8 +10,8 @@ from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 from care_core.diagnose.records import Hypothesis, What
+from care_core.ecosystems.findings import Finding, FindingKind, Health, Moment, Severity
 from care_core.frozen import dataclass
-from care_core.health.records import Finding, FindingKind, Health, Moment, Severity
 from care_core.numbers import six_digits
 from care_core.report.published import Strict
 from care_core.report.wording import SEVERITY_WORDS, hypothesis_text, noted

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Final, Literal
 
+from care_core.ecosystems.findings import Health
 from care_core.extract.coverage import Missed, Trial
-from care_core.health.records import Health
 from care_core.logs.base import Log
 from care_core.report.happened import (
     FindingEntry,

@@ -10,7 +10,7 @@ from care_core.report.wording import noted
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis
-    from care_core.health.records import Severity
+    from care_core.ecosystems.findings import Severity
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeVar
 
 from care_core.diagnose.records import Hypothesis, ObjectiveResult, Status
-from care_core.health.records import WHOLE_LOG, Finding, Health, Severity
-from care_core.health.telling import SYMPTOMS
+from care_core.ecosystems.findings import WHOLE_LOG, Finding, Health, Severity
+from care_core.ecosystems.ranking import SYMPTOMS
 from care_core.run import FIT_WORDS, FitVerdict
 
 if TYPE_CHECKING:

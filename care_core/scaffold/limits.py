@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from care_core.diagnose.tolerance import upper_quantile
-from care_core.health.examine import examine
+from care_core.ecosystems.examine import examine
 from care_core.scaffold.measures import Measure, Measures
 from care_core.variables import RelativeThreshold, Role, Threshold, Variable
 

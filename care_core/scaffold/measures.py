@@ -7,14 +7,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS
+from care_core.ecosystems.vehicles import vehicle_of
 from care_core.errors import CareError
 from care_core.extract.read import read_runs
-from care_core.extract.registry import EXTRACTORS, MISSION_KINDS
 from care_core.profile.schema import Schema
 from care_core.run import Run, Unavailable, is_known
 from care_core.scaffold.seen import Seen
 from care_core.variables import Extract, Role, Threshold, Variable
-from care_core.vehicles import vehicle_of
 
 _NUMBERS = ("Float32", "Float64", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64")
 _SIGNALS: Mapping[str, tuple[tuple[str, str, Role, str], ...]] = {

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from care_core.extract.drive import GOAL_TIMEOUT_S, TOLERANCE_M, Leg, Status, analyse
-from care_core.extract.registry import MISSION_KINDS
+from care_core.ecosystems.measures import MISSION_KINDS
+from care_core.ecosystems.ros.measures.drive import GOAL_TIMEOUT_S, TOLERANCE_M, Leg, Status, analyse
+from care_core.ecosystems.vehicles import vehicle_of
 from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
 from care_core.scaffold.seen import Seen
-from care_core.vehicles import vehicle_of
 
 _TYPES = {"odometry": ("Odometry",), "commands": ("Twist", "TwistStamped"), "battery": ("BatteryState",)}
 _USUAL = {"odometry": "/odom", "commands": "/cmd_vel", "battery": "/battery_state"}

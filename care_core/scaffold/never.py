@@ -9,8 +9,8 @@ import re
 from collections.abc import Mapping
 from fnmatch import translate
 
+from care_core.ecosystems.vehicles.self_written import SELF_WRITTEN, SIMULATOR_PREFIX
 from care_core.scaffold.seen import Ecosystem
-from care_core.vehicles.self_written import SELF_WRITTEN, SIMULATOR_PREFIX
 
 _WIRING = "wiring, radio, logging and what is fitted"
 _CODES = "codes and bit masks whose meaning is not known here"

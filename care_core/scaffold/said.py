@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from care_core.extract.goals import ROSOUT
+from care_core.ecosystems.ros.measures.goals import ROSOUT
 from care_core.scaffold.seen import Seen
 
 _VALUE = r"(-?\d[\d.eE+-]*|true|false)"

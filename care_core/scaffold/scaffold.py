@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from care_core.ecosystems.vehicles import vehicle_of
 from care_core.errors import LogError, UsageError
 from care_core.extract.read import reading_plan
 from care_core.profile.schema import Schema, parse_schema
@@ -17,7 +18,6 @@ from care_core.scaffold.said import said_parameters
 from care_core.scaffold.seen import Seen
 from care_core.scaffold.writing import comment, listed, scalar, variable_lines
 from care_core.variables import RelativeThreshold, Role, Threshold, Variable
-from care_core.vehicles import vehicle_of
 
 _ONLY_SAID = "only said in /rosout (record parameter_updates or /parameter_events, or give their file with --config)"
 

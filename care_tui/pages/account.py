@@ -8,7 +8,7 @@ from textual.content import Content
 
 from care_core.application.case import Case
 from care_core.application.viewing import what_would_fit
-from care_core.health.records import Health
+from care_core.ecosystems.findings import Health
 from care_tui.pages.page import Fetch, View
 from care_tui.pages.step import StepPage
 from care_tui.render.happened import Told, fit_rows, told, told_item, told_rows, verdict_line

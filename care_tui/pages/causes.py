@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 from textual.content import Content
 
 from care_core.diagnose.records import Cause, Fault, Hypothesis
-from care_core.health.records import Finding
+from care_core.ecosystems.findings import Finding
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.pages.page import View

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
-from care_core.health.records import Finding, Health, Moment, Severity
+from care_core.ecosystems.findings import Finding, Health, Moment, Severity
 from care_core.report.marks import Mark
 from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
 from care_core.text import clean, seconds

@@ -19,7 +19,7 @@ from typer.main import get_command
 from care_core.application import api
 from care_core.application.case import Case, Request
 from care_core.diagnose.records import Diagnosis
-from care_core.health.records import NOTHING_SEEN
+from care_core.ecosystems.findings import NOTHING_SEEN
 from care_core.profile.store import load_profile
 from care_core.tables.rows import ABOUT
 from care_tui import __version__, console

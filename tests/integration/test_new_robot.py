@@ -146,7 +146,7 @@ def test_the_files_to_begin_with_hold_the_defaults(tmp_path: Path) -> None:
 
 
 def test_healthy_drives_raise_hardly_an_alarm(tmp_path: Path) -> None:
-    from care_core.health.examine import examine
+    from care_core.ecosystems.examine import examine
 
     alarms = 0
     for seed in range(12):

@@ -12,7 +12,7 @@ import pytest
 from care_core.diagnose.judging import judge
 from care_core.diagnose.records import Diagnosis
 from care_core.diagnose.triage import diagnose
-from care_core.health.records import NOTHING_SEEN, Finding
+from care_core.ecosystems.findings import NOTHING_SEEN, Finding
 from care_core.learn.train import train
 from care_core.profile.model import write_model
 from care_core.profile.store import Profile

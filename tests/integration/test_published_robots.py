@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from care_core.ecosystems.measures import Mission, find_extractor
 from care_core.extract.coverage import cover
 from care_core.extract.fit import fit_of
-from care_core.extract.registry import Mission, find_extractor
 from care_core.extract.select import choose_profile, sound_profiles
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log

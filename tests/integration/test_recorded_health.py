@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from care_core.health.ardupilot import find, flight_of
-from care_core.health.records import Finding
+from care_core.ecosystems.ardupilot.examining import find, flight_of
+from care_core.ecosystems.findings import Finding
 from care_core.logs.opening import open_log
 
 GOOD = Path(__file__).parents[1] / "data" / "arducopter_good.BIN"

@@ -18,7 +18,7 @@ from care_core.diagnose.records import (
     PathNode,
     Prediction,
 )
-from care_core.health.records import Finding, Health, Moment
+from care_core.ecosystems.findings import Finding, Health, Moment
 from care_core.run import Damage, Evidence, Fit, FitVerdict, LogInfo, MissionInfo, ProfileChoice, Run, Setting
 from care_core.variables import Change, Role, Threshold, Variable
 

@@ -8,11 +8,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from care_core.health.ardupilot.account import account
-from care_core.health.ardupilot.flight import Flight
-from care_core.health.ardupilot.supply import cells
-from care_core.health.moments import MOST
-from care_core.health.records import Moment
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.supply import cells
+from care_core.ecosystems.ardupilot.timeline import account
+from care_core.ecosystems.findings import Moment
+from care_core.ecosystems.timeline import MOST
 from care_core.logs.base import Table
 from care_core.run import Damage, Setting
 

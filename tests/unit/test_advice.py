@@ -9,7 +9,7 @@ import pytest
 
 from care_core.diagnose.advice import believed, by_chance, falls_short, nearest, outweighed
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
-from care_core.health.records import Finding
+from care_core.ecosystems.findings import Finding
 from care_core.variables import Threshold
 from tests.made import LAND_SPEED, TIME, made_diagnosis
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_core.health.ardupilot import find
-from care_core.health.ardupilot.checks import CHECKS
-from care_core.health.ardupilot.flight import Flight, runs
-from care_core.health.ardupilot.signals import expanded, instances
-from care_core.health.records import Finding
+from care_core.ecosystems.ardupilot.checks import CHECKS
+from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.ardupilot.flight import Flight, runs
+from care_core.ecosystems.ardupilot.messages import expanded, instances
+from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table
 from care_core.run import Setting
 from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, UP_S, Made

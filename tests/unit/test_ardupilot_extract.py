@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.extract.ardupilot.mission import ArduPilotFlight
-from care_core.extract.ardupilot.series import statistic
-from care_core.extract.flight import analyse, distance_to_legs
-from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Mission, find_extractor, merge_needs
+from care_core.ecosystems.ardupilot.measures.flight import analyse, distance_to_legs
+from care_core.ecosystems.ardupilot.measures.mission import ArduPilotFlight
+from care_core.ecosystems.ardupilot.measures.series import statistic
+from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission, find_extractor, merge_needs
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema, read_schema

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from care_core.extract import ardurover  # noqa: F401  it registers its extractors
-from care_core.extract.flight import analyse
-from care_core.extract.registry import MISSION_KINDS, Mission, find_extractor
+from care_core.ecosystems.ardupilot.measures import rover  # noqa: F401  it registers its extractors
+from care_core.ecosystems.ardupilot.measures.flight import analyse
+from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
+from care_core.ecosystems.vehicles import is_skid_steered
 from care_core.logs.base import Table
 from care_core.run import Unavailable, Value
-from care_core.vehicles import is_skid_steered
 
 KIND = MISSION_KINDS["ardupilot_flight"]
 HOME = (47.0, 8.0)

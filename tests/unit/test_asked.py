@@ -8,8 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from care_core.extract.asked import Asked, asked, hover_power, internal_resistance, mission_asked
-from care_core.extract.registry import Mission
+from care_core.ecosystems.ardupilot.measures.requested import (
+    Asked,
+    asked,
+    hover_power,
+    internal_resistance,
+    mission_asked,
+)
+from care_core.ecosystems.measures import Mission
 from care_core.logs.base import Table
 from care_core.run import Unavailable
 

@@ -8,7 +8,7 @@ import pytest
 
 from care_core.diagnose.baseline import differing, for_any_mission, missions, propose, refusal
 from care_core.diagnose.judging import Judged, judge
-from care_core.health.records import NOTHING_SEEN, Finding
+from care_core.ecosystems.findings import NOTHING_SEEN, Finding
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.run import Check, Evidence, Run

@@ -15,9 +15,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rosbags.rosbag1 import Reader, Writer
 
 from care_core import limits
+from care_core.ecosystems.examine import examine
 from care_core.errors import CareError, LogError
 from care_core.extract.read import read_run
-from care_core.health.examine import examine
 from care_core.logs import mapped
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.opening import open_log

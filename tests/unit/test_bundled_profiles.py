@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from care_core.ecosystems.measures import MISSION_KINDS, find_extractor
 from care_core.extract.read import reading_plan
-from care_core.extract.registry import MISSION_KINDS, find_extractor
 from care_core.profile.schema import Schema, read_schema
 from care_core.variables import Role
 

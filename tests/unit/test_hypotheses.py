@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from care_core.diagnose.hypotheses import unasked, weigh
 from care_core.diagnose.records import Hypothesis
-from care_core.health.records import Finding, Severity, Suspect
+from care_core.ecosystems.findings import Finding, Severity, Suspect
 from care_core.run import Evidence
 
 

@@ -12,9 +12,9 @@ import pytest
 from care_core.application.case import Request
 from care_core.application.suites import suite_of_log
 from care_core.diagnose.records import Diagnosis
+from care_core.ecosystems.findings import NOTHING_SEEN
 from care_core.errors import ExitCode
 from care_core.files import bundled
-from care_core.health.records import NOTHING_SEEN
 from care_core.report.document import build_document
 from care_core.report.junit import suite_of, to_junit, unreadable
 from tests.made import HOSTILE, made_diagnosis

@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 
 from care_core.diagnose.records import Since
-from care_core.health.records import Finding, Moment
+from care_core.ecosystems.findings import Finding, Moment
 from care_core.report.document import build_document
 from care_core.report.markdown import LONGEST, to_markdown
 from tests.made import made_diagnosis

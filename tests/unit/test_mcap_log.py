@@ -11,7 +11,7 @@ import pytest
 from mcap.writer import CompressionType, IndexType
 from rosbags.rosbag2 import StoragePlugin
 
-from care_core.health.examine import examine
+from care_core.ecosystems.examine import examine
 from care_core.logs.base import LogFormat
 from care_core.logs.mcap_log import McapLog
 from care_core.logs.opening import open_log

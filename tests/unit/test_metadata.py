@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from care_core.application.describing import known_of
+from care_core.ecosystems.vehicles import is_self_written
 from care_core.metadata import ardupilot, navigation
 from care_core.metadata.families import expanded
 from care_core.metadata.words import word_of
 from care_core.run import Setting
 from care_core.variables import Role, Variable
-from care_core.vehicles import is_self_written
 
 
 def test_a_parameter_of_a_vehicle_is_told_by_release() -> None:

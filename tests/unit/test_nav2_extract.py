@@ -11,9 +11,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.extract.drive import ODOMETRY_FIELDS, ROSOUT_FIELDS, STAMPED_COMMAND_FIELDS, Status
-from care_core.extract.nav2 import FEEDBACK_FIELDS, PLAN_FIELDS, POSE_FIELDS, STATUS_FIELDS, TREE_FIELDS, find_legs
-from care_core.extract.registry import MISSION_KINDS, Mission, find_extractor
+from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
+from care_core.ecosystems.ros.measures.drive import ODOMETRY_FIELDS, ROSOUT_FIELDS, STAMPED_COMMAND_FIELDS, Status
+from care_core.ecosystems.ros.measures.nav2 import (
+    FEEDBACK_FIELDS,
+    PLAN_FIELDS,
+    POSE_FIELDS,
+    STATUS_FIELDS,
+    TREE_FIELDS,
+    find_legs,
+)
 from care_core.logs.base import Table
 from care_core.run import Unavailable, Value
 

@@ -14,10 +14,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_core.extract import battery as battery_extractors
-from care_core.extract import navigation
-from care_core.extract.actionlib import GOAL_FIELDS, RECOVERY_FIELDS, RESULT_FIELDS
-from care_core.extract.drive import (
+from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission, find_extractor
+from care_core.ecosystems.ros.measures import battery as battery_extractors
+from care_core.ecosystems.ros.measures import navigation
+from care_core.ecosystems.ros.measures.actionlib import GOAL_FIELDS, RECOVERY_FIELDS, RESULT_FIELDS
+from care_core.ecosystems.ros.measures.drive import (
     BATTERY_FIELDS,
     COMMAND_FIELDS,
     ODOMETRY_FIELDS,
@@ -25,7 +26,6 @@ from care_core.extract.drive import (
     angle_between,
 )
 from care_core.extract.read import read_run
-from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Mission, find_extractor
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 from care_core.profile.schema import read_schema

@@ -13,8 +13,8 @@ import pytest
 
 from care_core.causal.model import Model
 from care_core.diagnose.judging import beyond_training, judge, unread_options, verdict
-from care_core.extract.modes import mode_names
-from care_core.extract.registry import Mission
+from care_core.ecosystems.ardupilot.measures.modes import mode_names
+from care_core.ecosystems.measures import Mission
 from care_core.logs.base import Table
 from care_core.profile.schema import read_schema
 from care_core.report.terminal import to_text

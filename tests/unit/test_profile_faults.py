@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from care_core.ecosystems.measures import points
 from care_core.errors import ProfileError
 from care_core.extract.read import reading_plan
-from care_core.extract.registry import points
 from care_core.files import own_profiles
 from care_core.profile.schema import parse_schema
 from care_core.profile.store import available_profiles, load_profile

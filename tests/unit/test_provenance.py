@@ -13,13 +13,13 @@ from care_core.configs.loading import read_configs, resolve
 from care_core.diagnose import provenance
 from care_core.diagnose.judging import judge
 from care_core.diagnose.since import compare
+from care_core.ecosystems.vehicles.self_written import SELF_WRITTEN, is_self_written
 from care_core.logs.base import Log
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema, read_schema
 from care_core.profile.store import Profile, load_profile
 from care_core.run import Run, Setting
 from care_core.text import clock
-from care_core.vehicles.self_written import SELF_WRITTEN, is_self_written
 from tests.made import made_run
 
 ROOT = Path(__file__).resolve().parents[2]

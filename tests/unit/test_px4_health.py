@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from care_core.health.px4 import examine
-from care_core.health.records import Health
+from care_core.ecosystems.findings import Health
+from care_core.ecosystems.px4.examining import examine
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.run import Damage, Setting
 

@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.configs.driven import disagreements, in_force, option_value
+from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Args, Mission, MissionKind, extractor
 from care_core.errors import ProfileError, UsageError
 from care_core.extract.read import read_run, read_runs, reading_plan
-from care_core.extract.registry import EXTRACTORS, MISSION_KINDS, Args, Mission, MissionKind, extractor
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.profile.schema import EvidenceRule, Schema
 from care_core.run import Damage, Evidence, Setting, Unavailable, Value

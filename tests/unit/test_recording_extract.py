@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, find_extractor
+from care_core.ecosystems.whole_log import KIND
 from care_core.extract.read import reading_plan
-from care_core.extract.recording import KIND
-from care_core.extract.registry import MISSION_KINDS, Args, Mission, find_extractor
 from care_core.logs.base import Table
 from care_core.profile.schema import Schema
 from care_core.run import Unavailable

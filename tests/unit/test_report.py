@@ -16,9 +16,9 @@ from ruamel.yaml import YAML
 from care_core.diagnose.records import Fault, ObjectiveResult, ParameterChange, PathNode, Prediction, Since
 from care_core.diagnose.since import with_evidence
 from care_core.diagnose.triage import unjudged
+from care_core.ecosystems.findings import NOTHING_SEEN
 from care_core.errors import UsageError
 from care_core.files import write_atomically
-from care_core.health.records import NOTHING_SEEN
 from care_core.report.document import build_document, json_schema
 from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown

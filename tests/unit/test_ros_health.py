@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from care_core.health.records import Health
-from care_core.health.ros.checks import odometry
-from care_core.health.ros.checks.messages import gist
-from care_core.health.ros.examining import examine
+from care_core.ecosystems.findings import Health
+from care_core.ecosystems.ros.checks import odometry
+from care_core.ecosystems.ros.checks.messages import gist
+from care_core.ecosystems.ros.examining import examine
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SUCCEEDED, Drive

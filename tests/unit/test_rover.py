@@ -9,9 +9,9 @@ import pytest
 
 from care_core.application.case import Request, open_case
 from care_core.diagnose.records import Diagnosis
+from care_core.ecosystems.ardupilot.checks import attitude, blocked
+from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.files import bundled
-from care_core.health.ardupilot.checks import attitude, blocked
-from care_core.health.ardupilot.flight import Flight
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 

@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from care_core.run import Setting
-from care_core.vehicles import (
+from care_core.ecosystems.vehicles import (
     error_kind,
     error_words,
     event_words,
@@ -21,10 +20,11 @@ from care_core.vehicles import (
     vehicle_of,
     way_of,
 )
-from care_core.vehicles.frames import FRAMES, arms_of
-from care_core.vehicles.modes import px4_mode
-from care_core.vehicles.parameters import _chains
-from care_core.vehicles.vehicle import Kind
+from care_core.ecosystems.vehicles.frames import FRAMES, arms_of
+from care_core.ecosystems.vehicles.modes import px4_mode
+from care_core.ecosystems.vehicles.parameters import _chains
+from care_core.ecosystems.vehicles.vehicle import Kind
+from care_core.run import Setting
 
 QUAD_X = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0}
 QUAD_OUTPUTS = {f"SERVO{n}_FUNCTION": 32.0 + n for n in range(1, 5)}

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from care_core.diagnose.judging import judge
 from care_core.diagnose.whatif import Question, parse_change, question
+from care_core.ecosystems.findings import Finding, Health
 from care_core.errors import UsageError
-from care_core.health.records import Finding, Health
 from care_core.profile.store import Profile
 from care_core.report.whatif import whatif_document, whatif_text
 from care_core.run import ProfileChoice

@@ -14,8 +14,8 @@ from rosbags.rosbag2 import StoragePlugin
 from care_core.application.case import Request, exit_code, open_case
 from care_core.diagnose.judging import judge_plainly
 from care_core.diagnose.records import overall
+from care_core.ecosystems.measures import MISSION_KINDS, Mission
 from care_core.errors import ExitCode
-from care_core.extract.registry import MISSION_KINDS, Mission
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 from care_core.report.document import build_document

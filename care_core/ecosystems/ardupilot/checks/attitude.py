@@ -1,0 +1,252 @@
+"""Attitude: it does not follow its demand, it oscillates, and control that was lost.
+
+ArduPilot's crash check calls 30 degrees off the demand a loss of control (crash_check.cpp); in good flights roll and
+pitch follow within a few degrees (ArduPilot, Diagnosing problems using logs: mechanical failure). In nine of ten
+healthy training flights the error is below 7 degrees for 95 % of the time, in the rest bad gains make it swing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.checks.thrust import saturated
+from care_core.ecosystems.ardupilot.flight import STANDS_MS, UPSIDE_DOWN_DEG, Flight, Mask, Span, parts
+from care_core.ecosystems.ardupilot.measure import lasting, means, records, top
+from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.findings import Finding, Severity
+from care_core.logs.base import Table, Wanted
+from care_core.numbers import median
+
+READS: Wanted = {
+    "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
+    "RATE": ("R", "P", "RDes", "PDes", "ROut", "POut"),
+    "STER": ("TurnRate", "DesTurnRate", "SteerOut"),
+}
+
+FAR_DEG, YAW_DEG = 15.0, 45.0
+_WAVERS_DEG = 10.0
+_LASTS_S, _YAW_LASTS_S = 1.0, 3.0
+_KEEP_UPRIGHT = frozenset(("rover", "sub"))
+_ANY_WAY_UP = frozenset((1, 19))
+"""Modes of a submarine in which the pilot may turn it over: acro, manual (ArduSub/mode.h)."""
+_LIES_S, _BEFORE_S = 5.0, 10.0
+"""What is upside down for so long lies so; it had been upright so shortly before where it turned over."""
+SWING_DPS, OVER_DEMAND = 30.0, 3.0
+"""degrees/s; how many times the demand's own movement."""
+_SWING_S, _ENOUGH = 5.0, 10
+_WINDOW_S = 3.0
+"""What is a swing of a rate comes and goes within it."""
+_ALL = 1.0
+"""All that the motors have for one axis (AP_Motors.h: roll and pitch run from -1 to 1)."""
+_ALL_STEERING = 4500.0
+"""The same of a rover's steering (AP_MotorsUGV.h)."""
+_GETS_ON_S = 30.0
+_SPENT = 0.85
+"""Probability that a swing which takes all that the motors have is what fails the mission. 31 of the 34 training
+flights that swing and then run out of thrust or fall fail; all 106 that swing have a gain of that axis raised or the
+gyros' filter lowered."""
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """Swings of the rates first: then the attitude's error is theirs."""
+    if flight.lost_control_s is not None:
+        yield from _lost(flight, flight.lost_control_s)
+    yield from _upside_down(flight)
+    yield from _steering(flight)
+    if not flight.is_copter:
+        return
+    swings = list(_swings(flight))
+    yield from swings
+    if flight.lost_control_s is None and not swings:
+        yield from _far(flight)
+    yield from _yaw(flight)
+
+
+def _lost(flight: Flight, lost: float) -> Iterator[Finding]:
+    error = flight.lean_error
+    if error is None:
+        return
+    after = error[1][(error[0] >= lost) & (error[0] <= lost + 5)]
+    yield Finding(
+        "attitude", "control was lost", lost, flight.impact_s or flight.end_s, "critical",
+        f"the attitude is up to {float(np.max(after)):.0f} degrees off its demand and does not come back",
+        "ATT; 30 degrees: ArduCopter's crash check", probability=0.3,
+    )  # fmt: skip
+
+
+def _upside_down(flight: Flight) -> Iterator[Finding]:
+    """A rover that rolled over, a submarine that turned, or a board that is mounted otherwise than it is told."""
+    if flight.vehicle.kind not in _KEEP_UPRIGHT or flight.tilt is None:
+        return
+    t, tilt = flight.tilt
+    over = (tilt > UPSIDE_DOWN_DEG) & flight.during(flight.armed, t)
+    if flight.vehicle.kind == "sub":
+        over &= ~np.isin(flight.modes_at(t), tuple(_ANY_WAY_UP))
+    spans = lasting(t, over, _LIES_S)
+    if not spans:
+        return
+    start, end = spans[0][0], spans[-1][1]
+    before = tilt[(t < start) & (t >= start - _BEFORE_S)]
+    turned = len(before) > 0 and float(np.min(before)) < UPSIDE_DOWN_DEG / 2
+    yield Finding(
+        "attitude", "the vehicle turned over" if turned else "the vehicle is upside down", start, end, "critical",
+        f"its upper side points {float(median(tilt[flight.during(spans, t)])):.0f} degrees away from the sky"
+        + ("" if turned else " from the start: it lies so, or AHRS_ORIENTATION is not how the board is mounted"),
+        "ATT.Roll, Pitch", suspect="world" if turned else "parameter", probability=0.5,
+    )  # fmt: skip
+
+
+def _far(flight: Flight) -> Iterator[Finding]:
+    if flight.lean_error is None:
+        return
+    t, error = flight.lean_error
+    spans = lasting(t, (error > FAR_DEG) & flight.during(flight.flown, t), _LASTS_S)
+    if spans:
+        worst = top(error[(t >= spans[0][0]) & (t <= spans[-1][1])], 0.9)
+        severity: Severity = "critical" if flight.impact_s is not None else "warning"
+        yield Finding(
+            "attitude", "the attitude does not follow its demand", spans[0][0], spans[-1][1], severity,
+            f"roll and pitch are up to {worst:.0f} degrees off (limit {FAR_DEG:g})",
+            "ATT against DesRoll, DesPitch", probability=0.25, suspect="parameter",
+        )  # fmt: skip
+
+
+def _yaw(flight: Flight) -> Iterator[Finding]:
+    table = flight.one("ATT", "Yaw", "DesYaw")
+    if table is None or flight.lost_control_s is not None or not np.ptp(table["DesYaw"]):
+        return
+    off = np.abs((table["Yaw"] - table["DesYaw"] + 180) % 360 - 180)
+    spans = [
+        span
+        for span in lasting(table.t, (off > YAW_DEG) & flight.during(flight.flown, table.t), _YAW_LASTS_S)
+        if not _is_a_turn(off[flight.during((span,), table.t)])
+    ]
+    if spans:
+        yield Finding(
+            "attitude", "the heading does not follow its demand", spans[0][0], spans[-1][1], "warning",
+            f"up to {top(off[flight.during(spans, table.t)]):.0f} degrees off (limit {YAW_DEG:g})",
+            "ATT.Yaw against DesYaw", probability=0.25,
+        )  # fmt: skip
+
+
+def _is_a_turn(off: Floats) -> bool:
+    """Whether a heading only comes nearer to its demand, and much: it turns to one that was given at once."""
+    return bool(np.all(off <= np.minimum.accumulate(off) + _WAVERS_DEG)) and float(off[-1]) < 0.6 * float(off[0])
+
+
+def _swings(flight: Flight) -> Iterator[Finding]:
+    """Rates that swing far more than is asked for: gains too high, or filters too slow. The axis that swings most."""
+    table = flight.one("RATE", "R", "P", "RDes", "PDes")
+    if table is None:
+        return
+    flown = flight.during(flight.flown, table.t)
+    if flown.sum() < _ENOUGH:
+        return
+    found = []
+    for axis, wanted, name in (("R", "RDes", "roll"), ("P", "PDes", "pitch")):
+        spans, peak = _unasked(flight, table, axis, wanted, flown, (f"{axis}Out", _ALL))
+        if spans:
+            found.append((peak, name, spans))
+    if not found:
+        return
+    peak, name, spans = max(found)
+    spent = _spent(flight, spans)
+    down = _came_down(flight, spans)
+    lost = spent > 0 or down or flight.lost_control_s is not None
+    limit = (
+        f"; the motors are at their limit for {spent:.0f} s of it" if spent else "; then it came down" if down else ""
+    )
+    yield Finding(
+        "tuning", f"{name} oscillates", spans[0][0], spans[-1][1], "critical" if lost else "warning",
+        f"the {name} rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
+        f"{OVER_DEMAND:g} times what is asked, or all that the motors have){limit}",
+        "RATE against its demand", suspect="parameter", probability=_SPENT if spent or down else 0.2,
+    )  # fmt: skip
+
+
+def _steering(flight: Flight) -> Iterator[Finding]:
+    """A rover that steers by itself turns to and fro: gains of the steering that are too high."""
+    table = flight.one("STER", "TurnRate", "DesTurnRate")
+    if flight.vehicle.kind != "rover" or table is None:
+        return
+    steered = flight.drives_itself(table.t)
+    spans, peak = _unasked(flight, table, "TurnRate", "DesTurnRate", steered, ("SteerOut", _ALL_STEERING))
+    if not spans:
+        return
+    driven = flight.one("THR", "Speed")
+    swung = np.zeros(0) if driven is None else np.abs(driven["Speed"][flight.during(spans, driven.t)])
+    stays = len(swung) > 0 and spans[-1][1] - spans[0][0] > _GETS_ON_S and float(median(swung)) < STANDS_MS
+    end = "; the vehicle does not get on" if stays else ""
+    yield Finding(
+        "tuning", "the steering oscillates", spans[0][0], spans[-1][1], "critical" if stays else "warning",
+        f"the turn rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
+        f"{OVER_DEMAND:g} times what is asked, or all that the steering has){end}",
+        "STER.TurnRate against its demand", suspect="parameter", probability=_SPENT if stays else 0.2,
+    )  # fmt: skip
+
+
+def _unasked(
+    flight: Flight, table: Table, rate: str, wanted: str, where: Mask, limit: tuple[str, float]
+) -> tuple[list[Span], float]:
+    """Where a rate swings far more than is asked for, and how far it is off its demand at most.
+
+    `limit` names the controller's output and the most that the vehicle can give.
+    """
+    if len(table) < 3:
+        return [], 0.0
+    n = records(table.t, _WINDOW_S)
+
+    def level() -> Iterator[Floats]:
+        return means((np.abs(part[rate] - part[wanted]) for part in parts(table)), n)
+
+    def demand() -> Iterator[Floats]:
+        return means((np.abs(part[wanted]) for part in parts(table)), n)
+
+    far = where & np.concatenate([swing > SWING_DPS for swing in level()])
+    if not far.any():
+        return [], 0.0
+    over = [swing > OVER_DEMAND * asked for swing, asked in zip(level(), demand(), strict=True)]
+    spans = lasting(table.t, far & (np.concatenate(over) | _exhausted(table, n, *limit)), _SWING_S)
+    if not spans:
+        return [], 0.0
+    swung = flight.during(spans, table.t)
+    if not _to_and_fro((table[rate] - table[wanted])[swung]):
+        return [], 0.0
+    return spans, top(np.concatenate(list(level()))[swung], 0.9)
+
+
+def _exhausted(table: Table, n: int, output: str, most: float) -> Mask:
+    """Where the controller asks for more than the vehicle can give: then the demand swings with it."""
+    if output not in table.columns:
+        return np.zeros(len(table), dtype=bool)
+    asked = means((np.abs(part[output]) for part in parts(table)), n)
+    return np.concatenate([level > most for level in asked])
+
+
+def _to_and_fro(error: Floats) -> bool:
+    """Whether an error changes its side: often, or, in a log too slow to show each swing, so that it comes out even."""
+    turns = int((np.diff(np.sign(error)) != 0).sum())
+    often = turns > 0.15 * (len(error) - 1)
+    return often or (turns >= 2 and abs(float(np.mean(error))) < 0.5 * float(np.mean(np.abs(error))))
+
+
+def _came_down(flight: Flight, swings: list[Span]) -> bool:
+    """Whether it was on the ground and could not rise when, or soon after, it swung, and did not fall at once: that is
+    a part that broke."""
+    if flight.stranded is None or flight.lost_control_s is not None:
+        return False
+    return swings[0][0] < flight.stranded[0] <= swings[-1][1] + _SWING_S
+
+
+def _spent(flight: Flight, swings: list[Span]) -> float:
+    """Seconds in which the motors give all that they have after the vehicle began to swing and while it does.
+
+    To keep the attitude the mixer gives up height first (AP_MotorsMatrix: the throttle makes room for roll and pitch).
+    """
+    start, end = swings[0][0], swings[-1][1]
+    full = saturated(flight)
+    if not full or full[0][0] < start:
+        return 0.0
+    return sum(max(0.0, min(b, end) - a) for a, b in full)

@@ -1,0 +1,61 @@
+"""A vehicle that works and does not move: a rover that is blocked, stuck, or whose motors do not turn; a copter that
+leans against what it hit.
+
+Limits of a rover are those by which the firmware itself calls it crashed or blocked (Rover/crash_check.cpp): in a mode
+that drives by itself, for 2 s, a throttle of 5 % or more with less than 0.08 m/s and less than 0.08 rad/s of turn. The
+check of the firmware acts only where FS_CRASH_CHECK is set, which it is not as shipped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
+from care_core.ecosystems.ardupilot.measure import lasting
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Wanted
+from care_core.numbers import median
+
+READS: Wanted = {"THR": ("ThrOut", "Speed"), "STER": ("TurnRate",)}
+
+THROTTLE_PERCENT, STANDING_MS, TURNING_DPS = 5.0, 0.08, float(np.degrees(0.08))
+_LASTS_S = 2.0
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """The first time that it stood still although it was driven, or leant."""
+    yield from _held(flight)
+    driven = flight.one("THR", "ThrOut", "Speed")
+    if flight.vehicle.kind != "rover" or driven is None:
+        return
+    turned = flight.one("STER", "TurnRate")
+    still = np.abs(driven["Speed"]) < STANDING_MS
+    if turned is not None and len(turned):
+        still &= np.abs(np.interp(driven.t, turned.t, turned["TurnRate"])) < TURNING_DPS
+    pushed = np.abs(driven["ThrOut"]) >= THROTTLE_PERCENT
+    spans = lasting(driven.t, still & pushed & flight.drives_itself(driven.t), _LASTS_S)
+    if spans:
+        start, end = spans[0]
+        most = float(np.abs(driven["ThrOut"])[(driven.t >= start) & (driven.t <= end)].max())
+        yield Finding(
+            "blocked", "the vehicle is driven and does not move", start, end, "critical",
+            f"for {end - start:.0f} s below {STANDING_MS:g} m/s at up to {most:.0f} % throttle "
+            f"(limit {THROTTLE_PERCENT:g} % for {_LASTS_S:g} s)",
+            "THR, STER; Rover/crash_check.cpp", suspect="world",
+        )  # fmt: skip
+
+
+def _held(flight: Flight) -> Iterator[Finding]:
+    """Motors that push a copter against something are not asked for alike, and tell nothing of themselves."""
+    if flight.held and flight.tilt is not None:
+        start, end = flight.held[0][0], flight.held[-1][1]
+        t, tilt = flight.tilt
+        lean = float(median(tilt[flight.during(flight.held, t)]))
+        lasted = sum(b - a for a, b in flight.held)
+        yield Finding(
+            "blocked", "something holds it: it leans and does not move", start, end, "critical",
+            f"for {lasted:.0f} s below {STANDS_MS:g} m/s at a lean of {lean:.0f} degrees, after a blow",
+            "ATT, GPS.Spd; blows by VIBE.Clip and IMU", suspect="world", probability=0.9,
+        )  # fmt: skip

@@ -1,0 +1,51 @@
+"""An autopilot that cannot keep up: long loops, a load at its limit, records that were dropped.
+
+Load is the scheduler's own share of time in use, in tenths of a per cent (PM.Load). NLon counts loops that took half as
+long again as they should (AP_Scheduler::PerfInfo); that one of seven does is our limit, no healthy training flight has
+one long loop in a hundred. The CPU failsafe (ERR 19) is the firmware's own word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.measure import lasting
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Wanted
+
+READS: Wanted = {"PM": ("NLon", "NL", "Load")}
+
+LONG_SHARE, FULL_LOAD = 0.15, 950.0
+_FAILSAFE_CPU = 19
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """Overload while armed."""
+    stuck = [t for t, code in flight.errors(_FAILSAFE_CPU) if code and any(a <= t <= b for a, b in flight.armed)]
+    if stuck:
+        yield Finding("cpu", "the main loop got stuck", stuck[0], stuck[-1], "critical", "CPU failsafe", "ERR 19",
+                      probability=0.8)  # fmt: skip
+        return
+    table = flight.one("PM")
+    if table is None or flight.is_simulated:  # whose computer's load that is
+        return
+    armed = flight.during(flight.armed, table.t)
+    slow = np.zeros(len(table), dtype=bool)
+    said = []
+    if {"NLon", "NL"} <= table.columns.keys():
+        share = table["NLon"] / np.maximum(table["NL"], 1)
+        slow |= share > LONG_SHARE
+        if (slow & armed).any():
+            said.append(
+                f"{100 * float(np.max(share[armed])):.0f} % of the loops are long (limit {100 * LONG_SHARE:.0f})"
+            )
+    if "Load" in table.columns and (table["Load"][armed] > FULL_LOAD).any():
+        slow |= table["Load"] > FULL_LOAD
+        said.append(f"load {float(np.max(table['Load'][armed])) / 10:.0f} %")
+    spans = lasting(table.t, slow & armed, 5.0, gap_s=15.0, records=2)
+    if spans and said:
+        yield Finding("cpu", "the autopilot is overloaded", spans[0][0], spans[-1][1], "warning", "; ".join(said),
+                      "PM.NLon, NL, Load", probability=0.4)  # fmt: skip

@@ -1,0 +1,92 @@
+"""A crash, and a tip-over at take-off: what happened to the vehicle, whatever brought it about."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.vehicles import way_of
+from care_core.logs.base import Wanted
+
+READS: Wanted = {"RCIN": ("C3",)}
+
+_ERR_CRASH = 12
+_LOW_M = 1.5
+_TAKEOFF_S = 15.0
+_STICK_LOW = 1150.0
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """One finding: tipped over before it had flown, crashed, or came down."""
+    told = min((t for t, code in flight.errors(_ERR_CRASH) if code > 0), default=None)
+    said = min((t for t, text in flight.messages if text.startswith(("Crash: ", "Crash!"))), default=None)
+    lost, impact = flight.lost_control_s, flight.impact_s
+    begin = min((t for t in (told, said, lost) if t is not None), default=None)
+    if begin is None:
+        yield from _stranded(flight)
+    elif _tipped(flight, lost if lost is not None else begin):
+        start = lost if lost is not None else begin
+        yield Finding(
+            "takeoff", "it tipped over at take-off", start, told or start, "critical",
+            f"never above {_LOW_M:g} m before control was lost; wrong motor order, turning direction or propellers "
+            "show like this",
+            "ATT, height, ERR 12; 30 degrees: ArduCopter's crash check", probability=0.5, suspect="operation",
+        )  # fmt: skip
+    elif told is not None or said is not None or impact is not None:
+        first = min(t for t in (told, said, impact) if t is not None)
+        steered = _steered(flight, first)
+        what = "it hit something" if flight.was_struck else "it crashed"
+        what = "it flew into the ground as steered" if steered else what
+        yield Finding(
+            "crash", what, first, first, "critical",
+            ("the firmware says: crash" if told is not None or said is not None else "control was lost, then it hit")
+            + (f"; {steered}" if steered else "")
+            + ("; a blow came before control was lost" if flight.was_struck else ""),
+            "ERR 12, MSG, ATT, IMU", suspect="operation" if steered else "hardware", probability=0.1,
+        )  # fmt: skip
+
+
+def _stranded(flight: Flight) -> Iterator[Finding]:
+    if flight.stranded is not None:
+        start, end = flight.stranded
+        yield Finding(
+            "crash", "it came down and could not rise again", start, end, "critical",
+            f"on the ground for {end - start:.0f} s with the motors up and a height wanted that it does not reach",
+            "CTUN", probability=0.0,  # it says that the run failed, and nothing of why
+        )  # fmt: skip
+
+
+def _tipped(flight: Flight, at: float) -> bool:
+    """Whether it had not been higher than a person's knee, within seconds of its first throttle."""
+    span = next(((a, b) for a, b in flight.armed if a <= at <= b + 3), None)
+    if span is None or not flight.is_copter:
+        return False
+    known, driven = flight.height, flight.throttle
+    if known is not None:
+        t, height = known
+        before = height[(t >= span[0]) & (t <= at)]
+        if len(before) and float(np.max(before)) > _LOW_M:
+            return False
+    if driven is None:
+        return known is not None
+    t, throttle = driven
+    up = t[(t >= span[0]) & (t <= at) & (throttle > 0.15)]
+    return bool(len(up)) and at - float(up[0]) < _TAKEOFF_S
+
+
+def _steered(flight: Flight, at: float) -> str:
+    """What shows that it went down as told: the attitude was followed, and the pilot's throttle stick was at its
+    bottom."""
+    mode = flight.mode_at(at - 2.0)
+    by_stick = mode is not None and way_of(flight.vehicle.kind, mode) in ("manual", "hold")
+    if not by_stick or (flight.lost_control_s is not None and flight.lost_control_s < at - 1.0):
+        return ""
+    sticks = flight.one("RCIN", "C3")
+    if sticks is None:
+        return ""
+    stick = sticks["C3"][(sticks.t > at - 8.0) & (sticks.t <= at - 1.0)]
+    low = len(stick) > 2 and float(np.max(stick)) < _STICK_LOW and float(np.min(stick)) > 800
+    return "the throttle stick was at its bottom and the attitude followed its demand" if low else ""

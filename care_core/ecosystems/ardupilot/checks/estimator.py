@@ -1,0 +1,64 @@
+"""The estimator: test ratios over their limit, failsafes, resets and changes of lane.
+
+A ratio above 1 means that a measurement is rejected (AP_NavEKF3: innovation test ratios); the firmware's check acts at
+FS_EKF_THRESH, 0.8, of two of them for a second (ekf_check.cpp). 97.5 % of the healthy training flights stay below 0.16.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.measure import lasting
+from care_core.ecosystems.findings import Finding, Severity
+from care_core.logs.base import Wanted
+
+READS: Wanted = {"XKF4": ("SV", "SP", "SH", "SM", "FS")}
+
+RATIO = 1.0
+_LASTS_S = 2.0
+_EKF_CHECK, _FAILSAFE_EKF, _PRIMARY = 16, 17, 24
+_WORDS = {"SV": "velocity", "SP": "position", "SH": "height", "SM": "magnetic field"}
+_LANE = re.compile(r"(lane switch|EKF primary changed|switching to (compass|IMU|GPS)|EKF Failsafe|EKF variance)", re.I)
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """What the estimator made of its measurements while they mattered."""
+    worst: dict[str, tuple[float, float, float]] = {}
+    for core in flight.all("XKF4", "SV", "SP", "SH", "SM"):
+        for field in _WORDS:
+            spans = lasting(core.t, (core[field] > RATIO) & flight.during(flight.flown, core.t), _LASTS_S)
+            if spans:
+                start, end = spans[0][0], spans[-1][1]
+                peak = float(np.max(core[field][(core.t >= start) & (core.t <= end)]))
+                if field not in worst or start < worst[field][0]:
+                    worst[field] = (start, end, peak)
+    failed = _inside(flight, [t for t, code in flight.errors(_FAILSAFE_EKF) if code])
+    failed += _inside(flight, [t for t, code in flight.errors(_EKF_CHECK) if code])
+    switched = _inside(flight, [t for t, text in flight.messages if _LANE.search(text)])
+    if not worst and not failed and not switched:
+        return
+    if not worst and not failed:
+        yield Finding(
+            "estimator", "the estimator changed its lane or sensor", switched[0], switched[-1], "info",
+            "; ".join(dict.fromkeys(text for t, text in flight.messages if t in switched)), "MSG", probability=0.3,
+        )  # fmt: skip
+        return
+    start = min([span[0] for span in worst.values()] + failed)
+    end = max([span[1] for span in worst.values()] + failed)
+    said = [f"{_WORDS[field]} {peak:.1f}" for field, (_, _, peak) in sorted(worst.items(), key=lambda one: one[1][0])]
+    evidence = f"test ratios above {RATIO:g}: {', '.join(said)}" if said else "the firmware's EKF check failed"
+    if failed:
+        evidence += f"; EKF check or failsafe at {min(failed):.1f} s"
+    severity: Severity = "critical" if failed else "warning"
+    yield Finding(
+        "estimator", "the estimator rejects its measurements", start, end, severity, evidence,
+        "XKF4.SV, SP, SH, SM, ERR; limit 1 of AP_NavEKF3, 0.8 of FS_EKF_THRESH", probability=0.2,
+    )  # fmt: skip
+
+
+def _inside(flight: Flight, times: list[float]) -> list[float]:
+    return sorted(t for t in times if any(start <= t <= end for start, end in flight.flown))

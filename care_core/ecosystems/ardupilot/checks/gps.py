@@ -1,0 +1,227 @@
+"""GPS: jumps against its own velocity, glitches that the firmware saw, lost fixes, few satellites, a poor geometry.
+
+Limits: a position may leave what its velocity and 10 m/s^2 predict by 5 m (AP_GPS_Glitch of Copter 3.1:
+GPSGLITCH_RADIUS 5 m, GPSGLITCH_ACCEL 10 m/s^2); the estimator wants 6 satellites and an HDop below 2.5
+(AP_NavEKF3_VehicleStatus.cpp); HDop below 1.5 is good, over 2 poor (ArduPilot, Diagnosing problems using logs). The
+largest jump of 97.5 % of the healthy training flights is 0.4 m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight, Span
+from care_core.ecosystems.ardupilot.measure import Calibration, lasting, likely
+from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.findings import Finding, Severity
+from care_core.logs.base import Table, Wanted
+from care_core.numbers import quantile
+
+READS: Wanted = {
+    "GPS": ("Status", "NSats", "HDop", "Lat", "Lng", "Spd", "GCrs", "GMS"),
+    "GPA": ("HAcc", "SAcc"),
+    "XKF4": ("SP", "SV"),
+    "POS": ("Lat", "Lng"),
+}
+
+FROZEN_RECORDS, MOVED_M = 20, 20.0
+"""A receiver says the same position in so many records only if it is dead: while the estimate goes so far, 4 times the
+glitch radius, it must change."""
+
+JUMP_M, ACCELERATION = 5.0, 10.0
+FEWEST, FALL = 6, 3
+_TIMES_USUAL = 5.0
+POOR_HDOP, BAD_HDOP = 2.0, 2.5
+_SPEED_MS = 1.0
+_METRES = 111319.5
+_FIX = 3
+_ERR_GPS, _ERR_GPS_LOST, _GLITCH = 11, 7, 2
+_JUMP: Calibration = ((1.0, 0.7), (1.5, 0.95), (3.0, 0.98))
+"""By metres over the limit; on the training table every flight with a jump over 5 m has a glitch."""
+_FEW: Calibration = ((1.0, 0.85), (1.5, 0.95))
+"""By 6 over the satellites there were; on the training table only flights with a failing receiver have 6 or fewer."""
+_LOST = 0.15
+"""Of 11 training flights with few satellites and no further harm 4 failed, of those without a failed part 48 %: none by
+it (the 0.6 of a warning counts as four flights)."""
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """What is wrong with the first receiver while it matters."""
+    table = flight.one("GPS", "Status", "NSats")
+    if table is None:
+        yield from _told(flight)
+        return
+    own = table.where(flight.watch(table.t))
+    yield from _frozen(flight, own)
+    jumped = list(_jumps(flight, own))
+    yield from jumped
+    if not jumped:
+        yield from _told(flight)
+    lost = list(_lost(flight, own))
+    yield from lost
+    if not lost:
+        yield from _few(flight, own)
+        yield from _inaccurate(flight)
+
+
+def _frozen(flight: Flight, table: Table) -> Iterator[Finding]:
+    """A position that stays the same to the last digit while the estimate moves: whoever estimates has it elsewhere."""
+    place = flight.one("POS", "Lat", "Lng")
+    if place is None or len(place) < 2 or not {"Lat", "Lng"} <= table.columns.keys():
+        return
+    fixed = table.where(table["Status"] >= _FIX)
+    if len(fixed) < FROZEN_RECORDS or np.ptp(fixed["Lat"]) > 0 or np.ptp(fixed["Lng"]) > 0:
+        return
+    start, end = float(fixed.t[0]), float(fixed.t[-1])
+    moved = place.between(start, end)
+    if not len(moved):
+        return
+    north_m = float(np.ptp(moved["Lat"])) * _METRES
+    east_m = float(np.ptp(moved["Lng"])) * _METRES * float(np.cos(np.radians(moved["Lat"][0])))
+    if np.hypot(north_m, east_m) > MOVED_M:
+        yield Finding(
+            "gps", "the GPS position never changes", start, end, "warning",
+            f"the same in {len(fixed)} records with a fix, while the estimate went {np.hypot(north_m, east_m):.0f} m",
+            "GPS.Lat, Lng against POS.Lat, Lng", probability=0.9,
+        )  # fmt: skip
+
+
+def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
+    """Steps of the position that the velocity does not explain."""
+    if not {"Lat", "Lng", "Spd", "GCrs"} <= table.columns.keys():
+        return
+    fixed = table.where((table["Status"] >= _FIX) & (np.abs(table["Lat"]) > 1e-6))
+    if len(fixed) < 3:
+        return
+    new = np.append(True, (np.diff(fixed["Lat"]) != 0) | (np.diff(fixed["Lng"]) != 0) | (np.diff(fixed.t) > 1.0))
+    fixed = fixed.where(new)
+    if len(fixed) < 3:
+        return
+    t = fixed.t
+    off, dt = _unexplained(fixed)
+    limit = JUMP_M + 0.25 * ACCELERATION * np.minimum(dt, 1.5) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
+    limit = np.maximum(limit, _TIMES_USUAL * quantile(off, 0.9))  # a velocity that never fits tells nothing
+    beyond = np.flatnonzero((off > limit) & (dt < 3.0) & (dt > 0.01))
+    if not len(beyond):
+        return
+    start, size = float(t[1:][beyond[0]]), float(off[beyond].max())
+    over = float((off / limit)[beyond].max())
+    estimate = "; the estimator's position innovation is over its limit" if _upset(flight, start) else ""
+    yield Finding(
+        "gps", f"the GPS position jumps by {size:.0f} m", start, float(t[1:][beyond[-1]]),
+        _gravity(flight, start, size > 3 * JUMP_M or bool(estimate)),
+        f"{len(beyond)} jump{'s' * (len(beyond) > 1)} of up to {size:.1f} m that its own velocity does not explain "
+        f"(limit {JUMP_M:g} m and 10 m/s^2){estimate}",
+        "GPS.Lat, Lng against Spd and GCrs; GPSGLITCH_RADIUS 5 m, GPSGLITCH_ACCEL 10 m/s^2 of ArduPilot",
+        probability=likely(over, _JUMP),
+    )  # fmt: skip
+
+
+def _unexplained(table: Table) -> tuple[Floats, Floats]:
+    """Metres by which each step leaves what the mean velocity predicts, and the seconds that it took."""
+    dt = np.diff(table.t)
+    if "GMS" in table.columns:  # the receiver's own clock: records are written late now and then
+        own = np.diff(table["GMS"]) / 1e3
+        if abs(float(own.sum() - dt.sum())) < 0.05 * float(dt.sum()) + 1.0:
+            dt = np.where(own > 0, own, dt)
+    course = np.radians(table["GCrs"])
+    north, east = table["Spd"] * np.cos(course), table["Spd"] * np.sin(course)
+    d_north = np.diff(table["Lat"]) * _METRES - dt * (north[1:] + north[:-1]) / 2
+    d_east = np.diff(table["Lng"]) * _METRES * np.cos(np.radians(table["Lat"][0])) - dt * (east[1:] + east[:-1]) / 2
+    return np.hypot(d_north, d_east), dt
+
+
+def _upset(flight: Flight, start: float) -> bool:
+    return any(bool(np.any((one["SP"] > 1.0) & (one.t >= start - 1))) for one in flight.all("XKF4", "SP"))
+
+
+def _gravity(flight: Flight, start: float, is_large: bool) -> Severity:
+    return "critical" if is_large and flight.airborne and start >= flight.airborne[0][0] - 5 else "warning"
+
+
+def _told(flight: Flight) -> Iterator[Finding]:
+    """Glitches and losses as the firmware counted them."""
+    inside = [(t, code) for t, code in flight.errors(_ERR_GPS) if code == _GLITCH and _in(flight.flown, t)]
+    if inside:
+        cleared = [t for t, code in flight.errors(_ERR_GPS) if code == 0 and t > inside[0][0]]
+        yield Finding(
+            "gps", "GPS glitch", inside[0][0], cleared[-1] if cleared else inside[-1][0], "warning",
+            f"{len(inside)} GPS glitch{'es' * (len(inside) > 1)} reported in flight", "ERR 11-2 (GPS glitch)",
+            probability=0.6,
+        )  # fmt: skip
+
+
+def _in(spans: tuple[Span, ...], t: float) -> bool:
+    return any(start <= t <= end for start, end in spans)
+
+
+def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
+    """A fix that went away in the air."""
+    had = np.cumsum(table["Status"] >= _FIX) > 0
+    out = lasting(table.t, had & (table["Status"] < _FIX) & flight.during(flight.flown, table.t), 0.5, records=2)
+    if out:
+        start = out[0][0]
+        total = sum(b - a for a, b in out)
+        severity: Severity = "critical" if total > 5 and not flight.all("GPS")[1:] else "warning"
+        yield Finding(
+            "gps", "the GPS fix was lost in the air", start, out[-1][1], severity,
+            f"no 3D fix for {total:.0f} s", "GPS.Status below 3", probability=0.9,
+        )  # fmt: skip
+
+
+def _few(flight: Flight, table: Table) -> Iterator[Finding]:
+    """Few satellites, or far fewer than before; a poor HDop."""
+    if not flight.armed and (table["Status"] >= _FIX).any():
+        table = table.where(slice(int(np.argmax(table["Status"] >= _FIX)), None))  # before it a receiver starts
+    t, sats = table.t, table["NSats"]
+    if len(t) < 3 or not (table["Status"] >= _FIX).any():
+        return
+    usual = quantile(flight.one("GPS", "NSats")["NSats"], 0.9)  # type: ignore[index]
+    few = lasting(t, sats < FEWEST, 2.0) or lasting(t, (sats <= FEWEST) & (sats <= usual - FALL), 2.0)
+    if few:
+        start, end = few[0][0], few[-1][1]
+        least = float(np.min(sats[(t >= start) & (t <= end)]))
+        harmed = _harmed(flight, start)
+        yield Finding(
+            "gps", f"only {least:.0f} satellites", start, end,
+            "critical" if harmed else "warning",
+            f"{least:.0f} satellites (the estimator wants {FEWEST}, {usual:.0f} were there)",
+            "GPS.NSats; 6: AP_NavEKF3_VehicleStatus.cpp", probability=likely(FEWEST / max(least, 1.0), _FEW),
+            mission_lost=None if harmed else _LOST,
+        )  # fmt: skip
+        return
+    if "HDop" not in table.columns:
+        return
+    poor = lasting(t, (table["HDop"] > BAD_HDOP) & (table["HDop"] < 90) & flight.during(flight.flown, t), 5.0)
+    if poor:
+        worst = float(np.max(table["HDop"][(t >= poor[0][0]) & (t <= poor[-1][1])]))
+        yield Finding(
+            "gps", f"poor satellite geometry (HDop {worst:.1f})", poor[0][0], poor[-1][1], "warning",
+            f"HDop up to {worst:.1f} (good below 1.5, poor above {POOR_HDOP:g})",
+            "GPS.HDop; ArduPilot, Diagnosing problems using logs", suspect="world", probability=0.4,
+        )  # fmt: skip
+
+
+def _harmed(flight: Flight, start: float) -> bool:
+    """Whether the estimator gave up, or arming was refused, for want of a position."""
+    refused = flight.refused_for("gps", "3d fix", "position", "ahrs", "ekf", "need alt")
+    words = ("position lost", "ekf failsafe", "ekf variance", "gps glitch")
+    told = any(t >= start - 1 and any(word in text.casefold() for word in words) for t, text in flight.messages)
+    return refused is not None or (told and _upset(flight, start))
+
+
+def _inaccurate(flight: Flight) -> Iterator[Finding]:
+    """What the receiver itself says of its error."""
+    table = flight.one("GPA", "HAcc", "SAcc")
+    if table is None:
+        return
+    bad = lasting(table.t, ((table["HAcc"] > 10) | (table["SAcc"] > 3)) & flight.during(flight.flown, table.t), 5.0)
+    if bad:
+        part = table.between(bad[0][0], bad[-1][1])
+        yield Finding(
+            "gps", "the GPS doubts its position", bad[0][0], bad[-1][1], "warning",
+            f"accuracy down to {np.max(part['HAcc']):.1f} m and {np.max(part['SAcc']):.1f} m/s",
+            "GPA.HAcc, SAcc; the firmware's checks want 5 m and 1 m/s", suspect="world", probability=0.4,
+        )  # fmt: skip

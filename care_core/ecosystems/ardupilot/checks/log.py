@@ -1,0 +1,92 @@
+"""The log itself: holes in it, and an end in the air."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight, Mask
+from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Wanted
+from care_core.numbers import median, pauses
+
+READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "POWR": ("Vcc",)}
+
+_STEADY = ("ATT", "RCOU", "CTUN", "IMU")
+_HOLE_S, _TIMES = 2.0, 20.0
+_SWITCHED_S = 1.0
+_HIGH_M = 2.0
+_FALLS_V = 0.3
+"""Twice the swing that ArduPilot's page on brown-outs calls normal."""
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """Holes in all of the steady messages at once, and a log that ends before the landing."""
+    yield from _holes(flight)
+    yield from _ends_in_the_air(flight)
+
+
+def _holes(flight: Flight) -> Iterator[Finding]:
+    streams = [table for name in _STEADY if (table := flight.one(name)) is not None and len(table) > 20]
+    if not streams or flight.clock_jumps:
+        return
+    limit = max(_HOLE_S, _TIMES * float(median(np.diff(streams[0].t))))
+    low, high = pauses((table.t for table in streams), limit)
+    inside = _inside(flight, low, high)
+    low, high = low[inside], high[inside]
+    if len(low):
+        total = float((high - low).sum())
+        if flight.is_telemetry:
+            yield Finding(
+                "radio", "telemetry was interrupted", float(low[0]), float(high[-1]), "info",
+                f"{len(low)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
+                "times of the telemetry", suspect="world", probability=0.3,
+            )  # fmt: skip
+            return
+        yield Finding(
+            "log", f"the log has {len(low)} hole{'s' * (len(low) > 1)}", float(low[0]),
+            float(high[-1]), "warning", f"{total:.1f} s without any record (limit {limit:.0f} s)",
+            "times of ATT, RCOU, CTUN, IMU", probability=0.3,
+        )  # fmt: skip
+
+
+def _inside(flight: Flight, start: Floats, end: Floats) -> Mask:
+    """Which steps lie within one span armed and clear of its ends: there loggers are opened and closed."""
+    inside = np.zeros(len(start), dtype=bool)
+    for begin, over in flight.armed:
+        is_open = begin > 0.0
+        inside |= (start >= begin + _SWITCHED_S * is_open) & (end <= over) & (start <= over - _SWITCHED_S)
+    return inside
+
+
+def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
+    """Armed and lifting at the last record: power was lost, or the recording was stopped."""
+    if not flight.armed or flight.armed[-1][1] < flight.end_s or flight.impact_s is not None:
+        return
+    if flight.arm_changes and not flight.arm_changes[-1][1]:
+        return  # it was disarmed with its last record
+    throttle, height = flight.throttle, flight.height
+    if not flight.is_copter or height is None:
+        return
+    last_m = float(median(height[1][-3:]))
+    if not last_m > _HIGH_M or not (throttle is None or float(median(throttle[1][-3:])) > 0.2):
+        return
+    sagging = _supply_falls(flight)
+    yield Finding(
+        "battery" if sagging else "log", "power was lost in the air" if sagging else "the log ends in the air",
+        flight.end_s, flight.end_s, "critical" if sagging else "warning",
+        f"armed {last_m:.0f} m up at the last record: " + (sagging or "power was lost or the recording was stopped"),
+        "EV, ARM, CTUN, POS, POWR", probability=0.7 if sagging else 0.4,
+    )  # fmt: skip
+
+
+def _supply_falls(flight: Flight) -> str:
+    """What shows that the autopilot's supply fell away at the end; "" where nothing does."""
+    table = flight.one("POWR", "Vcc")
+    if table is None or len(table) < 10:
+        return ""
+    volts = np.where(table["Vcc"] > 100, table["Vcc"] / 1000, table["Vcc"])
+    usual, last = float(median(volts)), float(np.min(volts[-3:]))
+    return f"Vcc fell from {usual:.2f} to {last:.2f} V" if usual - last > _FALLS_V and last > 1.0 else ""

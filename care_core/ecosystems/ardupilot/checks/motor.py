@@ -1,0 +1,306 @@
+"""Loss of a motor, its controller or its propeller: which, from what the outputs ask of each.
+
+In level flight all motors share the load. One that gives less thrust is asked for more, alone, until it is at its
+limit; then the vehicle tips towards it although it is asked for all that it has. The firmware's own check says so after
+a second (thrust_loss_check of crash_check.cpp), and a controller with telemetry shows it in its speed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.ardupilot.flight import Flight, Mask
+from care_core.ecosystems.ardupilot.measure import Calibration, lasting, likely, means, records
+from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.vehicles import Motor, motors_of
+from care_core.frozen import dataclass
+from care_core.logs.base import Table, Wanted
+from care_core.numbers import median, pieces, quantile
+
+READS: Wanted = {
+    "RCOU": tuple(f"C{n}" for n in range(1, 15)),
+    "ATT": ("Roll", "Pitch", "Yaw", "DesRoll", "DesPitch", "DesYaw"),
+    "ESC": ("RPM",),
+}
+
+ALONE = 0.08
+"""Share of an output's range by which one motor alone stands above the middle of its peers. In nine of ten healthy
+training flights none does by 0.02, and the rest swing; a twisted arm or a battery off the middle moves motors in pairs.
+"""
+_NEXT = 0.6
+"""The next motor must stand below this share of that."""
+_ROOM, _ROOM_FLYING = 0.7, 0.85
+"""Peers above this share are near their limit themselves: then there is too little thrust, not one weak motor."""
+_STEADY = 2.0
+"""Least ratio of the excess to its own swings: all motors of a vehicle that oscillates are up in turn."""
+_WINDOW_S = 4.0
+_STAYS = 0.7
+"""A weak motor stays weak: for so much of the flight that is left."""
+_LASTS_S = 4.0
+_TRYING_S = 12.0
+_LIFTING = 0.2
+_CALM_DEG, _CLEARLY = 12.0, 0.15
+_FALL_S = 1.2
+"""So long after control was lost the vehicle falls to the side that lost it, before it tumbles."""
+_AT_LIMIT = 0.97
+_CALIBRATION: Calibration = ((1.0, 0.7), (2.0, 0.85))
+"""By the excess over ALONE; on the training table 9 of 12 flights with one motor so far above the others, to stay, have
+a weak one, and the other three fail for another part's sake."""
+_ALWAYS: Calibration = ((1.0, 0.3), (2.0, 0.5))
+"""Of one that stood above the others from the start: a twisted arm or an uneven load looks the same."""
+_THRUST_LOSS = re.compile(r"Potential Thrust Loss \((\d+)\)")
+_SOURCE = "RCOU of each motor against the middle of the others"
+
+
+@dataclass(frozen=True, eq=False)
+class _Outputs:
+    """What the motors were asked for, microseconds from the least to the most."""
+
+    motors: tuple[Motor, ...]
+    table: Table
+    least: float
+    most: float
+
+    @property
+    def t(self) -> Floats:
+        return self.table.t
+
+    def share(self, rows: Mask | slice) -> NDArray[np.float64]:
+        """What was asked in these rows, shape (motors, n): 0 idle, 1 the most it may give."""
+        part = self.table.where(rows)
+        share = np.array([part[_column(motor)] for motor in self.motors])
+        share -= self.least
+        share /= self.most - self.least
+        return np.clip(share, 0.0, 1.0, out=share)
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """The motor that does not give what is asked of it, by the strongest evidence."""
+    outputs = _outputs(flight)
+    if outputs is None:
+        return
+    for test in (_stopped, _fell_towards, _weak, _told):
+        found = next(iter(test(flight, outputs)), None)
+        if found is not None:
+            yield found
+            return
+
+
+def _outputs(flight: Flight) -> _Outputs | None:
+    table = flight.one("RCOU")
+    if table is None or not flight.is_copter:
+        return None
+    motors = motors_of(flight.settings, flight.outputs) or _nameless(table.columns)
+    columns = [_column(motor) for motor in motors]
+    if len(columns) < 3 or not all(column in table.columns for column in columns):
+        return None
+    low, high = _range(flight, float(np.max([np.max(table[column]) for column in columns])))
+    if not np.isfinite(high - low) or high - low < 100:
+        return None
+    return _Outputs(motors, table, low, high)
+
+
+def _column(motor: Motor) -> str:
+    return f"C{motor.output}"
+
+
+def _nameless(columns: Mapping[str, Floats]) -> tuple[Motor, ...]:
+    """The motors of a frame that the parameters do not tell: outputs in use, of unknown place. The first four to eight
+    outputs move in flight, those of servos and unused ones do not."""
+    used = [n for n in range(1, 9) if (column := columns.get(f"C{n}")) is not None and np.ptp(column) > 100]
+    return tuple(Motor(n, n, 0.0, 0.0, 0.0, 0.0, "") for n in used) if len(used) >= 4 else ()
+
+
+def _range(flight: Flight, seen: float) -> tuple[float, float]:
+    """Pulse widths (microseconds) of an idle output and of the most that one may be asked for, `seen` at most."""
+    low = flight.setting("MOT_PWM_MIN") or flight.setting("RC3_MIN", "THR_MIN_PWM") or 1000.0
+    high = flight.setting("MOT_PWM_MAX") or flight.setting("RC3_MAX") or 2000.0
+    most = flight.setting("MOT_SPIN_MAX")
+    top = low + (high - low) * (most if most is not None and 0.5 < most <= 1.0 else 1.0)
+    return low, min(top, max(seen, low + 0.6 * (high - low)))
+
+
+def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
+    """Rows in which the motors lift it, upright, and nothing else holds it: in the air, or where it never left the
+    ground the first seconds of trying, before the integrators wind up."""
+    t = outputs.t
+    lifting = flight.watch(t)
+    for rows in pieces(len(t)):
+        lifting[rows] &= median(outputs.share(rows), axis=0) > _LIFTING
+    lifting &= ~flight.during(flight.held, t)
+    if (tilt := flight.tilt) is not None:
+        lifting &= np.interp(t, *tilt) < 60.0
+    if flight.flown:
+        return lifting & flight.during(flight.flown, t)
+    return lifting & (t < t[lifting][0] + _TRYING_S) if lifting.any() else lifting
+
+
+def _excess(outputs: _Outputs, where: Mask) -> Iterator[NDArray[np.float64]]:
+    """How far each motor stands above the middle of the others in the rows of a mask, piece by piece of them, shape
+    (motors, n)."""
+    everyone = np.arange(len(outputs.motors))
+    for rows in pieces(len(where)):
+        share = outputs.share(rows)[:, where[rows]]
+        yield np.array([share[n] - median(share[everyone != n], axis=0) for n in everyone])
+
+
+def _joined(parts: Iterable[NDArray[Any]]) -> NDArray[Any]:
+    """Pieces of shape (motors, n) as one array."""
+    return np.concatenate([*parts], axis=1)
+
+
+def _of_one(parts: Iterable[Floats], n: int) -> Floats:
+    """What pieces of shape (motors, n) hold of one motor."""
+    return np.concatenate([part[n] for part in parts])
+
+
+def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+    """One motor lastingly above all the others."""
+    lifting = _lifting(flight, outputs)
+    if lifting.sum() < 8:
+        return
+    t = outputs.t[lifting]
+    window = records(t, _WINDOW_S)
+    is_alone, is_above = [], []
+    for piece in means(_excess(outputs, lifting), window):
+        order = np.sort(piece, axis=0)
+        is_alone.append((piece > ALONE) & (piece >= order[-1] - 1e-9) & (order[-2] < _NEXT * piece))
+        is_above.append(piece > ALONE / 2)
+    best: tuple[float, int, float, float] | None = None
+    for n, (alone, above) in enumerate(zip(_joined(is_alone), _joined(is_above), strict=True)):
+        spans = lasting(t, alone, _LASTS_S, gap_s=3.0)
+        if not spans:
+            continue
+        since = lifting & (outputs.t >= spans[0][0])
+        share = outputs.share(since)
+        asked = _of_one(_excess(outputs, since), n)
+        size = float(median(asked))
+        stays = float(above[t >= spans[0][0]].mean()) > _STAYS
+        steady = size > max(0.7 * ALONE, _STEADY * float(np.std(asked)))
+        has_room = float(median(np.delete(share, n, axis=0))) < (_ROOM_FLYING if flight.flown else _ROOM)
+        if stays and steady and has_room and (best is None or size > best[0]):
+            best = (size, n, spans[0][0], spans[-1][1])
+    if best is None:
+        return
+    size, n, start, end = best
+    share = outputs.share(lifting & (outputs.t >= start))
+    limit = float((share[n] > _AT_LIMIT).mean())
+    before = _of_one(means(_excess(outputs, lifting), window), n)[t < start - 2.0]
+    changed = len(before) >= 5 and float(median(before)) < size / 3
+    over = size / ALONE
+    yield _finding(
+        outputs.motors[n], "lost thrust" if changed or over > 2 else "works harder than the others", start, end,
+        _severity(flight, limit, size) if changed or over > 2 else "warning",
+        f"it is asked for {100 * median(share[n]):.0f} % where the others are at "
+        f"{100 * median(np.delete(share, n, axis=0)):.0f} % (limit: {100 * ALONE:.0f} points above them)"
+        + ("; before, they were even" if changed else "")
+        + (f"; at its limit {100 * limit:.0f} % of the time" if limit > 0.05 else ""),
+        _SOURCE, likely(over, _CALIBRATION if changed or over > 2 else _ALWAYS),
+    )  # fmt: skip
+
+
+def _severity(flight: Flight, limit: float, size: float) -> Severity:
+    """Critical where it has nothing left to give, or where control was lost after it."""
+    lost = flight.lost_control_s is not None or flight.impact_s is not None
+    return "critical" if lost or limit > 0.2 or size > 4 * ALONE else "warning"
+
+
+def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+    """Control was lost towards a motor that was asked for more than the others, at or near its limit."""
+    lost = flight.lost_control_s
+    table = flight.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+    if lost is None or table is None or not flight.airborne or flight.was_struck or not _was_calm(flight, lost):
+        return
+    rows = (table.t >= lost - 0.3) & (table.t <= lost + _FALL_S)
+    if not rows.any():
+        return
+    roll = float(np.mean((table["Roll"] - table["DesRoll"])[rows]))
+    pitch = float(np.mean((table["Pitch"] - table["DesPitch"])[rows]))
+    if np.hypot(roll, pitch) < 10.0:
+        return
+    down = flight.impact_s if flight.impact_s is not None else lost + 2.0
+    windows = ((lost - 0.2, lost + 0.8), (lost - 1.0, max(lost, min(lost + 2.0, down))), (lost - 3.0, lost + 2.0))
+    near = [(outputs.t >= start) & (outputs.t <= end) for start, end in windows]
+    asked = next((rows for rows in near if rows.sum() >= 3), near[-1])
+    if not asked.any():
+        return
+    asked_of = outputs.share(asked)
+    share = median(asked_of, axis=1)
+    # A motor pushes its own corner up: where it gives nothing, that corner goes down.
+    towards = np.array([-(motor.roll * roll + motor.pitch * pitch) for motor in outputs.motors]) / np.hypot(roll, pitch)
+    score = np.where(towards > 0.15, share, -1.0)
+    n = int(np.argmax(score + 0.2 * towards))
+    others = np.delete(share, n)
+    if score[n] < 0.6 or share[n] - float(median(others)) < _CLEARLY:
+        return
+    most = np.argmax(asked_of, axis=0) == n
+    if most.mean() < 0.6:  # asked for in turn with others: an oscillation
+        return
+    around = (outputs.t > lost - 2.0) & (outputs.t <= lost + 1.0)
+    begin = outputs.t[around][outputs.share(around)[n] > _AT_LIMIT]
+    yield _finding(
+        outputs.motors[n], "gave no thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0, "critical",
+        f"asked for {100 * share[n]:.0f} % (others {100 * median(others):.0f} %), yet the vehicle fell towards it: "
+        f"{roll:+.0f} degrees of roll and {pitch:+.0f} of pitch off the demand",
+        f"{_SOURCE}, and ATT", 0.85 if near[0].sum() > 3 else 0.6,
+    )  # fmt: skip
+
+
+def _was_calm(flight: Flight, lost: float) -> bool:
+    """Whether the attitude was followed until shortly before: what oscillates or drifts off lost no motor."""
+    error = flight.lean_error
+    if error is None:
+        return False
+    before = error[1][(error[0] >= lost - 6.0) & (error[0] <= lost - 0.6)]
+    return len(before) < 2 or quantile(before, 0.8) < _CALM_DEG
+
+
+def _told(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+    """The firmware's thrust loss check, which names the motor that is asked for most. Where another is asked for as
+    much, as when it turns against its will, neither is weak."""
+    for t, text in flight.messages:
+        match = _THRUST_LOSS.search(text)
+        if match and any(start <= t <= end for start, end in flight.armed):
+            motor = next((one for one in outputs.motors if one.number == int(match[1])), None)
+            near = np.abs(outputs.t - t) < 5.0
+            excess = median(_joined(_excess(outputs, near)), axis=1) if near.any() else np.zeros(len(outputs.motors))
+            own = float(excess[outputs.motors.index(motor)]) if motor is not None else 0.0
+            is_alone = own > ALONE and float(np.sort(excess)[-2]) < _NEXT * own
+            crowded = float(median(outputs.share(near))) > _ROOM if near.any() else True
+            if motor is not None and not crowded and is_alone:
+                severity: Severity = "critical" if flight.impact_s is not None else "warning"
+                yield _finding(motor, "lost thrust", t, flight.end_s, severity, f"the firmware says: {text}",
+                               "MSG; thrust_loss_check of ArduCopter", 0.2)  # fmt: skip
+                return
+
+
+def _stopped(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+    """A speed controller that reports no rotation while the others turn."""
+    speeds = flight.all("ESC", "RPM")
+    if len(speeds) < 3:
+        return
+    t = speeds[0].t
+    rpm = np.stack([np.interp(t, one.t, one["RPM"]) for one in speeds])
+    usual = median(rpm, axis=0)
+    for n, row in enumerate(rpm):
+        spans = lasting(t, (row < 0.3 * usual) & (usual > 1000) & flight.watch(t), 0.5)
+        if spans and n < len(outputs.motors):
+            yield _finding(outputs.motors[n], "stopped", spans[0][0], spans[-1][1], "critical",
+                           f"its controller reports {median(row[t >= spans[0][0]]):.0f} turns a minute, the others "
+                           f"{median(usual):.0f}", "ESC.RPM", 0.95)  # fmt: skip
+            return
+
+
+def _finding(
+    motor: Motor, what: str, start: float, end: float, severity: Severity, evidence: str, source: str,
+    probability: float,
+) -> Finding:  # fmt: skip
+    place = f" ({motor.place})" if motor.place else ""
+    title = f"motor {motor.number}{place} {what}"
+    return Finding("motor", title, start, max(end, start), severity, evidence, source, probability=probability)

@@ -1,0 +1,59 @@
+"""Arming that was refused: what the firmware said, where the vehicle never armed."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.findings import Finding, Severity, Suspect
+from care_core.logs.base import Wanted
+
+READS: Wanted = {}
+
+_REFUSAL = re.compile(r"^(Pre)?Arm: (?P<why>.+)")
+_BY_OPERATOR = re.compile(
+    r"""
+      mode\snot\sarmable | \bRC\d*\s?.*(not\s(found|calibrated)|neutral|radio) | not\sneutral | rudder
+    | (Throttle|collective)\s.*(high|low|neutral|below\sfailsafe) | Radio\sfailsafe | safety\sswitch | Leaning
+    | (compass|accels?|accelerometers?|INS)\s.*(not\scalibrated|calib\w*\sneeded|needs?\scalib)
+    | calibration\s(needed|running) | reboot | Emergency\sStop | Interlock | switch(es)?\s(is\s)?on | SD\scard | Logging
+    | Rally | Mission: | Auto\smode\srequires
+    """,
+    re.VERBOSE | re.IGNORECASE,
+)
+"""Complaints of what the pilot has to do or somebody to set up before a start: sticks, switches, mode, calibration.
+None of them reads a parameter that a flight is tuned by (AP_Arming.cpp, AP_Arming_Copter.cpp, RC_Channel.cpp)."""
+_SURE = 0.95
+"""The firmware says itself that this kept it from arming."""
+_STARTING_S = 30.0
+"""Complaints that end within this time of the start are those of sensors that warm up."""
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """The refusal that lasted, where no arming followed it."""
+    if flight.armed:
+        return
+    refusals = [(t, match["why"], match[1] is None) for t, text in flight.messages if (match := _REFUSAL.match(text))]
+    if not refusals:
+        return
+    last = refusals[-1][0]
+    lasting = [(t, why, asked) for t, why, asked in refusals if last - t < _STARTING_S]
+    counts = Counter(_plain(why) for _, why, _ in lasting)
+    why = max(counts, key=lambda one: counts[one])
+    begin = next(t for t, one, _ in refusals if _plain(one) == why)
+    asked = any(is_order for _, _, is_order in refusals)
+    severity: Severity = "critical" if asked and not flight.breaks_off else "warning"
+    by_operator = all(_BY_OPERATOR.search(one) for _, one, _ in lasting)
+    suspect: Suspect = "operation" if by_operator else "parameter"
+    yield Finding(
+        "prearm", f"arming was refused: {why}", begin, last, severity,
+        "; ".join(dict.fromkeys(_plain(one) for _, one, _ in lasting)), "MSG", suspect=suspect,
+        probability=_SURE if by_operator else 0.3,
+    )  # fmt: skip
+
+
+def _plain(why: str) -> str:
+    """A complaint without the numbers that change from one to the next."""
+    return re.sub(r"\s*\([^)]*\d[^)]*\)", "", why)

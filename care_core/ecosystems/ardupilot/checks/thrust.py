@@ -1,0 +1,97 @@
+"""Too little thrust: all that the motors have is used, or hovering takes most of it.
+
+The firmware learns a hover throttle up to 0.6875 (AP_MotorsMulticopter.h: AP_MOTORS_THST_HOVER_MAX); a vehicle that
+needs more has too little in hand to keep its attitude. 97.5 % of the healthy training flights hover below 0.68.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight, Span
+from care_core.ecosystems.ardupilot.measure import lasting, smooth
+from care_core.ecosystems.findings import Finding, Severity, Suspect
+from care_core.logs.base import Wanted
+from care_core.numbers import median
+
+READS: Wanted = {"CTUN": ("ThO", "Alt", "DAlt", "CRt", "DCRt"), "MOTB": ("ThLimit", "LiftMax")}
+
+HOVER_MOST = 0.6875
+FULL = 0.95
+_LASTS_S, _FULL_LASTS_S = 10.0, 3.0
+_BELOW_M = 2.0
+_GROUNDED_S = 5.0
+SPIN_MOST = 0.9
+_FAILSAFE_BATT = 6
+_PROBABILITY: Mapping[Suspect, float] = {"hardware": 0.3, "parameter": 0.1}
+"""On the training table 7 of 83 such flights have a weak motor, pack or worse; what a vehicle weighs it varies little,
+hence more than that where no option keeps the motors down."""
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """Saturation first, for it says more than a high hover throttle."""
+    driven = flight.throttle
+    if not flight.is_copter or flight.vehicle.kind == "heli" or driven is None:
+        return  # what a helicopter records as throttle is its collective pitch
+    t, throttle = driven
+    flown = flight.during(flight.flown or flight.watched, t) & (throttle > 0.05)
+    if flown.sum() < 5:
+        return
+    level = smooth(t, throttle, 4.0)
+    high = lasting(t, flown & (level > HOVER_MOST), _LASTS_S, gap_s=5.0)
+    full = saturated(flight)
+    if full:
+        start, end = full[0][0], full[-1][1]
+        below = _below(flight, start, end)
+        begin = min([start, *[a for a, _ in high]])
+        hover = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
+        lasted = sum(b - a for a, b in full)
+        grounded = not flight.flown and lasted > _GROUNDED_S
+        lost = flight.impact_s is not None or any(code for _, code in flight.errors(_FAILSAFE_BATT))
+        severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
+        suspect, why = _by_option(flight)
+        yield Finding(
+            "thrust", "too little thrust", begin, end, severity,
+            f"throttle above {100 * FULL:.0f} % for {lasted:.0f} s from {start:.0f} s on"
+            + (f", {below:.1f} m below the height wanted" if below else "")
+            + f"; {100 * hover:.0f} % before that" + why,
+            "CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875", suspect=suspect, probability=_PROBABILITY[suspect],
+        )  # fmt: skip
+    elif high and sum(b - a for a, b in high) > 0.3 * float(flown.sum()) * float(median(np.diff(t))):
+        share = float(median(level[flown]))
+        suspect, why = _by_option(flight)
+        yield Finding(
+            "thrust", f"hovering takes {100 * share:.0f} % of the throttle", high[0][0], high[-1][1], "warning",
+            f"mean throttle {100 * share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %){why}",
+            "CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875", suspect=suspect, probability=_PROBABILITY[suspect],
+        )  # fmt: skip
+
+
+def saturated(flight: Flight) -> list[Span]:
+    """When the motors give all that they have."""
+    driven = flight.throttle
+    if driven is None:
+        return []
+    t, throttle = driven
+    flown = flight.during(flight.flown or flight.watched, t)
+    return lasting(t, flown & (throttle > FULL), _FULL_LASTS_S, gap_s=1.0)
+
+
+def _by_option(flight: Flight) -> tuple[Suspect, str]:
+    """Whether a parameter keeps the motors from their full output."""
+    most = flight.setting("MOT_SPIN_MAX")
+    if most is not None and 0.0 < most < SPIN_MOST:
+        return "parameter", f"; MOT_SPIN_MAX={most:g} keeps the motors from their full output (0.95 is usual)"
+    return "hardware", ""
+
+
+def _below(flight: Flight, start: float, end: float) -> float:
+    """Metres by which the vehicle stays below the height that it wants, 0 where it does not or nothing says so."""
+    table = flight.one("CTUN", "Alt", "DAlt")
+    if table is None or not np.any(table["DAlt"]):
+        return 0.0
+    part = table.between(start, end)
+    gap = float(median(part["DAlt"] - part["Alt"])) if len(part) else 0.0
+    return gap if gap > _BELOW_M else 0.0

@@ -1,0 +1,141 @@
+"""Vibration of the inertial sensors, and clipping of their range.
+
+Limits: "levels below 30 m/s/s are normally acceptable, above 30 may have problems, above 60 nearly always have
+problems"; clipping should be 0, and some hundred clips are a serious problem (ArduPilot, Measuring Vibration).
+97.5 % of the healthy training flights lie below 1.6 m/s^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.measure import Calibration, lasting, length, likely, roughness, smooth, steady, top
+from care_core.ecosystems.findings import Finding, Severity
+from care_core.logs.base import Table, Wanted
+from care_core.numbers import quantile
+
+READS: Wanted = {
+    "VIBE": ("VibeX", "VibeY", "VibeZ", "Clip"),
+    "IMU": ("AccX", "AccY", "AccZ"),
+    "XKF4": ("SV", "SH"),
+}
+
+FELT, HIGH, SEVERE = 15.0, 30.0, 60.0
+ROSE = 10.0
+"""m/s^2: the least that counts where it rose to five times what it was: within the acceptable, yet something came
+loose. No healthy flight of the training table reaches 2.2."""
+_TIMES = 5.0
+_CLIPS = 100
+_LASTS_S = 2.0
+_SPIN_UP_S = 4.0
+_FAILSAFE_VIBE = 29
+_CALIBRATION: Calibration = ((0.5, 0.5), (1.0, 0.9), (2.0, 0.97))
+"""By level over HIGH; on the training table every flight above ROSE has failing accelerometers (15 of 15)."""
+_SOURCE = "VIBE; limits 30 and 60 m/s^2: ArduPilot, Measuring Vibration"
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """Vibration over the documented levels, or that rose sharply in flight."""
+    found = [finding for n, table in enumerate(flight.all("VIBE", "VibeX", "VibeY", "VibeZ"))
+             if (finding := _of(flight, table, n)) is not None]  # fmt: skip
+    if not found and not flight.all("VIBE"):
+        found = [finding for finding in [_raw(flight)] if finding is not None]
+    if found:
+        yield max(found, key=lambda finding: (finding.severity == "critical", finding.probability))
+
+
+def _of(flight: Flight, table: Table, number: int) -> Finding | None:
+    calm = flight.watch(table.t)
+    for start, end in flight.watched:  # touching and leaving the ground shakes
+        calm &= ~((table.t >= start) & (table.t < start + _SPIN_UP_S)) | (end - start < 3 * _SPIN_UP_S)
+    t = table.t[calm]
+    if len(t) < 3:
+        return None
+    level = np.maximum(np.maximum(table["VibeX"], table["VibeY"]), table["VibeZ"])[calm]
+    level = steady(t, np.where(np.isfinite(level), level, 0.0), _LASTS_S)  # not a blow, which fades within a second
+    aloft = flight.during(flight.flown, t)  # on the ground its motors idle, which says nothing of what it was
+    before = quantile(level[aloft] if aloft.any() else level, 0.05)
+    upset = _upset(flight)
+    limit = ROSE if before < ROSE / _TIMES or upset else FELT
+    spans = lasting(t, level > limit, _LASTS_S)
+    clips = _clipped(table, calm)
+    if not spans and clips < _CLIPS:
+        return None
+    start, end = (spans[0][0], spans[-1][1]) if spans else _clipping(table, calm)
+    peak = top(level[(t >= start) & (t <= end)], 0.9)
+    severity = _severity(flight, peak, clips, any(at >= start - 1 for at in upset), before < peak / _TIMES)
+    rose = f", from {before:.1f}" if before < peak / _TIMES else ""
+    lasted = sum(b - a for a, b in spans) if spans else end - start
+    clipping = f"; {clips:.0f} clips of the accelerometer's range" if clips else ""
+    return Finding(
+        "vibration",
+        f"strong vibration ({peak:.0f} m/s^2)",
+        start,
+        end,
+        severity,
+        f"VIBE of IMU {number + 1} at {peak:.0f} m/s^2{rose} for {lasted:.0f} s ({_against(peak)}){clipping}",
+        _SOURCE,
+        probability=likely(max(peak / HIGH, 1.0 if clips >= _CLIPS else 0.0), _CALIBRATION),
+    )
+
+
+def _against(peak: float) -> str:
+    """What the documentation says of such a level."""
+    return f"limit {HIGH:.0f}" if peak > HIGH else f"acceptable below {HIGH:.0f}"
+
+
+def _clipped(table: Table, calm: np.ndarray) -> float:
+    """Clips counted in flight; the counter only ever rises."""
+    if "Clip" not in table.columns or not calm.any():
+        return 0.0
+    counts = table["Clip"][calm]
+    return max(float(counts[-1] - counts[0]), 0.0)
+
+
+def _clipping(table: Table, calm: np.ndarray) -> tuple[float, float]:
+    counts, t = table["Clip"][calm], table.t[calm]
+    rising = t[1:][np.diff(counts) > 0]
+    return float(rising[0]), float(rising[-1])
+
+
+def _severity(flight: Flight, peak: float, clips: float, is_upset: bool, has_risen: bool) -> Severity:
+    """Critical where it is severe, made the firmware go over to its vibration failsafe, or upset the estimator."""
+    if peak > SEVERE or clips >= 10 * _CLIPS or any(code for _, code in flight.errors(_FAILSAFE_VIBE)) or is_upset:
+        return "critical"
+    return "warning" if peak > HIGH or clips >= _CLIPS or has_risen else "info"
+
+
+def _upset(flight: Flight) -> list[float]:
+    """When the estimator rejected its velocity or height, which vibration is the usual reason for."""
+    return [
+        start
+        for core in flight.all("XKF4", "SV", "SH")
+        for start, _ in lasting(core.t, ((core["SV"] > 1.0) | (core["SH"] > 1.0)) & flight.watch(core.t), 1.0)
+    ]
+
+
+def _raw(flight: Flight) -> Finding | None:
+    """Before firmware 3.3: acceleration itself, which should stay within 3 m/s^2 on the level axes and within 5 of
+    gravity on the third (ArduPilot's advice for logs without VIBE)."""
+    table = flight.one("IMU", "AccX", "AccY", "AccZ")
+    if table is None or len(table) < 50:
+        return None
+    t = table.t
+    calm = flight.during(flight.flown, t)
+    if flight.tilt is not None:
+        calm &= np.interp(t, *flight.tilt) < 15
+    rough = smooth(t, length(roughness(table[axis]) for axis in ("AccX", "AccY", "AccZ")), 2.0)
+    spans = lasting(t, calm & (rough > 5.0), _LASTS_S)
+    if not spans:
+        return None
+    start, end = spans[0][0], spans[-1][1]
+    peak = top(rough[calm & (t >= start) & (t <= end)], 0.9)
+    severity: Severity = "critical" if peak > 15 else "warning"
+    return Finding(
+        "vibration", f"strong vibration ({peak:.0f} m/s^2)", start, end, severity,
+        f"accelerations leap by {peak:.0f} m/s^2 from record to record for {end - start:.0f} s (limit 5)",
+        "IMU; limits of 3 and 5 m/s^2 for logs without VIBE: ArduPilot, Measuring Vibration", probability=0.6,
+    )  # fmt: skip

@@ -1,0 +1,352 @@
+"""What one ArduPilot flight or drive did: its mission items, its track around home, and its phases.
+
+Everything is worked out once per mission (`Mission.shared(analyse)`) and read by the extractors of `ardupilot`.
+Positions are metres north and east of home on a plane, which is exact to centimetres over a few kilometres.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.ardupilot.measures.modes import MODES, kind_flown, modes_in_force
+from care_core.ecosystems.ardupilot.measures.requested import ITEMS, Asked, Item, asked, home_of, items_of
+from care_core.ecosystems.measures import Mission, has, merge_needs
+from care_core.frozen import dataclass
+from care_core.logs.base import Table, Wanted
+from care_core.numbers import distinct, known_median, median
+from care_core.run import Unavailable
+
+NEEDS: Wanted = merge_needs(
+    (
+        ITEMS,
+        {
+            "POS": ("RelHomeAlt",),
+            "GPS": ("I", "GMS"),
+            **MODES,
+            "MSG": ("Message",),
+            "ARM": ("ArmState", "Forced"),
+            "EV": ("Id",),
+            "ERR": ("Subsys", "ECode"),
+        },
+    )
+)
+"""What `analyse` and the search for missions read."""
+
+FILL_S = 0.05
+"""Spacing to which a thinned track is filled in before distances are taken from it."""
+FILLABLE_S = 0.6
+"""Median spacing above which a corner between two positions could be anything, and nothing is filled in."""
+AIRBORNE_M = 2.0
+"""Height above home from which a vehicle counts as airborne."""
+
+_METRES_PER_DEGREE = 111_319.49
+_NAV_WAYPOINT = 16
+_HOMEWARD = (20, 21)  # MAV_CMD_NAV_RETURN_TO_LAUNCH, MAV_CMD_NAV_LAND
+_AT_HEIGHT_M = 0.5
+_STARTED = re.compile(r"Mission: (\d+) ")
+_REACHED = re.compile(r"Reached (?:command|waypoint) #(\d+)")
+"""A copter says it when the wait is over (ArduCopter/mode_auto.cpp), rovers and planes when they arrive
+(Rover/mode_auto.cpp)."""
+_COMPLETE = ("Mission Complete", "Mission complete")
+"""What a rover (Rover/mode_auto.cpp) and a submarine say when no item is left."""
+_SAID_AFTER_S = 0.6
+"""What ends a mission may be said a moment after it has ended."""
+
+Floats = NDArray[np.float64]
+
+
+class Waypoint(NamedTuple):
+    """A mission waypoint: latitude and longitude in degrees, height above home in metres."""
+
+    lat: float
+    lng: float
+    alt_m: float
+
+
+class Phase(NamedTuple):
+    """A part of the flight that was completed, in seconds of the log."""
+
+    start_s: float
+    end_s: float
+
+    @property
+    def duration_s(self) -> float:
+        return self.end_s - self.start_s
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """Where the vehicle was: arrays of shape (n,), seconds of the log and metres from home."""
+
+    t: Floats
+    north: Floats
+    east: Floats
+    height: Floats
+
+    def filled_in(self) -> Track:
+        """The same track at `FILL_S` or closer: cubic Hermite between positions, velocities by central differences."""
+        steps = np.diff(self.t)
+        if len(steps) < 2 or not FILL_S < median(steps) <= FILLABLE_S or (steps <= 0).any():
+            return self
+        t = distinct(np.concatenate((self.t, np.arange(self.t[0], self.t[-1], FILL_S))))
+        return Track(
+            t, _hermite(t, self.t, self.north), _hermite(t, self.t, self.east), np.interp(t, self.t, self.height)
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Flight:
+    """One flight. `phases` holds only what was completed, by name and index (legs count from 1, the rest is 0);
+    of a drive, the mission as far as it went."""
+
+    waypoints: tuple[Waypoint, ...]
+    """The waypoints of the mission that the vehicle was given."""
+    route: Floats
+    """Shape (waypoints, 2): north and east of home in metres, the flown order."""
+    corners: Floats
+    """Shape (legs + 1, 2): the way that was asked for, from home through the waypoints to where it ends."""
+    end: tuple[float, float] | None
+    """Where the mission ends, None where it says neither to return nor to land."""
+    reached: int
+    """How many of the waypoints the autopilot reported as reached."""
+    track: Track | None
+    """None when the log holds no position."""
+    phases: Mapping[tuple[str, int], Phase]
+    drive: Phase | None = None
+    """Of a vehicle that stays on the ground: from the start of its mission to where it was complete, or broken off.
+    None of one that flies."""
+    completed: bool = False
+    """Whether the vehicle said that its mission is complete, as rovers and submarines do."""
+
+    def under_way(self, t: Floats) -> NDArray[np.bool_]:
+        """Whether the vehicle was on its way at times `t`: in its mission, or, where it flies, above `AIRBORNE_M`."""
+        if self.drive is not None:
+            return np.asarray((t >= self.drive.start_s) & (t <= self.drive.end_s))
+        if self.track is None:
+            return np.zeros(len(t), dtype=bool)
+        return np.asarray(np.interp(t, self.track.t, self.track.height) > AIRBORNE_M)
+
+    def path_errors(self) -> Floats:
+        """Horizontal distance in metres from the way that was asked for while under way, along the track as flown.
+
+        A vehicle turns between two positions of a thinned log, so the corners are filled in first.
+        """
+        if self.track is None:
+            return np.empty(0)
+        track = self.track.filled_in()
+        going = self.under_way(track.t)
+        points = np.column_stack((track.north[going], track.east[going]))
+        return distance_to_legs(points, self.corners)
+
+
+def analyse(mission: Mission) -> Flight:
+    """Work out the flight of a mission; use through `mission.shared`."""
+    items = _items(mission)
+    numbers = [number for number, item in items.items() if _is_waypoint(item)]
+    waypoints = tuple(Waypoint(items[n].lat, items[n].lng, items[n].alt_m) for n in numbers)
+    home = home_of(mission)
+    track = _track(mission, home)
+    started, reached = _milestones(mission)
+    said = messages(mission.tables.get("MSG"), mission.start_s, mission.end_s + _SAID_AFTER_S)
+    complete_s = next((t for t, text in reversed(said) if text.startswith(_COMPLETE)), None)
+    drive = _drive(mission, complete_s) if kind_flown(mission) == "rover" else None
+    if drive is not None and numbers:
+        started.setdefault(numbers[0], drive.start_s)  # named once, before the vehicle may move
+    route = np.array([_offset(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
+    corners, end = _way(mission.shared(asked))
+    return Flight(
+        waypoints=waypoints,
+        route=route.astype(np.float64),
+        corners=corners,
+        end=end,
+        reached=sum(number in reached for number in numbers),
+        track=track,
+        phases=_phases(mission, track, numbers, started, reached) if drive is None
+        else _drive_phases(mission, drive, numbers, started, reached, complete_s),
+        drive=drive,
+        completed=complete_s is not None,
+    )  # fmt: skip
+
+
+def _hermite(t: Floats, known_t: Floats, known: Floats) -> Floats:
+    """Cubic Hermite interpolation with central-difference slopes."""
+    slope = np.gradient(known, known_t)
+    i = np.clip(np.searchsorted(known_t, t, side="right") - 1, 0, len(known_t) - 2)
+    width = known_t[i + 1] - known_t[i]
+    u = (t - known_t[i]) / width
+    from_left = (1 + 2 * u) * (1 - u) ** 2 * known[i] + u * (1 - u) ** 2 * width * slope[i]
+    from_right = u**2 * (3 - 2 * u) * known[i + 1] + u**2 * (u - 1) * width * slope[i + 1]
+    return np.asarray(from_left + from_right)
+
+
+def distance_to_legs(points: Floats, corners: Floats) -> Floats:
+    """Distance of each point, shape (n, 2), from the nearest of the legs between `corners`, shape (legs + 1, 2)."""
+    if len(corners) < 2 or not len(points):
+        return np.empty(0)
+    nearest = np.full(len(points), np.inf)
+    for start, end in pairwise(corners):  # leg by leg, since a log holds many points
+        leg, along = end - start, points - start
+        share = np.clip((along * leg).sum(axis=1) / max(float((leg**2).sum()), 1e-9), 0.0, 1.0)
+        off = along - share[:, None] * leg
+        nearest = np.minimum(nearest, np.hypot(off[:, 0], off[:, 1]))
+    return nearest
+
+
+def waypoint_offsets(waypoints: Sequence[Waypoint], expected: Sequence[Sequence[float]]) -> list[float]:
+    """Distance in metres, height included, of each waypoint from the one it should be."""
+    offsets = []
+    for waypoint, (lat, lng, alt_m) in zip(waypoints, expected, strict=True):
+        north, east = _offset((lat, lng), waypoint.lat, waypoint.lng)
+        offsets.append(math.hypot(north, east, waypoint.alt_m - alt_m))
+    return offsets
+
+
+def metres_between(lat: Floats, lng: Floats) -> float:
+    """Diagonal in metres of the area that positions, in degrees, each of shape (n,), lie in."""
+    north, east = (float(np.ptp(one[np.isfinite(one)])) * _METRES_PER_DEGREE for one in (lat, lng))
+    return math.hypot(north, east * math.cos(math.radians(known_median(lat))))
+
+
+def messages(table: Table | None, start_s: float = -math.inf, end_s: float = math.inf) -> list[tuple[float, str]]:
+    """Time and text of the vehicle's messages between two times."""
+    if table is None or "Message" not in table.columns:
+        return []
+    part = table.between(start_s, end_s)
+    return list(zip(part.t.tolist(), part["Message"].tolist(), strict=True))
+
+
+def _items(mission: Mission) -> dict[int, Item]:
+    return items_of(mission.tables.get("CMD"), mission.end_s)
+
+
+def _way(found: Asked | Unavailable) -> tuple[Floats, tuple[float, float] | None]:
+    """The corners of the way that was asked for, from home, and where it ends."""
+    if isinstance(found, Unavailable):
+        return np.empty((0, 2)), None
+    corners = found.points[:, :2]
+    if found.ending == "return":
+        corners = np.vstack((corners, np.zeros(2)))
+    end = (float(corners[-1, 0]), float(corners[-1, 1]))
+    return corners, None if found.ending == "open" else end
+
+
+def _is_waypoint(item: Item) -> bool:
+    return item.command == _NAV_WAYPOINT and (item.lat != 0 or item.lng != 0)
+
+
+def _offset(home: Sequence[float], lat: float, lng: float) -> tuple[float, float]:
+    return (lat - home[0]) * _METRES_PER_DEGREE, (lng - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
+
+
+def _track(mission: Mission, home: Sequence[float] | None) -> Track | None:
+    position = mission.table("POS")
+    if home is None or position is None or not has(position, "Lat", "Lng", "RelHomeAlt"):
+        return None
+    position = position.where(np.isfinite(position["Lat"] + position["Lng"] + position["RelHomeAlt"]))
+    if not len(position):
+        return None
+    north = (position["Lat"] - home[0]) * _METRES_PER_DEGREE
+    east = (position["Lng"] - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
+    return Track(position.t, north, east, position["RelHomeAlt"])
+
+
+def _milestones(mission: Mission) -> tuple[dict[int, float], dict[int, float]]:
+    """When each mission item was first started, and when it was first reported as reached."""
+    started: dict[int, float] = {}
+    reached: dict[int, float] = {}
+    for t, text in messages(mission.tables.get("MSG"), mission.start_s, mission.end_s):
+        for pattern, found in ((_STARTED, started), (_REACHED, reached)):
+            match = pattern.match(text)
+            if match:
+                found.setdefault(int(match[1]), t)
+    return started, reached
+
+
+def _phases(
+    mission: Mission, track: Track | None, numbers: Sequence[int], started: Mapping[int, float],
+    reached: Mapping[int, float],
+) -> dict[tuple[str, int], Phase]:  # fmt: skip
+    phases: dict[tuple[str, int], Phase] = {}
+    if numbers and numbers[0] in started:
+        phases["takeoff", 0] = Phase(mission.start_s, started[numbers[0]])
+    for index, number in enumerate(numbers, start=1):
+        if number in started and number in reached:
+            phases["leg", index] = Phase(started[number], reached[number])
+    homeward, way = _homeward(mission, started), mission.shared(asked)
+    returns = isinstance(way, Unavailable) or way.ending == "return"
+    if homeward is not None and track is not None:
+        phases.update(
+            {(name, 0): phase for name, phase in _return_phases(mission, track, homeward, returns=returns).items()}
+        )
+    return phases
+
+
+def _drive(mission: Mission, complete_s: float | None) -> Phase:
+    """A ground vehicle's mission in the time that it was armed: to where it said that it is complete."""
+    automatic = [mode.t for mode in mission.shared(modes_in_force) if mode.way == "mission"]
+    start_s = max(mission.start_s, min(automatic, default=mission.start_s))
+    return Phase(start_s, mission.end_s if complete_s is None else max(start_s, min(complete_s, mission.end_s)))
+
+
+def _drive_phases(
+    mission: Mission, drive: Phase, numbers: Sequence[int], started: Mapping[int, float], reached: Mapping[int, float],
+    complete_s: float | None,
+) -> dict[tuple[str, int], Phase]:  # fmt: skip
+    """The legs of a ground vehicle, each to its arrival, and its waits: to the next item, or the mission's end."""
+    phases = {("mission", 0): drive}
+    way = mission.shared(asked)
+    waits = () if isinstance(way, Unavailable) else way.holds_s
+    ends = sorted((*started.values(), *(() if complete_s is None else (complete_s,))))
+    for index, number in enumerate(numbers, start=1):
+        if number not in started or number not in reached:
+            continue
+        phases["leg", index] = Phase(started[number], reached[number])
+        after = next((t for t in ends if t > reached[number]), None)
+        if after is not None and index <= len(waits) and waits[index - 1] > 0:
+            phases["hold", index] = Phase(reached[number], after)
+    return phases
+
+
+def _homeward(mission: Mission, started: Mapping[int, float]) -> float | None:
+    """When the vehicle set out for home: by a mission item, a failsafe or the operator."""
+    items = _items(mission)
+    times = [t for number, t in started.items() if number in items and items[number].command in _HOMEWARD]
+    entered = mission.shared(modes_in_force)
+    times += [mode.t for mode in entered if mode.way in ("return", "land") and mode.t >= mission.start_s]
+    return min(times, default=None)
+
+
+def _return_phases(mission: Mission, track: Track, homeward_s: float, *, returns: bool) -> dict[str, Phase]:
+    """The way home by height: the climb to the return height, the flight at it, the descent, the last metres."""
+    after = track.t >= homeward_s
+    t, height = track.t[after], track.height[after]
+    if len(t) < 3 or height.max() < AIRBORNE_M:
+        return {}
+    high = np.flatnonzero(height >= height.max() - _AT_HEIGHT_M)
+    top_s, leave_s = float(t[high[0]]), float(t[high[-1]])
+    phases = {"return_climb": Phase(homeward_s, top_s)}
+    if height[-1] > AIRBORNE_M:
+        return phases
+    phases["return_cruise"] = Phase(top_s, leave_s)
+    if returns:
+        phases["return"] = Phase(homeward_s, leave_s)
+    slow_below = _number(mission.settings.get("LAND_ALT_LOW"), 1000.0) / 100
+    low = np.flatnonzero((t >= leave_s) & (height <= slow_below))
+    if not len(low):  # a height that no landing ends below
+        return phases
+    slow_s = float(t[low[0]])
+    if height.max() > slow_below + 1.0:
+        phases["descent"] = Phase(leave_s, slow_s)
+    phases["touchdown"] = Phase(slow_s, mission.end_s)
+    return phases
+
+
+def _number(value: float | str | None, default: float) -> float:
+    return float(value) if isinstance(value, (int, float)) else default

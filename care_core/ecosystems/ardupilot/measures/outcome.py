@@ -1,0 +1,187 @@
+"""Whether an ArduPilot run did what it set out to do: its mission, and what every run is judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.ardupilot.measures.events import CUT, failed, forced, has_event, is_armed, is_over
+from care_core.ecosystems.ardupilot.measures.flight import AIRBORNE_M, NEEDS, Flight, analyse, metres_between
+from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, kind_flown, modes_in_force
+from care_core.ecosystems.ardupilot.measures.route import landing_error
+from care_core.ecosystems.measures import Args, Mission, extractor, has
+from care_core.ecosystems.vehicles import flies, mode_name
+from care_core.logs.base import Wanted
+from care_core.run import Check, Unavailable, Value, is_known
+
+Floats = NDArray[np.float64]
+
+WAYPOINT_TOLERANCE_M = 5.0
+_TOOK_OFF, _LANDED = (16, 28), (18,)
+"""EV records of the land detector."""
+_DRIVES = frozenset(("rover",))
+_GLIDES = frozenset(("plane", "quadplane"))
+"""What lands where it finds room: its last height says little."""
+_MOVED_M = 5.0
+"""A receiver that stands still wanders by its accuracy, 2 to 3 m."""
+_BARELY_M = 0.5
+"""Rise below which a vehicle never left the ground: barometers drift by less in a flight's time."""
+_TOUCHED_S, _SWITCHED_OFF_S = 5.0, 0.05
+"""Before the disarming, where the land detector found the ground: at most, and at least (disarming sets it as well)."""
+HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
+"""Where heights are told: above home, else above some other ground."""
+
+
+def _nothing_to_judge(mission: Mission, flight: Flight) -> Unavailable | None:
+    """Why a flight says nothing about a mission, None when it does."""
+    if not flight.waypoints:
+        return Unavailable("the log names no waypoints", "record CMD")
+    if "MSG" not in mission.tables:
+        return Unavailable("the log does not say which waypoints were reached", "record MSG")
+    return None
+
+
+def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Check]:
+    """What a flight or drive is judged by that no limit belongs to; with its mission, where one was begun."""
+    crashed = bool(has_event(mission, "crash"))
+    yield Check("armed", 1.0, "the vehicle armed")
+    kind = kind_flown(mission)
+    if flies(kind):
+        yield Check("took_off", _took_off(mission, crashed=crashed), "it left the ground", "it never left the ground")
+    elif and_mission and kind in _DRIVES:
+        yield Check("moved", _moved(mission), "it moved")
+    done: Value = 0.0
+    if and_mission and any(mode.way == "mission" for mode in mission.shared(modes_in_force)):
+        done = _mission_done(mission)
+        yield Check("mission_success", done, "every waypoint of the mission was reached", short_of(mission))
+    yield Check("no_crash", 1.0 - crashed, "the autopilot reported no crash", "the autopilot reported a crash")
+    acted = has_event(mission, "failsafe")
+    yield Check("no_failsafe", 1.0 - acted, "no failsafe acted", "a failsafe acted")
+    if flies(kind):
+        landed = Unavailable("it crashed") if crashed else _landed(mission)
+        yield Check("landed", landed, "it was on the ground at the end", "it was disarmed above the ground")
+    elif done == 1.0 and not mission.ended:
+        return  # what stands on the ground when all is done comes to no harm by staying armed
+    at_end: Value = 1.0 - forced(mission) if mission.ended else CUT
+    yield Check("disarmed", at_end, "it was disarmed, and not by force in flight", "it was disarmed by force")
+
+
+def _mission_done(mission: Mission) -> Value:
+    """1 where the vehicle says that its mission is complete or reached every waypoint of it, 0 where a crash or a
+    failsafe ended it or it was disarmed on its way; what somebody broke off is no failure of the mission."""
+    flight = mission.shared(analyse)
+    if flight.completed:
+        return 1.0
+    unknown = _nothing_to_judge(mission, flight)
+    if unknown is not None:
+        return unknown
+    if flight.reached >= len(flight.waypoints):
+        return 1.0
+    if failed(mission):
+        return 0.0
+    if not mission.ended:
+        return CUT
+    last = mission.shared(modes_in_force)[-1]
+    if last.way == "mission":
+        return 0.0
+    name = mode_name(kind_flown(mission), last.number)
+    return Unavailable(f"{short_of(mission)}, and the last mode was {name}", "judge a run that ends in its mission")
+
+
+def short_of(mission: Mission) -> str:
+    flight = mission.shared(analyse)
+    return f"{flight.reached} of the mission's {len(flight.waypoints)} waypoints were reached"
+
+
+def _moved(mission: Mission) -> Value:
+    """1 where its position changed by more than positions do that stand still; to stay is no failure."""
+    position = mission.table("POS")
+    if not has(position, "Lat", "Lng"):
+        return Unavailable("the log holds no position", "record POS", "POS")
+    far = metres_between(position["Lat"], position["Lng"])
+    return 1.0 if far > _MOVED_M else Unavailable(f"it stayed within {far:.1f} m")
+
+
+def _took_off(mission: Mission, *, crashed: bool) -> Value:
+    heights = _heights(mission)
+    flew = (len(heights) and bool(heights.max() > AIRBORNE_M)) or _detected(mission, _TOOK_OFF)
+    if flew or crashed:
+        return float(flew)
+    if len(heights) and heights.max() > _BARELY_M:
+        return Unavailable(f"it rose no higher than {heights.max():.1f} m: too little to tell a flight by")
+    return Unavailable("it never left the ground" if len(heights) else "the log holds no height")
+
+
+def _landed(mission: Mission) -> Value:
+    if not is_known(_took_off(mission, crashed=False)):
+        return _took_off(mission, crashed=False)
+    if not mission.ended:
+        return CUT
+    heights = _heights(mission)
+    low = bool(heights[-1] <= AIRBORNE_M) if len(heights) else _detected(mission, _LANDED)
+    low = low or _touched_down(mission)
+    if not low and kind_flown(mission) in _GLIDES:
+        return Unavailable(f"it was disarmed {heights[-1]:.0f} m above home" if len(heights) else "nothing says so")
+    return float(low)
+
+
+def _heights(mission: Mission) -> Floats:
+    """Heights above home while armed, shape (n,); none where the log does not tell any."""
+    for channel, fields in HEIGHTS.items():
+        table = mission.table(channel)
+        for field in fields:
+            if table is not None and has(table, field):
+                heights = table[field][np.isfinite(table[field])]
+                if len(heights) and np.ptp(heights) > 0:
+                    return np.asarray(heights - (0.0 if channel == "POS" else heights[0]), dtype=np.float64)
+    return np.empty(0)
+
+
+def _touched_down(mission: Mission) -> bool:
+    """Whether the land detector found the ground just before it was disarmed, whatever a barometer that drifted says:
+    disarming itself sets the detector as well, so that record does not count."""
+    table = mission.table("EV")
+    if not has(table, "Id"):
+        return False
+    said = table.t[np.isin(table["Id"], _LANDED)]
+    return bool(((said > mission.end_s - _TOUCHED_S) & (said < mission.end_s - _SWITCHED_OFF_S)).any())
+
+
+def _detected(mission: Mission, events: tuple[int, ...]) -> bool:
+    """Whether the land detector said so."""
+    table = mission.table("EV")
+    return table is not None and has(table, "Id") and bool(np.isin(table["Id"], events).any())
+
+
+@extractor("mission_success", needs=NEEDS, unit="")
+def mission_success(mission: Mission, args: Args) -> Value:
+    """1 when every waypoint was reached, the vehicle landed where the mission ends (within `tolerance_m` of it; a rover
+    says that its mission is complete) and disarmed by itself, with no crash and no failsafe; else 0. A refused arming
+    is 0."""
+    if not is_armed(mission):
+        return 0.0
+    if not flew_automatically(mission):
+        return Unavailable("no mission was flown")
+    if failed(mission):
+        return 0.0
+    return _mission_flown(mission) if is_over(mission) else CUT
+
+
+def _mission_flown(mission: Mission) -> Value:
+    """1 when every waypoint was reached and the vehicle landed where the mission ends, or said so, else 0."""
+    flight = mission.shared(analyse)
+    unknown = _nothing_to_judge(mission, flight)
+    if unknown is not None:
+        return unknown
+    if flight.reached < len(flight.waypoints):
+        return 0.0
+    if flight.drive is not None:
+        return float(flight.completed)
+    if flight.end is None:
+        return 1.0
+    off_m = landing_error(mission, {})
+    if not is_known(off_m):
+        return off_m
+    return float(off_m <= float(mission.spec.get("tolerance_m", WAYPOINT_TOLERANCE_M)))

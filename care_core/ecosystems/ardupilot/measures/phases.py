@@ -1,0 +1,33 @@
+"""The parts of an ArduPilot run, as the arguments of an extractor name them."""
+
+from __future__ import annotations
+
+from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN, is_armed
+from care_core.ecosystems.ardupilot.measures.flight import Flight, analyse
+from care_core.ecosystems.measures import Args, Mission, numeric, one_of
+from care_core.run import Unavailable
+
+PHASE_ARGS = {
+    "phase": one_of(
+        "only this part of the flight: takeoff, leg, return, return_climb, return_cruise, descent, touchdown; of a "
+        "drive: mission (from its start to where it is complete, or ends), leg, hold",
+        *("takeoff", "leg", "return", "return_climb", "return_cruise", "descent", "touchdown", "mission", "hold"),
+    ),
+    "index": numeric("number of the leg or wait, from 1"),
+}
+
+
+def flight_of(mission: Mission) -> Flight | Unavailable:
+    return mission.shared(analyse) if is_armed(mission) else NOT_FLOWN
+
+
+def span_of_phase(mission: Mission, args: Args) -> tuple[float, float] | Unavailable:
+    """Start and end in the log of the part of the flight that `args` name."""
+    flight = flight_of(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    name, index = str(args.get("phase", "")), int(args.get("index", 0))
+    phase = flight.phases.get((name, index))
+    if phase is None:
+        return Unavailable(f"the flight did not complete '{name}{f' {index}' if index else ''}'")
+    return phase.start_s, phase.end_s

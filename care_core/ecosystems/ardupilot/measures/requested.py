@@ -1,0 +1,268 @@
+"""What was asked of one ArduPilot flight: its mission in numbers, and the vehicle that flew it. Never a cause.
+
+A mission item's number 0 is home and never flown. Jumps are followed as often as they say. What is asked is known
+before the flight, so a vehicle that never armed has it too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
+from care_core.frozen import dataclass
+from care_core.logs.base import Table, Wanted
+from care_core.numbers import median
+from care_core.run import Unavailable, Value
+
+Floats = NDArray[np.float64]
+Ending = Literal["return", "land", "open"]
+
+ITEMS: Wanted = {
+    "CMD": ("CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame"),
+    "ORGN": ("Type", "Lat", "Lng", "Alt"),
+    "POS": ("Lat", "Lng"),
+}
+"""What `asked` reads."""
+
+# Commands of MAVLink's common dialect (MAV_CMD).
+_WAYPOINT, _LOITER_TURNS, _LOITER_TIME, _RETURN, _LAND, _TAKEOFF, _SPLINE = 16, 18, 19, 20, 21, 22, 82
+_DELAY, _JUMP, _CHANGE_SPEED = 93, 177, 178
+_PLACES = frozenset((_WAYPOINT, _LOITER_TURNS, _LOITER_TIME, _SPLINE))
+_HOLDS = frozenset((_WAYPOINT, _LOITER_TIME))
+_ABOVE_SEA = (0, 5)
+"""MAV_FRAME of a height above sea level; the others count from home (3, 6) or from the terrain (10, 11)."""
+_AIRSPEED, _GROUNDSPEED = 0, 1
+_MOST_ITEMS = 2000
+"""Items that are followed: a jump without end would never stop."""
+_HOME = 1
+"""Type of an ORGN record: home; 0 is the origin of the estimator."""
+_SHARP_DEG = 60.0
+"""Corners from which a vehicle that turns on the spot stops and does so (AR_PivotTurn.cpp: WP_PIVOT_ANGLE)."""
+_LEVEL_M = 0.5
+"""Height difference below which a leg is level."""
+_METRES_PER_DEGREE = 111_319.49
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One mission item: command, its first two parameters, place in degrees, height in metres and its frame."""
+
+    command: int
+    first: float
+    second: float
+    lat: float
+    lng: float
+    alt_m: float
+    frame: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    """A mission in metres from home. Legs begin above home, at the height of the take-off."""
+
+    points: Floats
+    """Shape (legs + 1, 3): north, east and height of the corners, the first above home."""
+    holds_s: Floats
+    """Shape (legs,): seconds to wait at the end of each leg."""
+    speeds: Floats
+    """Shape (legs,): commanded speed in m/s, 0 where the vehicle's own parameter rules."""
+    ending: Ending
+    """Whether it returns to home, lands where the last leg ends, or says neither."""
+
+    @property
+    def lengths(self) -> Floats:
+        """Horizontal length of each leg in metres."""
+        step = np.diff(self.points[:, :2], axis=0)
+        return np.asarray(np.hypot(step[:, 0], step[:, 1]))
+
+    @property
+    def rises(self) -> Floats:
+        """How far each leg leads up, in metres."""
+        return np.asarray(np.diff(self.points[:, 2]))
+
+    @property
+    def turns_deg(self) -> Floats:
+        """Change of course, 0 to 180 degrees, at each corner."""
+        step = np.diff(self.points[:, :2], axis=0)
+        course = np.degrees(np.arctan2(step[:, 1], step[:, 0]))
+        return np.asarray(np.abs((np.diff(course) + 180.0) % 360.0 - 180.0))
+
+    @property
+    def corners_deg(self) -> Floats:
+        """Change of course at each corner that is flown through without a wait."""
+        return np.asarray(self.turns_deg[self.holds_s[:-1] == 0])
+
+    @property
+    def commanded_speed(self) -> float:
+        """The speed that is commanded over most of the way, 0 where that is none."""
+        chosen = {speed: self.lengths[self.speeds == speed].sum() for speed in dict.fromkeys(self.speeds.tolist())}
+        return float(max(chosen, key=lambda speed: float(chosen[speed]), default=0.0))
+
+
+def asked(mission: Mission) -> Asked | Unavailable:
+    """The mission that the vehicle was given; use through `mission.shared`."""
+    items = items_of(mission.tables.get("CMD"), mission.end_s)
+    if not items:
+        return Unavailable("the log names no mission items", "record CMD")
+    home = home_of(mission)
+    if home is None:
+        return Unavailable("the log does not say where home is", "record ORGN or POS")
+    points, holds, speeds = [(0.0, 0.0, 0.0)], [], []
+    speed = 0.0
+    ending: Ending = "open"
+    for item in _followed(items):
+        if item.command == _TAKEOFF:
+            points[0] = (0.0, 0.0, _height(item, home))
+        elif item.command == _CHANGE_SPEED and item.first in (_AIRSPEED, _GROUNDSPEED):
+            speed = item.second if item.second > 0 else speed
+        elif item.command in _PLACES:
+            points.append(_place(item, home, points[-1]))
+            holds.append(max(item.first, 0.0) if item.command in _HOLDS else 0.0)
+            speeds.append(speed)
+        elif item.command == _DELAY and holds:
+            holds[-1] += max(item.first, 0.0)
+        elif item.command in (_RETURN, _LAND):
+            if item.command == _LAND and (item.lat or item.lng):
+                points.append((*_offset(item, home), points[-1][2]))
+                holds.append(0.0)
+                speeds.append(speed)
+            ending = "return" if item.command == _RETURN else "land"
+            break
+    if len(points) < 2:
+        return Unavailable("the mission has no waypoints")
+    return Asked(np.array(points), np.array(holds), np.array(speeds), ending)
+
+
+def items_of(table: Table | None, until_s: float) -> dict[int, Item]:
+    """The mission's items by their number as last loaded before a time, home (number 0) left out."""
+    if table is None or not has(table, "CNum", "CId", "Lat", "Lng", "Alt"):
+        return {}
+    part = table.where(table.t <= until_s)
+    zeros = np.zeros(len(part))
+    columns = [part.columns.get(name, zeros) for name in ITEMS["CMD"]]
+    items: dict[int, Item] = {}
+    for number, command, first, second, lat, lng, alt, frame in zip(*(c.tolist() for c in columns), strict=True):
+        items[int(number)] = Item(int(command), first, second, lat, lng, alt, int(frame))
+    return {number: item for number, item in sorted(items.items()) if number > 0}
+
+
+def _followed(items: Mapping[int, Item]) -> Iterator[Item]:
+    """The items in the order in which they are flown."""
+    left = {number: int(item.second) for number, item in items.items() if item.command == _JUMP}
+    number, count = min(items), 0
+    while number in items and count < _MOST_ITEMS:
+        item, count = items[number], count + 1
+        if item.command == _JUMP and left[number] > 0 and int(item.first) in items:
+            left[number] -= 1
+            number = int(item.first)
+            continue
+        yield item
+        number += 1
+
+
+def home_of(mission: Mission) -> tuple[float, float, float] | None:
+    """Latitude, longitude and height above sea of home: as set on arming, else the first position, else the origin of
+    the estimator, which is all that a vehicle knows that never armed."""
+    origins, position = mission.tables.get("ORGN"), mission.table("POS")
+    if not has(origins, "Type", "Lat", "Lng"):
+        return _place_of(position)
+    homes = origins.where((origins["Type"] == _HOME) & (origins.t <= mission.start_s + 1.0))
+    return _place_of(homes) or _place_of(position) or _place_of(origins)
+
+
+def _place_of(table: Table | None) -> tuple[float, float, float] | None:
+    """The last place of home, the first of a track; its height is 0 where it is not known."""
+    if not has(table, "Lat", "Lng"):
+        return None
+    at = -1 if "Type" in table.columns else 0
+    height = float(table["Alt"][at]) if "Alt" in table.columns else 0.0
+    return float(table["Lat"][at]), float(table["Lng"][at]), height
+
+
+def _offset(item: Item, home: Sequence[float]) -> tuple[float, float]:
+    north = (item.lat - home[0]) * _METRES_PER_DEGREE
+    return north, (item.lng - home[1]) * _METRES_PER_DEGREE * math.cos(math.radians(home[0]))
+
+
+def _height(item: Item, home: Sequence[float]) -> float:
+    return item.alt_m - home[2] if item.frame in _ABOVE_SEA and home[2] else item.alt_m
+
+
+def _place(item: Item, home: Sequence[float], before: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Where an item leads; coordinates or a height of 0 mean those of the item before."""
+    north, east = _offset(item, home) if item.lat or item.lng else before[:2]
+    return north, east, _height(item, home) if item.alt_m else before[2]
+
+
+# --- the mission ------------------------------------------------------------------------------------------------
+
+
+_MISSION: Mapping[str, Callable[[Asked], float]] = {
+    "path_length": lambda a: float(a.lengths.sum()),
+    "legs": lambda a: float(len(a.lengths)),
+    "leg_variation": lambda a: float(a.lengths.std() / max(a.lengths.mean(), 1e-9)),
+    "climb": lambda a: float(np.maximum(a.rises, 0).sum()),
+    "climbing_legs": lambda a: float((a.rises > _LEVEL_M).sum()),
+    "descent": lambda a: float(np.maximum(-a.rises, 0).sum()),
+    "descending_legs": lambda a: float((a.rises < -_LEVEL_M).sum()),
+    "flown_corners": lambda a: float(len(a.corners_deg)),
+    "corner_turn": lambda a: float(a.corners_deg.mean()) if len(a.corners_deg) else 0.0,
+    "sharp_corners": lambda a: float((a.corners_deg > _SHARP_DEG).sum()),
+    "sharp_turns": lambda a: float(a.turns_deg[a.turns_deg > _SHARP_DEG].sum()),
+    "hold_time": lambda a: float(a.holds_s.sum()),
+    "stops": lambda a: float((a.holds_s > 0).sum()),
+    "commanded_speed": lambda a: a.commanded_speed,
+    "takeoff_height": lambda a: float(a.points[0, 2]),
+    "end_height": lambda a: float(a.points[-1, 2]),
+    "return_distance": lambda a: math.hypot(*a.points[-1, :2]) if a.ending == "return" else 0.0,
+    "returns": lambda a: float(a.ending == "return"),
+}
+
+
+@extractor("mission_asked", needs=ITEMS, unit="", args={"what": one_of(", ".join(_MISSION), *_MISSION)})
+def mission_asked(mission: Mission, args: Args) -> Value:
+    """One number of the mission that the vehicle was given: lengths and heights in m, times in s, turns in degrees,
+    `commanded_speed` in m/s (0: none), `returns` 1 or 0; corners are `sharp` from 60 degrees, `sharp_turns` adds up
+    theirs, those with a wait too."""
+    measure = _MISSION.get(str(args.get("what")))
+    if measure is None:
+        return Unavailable(f"there is no '{args.get('what')}' of a mission", f"use one of {', '.join(_MISSION)}")
+    found = mission.shared(asked)
+    return found if isinstance(found, Unavailable) else measure(found)
+
+
+# --- the vehicle ------------------------------------------------------------------------------------------------
+
+
+_BATTERY: Wanted = {"BAT": ("Inst", "Instance", "Volt", "Curr", "Res")}
+
+
+@extractor("hover_power", needs=_BATTERY, unit="W")
+def hover_power(mission: Mission, args: Args) -> Value:
+    """Median electric power while airborne: what the vehicle takes to stay up, with its load."""
+    table = _in_the_air(mission, "Volt", "Curr")
+    return table if isinstance(table, Unavailable) else float(median(table["Volt"] * table["Curr"]))
+
+
+@extractor("internal_resistance", needs=_BATTERY, unit="ohm")
+def internal_resistance(mission: Mission, args: Args) -> Value:
+    """Median of the battery's resistance while airborne, as the battery monitor estimates it."""
+    table = _in_the_air(mission, "Res")
+    return table if isinstance(table, Unavailable) else float(median(table["Res"]))
+
+
+def _in_the_air(mission: Mission, *fields: str) -> Table | Unavailable:
+    """The first battery's rows with a current, in the flight."""
+    table = mission.table("BAT")
+    if table is None or not has(table, "Curr", *fields):
+        return missing(f"BAT with {' and '.join(fields)}")
+    number = next((name for name in ("Inst", "Instance") if name in table.columns), None)
+    first = table if number is None else table.where(table[number] == table[number].min())
+    most = float(first["Curr"].max())
+    flown = first.where(first["Curr"] > 0.5 * most) if most > 0 else first.where(slice(0, 0))
+    return flown if len(flown) else Unavailable("the battery's current was never above 0", "calibrate the monitor")

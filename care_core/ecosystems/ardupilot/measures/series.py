@@ -1,0 +1,99 @@
+"""Rows of a channel over a part of an ArduPilot run, and statistics of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.ardupilot.measures.flight import NEEDS
+from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flight_of, span_of_phase
+from care_core.ecosystems.measures import Args, Mission, extractor, merge_needs, missing, one_of
+from care_core.logs.base import Table, Wanted
+from care_core.numbers import distinct, quantile
+from care_core.run import Unavailable, Value
+
+Floats = NDArray[np.float64]
+
+MIN_ROWS = 5
+_STATISTIC = one_of("mean, max, min, std, rms or peak (95th percentile)", "mean", "max", "min", "std", "rms", "peak")
+
+
+def series(
+    mission: Mission, channel: str, fields: Sequence[str], args: Args, *, under_way: bool = True
+) -> Table | Unavailable:
+    """Rows of a channel while under way (or in a phase), first instance only, with all of `fields` finite."""
+    flight = flight_of(mission)
+    if isinstance(flight, Unavailable):
+        return flight
+    table = mission.table(channel)
+    if table is None or not all(field in table.columns for field in fields):
+        return missing(channel)
+    table = next(iter(instances(table)), table)
+    if "phase" in args:
+        span = span_of_phase(mission, args)
+        if isinstance(span, Unavailable):
+            return span
+        table = table.between(*span)
+    elif under_way:
+        if flight.track is None and flight.drive is None:
+            return missing("POS")
+        table = table.where(flight.under_way(table.t))
+    finite = np.ones(len(table), dtype=bool)
+    for field in fields:
+        finite &= np.isfinite(table[field])
+    table = table.where(finite)
+    if len(table) < MIN_ROWS:
+        return Unavailable(f"too little {channel} in this part of the flight", "was the vehicle under way?")
+    return table
+
+
+def instances(table: Table) -> list[Table]:
+    """The table split by the column that numbers its sensors, lowest first."""
+    name = next((name for name in ("I", "IMU", "C", "Inst", "Instance") if name in table.columns), None)
+    if name is None:
+        return [table]
+    return [table.where(table[name] == number) for number in distinct(table[name])]
+
+
+def statistic(values: Floats, stat: str) -> Value:
+    """One number from many. `peak` is the 95th percentile, which one bad sample cannot move."""
+    measures: dict[str, Callable[[Floats], object]] = {
+        "mean": np.mean,
+        "max": np.max,
+        "min": np.min,
+        "std": np.std,
+        "rms": lambda x: np.sqrt(np.mean(x**2)),
+        "peak": lambda x: quantile(x, 0.95),
+    }
+    if not len(values):
+        return Unavailable("the vehicle was never under way")
+    if stat not in measures:
+        return Unavailable(f"there is no statistic '{stat}'", f"use one of {', '.join(measures)}")
+    return float(measures[stat](values))  # type: ignore[arg-type]
+
+
+def register(
+    name: str, wanted: Wanted, unit: str, doc: str, measure: Callable[[Table, Mission, Args], Floats],
+    *, stat: str, args: Mapping[str, str] | None = None,
+    columns: Callable[[Mission], Sequence[str]] | None = None,
+) -> None:  # fmt: skip
+    """Register an extractor that is a statistic of one channel over a part of the flight.
+
+    Args:
+        columns: which of the wanted fields this vehicle's log must have; all of them when None.
+    """
+    ((channel, fields),) = wanted.items()
+    required = [field for field in fields if field not in ("I", "IMU", "C")]
+
+    def compute(mission: Mission, given: Args) -> Value:
+        table = series(mission, channel, required if columns is None else columns(mission), given)
+        if isinstance(table, Unavailable):
+            return table
+        return statistic(measure(table, mission, given), str(given.get("stat", stat)))
+
+    compute.__module__ = measure.__module__
+    compute.__doc__ = f"{doc} Statistic: {stat} unless `stat` says otherwise."
+    described = {"stat": _STATISTIC, **PHASE_ARGS, **(args or {})}
+    extractor(name, needs=merge_needs((NEEDS, wanted)), unit=unit, args=described)(compute)

@@ -1,0 +1,405 @@
+"""What an ArduPilot vehicle did, in order of time, and what it said of it: an account that is read in a minute.
+
+Everything comes from what the vehicle recorded or sent. Repeats are told once with their count; statistics and
+calibration are not told.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight, Span
+from care_core.ecosystems.ardupilot.supply import supply
+from care_core.ecosystems.ardupilot.texts import (
+    RECORDED,
+    is_routine,
+    mission_item,
+    refusal,
+    says_what_is_recorded,
+)
+from care_core.ecosystems.findings import Moment
+from care_core.ecosystems.timeline import (
+    account_of,
+    counted,
+    damage_of,
+    gaps,
+    parameter_changes,
+    repeats,
+)
+from care_core.ecosystems.vehicles import (
+    FAILSAFE,
+    Vehicle,
+    error_kind,
+    error_words,
+    event_words,
+    flies,
+    is_over,
+    method_words,
+    mode_name,
+    mode_number,
+    motors_of,
+    reason_words,
+    with_said,
+)
+from care_core.ecosystems.vehicles.modes import px4_mode
+from care_core.logs.base import Wanted
+from care_core.run import Damage
+from care_core.text import listed
+
+READS: Wanted = {
+    "MSG": ("Message",),
+    "MODE": ("ModeNum", "Rsn"),
+    "EV": ("Id",),
+    "ERR": ("Subsys", "ECode"),
+    "ARM": ("ArmState", "Forced", "Method"),
+    "BAT": ("Volt", "Curr"),
+    "GPS": ("Status", "NSats", "HDop"),
+    "RCOU": ("C1",),
+    "RSSI": ("RXRSSI",),
+}
+
+_REASON_KNOWN = (4, 0)
+"""Since Copter 4.0 MODE.Rsn means the same on every vehicle (AP_Vehicle/ModeReason.h)."""
+_ARMED, _DISARMED = 10, 11
+_TOOK_OFF, _LANDED = (16, 28), 18
+_QUIET_EVENTS = frozenset((_ARMED, _DISARMED, 15, 16, 17, 18, 25, 26, 27, 28, 29, 38, 39, 57, 63, 64, 65, 66, 73))
+"""Armed, landed and taken off are told otherwise; the rest are settings of every flight."""
+_AT_START = frozenset((54, 55, 60, 62, 67, 164))
+"""Events that mean nothing while disarmed: estimators and switches finding their place."""
+_INTERLOCK_OFF, _YAW_RESET = 56, 62
+_EKF_PRIMARY, _TERRAIN = 24, 21
+_SPOOL_DOWN_S = 6.0
+"""A landing switches the interlock off itself before it disarms."""
+_FLURRY_S, _FLURRY = 1.0, 4
+_SAME_S = 2.0
+_SWITCHED_OFF_S = 0.05
+_IN_AIR_M, _LIFTED_M = 2.0, 0.5
+
+
+def account(flight: Flight, damage: Sequence[Damage] = ()) -> tuple[Moment, ...]:
+    """The account of a flight.
+
+    Args:
+        damage: what is broken in its log.
+    """
+    vehicle = flight.vehicle
+    found = [
+        *_arming(flight),
+        *_modes(flight, vehicle),
+        *_errors(flight, vehicle),
+        *_events(flight),
+        *_flown(flight),
+        *_texts(flight),
+        *parameter_changes(flight.settings, flight.armed, "PARM"),
+        *supply(flight),
+        *gaps(flight.tables.values(), flight.armed),
+        *damage_of(damage),
+        *_clock(flight),
+        *_end(flight),
+    ]
+    return account_of(_once(found), _introduced(flight, vehicle))
+
+
+def _introduced(flight: Flight, vehicle: Vehicle) -> Moment:
+    parts = [vehicle.title]
+    motors = motors_of(flight.settings, flight.outputs)
+    if motors and vehicle.kind == "quadplane":
+        parts.append(f"{len(motors)} lift motors")
+    if vehicle.kind == "unknown" and "vehicle" in flight.facts:
+        parts.append("neither ArduPilot nor PX4 by what it says of itself")
+    return Moment(0.0, "vehicle", ", ".join(parts), "MSG" if vehicle.firmware else "the log")
+
+
+# --- arming ----------------------------------------------------------------------------------------------------
+
+
+def _arming(flight: Flight) -> Iterator[Moment]:
+    armed_at: float | None = None
+    for t, is_armed, how in _armings(flight):
+        if is_armed:
+            armed_at = t
+            yield Moment(t, "arming", " ".join(filter(None, ("armed", how))), "ARM")
+        else:
+            lasted = f", armed for {t - armed_at:.0f} s" if armed_at is not None else ""
+            yield Moment(t, "arming", " ".join(filter(None, ("disarmed", how))) + lasted, "ARM")
+            armed_at = None
+    if not flight.arm_changes and flight.armed:
+        how = "it is written while armed only (LOG_DISARMED 0)" if flight.is_written_armed else "by its throttle"
+        yield Moment(flight.armed[0][0], "arming", f"armed: the log tells of no arming, {how}", "the log")
+    yield from _refusals(flight)
+
+
+def _armings(flight: Flight) -> list[tuple[float, bool, str]]:
+    """When it was armed and disarmed, each state once, and how."""
+    table = flight.one("ARM", "ArmState")
+    if table is None:
+        known = [(t, number == _ARMED, "") for t, number in _numbered(flight) if number in (_ARMED, _DISARMED)]
+    else:
+        known = []
+        for row in range(len(table)):
+            how = method_words(int(table["Method"][row])) if "Method" in table.columns else ""
+            if "Forced" in table.columns and table["Forced"][row] == 1:
+                how = f"{how}, by force".strip(", ")
+            known.append((float(table.t[row]), bool(table["ArmState"][row] == 1), how))
+    ways = {(t, is_armed): how for t, is_armed, how in known}
+    told = with_said([(t, is_armed) for t, is_armed, _ in known], flight.messages)
+    known = [(t, is_armed, ways.get((t, is_armed), "")) for t, is_armed in told]
+    return [one for at, one in enumerate(known) if at == 0 or known[at - 1][1] != one[1]]
+
+
+def _refusals(flight: Flight) -> Iterator[Moment]:
+    """Refusals of arming, each complaint once between two armings; the last one of a vehicle that never armed leads."""
+    refused = [(t, text) for t, text in flight.messages if refusal(text) is not None]
+    if not refused:
+        return
+    armed = [t for t, is_armed, _ in _armings(flight) if is_armed]
+    if not flight.armed:
+        standing = dict.fromkeys(refusal(text) or "" for t, text in refused if t >= refused[-1][0] - 1.0)
+        what = f"it never armed: {'; '.join(standing)}"
+        yield Moment(refused[-1][0], "arming", f"{what} ({counted(len(refused), 'refusal')})", "MSG")
+    for _, several in groupby(refused, key=lambda one: sum(t <= one[0] for t in armed)):
+        complaints = list(several)
+        tried = {refusal(text) for _, text in complaints if text.startswith("Arm: ")}
+        yield from repeats([
+            Moment(t, "arming", f"Arm: {refusal(text)}" if refusal(text) in tried else text, "MSG")
+            for t, text in complaints
+        ])  # fmt: skip
+
+
+# --- modes, errors, events -------------------------------------------------------------------------------------
+
+
+def _modes(flight: Flight, vehicle: Vehicle) -> Iterator[Moment]:
+    entered = [(t, name, why) for t, name, why in _entered(flight, vehicle)]
+    changes = [one for at, one in enumerate(entered) if at == 0 or entered[at - 1][1] != one[1]]
+    for flurry in _flurries(changes):
+        t, name, why = flurry[0]
+        if len(flurry) < _FLURRY:
+            for t, name, why in flurry:
+                yield Moment(t, "mode", f"{_mode(name)}{f' ({why})' if why else ''}", "MODE")
+        else:
+            names = list(dict.fromkeys(name for _, name, _ in flurry))
+            yield Moment(t, "mode", f"mode changed {len(flurry)} times at once: {', '.join(names)}", "MODE")
+
+
+def _entered(flight: Flight, vehicle: Vehicle) -> Iterator[tuple[float, str, str]]:
+    table = flight.one("MODE", "ModeNum")
+    if table is None:
+        return
+    reasons = table["Rsn"] if "Rsn" in table.columns and (vehicle.version or (0,)) >= _REASON_KNOWN else None
+    for row, (t, mode) in enumerate(zip(table.t.tolist(), table["ModeNum"].tolist(), strict=True)):
+        if isinstance(mode, str):
+            number = mode_number(vehicle.kind, mode)
+            name = mode if number is None else mode_name(vehicle.kind, number)
+        else:
+            name = mode_name(vehicle.kind, px4_mode(int(mode)) if vehicle.kind == "px4" else int(mode))
+        why = reason_words(int(reasons[row])) if reasons is not None and np.isfinite(reasons[row]) else ""
+        yield t, name, why
+
+
+def _mode(name: str) -> str:
+    return name if name.startswith("mode ") else f"mode {name}"
+
+
+def _flurries(changes: Sequence[tuple[float, str, str]]) -> Iterator[list[tuple[float, str, str]]]:
+    """Mode changes that follow each other faster than anybody flips a switch, together."""
+    flurry: list[tuple[float, str, str]] = []
+    for change in changes:
+        if flurry and change[0] - flurry[-1][0] > _FLURRY_S:
+            yield flurry
+            flurry = []
+        flurry.append(change)
+    if flurry:
+        yield flurry
+
+
+def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Moment]:
+    """ERR records; one that is over again is one line with how long it lasted, and so is one that is said again."""
+    table = flight.one("ERR", "Subsys", "ECode")
+    if table is None:
+        return
+    rows = list(zip(table.t.tolist(), table["Subsys"].astype(int).tolist(), table["ECode"].astype(int).tolist(),
+                    strict=True))  # fmt: skip
+    lasted: dict[tuple[int, int], list[tuple[float, float]]] = {}
+    lanes: list[tuple[float, int]] = []
+    for at, (t, subsystem, code) in enumerate(rows):
+        if subsystem == _TERRAIN and not any(start <= t <= end for start, end in flight.armed):
+            continue  # every start, until the map is loaded
+        if subsystem == _EKF_PRIMARY:
+            lanes.append((t, code))
+            continue
+        if is_over(subsystem, code):
+            continue
+        after = next((row for row in rows[at + 1 :] if row[1] == subsystem), None)
+        ends = after is not None and is_over(subsystem, after[2])
+        lasted.setdefault((subsystem, code), []).append((t, after[0] if after and ends else math.inf))
+    for (subsystem, code), times in lasted.items():
+        kind = {"failsafe": "failsafe", "crash": "crash"}.get(error_kind(subsystem), "error")
+        yield Moment(times[0][0], kind, error_words(subsystem, code, vehicle.kind) + _lasting(times), "ERR")
+    if lanes:
+        t, code = lanes[0]
+        told = error_words(_EKF_PRIMARY, code, vehicle.kind)
+        again = f", and {counted(len(lanes) - 1, 'more switch', 'es')} until {lanes[-1][0]:.0f} s"
+        yield Moment(t, "error", told + (again if len(lanes) > 1 else ""), "ERR")
+
+
+def _lasting(times: Sequence[tuple[float, float]]) -> str:
+    """How often and until when something was so, of when it began and ended each time (infinity: it did not)."""
+    start, end = times[0]
+    if len(times) > 1:
+        return f" ({len(times)} times until {times[-1][0]:.0f} s)"
+    return f", over after {end - start:.1f} s" if math.isfinite(end) else ""
+
+
+def _numbered(flight: Flight) -> list[tuple[float, int]]:
+    """Times and numbers of the EV records."""
+    table = flight.one("EV", "Id")
+    if table is None:
+        return []
+    return list(zip(table.t.tolist(), table["Id"].astype(int).tolist(), strict=True))
+
+
+def _events(flight: Flight) -> Iterator[Moment]:
+    ended = [end for _, end in flight.armed]
+    numbered = _numbered(flight)
+    aligned: set[Span] = set()
+    told = []
+    for t, number in numbered:
+        span = next((span for span in flight.armed if span[0] <= t <= span[1]), None)
+        if number in _QUIET_EVENTS or (number in _AT_START and span is None):
+            continue
+        if number == _YAW_RESET and span is not None and span not in aligned:
+            aligned.add(span)  # the first climb aligns the estimator's heading
+        elif number != _INTERLOCK_OFF or not any(t - 1.0 <= end <= t + _SPOOL_DOWN_S for end in ended):
+            told.append(Moment(t, "event", event_words(number), "EV"))
+    yield from repeats(told)
+
+
+def _flown(flight: Flight) -> Iterator[Moment]:
+    """Taking off and landing, as the vehicle's own detector says."""
+    for start, end in flight.armed:
+        top = _highest(flight, start, end)
+        if top is not None and top[1] > _IN_AIR_M:
+            yield Moment(top[0], "flight", f"highest point, {top[1]:.1f} m", "POS")
+        if top is not None and top[1] < _LIFTED_M:
+            continue  # the land detector of old firmware goes by throttle alone
+        state = ""
+        for t, number in _numbered(flight):
+            what = "took off" if number in _TOOK_OFF else "landed" if number == _LANDED else ""
+            is_switched_off = what == "landed" and t > end - _SWITCHED_OFF_S
+            if is_switched_off:
+                continue  # disarming says so itself, wherever the vehicle is
+            if what and what != state and (state or what == "took off") and start <= t <= end:
+                yield Moment(t, "flight", what, "EV")
+                state = what
+
+
+def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | None:
+    """When a vehicle that flies was highest while armed, and how high."""
+    known = flight.height
+    if known is None or flight.vehicle.kind in ("rover", "sub"):
+        return None
+    t, height = known
+    inside = np.flatnonzero((t >= start) & (t <= end) & np.isfinite(height))
+    if not len(inside):
+        return None
+    top = inside[np.argmax(height[inside])]
+    return float(t[top]), float(height[top])
+
+
+# --- what it said ----------------------------------------------------------------------------------------------
+
+
+def _texts(flight: Flight) -> Iterator[Moment]:
+    """The vehicle's texts but for those of every flight; mission items that follow each other are one line."""
+    said = [(t, text) for t, text in flight.messages if refusal(text) is None]
+    items: list[tuple[float, int, str]] = []
+    told: list[Moment] = []
+    for t, text in said:
+        item = mission_item(text)
+        if item is not None:
+            items.append((t, *item))
+        elif not is_routine(text) and not _is_recorded(text, t, flight):
+            kind = "crash" if "crash" in text.casefold() else "failsafe" if FAILSAFE.search(text) else "message"
+            told.append(Moment(t, kind, text, "MSG"))
+    yield from repeats(told)
+    yield from _mission(flight, items)
+
+
+def _is_recorded(text: str, t: float, flight: Flight) -> bool:
+    return any(
+        says_what_is_recorded(text, subsystem) and any(abs(t - at) < _SAME_S for at, _ in flight.errors(subsystem))
+        for subsystem in RECORDED
+    )
+
+
+def _mission(flight: Flight, items: Sequence[tuple[float, int, str]]) -> Iterator[Moment]:
+    """The mission of each arming in one line."""
+    for start, end in flight.armed:
+        own = [(t, number, what) for t, number, what in items if start <= t <= end and number > 0]
+        if not own:
+            continue
+        reached = sorted({number for _, number, what in own if what == "reached"})
+        last = own[-1]
+        text = f"mission: items {own[0][1]} to {max(number for _, number, _ in own)}"
+        done = f", reached {_ranges(reached)}" if reached else ", none reached"
+        yield Moment(own[0][0], "mission", f"{text} until {last[0]:.0f} s{done}", "MSG")
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """1, 2, 3, 5 as "1 to 3 and 5"."""
+    parts: list[list[int]] = []
+    for number in numbers:
+        if parts and number == parts[-1][-1] + 1:
+            parts[-1].append(number)
+        else:
+            parts.append([number])
+    texts = [f"{part[0]} to {part[-1]}" if len(part) > 1 else str(part[0]) for part in parts]
+    return listed(texts)
+
+
+# --- the end --------------- ---------------------------------------------------------------------------------
+
+
+def _clock(flight: Flight) -> Iterator[Moment]:
+    if "clock" in flight.facts:
+        yield Moment(0.0, "log", f"the log has no times: they are {flight.facts['clock']}", "the log")
+
+
+def _end(flight: Flight) -> Iterator[Moment]:
+    """A log that ends while the vehicle is armed says nothing of how the flight ended."""
+    changes = _armings(flight)
+    is_armed = changes[-1][1] if changes else bool(flight.armed) and flight.armed[-1][1] > flight.end_s - 1.0
+    if not is_armed:
+        return
+    where = ""
+    if flies(flight.vehicle.kind) and (told := flight.height) is not None:
+        t, height = told
+        known = np.isfinite(height)
+        if known.any() and t[known][-1] > flight.end_s - 5.0 and height[known][-1] > _IN_AIR_M:
+            where = f" in the air, {height[known][-1]:.0f} m up"
+    text = f"the log ends{where} with the vehicle armed: power lost, or the recording stopped"
+    yield Moment(flight.end_s, "log", text, "the log")
+
+
+# --- putting it together ---------------------------------------------------------------------------------------
+
+
+def _once(moments: Sequence[Moment]) -> list[Moment]:
+    """Without crashes and failsafes that were said twice: their text tells more than their ERR record."""
+    texts = [one for one in moments if one.source == "MSG"]
+    return [
+        one
+        for one in moments
+        if one.source != "ERR" or one.kind not in ("crash", "failsafe")
+        or not any(_same_subject(one, text) for text in texts)
+    ]  # fmt: skip
+
+
+def _same_subject(record: Moment, text: Moment) -> bool:
+    is_near = abs(text.time_s - record.time_s) < _SAME_S and record.kind == text.kind
+    return is_near and record.text.split(maxsplit=1)[0].casefold() in text.text.casefold()

@@ -1,0 +1,1 @@
+"""PX4: what its logs say, how its flights are found, and its health checks."""

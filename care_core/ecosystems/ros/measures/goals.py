@@ -1,0 +1,262 @@
+"""Missions of goals sent one after the other: how they are found, what tells them apart, what went wrong in them.
+
+The planner says little about why it fails (a robot boxed in by its own cost weights dithers on the spot without one
+warning), so the evidence holds what such a failure looks like beside what the log says. How the log tells its goals
+is the goal server's own, see `drive.GoalServer`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from care_core.ecosystems.measures import Args, Mission, MissionKind, numeric, points
+from care_core.ecosystems.ros.measures.drive import (
+    BATTERY_FIELDS,
+    COMMAND_FIELDS,
+    MOVING_MPS,
+    ODOMETRY_FIELDS,
+    ROSOUT_FIELDS,
+    STAMPED_COMMAND_FIELDS,
+    STAMPED_FIELDS,
+    TOLERANCE_M,
+    Commands,
+    Leg,
+    Status,
+    analyse,
+    difference,
+    goal_server,
+    listed_goals,
+    longest,
+    own_goals,
+    share,
+    time_limit_s,
+    topics,
+)
+from care_core.logs.base import Table, Wanted
+from care_core.logs.plausible import kept_its_rate
+from care_core.run import Check, Evidence, Unavailable, Value
+
+ROSOUT = ("/rosout", "/rosout_agg")
+
+_IDLE_S = 120.0
+"""A pause this long between goals ends a mission."""
+
+_WARN = 4
+"""Level of a warning in rosgraph_msgs/Log (1 debug, 2 info, 4 warn, 8 error, 16 fatal)."""
+
+_ROS2_LEVELS = {10: 1, 20: 2, 30: 4, 40: 8, 50: 16}
+"""Levels of rcl_interfaces/Log in those of rosgraph_msgs/Log."""
+
+_STUCK_S = 15.0
+"""A robot that stands or only swings for this long with a goal ahead is stuck."""
+
+_MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
+    (re.compile(r"recovery|running (spin|backup|wait|drive_on_heading)"
+                r"|clearing .* costmap|clearing costmap", re.IGNORECASE), "recovery"),
+    (re.compile(r"abort", re.IGNORECASE), "abort"),
+    (re.compile(r"failed to (produce|find|get|make|create|generate) .*(path|plan|control)|failed to make progress"
+                r"|rotation cmd in collision|error when rotating|no valid (trajector|control)|unable to|off the map"
+                r"|in collision|collision ahead|oscillat", re.IGNORECASE), "planner"),
+    (re.compile(r"(control|map update|planner) loop missed|sensor origin|transform", re.IGNORECASE), "timing"),
+)  # fmt: skip
+"""What a message of the log speaks about, first match counts."""
+
+GOAL_ARGS: Mapping[str, str] = {
+    "goals": points(
+        "list of [x, y] or [x, y, heading] in m and rad, in the frame of the goals: the mission that fixed thresholds "
+        "and the time of a goal belong to",
+        *(2, 3),
+    ),
+    "goal_timeout_s": numeric(
+        "time within which each goal must be reached, 60 unless given; longer where goals lie farther apart than those "
+        "of the list"
+    ),
+    "tolerance_m": numeric("how far a goal may be from the listed one, 0.3 unless given"),
+    "passages": points("list of [x, y] of narrow passages, in the frame of the odometry", 2),
+    "odometry": "topic of nav_msgs/Odometry, /odom unless given",
+    "commands": "topic of geometry_msgs/Twist or TwistStamped, /cmd_vel unless given",
+    "battery": "topic of sensor_msgs/BatteryState, /battery_state unless given",
+}
+
+
+class GoalMissions(MissionKind):
+    """From the first goal of a list to the answer to its last."""
+
+    def __init__(self, name: str, args: Mapping[str, str], rosout: Sequence[str] = ROSOUT) -> None:
+        """`name` is the mission kind, which names its goal server too; `args` are those of that goal server alone.
+        `rosout` is where its nodes speak."""
+        self.name, self.rosout = name, rosout
+        self.args = {**args, **GOAL_ARGS}
+
+    def needs(self, spec: Args) -> Wanted:
+        names = topics(spec)
+        return {
+            **goal_server(spec).needs(spec),
+            names.odometry: (*ODOMETRY_FIELDS, *STAMPED_FIELDS),
+            names.commands: (*COMMAND_FIELDS, *STAMPED_COMMAND_FIELDS),
+            names.battery: (*BATTERY_FIELDS, *STAMPED_FIELDS),
+            **dict.fromkeys(self.rosout, ROSOUT_FIELDS),
+        }
+
+    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
+        """One mission each time the list of goals starts again, or goals come after a long pause."""
+        missions = []
+        groups = _split(goal_server(spec).legs(tables, spec, duration_s), spec)
+        for number, legs in enumerate(groups):
+            until_s = groups[number + 1][0].sent_s if number + 1 < len(groups) else duration_s
+            missions.append(Mission(tables, legs[0].sent_s, legs[-1].end_s, _has_ended(legs, spec, until_s), spec))
+        return tuple(missions)
+
+    def mismatch(self, mission: Mission) -> str:
+        return difference(mission.shared(analyse).legs, mission.spec)
+
+    def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
+        """Failed goals, recoveries, standstill, and warnings of the log: each kind of message once, with its count."""
+        found = (*_failed_goals(mission), *_recoveries(mission), *_stuck(mission), *_warnings(mission))
+        return tuple(sorted(found, key=lambda one: one.time_s))
+
+    def outcome(self, mission: Mission) -> tuple[Check, ...]:
+        """Whether the goals were reached; one that its sender cancelled or replaced is no failure of the robot."""
+        legs = mission.shared(analyse).legs
+        reached = sum(leg.status == Status.SUCCEEDED for leg in legs)
+        failed = sum(leg.status in (Status.ABORTED, Status.REJECTED, Status.LOST) for leg in legs)
+        word = f"{reached} of {len(legs)} goals were reached"
+        value: Value = 1.0 if reached else Unavailable(f"{word}, the others were cancelled or left open")
+        if failed:
+            value = 0.0
+        elif legs and legs[-1].status is None:
+            value = Unavailable("the log ends before the last goal was answered", "record until it is")
+        return (Check("goals_reached", value, "every goal that was not taken back was reached", word),)
+
+
+def _split(legs: Sequence[Leg], spec: Args) -> list[list[Leg]]:
+    goals = listed_goals(spec)
+    tolerance_m = float(spec.get("tolerance_m", TOLERANCE_M))
+    groups: list[list[Leg]] = []
+    for leg in legs:
+        if not groups or _starts_again(leg, groups[-1], goals, tolerance_m):
+            groups.append([])
+        groups[-1].append(leg)
+    return groups
+
+
+def _starts_again(leg: Leg, group: Sequence[Leg], goals: Sequence[tuple[float, float]], tolerance_m: float) -> bool:
+    """Whether a goal begins a new mission after those of `group`."""
+    if leg.sent_s - group[-1].end_s > _IDLE_S:
+        return True
+    # A goal that replaces one still under way belongs to the same mission, wherever it lies.
+    replaces = group[-1].status is None or group[-1].end_s >= leg.sent_s
+    firsts = {(group[0].x, group[0].y), *goals[:1]}
+    return not replaces and any(leg.offset(*first) <= tolerance_m for first in firsts)
+
+
+def _has_ended(legs: Sequence[Leg], spec: Args, until_s: float) -> bool:
+    """Whether the log shows the mission's end: its last goal answered or out of time, and no goal of the list to come.
+
+    A client may give up after failed goals, so a list that was not finished has ended too once a goal failed; while
+    every goal so far was reached, the log must go on for a goal's time without the next.
+    """
+    limit_s = time_limit_s(legs, spec)
+    last = legs[-1]
+    if last.status is None:
+        return until_s - last.sent_s > limit_s
+    if len(legs) < len(own_goals(legs, spec)) and all(leg.reached(limit_s) for leg in legs):
+        return until_s - last.end_s > limit_s
+    return True
+
+
+# Evidence
+
+
+def _failed_goals(mission: Mission) -> Iterator[Evidence]:
+    drive = mission.shared(analyse)
+    for number, leg in enumerate(drive.legs, start=1):
+        said = f": {leg.text}" if leg.text else ""
+        if leg.status in (Status.ABORTED, Status.REJECTED, Status.LOST):
+            word = Status(leg.status).name.lower()
+            yield Evidence(leg.end_s, f"goal {number} {word} after {leg.time_s:.0f} s{said}", "abort")
+        elif leg.time_s > drive.timeout_s:
+            yield Evidence(leg.end_s, f"goal {number} not reached within {drive.timeout_s:.0f} s{said}", "timeout")
+        elif leg.status in (Status.PREEMPTED, Status.RECALLED):
+            yield Evidence(leg.end_s, f"goal {number} cancelled after {leg.time_s:.0f} s{said}", "cancel")
+
+
+def _recoveries(mission: Mission) -> Iterator[Evidence]:
+    ran = goal_server(mission.spec).recoveries(mission)
+    if not isinstance(ran, Unavailable):
+        yield from _condensed([(time_s, f"recovery behavior {name}", "recovery") for time_s, name in ran])
+
+
+def _stuck(mission: Mission) -> Iterator[Evidence]:
+    """Goals on which the robot made no way for long, and what it was commanded meanwhile."""
+    drive = mission.shared(analyse)
+    if drive.odometry is None or not drive.odometry.tells_speed:
+        return
+    for number, leg in enumerate(drive.legs):
+        inside = drive.odometry.leg == number
+        still_s = longest(np.abs(drive.odometry.speed[inside]) < MOVING_MPS, drive.odometry.dt[inside])
+        if still_s < _STUCK_S or leg.reached(drive.timeout_s):
+            continue
+        text = f"made no way for {still_s:.0f} s on goal {number + 1}{_commanded(drive.commands, leg)}"
+        yield Evidence(leg.end_s, text, "stuck")
+
+
+def _commanded(commands: Commands | None, leg: Leg) -> str:
+    if commands is None:
+        return ""
+    inside = (commands.t >= leg.sent_s) & (commands.t <= leg.end_s)
+    shares = {
+        "to stand": share(commands.stands[inside], commands.dt[inside]),
+        "to turn on the spot": share(commands.turns_on_spot[inside], commands.dt[inside]),
+    }
+    order = max(shares, key=lambda one: shares[one])
+    return f", commanded {order} {shares[order]:.0%} of the time" if shares[order] > 0 else ""
+
+
+def _warnings(mission: Mission) -> Iterator[Evidence]:
+    """Warnings and errors of the log, and recoveries that it announces at a lower level."""
+    table = rosout(mission)
+    if table is None:
+        return
+    rows = []
+    for time_s, level, name, text in zip(table.t.tolist(), *(table[one] for one in ROSOUT_FIELDS), strict=True):
+        kind = next((kind for pattern, kind in _MESSAGE_KINDS if pattern.search(text)), None)
+        if (level >= _WARN and not kept_its_rate(text)) or kind == "recovery":
+            # On ROS 1 one node does it all and its name begins with a slash; on ROS 2 the server that speaks matters.
+            said = text if name.startswith("/") or not name else f"{name}: {text}"
+            rows.append((time_s, said, kind or "warning"))
+    yield from _condensed(rows)
+
+
+def _condensed(rows: Sequence[tuple[float, str, str]]) -> Iterator[Evidence]:
+    """The first of each kind of message, with how often it came; messages that differ in numbers only are one kind."""
+    counts: dict[str, int] = {}
+    firsts: dict[str, tuple[float, str, str]] = {}
+    for row in rows:
+        key = re.sub(r"-?\d+(\.\d+)?(e-?\d+)?", "#", row[1])
+        counts[key] = counts.get(key, 0) + 1
+        firsts.setdefault(key, row)
+    for key, (time_s, text, kind) in firsts.items():
+        times = f" ({counts[key]} times)" if counts[key] > 1 else ""
+        yield Evidence(time_s, text + times, kind)
+
+
+def _is_said(level: object, name: object, text: object) -> bool:
+    return isinstance(level, (int, float)) and math.isfinite(level) and isinstance(name, str) and isinstance(text, str)
+
+
+def rosout(mission: Mission) -> Table | None:
+    """What nodes said during the mission, with levels as ROS 1 has them. What a damaged definition reads as no text, or
+    no level, was said by nobody."""
+    for channel in ROSOUT:
+        table = mission.table(channel)
+        if table is not None and all(name in table.columns for name in ROSOUT_FIELDS):
+            said = zip(*(table[name].tolist() for name in ROSOUT_FIELDS), strict=True)
+            table = table.where(np.array([_is_said(*row) for row in said], dtype=bool))
+            levels = np.array([_ROS2_LEVELS.get(int(level), int(level)) for level in table["level"]], np.float64)
+            return Table(table.t, {**table.columns, "level": levels})
+    return None

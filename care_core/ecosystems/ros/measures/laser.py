@@ -1,0 +1,34 @@
+"""Extractors of a laser scanner, sensor_msgs/LaserScan."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from care_core.ecosystems.measures import Args, Mission, extractor, has, missing
+from care_core.run import Unavailable, Value
+
+SCAN = "/scan"
+_FIELDS = ("ranges", "range_min", "range_max")
+
+
+@extractor(
+    "obstacle_distance",
+    needs=lambda args: {str(args.get("channel", SCAN)): _FIELDS},
+    unit="m",
+    args={"channel": "topic of sensor_msgs/LaserScan, /scan unless given"},
+)
+def obstacle_distance(mission: Mission, args: Args) -> Value:
+    """The smallest distance that the scanner measured, from itself; rays outside its own limits are none."""
+    channel = str(args.get("channel", SCAN))
+    table = mission.table(channel)
+    if not has(table, *_FIELDS):
+        return missing(channel)
+    nearest = [_nearest(*scan) for scan in zip(*(table[name] for name in _FIELDS), strict=True)]
+    known = [distance for distance in nearest if distance is not None]
+    return min(known) if known else Unavailable("no ray hit anything", "check the scanner", channel)
+
+
+def _nearest(ranges: object, least: float, most: float) -> float | None:
+    distances = np.asarray(ranges, np.float64)
+    valid = distances[np.isfinite(distances) & (distances >= least) & (distances <= most)]
+    return float(valid.min()) if len(valid) else None

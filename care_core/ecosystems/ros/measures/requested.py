@@ -1,0 +1,146 @@
+"""What was asked of one drive along goals: how many, how far apart, how much turning. Known before it, never a cause.
+
+A drive of the profile's own goals was asked for all of them, however many were sent before it was given up. Distances
+are straight lines: what the map puts between two goals is not in the log.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from functools import wraps
+from itertools import pairwise
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.measures.requested import Asked
+from care_core.ecosystems.measures import Args, Mission, extractor, one_of
+from care_core.ecosystems.ros.measures.drive import (
+    TOLERANCE_M,
+    Drive,
+    analyse,
+    angle_between,
+    listed_headings,
+    no_odometry,
+)
+from care_core.run import Unavailable, Value
+
+_LEAST_RAD = 0.2
+"""A smaller turn is made on the way: headings at the start of the training runs lie within 0.12 rad of the course."""
+
+Pose = tuple[float, float, float]
+"""x and y in m, heading in rad; nan where the log does not say."""
+
+
+def goals_asked(mission: Mission) -> tuple[Asked, float] | Unavailable:
+    """The way through the goals, from where the robot stood, and all turning it asks for in rad; use through
+    `mission.shared`."""
+    drive = mission.shared(analyse)
+    goals = _goals(drive, mission.spec)
+    if any(math.isnan(x) for x, _, _ in goals):
+        return Unavailable("the log does not say where the goals lie", "ros2 bag record /goal_pose /plan")
+    start = _start(drive, goals[0])
+    if isinstance(start, Unavailable):
+        return start
+    poses = (start, *goals)
+    points = np.array([(x, y, 0.0) for x, y, _ in poses])
+    none = np.zeros(len(goals))
+    return Asked(points, none, none, "open"), sum(_turns(poses))
+
+
+def _goals(drive: Drive, spec: Args) -> tuple[Pose, ...]:
+    """The goals of the mission: all of the profile's own, or those that were sent."""
+    sent = tuple((leg.x, leg.y, leg.yaw) for leg in drive.legs)
+    unsent = tuple((x, y, yaw) for (x, y), yaw in zip(drive.goals, listed_headings(spec), strict=False))
+    return (*sent, *unsent[len(sent) :])
+
+
+def _start(drive: Drive, first: Pose) -> Pose | Unavailable:
+    """Where the robot stood when the first goal was sent, in the frame of the goals.
+
+    Where the odometry has a frame of its own, the way to the first goal is as long as the robot came forward on it.
+    """
+    odometry = drive.placed or drive.odometry
+    if odometry is None:
+        return no_odometry(drive)
+    here = np.flatnonzero(odometry.leg == 0)
+    if not len(here):
+        return Unavailable("the odometry begins after the first goal was sent", "record the whole mission")
+    begin, end = here[0], here[-1]
+    frame, own = drive.legs[0].frame.strip("/"), odometry.frame.strip("/")
+    if not frame or not own or frame == own:
+        return float(odometry.x[begin]), float(odometry.y[begin]), float(odometry.yaw[begin])
+    if not drive.legs[0].reached(drive.timeout_s):
+        hint = "name in the mission section a topic of nav_msgs/Odometry in the goals' frame"
+        return Unavailable(f"goals are in frame {frame}, odometry is in {own}", hint)
+    way_m = math.hypot(odometry.x[end] - odometry.x[begin], odometry.y[end] - odometry.y[begin])
+    return first[0] - max(way_m, TOLERANCE_M), first[1], math.nan
+
+
+def _turns(poses: tuple[Pose, ...]) -> Iterator[float]:
+    """Towards each goal, and at it to its heading; rad. What is not known counts as none."""
+    for (x, y, before), (there_x, there_y, after) in pairwise(poses):
+        course = math.atan2(there_y - y, there_x - x)
+        if math.hypot(there_x - x, there_y - y) < TOLERANCE_M:
+            yield _turn(before, after)
+        else:
+            yield _turn(before, course) + _turn(course, after)
+
+
+def _turn(a: float, b: float) -> float:
+    angle = angle_between(a, b)
+    return angle if angle >= _LEAST_RAD else 0.0
+
+
+_ASKED: Mapping[str, Callable[[Asked, float], float]] = {
+    "goals": lambda way, turn: float(len(way.lengths)),
+    "path_length": lambda way, turn: float(way.lengths.sum()),
+    "goal_distance": lambda way, turn: float(way.lengths.mean()),
+    "turn": lambda way, turn: turn,
+    "goal_turn": lambda way, turn: turn / len(way.lengths),
+}
+
+
+@extractor(
+    "goals_asked",
+    needs={},
+    parts=("goals", "odometry"),
+    unit="",
+    args={"what": one_of(", ".join(_ASKED), *_ASKED)},
+)
+def goals_asked_for(mission: Mission, args: Args) -> Value:
+    """One number of what the goals ask for: `goals`, `path_length` (m, straight from goal to goal), `turn` (rad), and
+    `goal_distance` and `goal_turn`, the same for each goal."""
+    measure = _ASKED.get(str(args.get("what")))
+    if measure is None:
+        return Unavailable(f"there is no '{args.get('what')}' of goals", f"use one of {', '.join(_ASKED)}")
+    found = mission.shared(goals_asked)
+    return found if isinstance(found, Unavailable) else measure(*found)
+
+
+def way_asked_m(mission: Mission) -> float | Unavailable:
+    """Length of the way through the goals."""
+    found = mission.shared(goals_asked)
+    if isinstance(found, Unavailable):
+        return found
+    length_m = float(found[0].lengths.sum())
+    return length_m if length_m > 0 else Unavailable("the goals ask for no way", "judge a mission that leads somewhere")
+
+
+PER_GOAL = {"per": one_of("goal: for each goal that the mission asks for; in all unless given", "goal")}
+PER_METRE = {"per": one_of("metre: for each metre of way that the goals ask for; in all unless given", "metre")}
+
+
+def divided(compute: Callable[[Mission, Args], Value]) -> Callable[[Mission, Args], Value]:
+    """A sum over the mission, for each metre or goal that it asks for where the argument `per` says so."""
+
+    @wraps(compute)
+    def answer(mission: Mission, args: Args) -> Value:
+        value, per = compute(mission, args), args.get("per")
+        if isinstance(value, Unavailable) or per is None:
+            return value
+        drive = mission.shared(analyse)
+        amount = way_asked_m(mission) if per == "metre" else float(len(drive.goals) or len(drive.legs))
+        return amount if isinstance(amount, Unavailable) else value / amount
+
+    return answer

@@ -1,0 +1,170 @@
+"""Moments of an account put together: repeats told once, changes of parameters, gaps and damage, order and length."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from care_core.ecosystems.findings import Moment
+from care_core.ecosystems.vehicles import is_self_written
+from care_core.logs.base import Table
+from care_core.numbers import Floats, ascending, distinct, median, pauses
+from care_core.run import Damage, Setting, shown
+
+Span = tuple[float, float]
+
+MOST = 40
+"""Lines of an account; of a longer one the least telling are left out."""
+
+_KEPT_LONGEST = ("vehicle", "crash", "failsafe", "arming", "error", "log", "flight", "battery", "gps", "radio", "mode",
+                 "parameter", "event", "message", "mission")  # fmt: skip
+_AT_ONCE = ("vehicle", "crash", "failsafe", "error", "event", "arming", "battery", "gps", "radio", "mode", "flight",
+            "mission", "message", "parameter", "log")  # fmt: skip
+"""Kinds of moments as they stand where several happen at once: what happened before what followed from it."""
+
+_NUMBERS = re.compile(r"\d+(?:\.\d+)?")
+_TELLING = re.compile(
+    r"fail|error|lost|loss|crash|glitch|variance|unhealthy|not healthy|inconsistent|critical|low\b|emergency|reset"
+    r"|lane|switch|breach|stop|clip|vibration|brown|watchdog|internal|overload|timeout|refus|denied|aborted|warn"
+    r"|bad\b|yaw imbalance|thrust|terminat|parachute|EKF|compass|battery|land",
+    re.IGNORECASE,
+)
+_CHANGES_NAMED = 4
+_TELEMETRY_RATE = re.compile(
+    r"SR\d+_|MAV\d*_(\w*RATE|RAW_SENS|EXT_STAT|RC_CHAN|RAW_CTRL|POSITION|EXTRA\d|PARAMS|ADSB)\b"
+)
+"""Rates that ground stations set by themselves when they connect."""
+_PAUSE_S, _GAP_MEDIANS, _IDLE_S = 2.0, 20.0, 60.0
+_CLEARLY = 3.0
+"""Where so many times as many steps as fit into a span would be too long, more than half of them are not."""
+_SWITCHED_WITHIN_S = 2.0
+
+
+def account_of(moments: Iterable[Moment], introduction: Moment, most: int = MOST) -> tuple[Moment, ...]:
+    """An account: the introduction, then everything in order of time, the most telling where there is too much."""
+    return (introduction, *_kept(sorted(moments, key=_place), most - 1))
+
+
+def repeats(moments: Sequence[Moment]) -> Iterator[Moment]:
+    """Moments that differ in nothing but numbers as one, with their count and when the last one was."""
+    groups: dict[tuple[str, str], list[Moment]] = {}
+    for moment in moments:
+        groups.setdefault((moment.kind, _NUMBERS.sub("#", moment.text)), []).append(moment)
+    for several in groups.values():
+        first = several[0]
+        again = f" ({len(several)} times until {several[-1].time_s:.0f} s)" if len(several) > 1 else ""
+        yield Moment(first.time_s, first.kind, first.text + again, first.source)
+
+
+def parameter_changes(
+    settings: Mapping[str, tuple[Setting, ...]], armed: Sequence[Span], source: str
+) -> Iterator[Moment]:
+    """Parameters changed while armed one by one, those changed on the ground together."""
+    ground: dict[str, tuple[float, str]] = {}
+    for name, history in settings.items():
+        if is_self_written(name) or _TELEMETRY_RATE.match(name):
+            continue
+        for before, after in pairwise(history):
+            t = after.changed_at_s
+            if t is None or not math.isfinite(t):
+                continue
+            change = f"from {shown(before.value)} to {shown(after.value)}"
+            if within(armed, t):
+                yield Moment(t, "parameter", f"{name} changed {change} while armed", source)
+            else:
+                ground[name] = (ground.get(name, (t,))[0], f"{name} {change}")
+    if ground:
+        named = sorted(ground.values())
+        more = f" and {len(named) - _CHANGES_NAMED} more" if len(named) > _CHANGES_NAMED else ""
+        what = "parameter changed" if len(named) == 1 else f"{len(named)} parameters changed"
+        text = f"{what} while disarmed: {', '.join(change for _, change in named[:_CHANGES_NAMED])}{more}"
+        yield Moment(named[0][0], "parameter", text, source)
+
+
+def gaps(tables: Iterable[Table], armed: Sequence[Span]) -> Iterator[Moment]:
+    """The longest time in which nothing at all was recorded while armed, and while disarmed if it is long."""
+    told = [table for table in tables if len(table) > _GAP_MEDIANS]
+    starts, ends = pauses(map(_known, told), _PAUSE_S)
+    limit = max(_PAUSE_S, _GAP_MEDIANS * _usual_step(told)) if len(starts) else _PAUSE_S
+    edges = [edge for span in armed for edge in span]  # a log may be written while armed only
+    flown, idle = [], []
+    for low, high in zip(starts.tolist(), ends.tolist(), strict=True):
+        if high - low <= limit:
+            continue
+        is_switch = any(low - _SWITCHED_WITHIN_S <= edge <= high + _SWITCHED_WITHIN_S for edge in edges)
+        if within(armed, low) and within(armed, high) and not is_switch:
+            flown.append((low, high))
+        elif high - low > _IDLE_S:
+            idle.append((low, high))
+    for lasted, when in ((flown, " while armed"), (idle, "")):
+        if lasted:
+            start, end = max(lasted, key=lambda pause: pause[1] - pause[0])
+            more = f", the longest of {len(lasted)} gaps" if len(lasted) > 1 else ""
+            yield Moment(start, "log", f"nothing is recorded for {end - start:.1f} s{when}{more}", "the log")
+
+
+def _known(table: Table) -> Floats:
+    t = table.t
+    known = np.isfinite(t)
+    return t if known.all() else t[known]
+
+
+def _usual_step(tables: Sequence[Table]) -> float:
+    """Median step of all times together; 0 where it is clearly too short to matter, which the longest series says. The
+    times of a large log are looked at one message after the other."""
+    first_s, last_s, longest, count = math.inf, -math.inf, 0, 0
+    for t in map(_known, tables):
+        if len(t):
+            first_s, last_s = min(first_s, float(np.min(t))), max(last_s, float(np.max(t)))
+        if len(t) > longest:
+            ordered = ascending(t)
+            longest, count = len(t), int(np.count_nonzero(ordered[1:] != ordered[:-1]))
+    if count * _PAUSE_S / _GAP_MEDIANS > _CLEARLY * (last_s - first_s):
+        return 0.0
+    steps = np.diff(distinct(np.concatenate([np.empty(0), *map(_known, tables)])))
+    return float(median(steps)) if len(steps) else 0.0
+
+
+def damage_of(damage: Sequence[Damage]) -> Iterator[Moment]:
+    """What is broken in a log, in one line."""
+    if damage:
+        first = damage[0]
+        text = first.what if first.what.startswith("the log") else f"damage in the log: {first.what}"
+        more = f", and {counted(len(damage) - 1, 'more place')}" if len(damage) > 1 else ""
+        yield Moment(math.nan if first.time_s is None else first.time_s, "log", text + more, "the log")
+
+
+def counted(number: int, what: str, plural: str = "s") -> str:
+    """A number with its noun: "1 refusal", "2 switches"."""
+    return f"{number} {what}{'' if number == 1 else plural}"
+
+
+def within(spans: Iterable[Span], t: float) -> bool:
+    """Whether a time lies in one of the spans."""
+    return any(start <= t <= end for start, end in spans)
+
+
+def _place(moment: Moment) -> tuple[bool, float, int]:
+    """Where a moment stands: by time to a tenth of a second, then by kind; what has no time comes last."""
+    known = math.isfinite(moment.time_s)
+    return not known, round(moment.time_s, 1) if known else 0.0, _AT_ONCE.index(moment.kind)
+
+
+def _kept(moments: Sequence[Moment], most: int) -> list[Moment]:
+    """At most so many moments in their order, the most telling ones."""
+    if len(moments) <= most:
+        return list(moments)
+    order = {kind: place for place, kind in enumerate(_KEPT_LONGEST)}
+
+    def weight(at: int) -> tuple[float, int]:
+        moment = moments[at]
+        is_promoted = moment.kind == "message" and _TELLING.search(moment.text) is not None
+        return (order["error"] + 0.5 if is_promoted else order[moment.kind]), at
+
+    chosen = set(sorted(range(len(moments)), key=weight)[: most - 1])
+    rest = Moment(math.nan, "message", f"and {len(moments) - len(chosen)} more moments of less weight", "the log")
+    return [*(moment for at, moment in enumerate(moments) if at in chosen), rest]

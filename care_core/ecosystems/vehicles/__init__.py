@@ -1,0 +1,42 @@
+"""What is known of vehicles before any log is read: their modes, errors, events, motors and the names of parameters.
+
+Facts of ArduPilot's and PX4's source, as tables. Knows nothing of logs.
+"""
+
+from care_core.ecosystems.vehicles.arming import method_words, with_said
+from care_core.ecosystems.vehicles.errors import FAILSAFE, error_kind, error_words, is_over
+from care_core.ecosystems.vehicles.events import event_words
+from care_core.ecosystems.vehicles.modes import Way, mode_name, mode_number, reason_words, way_of
+from care_core.ecosystems.vehicles.motors import Motor, is_skid_steered, motor_outputs, motors_of
+from care_core.ecosystems.vehicles.parameters import Spelling, renamed, spelled_in, spellings
+from care_core.ecosystems.vehicles.self_written import is_self_written
+from care_core.ecosystems.vehicles.vehicle import UNLIKE_ROVERS, Kind, Vehicle, flies, vehicle_of
+
+__all__ = [
+    "FAILSAFE",
+    "UNLIKE_ROVERS",
+    "Kind",
+    "Motor",
+    "Spelling",
+    "Vehicle",
+    "Way",
+    "error_kind",
+    "error_words",
+    "event_words",
+    "flies",
+    "is_over",
+    "is_self_written",
+    "is_skid_steered",
+    "method_words",
+    "mode_name",
+    "mode_number",
+    "motor_outputs",
+    "motors_of",
+    "reason_words",
+    "renamed",
+    "spelled_in",
+    "spellings",
+    "vehicle_of",
+    "way_of",
+    "with_said",
+]

@@ -1,0 +1,90 @@
+"""Which output drives which motor, and where that motor is."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+from care_core.ecosystems.vehicles.frames import Arm, arms_of, frame_of
+from care_core.ecosystems.vehicles.settings import Driven, code
+from care_core.frozen import dataclass
+
+_FUNCTIONS = {**{32 + n: n for n in range(1, 9)}, **{73 + n: n for n in range(9, 13)}}
+"""SERVOn_FUNCTION -> motor number: k_motor1 to k_motor8 are 33 to 40, k_motor9 to k_motor12 are 82 to 85
+(SRV_Channel.h)."""
+_OUTPUTS = 32
+_ON_AXIS_DEG = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """A motor of a multicopter. Factors are the shares of a demand that it gives, at most 0.5; see `frames`."""
+
+    number: int
+    output: int
+    """Number of its output: column `C<output>` of RCOU."""
+    angle_deg: float
+    """Clockwise from the nose."""
+    roll: float
+    pitch: float
+    yaw: float
+    place: str
+    """In words: "front right", "upper rear left"."""
+
+
+def motor_outputs(settings: Driven) -> dict[int, int]:
+    """Motor number -> output number, as SERVOn_FUNCTION says; empty where no parameter does (firmware before 3.5)."""
+    outputs: dict[int, int] = {}
+    for output in range(1, _OUTPUTS + 1):
+        function = code(settings, f"SERVO{output}_FUNCTION")
+        if function in _FUNCTIONS:
+            outputs.setdefault(_FUNCTIONS[function], output)
+    return outputs
+
+
+def is_skid_steered(settings: Driven) -> bool | None:
+    """Whether a ground vehicle steers by driving its sides apart (SRV_Channel.h: k_throttleLeft 73, k_throttleRight
+    74), rather than by a steered wheel or rudder (k_steering 26); None where no parameter says."""
+    functions = {code(settings, f"SERVO{output}_FUNCTION") for output in range(1, _OUTPUTS + 1)}
+    if {73, 74} <= functions:
+        return True
+    return False if 26 in functions else None
+
+
+def motors_of(settings: Driven, motors: int | None = None) -> tuple[Motor, ...]:
+    """The motors of a multicopter or a quadplane with their outputs, in order of number.
+
+    Empty where the frame is unknown, or its outputs do not drive its motors. `motors` is the number of motor outputs
+    that the log records, which old firmware needs (see `vehicle_of`).
+    """
+    arms = arms_of(*frame_of(settings, motors))
+    outputs = motor_outputs(settings)
+    if not any(name.startswith("SERVO") and name.endswith("_FUNCTION") for name in settings):
+        outputs = {number: number for number in arms}  # as firmware before 3.5 has them
+    if not arms or not arms.keys() <= outputs.keys():
+        return ()
+    places = _places(arms)
+    return tuple(
+        Motor(number, outputs[number], arm.angle_deg, arm.roll, arm.pitch, arm.yaw, places[number])
+        for number, arm in sorted(arms.items())
+    )
+
+
+def _places(arms: Mapping[int, Arm]) -> dict[int, str]:
+    """Per motor its place in words; two motors of one word (an octocopter has them) are told apart by their angle."""
+    words = {n: " ".join(filter(None, (arm.level, _side(arm.angle_deg)))) for n, arm in arms.items()}
+    spots = {(words[n], round(arm.angle_deg)) for n, arm in arms.items()}
+    alike = Counter(word for word, _ in spots)
+    return {
+        n: word if alike[word] == 1 else f"{word}, {abs(arms[n].angle_deg):.0f} degrees from the nose"
+        for n, word in words.items()
+    }
+
+
+def _side(angle_deg: float) -> str:
+    """Where an angle from the nose points: one of the four axes, else the corner between two."""
+    from_nose = abs((angle_deg + 180) % 360 - 180)
+    along = "front" if from_nose < 90 - _ON_AXIS_DEG else "rear" if from_nose > 90 + _ON_AXIS_DEG else ""
+    is_across = _ON_AXIS_DEG < from_nose < 180 - _ON_AXIS_DEG
+    across = ("right" if angle_deg % 360 < 180 else "left") if is_across else ""
+    return " ".join(filter(None, (along, across)))
