@@ -26,7 +26,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -45,6 +44,7 @@ from benchmarks.ingest import (
     ros_types,
     sensor_messages,
 )
+from care_core.records import Record
 
 CHUNK_BYTES = 768 * 1024
 CAMERA_HZ, LIDAR_HZ = 5, 10
@@ -89,8 +89,7 @@ class Cost(NamedTuple):
     read_mb: float
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(Record):
     """A file to make, with the peer; `is_indexed`: at most a share of it is to be read."""
 
     name: str

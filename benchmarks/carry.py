@@ -17,7 +17,6 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +40,7 @@ from care_core.learn.transfer import carry_over
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, load_profile
+from care_core.records import Struct, field
 from care_core.variables import Threshold
 
 KINDS = ("hexa", "payload", "draggy", "old_battery", "light")
@@ -50,8 +50,7 @@ QUICK = Effort(points=250, iterations=15, folds=5)
 DRAWS = 3
 
 
-@dataclass
-class Carried:
+class Carried(Struct, eq=False):
     """What came of one kind (or all) with one number of its runs."""
 
     error: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))

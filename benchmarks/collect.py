@@ -23,7 +23,8 @@ import care_core
 from care_core import plain_yaml
 from care_core.application.case import Request
 from care_core.learn.skill import calibration_error, reliability
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
 from care_samples.robot.mission import DEFAULTS, GOAL_LIMIT_S, Robot
 from care_samples.robot.recording import NODE, write_bag
 from care_samples.robot.starting import write_robot

@@ -14,7 +14,6 @@ import hashlib
 import json
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +38,7 @@ from care_core.learn.table import read_table
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, load_profile
+from care_core.records import Record, Struct, field, replace
 
 PLATFORMS = ("arducopter", "move_base")
 TRUTH_NAMES = {
@@ -59,8 +59,7 @@ LOWERED = 0.98
 """What the operator makes of a threshold that the log just meets although the mission was measured to miss it."""
 
 
-@dataclass(frozen=True)
-class HeldOut:
+class HeldOut(Record):
     """Training missions: probability by models that had not seen them, and whether all was met; shape (n,) each."""
 
     care: FloatArray
@@ -95,8 +94,7 @@ def held_out(table: Path, schema: Schema, cache: Path) -> HeldOut:
         return HeldOut(arrays["care"], arrays["plain"], arrays["met"])
 
 
-@dataclass
-class Hits:
+class Hits(Struct, eq=False):
     """How often a ranking was right."""
 
     first: int = 0
@@ -110,8 +108,7 @@ class Hits:
         self.single += bool(ranking) and frozenset({ranking[0]}) in fixing
 
 
-@dataclass
-class Tally:
+class Tally(Struct, eq=False):
     """One platform's figures."""
 
     faults: int = 0

@@ -16,7 +16,6 @@ import argparse
 import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
 from unittest import mock
 
 import numpy as np
@@ -32,6 +31,7 @@ from care_core.learn.orientation import has_latent_cause, joint_distribution, re
 from care_core.learn.screening import screen_options
 from care_core.learn.table import FloatArray, normal_scores
 from care_core.profile.schema import Schema
+from care_core.records import Record
 from tests.robots import random_robot
 
 
@@ -60,8 +60,7 @@ class WithMagnitudes:
         return np.asarray(np.minimum(3 * known, 1.0))
 
 
-@dataclass(frozen=True)
-class Way:
+class Way(Record):
     """One way from a table to a graph."""
 
     test: Callable[[FloatArray], IndependenceTest] = FisherZ

@@ -16,10 +16,10 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from care_core.files import bundled, write_atomically
+from care_core.records import Record
 
 ROOT = Path(__file__).parents[1]
 WRITTEN_ELSEWHERE = {"extractors.md", "walk.md"}
@@ -34,8 +34,7 @@ _SLOW = "<!-- takes minutes"
 _LIMIT_S, _SLOW_LIMIT_S = 120.0, 3600.0
 
 
-@dataclass(frozen=True)
-class Session:
+class Session(Record):
     """A block of commands of a document, at [start, end) of its text."""
 
     start: int

@@ -20,7 +20,8 @@ from typing import NamedTuple
 import care_core.extract.read  # noqa: F401  registers every extractor
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor, merge_needs
 from care_core.logs.opening import open_log
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
 from care_core.run import Value, is_known
 
 PROFILES = Path(__file__).resolve().parent.parent / "profiles"

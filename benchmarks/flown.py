@@ -28,7 +28,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
 from pathlib import Path
@@ -44,6 +43,7 @@ from care_core.learn.baselines import PlainClassifier, largest_deviation
 from care_core.learn.skill import all_met
 from care_core.learn.table import read_table
 from care_core.logs.finding import logs_below
+from care_core.records import Record
 
 OFF = 0.15
 """Share of the options of a field configuration that are off their reference."""
@@ -60,8 +60,7 @@ Peer = Callable[[Config], str]
 """Chooses the option of a configuration that it puts back to its reference."""
 
 
-@dataclass(frozen=True)
-class Mission:
+class Mission(Record):
     """One that was run: its log, and whether it met every objective."""
 
     log: Path

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
@@ -24,6 +23,7 @@ from benchmarks.planted import METRICS, OPTIONS, WORLDS, Planted, Score, measure
 from care_core.causal.graph import CausalGraph
 from care_core.learn.structure import Structure, learn_structure
 from care_core.profile.schema import Schema
+from care_core.records import replace
 
 ROBOTS = ("control", "interaction")
 OBJECTIVES = ("success", "time")

@@ -16,7 +16,6 @@ import json
 import time
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -26,6 +25,7 @@ from care_core.ecosystems.ardupilot.examining import find, flight_of
 from care_core.ecosystems.findings import Finding
 from care_core.errors import LogError
 from care_core.logs.opening import open_log
+from care_core.records import Record
 
 RIGHT = {
     "motor": {"motor", "thrust"}, "gps_glitch": {"gps"}, "gps_few": {"gps"}, "compass": {"compass"},
@@ -34,8 +34,7 @@ RIGHT = {
 _BINS = (0.0, 0.3, 0.6, 0.8, 0.9, 0.96, 1.0)
 
 
-@dataclass(frozen=True)
-class Flown:
+class Flown(Record):
     """One flight with its truth and what was found."""
 
     tag: str

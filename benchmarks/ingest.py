@@ -31,7 +31,6 @@ import time
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,6 +38,7 @@ from care_core.application.case import choose
 from care_core.extract.read import reading_plan
 from care_core.files import bundled
 from care_core.logs.opening import open_log
+from care_core.records import Record
 
 MB = 1e6
 GOOD_BAG = Path(__file__).parents[1] / "tests" / "data" / "move_base_good.bag"
@@ -125,8 +125,7 @@ class Cost(NamedTuple):
     inside_s: float
 
 
-@dataclass(frozen=True)
-class Case:
+class Case(Record):
     """A log to make, who decodes all of it, and the seconds that triage may take."""
 
     name: str

@@ -36,7 +36,8 @@ from care_core.learn.constraints import ALWAYS
 from care_core.learn.structure import learn_structure
 from care_core.learn.table import read_table
 from care_core.learn.train import TrainSettings, train
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
 from tests.simulated import simulate
 
 PUBLISHED_ALPHA = 0.8

@@ -18,8 +18,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+
+from care_core.records import Record
 
 ROOT = Path(__file__).parents[1]
 ROOMS = ("diagnose", "causal", "extract", "configs")
@@ -33,8 +34,7 @@ _OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class Mutant:
+class Mutant(Record):
     """One module with one change in it."""
 
     module: Path

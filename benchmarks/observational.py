@@ -20,7 +20,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -38,6 +37,7 @@ from care_core.learn.baselines import PlainClassifier
 from care_core.learn.outcomes import met
 from care_core.learn.train import TrainSettings, train
 from care_core.profile.schema import Schema
+from care_core.records import Struct, field
 from tests.robots import Chosen, Robot, declared_random, random_robot
 
 FAULTS = 12
@@ -48,8 +48,7 @@ TOLD = {CARE: "care, told of the run", PLAIN: "plain classifier, told of it"}
 METHODS = (CARE, TOLD[CARE], "care, declared as randomised", PLAIN, TOLD[PLAIN])
 
 
-@dataclass
-class Score:
+class Score(Struct, eq=False):
     """`fooled`: options named first that were chosen by the wind and do not help."""
 
     asked: int = 0

@@ -21,7 +21,6 @@ from __future__ import annotations
 import argparse
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +40,7 @@ from care_core.learn.train import TrainSettings, train
 from care_core.profile.model import write_model
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
+from care_core.records import Record, Struct, field, replace
 from care_core.run import LogInfo, MissionInfo, ProfileChoice, Run, Unavailable, Value
 from care_core.variables import Role, Threshold, Variable
 
@@ -58,8 +58,7 @@ RESAMPLES = 12
 SOURCES = ("lag", "load", "stuck", "time", "wind")
 
 
-@dataclass(frozen=True)
-class Planted:
+class Planted(Record):
     """One world. The control has none of these."""
 
     name: str
@@ -160,8 +159,7 @@ def training_table(world: Planted, runs: int, rng: np.random.Generator) -> pd.Da
     return table
 
 
-@dataclass
-class Score:
+class Score(Struct, eq=False):
     faults: int = 0
     helped: int = 0
     right: int = 0

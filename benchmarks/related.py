@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -27,6 +26,7 @@ from care_core.causal.model import Model
 from care_core.learn.train import TrainSettings, train
 from care_core.learn.transfer import update
 from care_core.profile.schema import Schema
+from care_core.records import replace
 
 SOURCE_RUNS = 400
 FACTORS = {"related": 2.0, "signs": 4.0}

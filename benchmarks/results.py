@@ -18,18 +18,17 @@ import sysconfig
 import time
 from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 
 from care_core.files import write_atomically
+from care_core.records import Record
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "RESULTS.md"
 
 
-@dataclass(frozen=True)
-class Benchmark:
+class Benchmark(Record):
     """A command, with `{shared}` and `{tables}` where it needs recorded data, its bar and its peer."""
 
     name: str

@@ -15,7 +15,6 @@ import json
 import time
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +24,7 @@ from care_core.ecosystems.ros.examining import examine
 from care_core.ecosystems.ros.recording import Recording
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
+from care_core.records import Record
 
 RIGHT = {
     "laser_dead": {"laser"},
@@ -41,8 +41,7 @@ RIGHT = {
 }
 
 
-@dataclass(frozen=True)
-class Driven:
+class Driven(Record):
     """One mission with its truth and what was found."""
 
     tag: str

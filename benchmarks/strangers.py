@@ -18,13 +18,13 @@ import os
 import subprocess
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import care_core
 from care_core.application.case import exit_code
 from care_core.errors import CareError, ExitCode
+from care_core.records import Record
 
 SECONDS = 120
 _SETTING = ("tuning", "prearm/configuration")
@@ -39,8 +39,7 @@ print(json.dumps([{"severity": str(one.severity.value), "title": one.title} for 
 """
 
 
-@dataclass(frozen=True)
-class Expected:
+class Expected(Record):
     """What an expert says of a log."""
 
     file: str
@@ -62,8 +61,7 @@ class Expected:
         return not any(kind in self.kind for kind in _SETTING)
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(Record):
     """What a tool says: fit of its profile, how it ends, its first finding, whether any finding is critical."""
 
     fit: str = ""

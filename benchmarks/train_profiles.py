@@ -16,7 +16,6 @@ import sys
 import tarfile
 import tempfile
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 from care_core.files import bundled
@@ -25,15 +24,16 @@ from care_core.learn.table import read_table
 from care_core.learn.train import TrainSettings, train
 from care_core.logs.finding import find_logs
 from care_core.profile.model import write_model
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
+from care_core.records import Record
 from care_core.tables.ingest import ingest, journal_of
 from care_core.tables.rows import write_table
 
 RESAMPLES = 50
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(Record):
     """Where a profile's runs come from: archives of logs, or a table. `origin` goes into the model card."""
 
     paths: tuple[str, ...]

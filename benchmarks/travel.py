@@ -16,7 +16,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
@@ -45,6 +44,7 @@ from care_core.learn.table import read_table
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, load_profile
+from care_core.records import Struct, field
 
 EFFORT = Effort(points=500, iterations=40, folds=5)
 MEASURED = ("mission_time", "energy")
@@ -61,8 +61,7 @@ FAR = (0.5, 1.0)
 """Distances that part near, farther and far missions."""
 
 
-@dataclass
-class LeftOut:
+class LeftOut(Struct, eq=False):
     """Predictions of runs whose missions the model never saw, each of shape (n,)."""
 
     distance: FloatArray
@@ -194,8 +193,7 @@ def show_left_out(found: LeftOut, frame: pd.DataFrame, schema: Schema) -> None:
 # --- faults whose resets were flown -----------------------------------------------------------------------------
 
 
-@dataclass
-class Faults:
+class Faults(Struct, eq=False):
     """What came of the failed flights."""
 
     flights: int = 0

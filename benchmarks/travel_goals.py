@@ -15,7 +15,6 @@ import os
 import tarfile
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +32,9 @@ from care_core.learn.fitting import OUTCOME
 from care_core.learn.outcomes import fit_on
 from care_core.logs.finding import find_logs
 from care_core.logs.opening import open_log
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
+from care_core.records import replace
 from care_core.run import is_known
 
 MEASURED = ("mission_time", "energy")

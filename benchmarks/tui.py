@@ -20,11 +20,11 @@ import sys
 import termios
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from fcntl import ioctl
 from pathlib import Path
 
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
+from care_core.records import Struct, replace
 from care_core.run import LogInfo, MissionInfo, Run
 from care_core.run import ProfileChoice as Choice
 from care_core.variables import Change, Role, Threshold, Variable
@@ -97,8 +97,7 @@ def serve_made() -> None:
     CareApp(Request(Path("/logs/many.BIN")), engine=engine, settings=Settings(places=())).run()
 
 
-@dataclass
-class Terminal:
+class Terminal(Struct, eq=False):
     """A child in a pseudo-terminal of a given size."""
 
     fd: int

@@ -12,10 +12,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from care_core.files import bundled, write_atomically
+from care_core.records import Record, Struct, field
 
 SAMPLE = "arducopter_failed.BIN"
 WIDTH, HEIGHT = 80, 24
@@ -28,8 +28,7 @@ A new user has a failed flight, `{SAMPLE}`, and the one command `care`. Every sc
 """
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(Record):
     """A key with what it is for, and a text that tells that its work is done."""
 
     keys: tuple[str, ...]
@@ -65,8 +64,7 @@ WALK = (
 )
 
 
-@dataclass
-class Terminal:
+class Terminal(Struct, eq=False):
     """A tmux of its own with a plain shell in it."""
 
     folder: Path

@@ -12,17 +12,16 @@ import os
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import care_core
 from care_core.application.case import exit_code
 from care_core.errors import CareError
 from care_core.logs.finding import is_recorder_folder as is_recording
+from care_core.records import Record
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(Record):
     """What became of a file: `read`, `damage` or `refused`; a sentence; the exit code of its triage; the seconds."""
 
     kind: str

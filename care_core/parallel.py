@@ -12,12 +12,12 @@ import signal
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Generic, TypeVar
 
 from care_core.errors import CareError
+from care_core.records import Record, Struct
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
@@ -26,16 +26,14 @@ _LOOK_S = 0.2
 """How often the time limit is looked at."""
 
 
-@dataclass(frozen=True, slots=True)
-class Failed:
+class Failed(Record):
     """No answer for an item, and why. `is_final`: the item itself is at fault, so trying again is of no use."""
 
     reason: str
     is_final: bool
 
 
-@dataclass(slots=True)
-class _Worker:
+class _Worker(Struct, eq=False):
     """A process, the parent's end of its pipe, and the item that it works on since `since` (monotonic seconds)."""
 
     process: BaseProcess

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import field
 from typing import Literal, TypeGuard
 
-from care_core.frozen import dataclass
+from care_core.records import Record, field
 
 
-@dataclass(frozen=True, slots=True)
-class Unavailable:
+class Unavailable(Record):
     """A value that could not be had: why, and how to have it next time. A result, not an error."""
 
     reason: str
@@ -34,8 +32,7 @@ def shown(value: float | str | None) -> str:
     return value if isinstance(value, str) else f"{value:.7g}"
 
 
-@dataclass(frozen=True, slots=True)
-class Setting:
+class Setting(Record):
     """A parameter as driven: its last value before the mission ended, and what the source says about it."""
 
     name: str
@@ -52,8 +49,7 @@ Find = Callable[[str], Setting | None]
 """What files give a parameter, by its name in a log; None where they give nothing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Damage:
+class Damage(Record):
     """What is broken in a log, at which byte, at which second of the log (None: unknown)."""
 
     what: str
@@ -63,8 +59,7 @@ class Damage:
     """Whether the clock of the log jumps there: what lies between two records of it is unknown."""
 
 
-@dataclass(frozen=True, slots=True)
-class Evidence:
+class Evidence(Record):
     """A message of this run that speaks about its failure, with the options it points at (may be none)."""
 
     time_s: float
@@ -82,8 +77,7 @@ class Evidence:
         return f"this run says: {self.text}{meaning}"
 
 
-@dataclass(frozen=True, slots=True)
-class Check:
+class Check(Record):
     """A plain question to a run that no limit judges: did it take off, did it land. 1 is yes and well, 0 is no."""
 
     name: str
@@ -94,8 +88,7 @@ class Check:
     """What is said where it is not: "a failsafe acted"."""
 
 
-@dataclass(frozen=True, slots=True)
-class Robot:
+class Robot(Record):
     """One robot among several. Runs belong together by `id`; `name` is what people read."""
 
     id: str
@@ -106,8 +99,7 @@ class Robot:
     """Whether it tells this robot from others of its kind: a system id as delivered, or a model's name, does not."""
 
 
-@dataclass(frozen=True, slots=True)
-class LogInfo:
+class LogInfo(Record):
     """Where a run came from."""
 
     path: str
@@ -127,8 +119,7 @@ FitVerdict = Literal["fits", "partly", "no"]
 FIT_WORDS: Mapping[FitVerdict, str] = {"fits": "fits", "partly": "fits in part", "no": "does not fit"}
 
 
-@dataclass(frozen=True, slots=True)
-class Fit:
+class Fit(Record):
     """How well a profile fits a log: "partly" caps every confidence at low, with "no" nothing is advised."""
 
     verdict: FitVerdict
@@ -145,8 +136,7 @@ class Fit:
 FITS = Fit("fits")
 
 
-@dataclass(frozen=True, slots=True)
-class ProfileChoice:
+class ProfileChoice(Record):
     """The profile that was used, how it was chosen, and how well it fits the log."""
 
     name: str
@@ -156,8 +146,7 @@ class ProfileChoice:
     fit: Fit = FITS
 
 
-@dataclass(frozen=True, slots=True)
-class MissionInfo:
+class MissionInfo(Record):
     """Which mission of the log this is. `index` counts from 1; `fits` says whether it is the profile's mission."""
 
     index: int
@@ -173,8 +162,7 @@ class MissionInfo:
     """What the mission asks for, by context, known before it is flown: runs that were asked the same compare."""
 
 
-@dataclass(frozen=True, slots=True)
-class Run:
+class Run(Record):
     """One mission. Keys are the profile's variable names; `config` lacks options that no source holds."""
 
     config: Mapping[str, float]

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Mapping
-from dataclasses import field
 from enum import Enum
 from types import MappingProxyType
 from typing import Any, Literal
 
-from care_core.frozen import dataclass
+from care_core.records import Record, field
 
 
 class Role(str, Enum):
@@ -39,8 +38,7 @@ SAME_SHARE, SAME_LEAST = 0.05, 0.5
 leg more is one."""
 
 
-@dataclass(frozen=True, slots=True)
-class Threshold:
+class Threshold(Record):
     """The bound an objective must keep, in the objective's unit."""
 
     op: Op
@@ -53,8 +51,7 @@ class Threshold:
         return f"{self.op} {self.value:g}"
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeThreshold:
+class RelativeThreshold(Record):
     """A bound that is a multiple of what the reference configuration needs for the same mission and conditions."""
 
     op: Op
@@ -74,8 +71,7 @@ class RelativeThreshold:
         return f"{self.op} {self.ratio:g} x what the reference configuration needs{floor}"
 
 
-@dataclass(frozen=True, slots=True)
-class OwnLimit:
+class OwnLimit(Record):
     """What an objective's threshold is where it is the operator's: the file that holds it, and the mission that it
     belongs to (contexts by name; empty: any mission)."""
 
@@ -93,16 +89,14 @@ class OwnLimit:
         return ""
 
 
-@dataclass(frozen=True, slots=True)
-class Extract:
+class Extract(Record):
     """How a value is read from a log: the name of an extractor and its arguments."""
 
     kind: str
     args: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 
-@dataclass(frozen=True, slots=True)
-class Events:
+class Events(Record):
     """The like parts of a mission, each with noise of its own: the context that counts them, and the metric that holds
     the standard deviation of the logarithm of what each took."""
 
@@ -110,8 +104,7 @@ class Events:
     variation: str
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
+class Variable(Record):
     """One declared variable of a profile.
 
     `range` holds the acceptable values (what may be suggested), in `unit`. `parameters` are the keys an option
@@ -229,8 +222,7 @@ class Variable:
         return f"{self.show(value)}{ASSUMED if is_assumed else ''}"
 
 
-@dataclass(frozen=True, slots=True)
-class Change:
+class Change(Record):
     """One option to change, in the option's unit."""
 
     option: Variable

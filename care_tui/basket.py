@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 
+from care_core.records import Struct, field
 from care_core.variables import Variable
 
 NUDGES = 20
@@ -13,8 +13,7 @@ NUDGES = 20
 Values = Mapping[str, float]
 
 
-@dataclass
-class Basket:
+class Basket(Struct, eq=False):
     """What to change to which value. `ticked` are the changes that count; `values` also remembers unticked ones."""
 
     ticked: dict[str, float] = field(default_factory=dict)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -12,6 +11,7 @@ from care_core.application.case import Case, Progress, ReportFormat, Request, op
 from care_core.application.configuring import DiffSide, commands_of, diff_of
 from care_core.application.remembering import remember_triage
 from care_core.errors import CareError
+from care_core.records import Record
 
 if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix
@@ -73,8 +73,7 @@ def save_text(path: Path, text: str) -> None:
     write_atomically(path, text)
 
 
-@dataclass(frozen=True, slots=True)
-class Engine:
+class Engine(Record):
     """Everything the walk asks of care_core."""
 
     diagnose: Callable[[Request, Progress], Case] = open_and_warm

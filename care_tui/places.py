@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
+
+from care_core.records import Record
 
 PLACES = (
     Path(),
@@ -28,8 +29,7 @@ RECENT = 20
 """How many opened logs are remembered."""
 
 
-@dataclass(frozen=True, slots=True)
-class LogFile:
+class LogFile(Record):
     """A log that could be opened; `modified_s` in seconds since 1970, `size` in bytes."""
 
     path: Path

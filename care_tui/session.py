@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 from care_core.application.case import Case, ReportFormat, changes_of, decided, fixes
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult
 from care_core.errors import CareError
+from care_core.records import Struct, field, replace
 from care_core.variables import Variable
 from care_tui.basket import Basket
 
@@ -16,8 +16,7 @@ FORMATS: tuple[ReportFormat, ...] = ("yaml", "markdown", "html", "json", "junit"
 State = Literal["empty", "loading", "data", "error"]
 
 
-@dataclass
-class Session:
+class Session(Struct, eq=False):
     """One log on its way from the fault to the report. A new log gets a new session."""
 
     path: Path | None = None

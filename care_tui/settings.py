@@ -7,11 +7,11 @@ import os
 import re
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
 from care_core.errors import ConfigError, UsageError, nearest
+from care_core.records import Record, field, replace
 from care_tui.places import PLACES, at_home
 
 SERVER = "CARE_SERVER"
@@ -22,8 +22,7 @@ SIGNS = "▸✓⣿"
 COLORS = ("auto", "truecolor", "256", "16", "none")
 
 
-@dataclass(frozen=True, slots=True)
-class Settings:
+class Settings(Record):
     """What can be set. A flag of the command line beats the file."""
 
     theme: str = ""
@@ -63,7 +62,7 @@ def load_settings(path: Path | None = None) -> Settings:
         return Settings()
     if not isinstance(data, dict):
         raise ConfigError("The settings are no mapping of names to values.", where=str(file))
-    known = {f.name for f in fields(Settings)}
+    known = set(Settings.__struct_fields__)
     for key in data:
         if key not in known:
             hint = nearest(str(key), known) or f"Known are {', '.join(sorted(known))}."

@@ -72,7 +72,7 @@ def _schema(name: str) -> Schema:
 
 
 def read_profile(path: Path) -> Answer:
-    from care_core.profile.schema import read_schema
+    from care_core.profile.reading import read_schema
 
     return str(len(read_schema(path).variables))
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +18,7 @@ from care_core.diagnose.records import Diagnosis
 from care_core.files import bundled, check_replaceable, write_atomically
 from care_core.history.store import History
 from care_core.profile.model import read_model, write_model
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.reading import read_report
 from care_core.report.writers import published, to_yaml

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from care_core.diagnose.records import (
 )
 from care_core.ecosystems.findings import Finding, Health, Moment
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.records import Struct, field
 from care_core.run import Damage, Evidence, Fit, LogInfo, MissionInfo, ProfileChoice, Run, Setting, Unavailable
 from care_core.variables import Change, Role, Threshold, Variable
 
@@ -40,8 +40,7 @@ T = np.linspace(0.0, 100.0, 201)
 """Times of the messages of a `MadeLog`, in seconds."""
 
 
-@dataclass
-class MadeLog:
+class MadeLog(Struct, eq=False):
     """Tables as a log."""
 
     tables: Mapping[str, Mapping[str, Any]]

@@ -12,7 +12,6 @@ inert, filter                             move nothing
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -21,6 +20,7 @@ from care_core.causal.counterfactual import World
 from care_core.learn.train import TrainSettings
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.run import LogInfo, MissionInfo, Run, Unavailable, Value
 from care_core.variables import Role, Threshold, Variable
 

@@ -8,7 +8,6 @@ are set at random, or by operators who look at the context, or at something that
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph, Edge
 from care_core.profile.schema import Schema
+from care_core.records import Record, replace
 from care_core.variables import Role, Threshold, Variable
 
 FloatArray = NDArray[np.float64]
@@ -27,8 +27,7 @@ SHAPES: tuple[Shape, ...] = ("line", "bend", "bump", "step")
 TIME_LIMIT = 1.0
 
 
-@dataclass(frozen=True)
-class Law:
+class Law(Record):
     """How a cause on its scale (about -1.5 to 1.5) moves its effect."""
 
     shape: Shape
@@ -44,8 +43,7 @@ class Law:
         return np.asarray(self.strength * moved)
 
 
-@dataclass(frozen=True)
-class Robot:
+class Robot(Record):
     """One robot. `drive` flies it; `do` sets options whatever the operators would have chosen."""
 
     schema: Schema

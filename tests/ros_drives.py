@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.records import Struct, field
 from tests.ros_samples import ROS2, SECOND_NS, START_NS, McapFile, cdr, make, stamp
 
 FAILS_AT_S, ENDS_S = 16.0, 40.0
@@ -21,8 +21,7 @@ BATTERY, STATUS, LOG = "sensor_msgs/msg/BatteryState", "action_msgs/msg/GoalStat
 SUCCEEDED, ABORTED = 4, 6
 
 
-@dataclass
-class Drive:
+class Drive(Struct, eq=False):
     """What the robot does: `fault` begins at `FAILS_AT_S`; `outcome` is how its only goal ends (a Nav2 code)."""
 
     fault: str = ""

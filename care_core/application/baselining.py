@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from care_core import plain_yaml
 from care_core.application.case import fitting, opened
 from care_core.errors import CareError, ConfigError, LogError
-from care_core.profile.site import SITE_SCHEMA, load_site
+from care_core.profile.site import load_site
+from care_core.records import replace
 
 if TYPE_CHECKING:
     from care_core.diagnose.baseline import Baseline, Proposal, Refused
@@ -104,6 +104,8 @@ def site_text(found: Baseline, file: Path) -> str:
         load_site(file)
         text = file.read_text(encoding="utf-8")
     else:
+        from care_core.profile.site_file import SITE_SCHEMA
+
         text = f"{_NEW_SITE}schema: {SITE_SCHEMA}\nlimits:\n"
     data = plain_yaml.editable(text)
     data["limits"] = data["limits"] or {}

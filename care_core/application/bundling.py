@@ -7,7 +7,6 @@ from __future__ import annotations
 import platform
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from io import BytesIO, StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +19,7 @@ from care_core.application.signals import Line, Source, lines_of
 from care_core.application.viewing import log_of, messages_of
 from care_core.errors import CareError
 from care_core.files import BUNDLE_FOLDER
+from care_core.records import Record, replace
 from care_core.run import Setting, Unavailable
 from care_core.text import cell, clean, seconds
 
@@ -48,8 +48,7 @@ _IDENTITIES = re.compile(r"SERIAL_?NUM|^SYSID|MAV_SYS_?ID|^STAT_|^O?DID_|UUID|HO
 """Parameters that name one vehicle, its hours or the day they were counted from."""
 
 
-@dataclass(frozen=True)
-class Bundle:
+class Bundle(Record):
     """A zip, and what is in it by name with its size in bytes as it lies there."""
 
     content: bytes

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from care_core.errors import CareError, ExitCode
-from care_core.frozen import dataclass
+from care_core.records import Record, field, replace
 
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
@@ -50,8 +49,7 @@ SUFFIXES: Mapping[str, ReportFormat] = {
 """Suffix of a file to the format of the report in it; the first suffix of a format is its usual one."""
 
 
-@dataclass(frozen=True, slots=True)
-class Request:
+class Request(Record):
     """What an operator asks: a log, and how to look at it. The fields are the options of `care triage`."""
 
     log: Path
@@ -79,8 +77,7 @@ class Request:
     """What the operator calls the robot; by what the log says when None."""
 
 
-@dataclass(frozen=True, eq=False)
-class Reading:
+class Reading(Record, eq=False, dict=True):
     """A log read by a profile and judged: what every question about a run begins with."""
 
     profile: Profile
@@ -97,8 +94,7 @@ class Reading:
         return question(self.judged, self.profile, self.choice, self.health)
 
 
-@dataclass(frozen=True, eq=False)
-class Case:
+class Case(Record, eq=False):
     """A diagnosis with what is needed to ask more about it. The log was opened and digested once, and stays open."""
 
     diagnosis: Diagnosis

@@ -8,11 +8,11 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from care_core.errors import CareError
+from care_core.records import Record
 
 Status = Literal["ok", "warn", "fail"]
 
@@ -32,8 +32,7 @@ _LITTLE_BYTES, _NOTHING_BYTES = 200_000_000, 20_000_000
 no history."""
 
 
-@dataclass(frozen=True, slots=True)
-class Checked:
+class Checked(Record):
     """One thing that was looked at: what is so, and what to do where that is not well."""
 
     name: str

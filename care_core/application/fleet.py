@@ -6,7 +6,6 @@ import os
 import time
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ from care_core.errors import CareError
 from care_core.fleet.rows import Row, by_folder, row_of, unreadable
 from care_core.fleet.sources import Source, fetched, gather
 from care_core.fleet.together import Fleet, together
+from care_core.records import Record, replace
 
 if TYPE_CHECKING:
     from care_core.causal.counterfactual import World
@@ -23,8 +23,7 @@ _PACE_LOGS = 5
 """So many logs say how long the rest will take."""
 
 
-@dataclass(frozen=True, slots=True)
-class Cluster:
+class Cluster(Record):
     """Where the work is done, and how much of it one log may take."""
 
     scheduler: str | None = None

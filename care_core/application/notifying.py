@@ -13,10 +13,10 @@ import signal
 import subprocess
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 from care_core.errors import UsageError, nearest
+from care_core.records import Record
 from care_core.report.watching import NO_ROBOT, WatchEntry, entry_json
 
 PLACES = ("log", "name", "verdict", "robot", "says", "profile", "sha256", "number")
@@ -26,8 +26,7 @@ LIMIT_S = 30.0
 _PLACE = re.compile(r"\{(\w+)\}")
 
 
-@dataclass(frozen=True, slots=True)
-class Notifier:
+class Notifier(Record):
     """The words of a command, and how many seconds it may take."""
 
     words: tuple[str, ...]

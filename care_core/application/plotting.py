@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case
@@ -14,6 +13,7 @@ from care_core.application.signals import Line as Values
 from care_core.application.signals import Signal, Source, lines_of, signals_of, type_name, whole_of
 from care_core.application.viewing import log_of
 from care_core.numbers import median
+from care_core.records import replace
 from care_core.report.marks import Mark, marks_of
 from care_core.report.plots import Band, Drawn, Limit, Line, Plot, Point
 

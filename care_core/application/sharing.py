@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 from care_core.application.case import Case
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import Moment
+from care_core.records import Record, replace
 from care_core.variables import Variable
 
 NO_PLACE = "(position left out)"
@@ -63,8 +63,7 @@ _TEXTUAL = {"message", "error", "warning", "event", "arming", "failsafe", "crash
 """Kinds of moments that may hold what the robot's software wrote."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sharing:
+class Sharing(Record):
     """What of a run may go to strangers."""
 
     positions: bool = True
@@ -97,8 +96,7 @@ def without_places(text: str) -> str:
     return _PLACES.sub(NO_PLACE, text)
 
 
-@dataclass(frozen=True, slots=True)
-class Hider:
+class Hider(Record):
     """Leaves out what says whose robot it was; the words in `public` say nothing of that, and single letters."""
 
     public: frozenset[str]
@@ -147,9 +145,9 @@ def mapped(value: object, change: Callable[[str], str]) -> object:
     if isinstance(value, Variable):
         own = value.own_limit and replace(value.own_limit, source=change(value.own_limit.source))
         return replace(value, own_limit=own, parameters=tuple(map(change, value.parameters)))
-    if is_dataclass(value) and not isinstance(value, type):
-        parts = {part.name: mapped(getattr(value, part.name), change) for part in fields(value)}
-        return replace(cast("Any", value), **parts)
+    if isinstance(value, Record):
+        parts = {name: mapped(getattr(value, name), change) for name in value.__struct_fields__}
+        return replace(value, **parts)
     if isinstance(value, Mapping):
         return {mapped(name, change): mapped(part, change) for name, part in value.items()}
     if isinstance(value, tuple):

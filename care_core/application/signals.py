@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case
 from care_core.application.viewing import TEXTS, log_of
 from care_core.errors import CareError
+from care_core.records import Record, replace
 
 if TYPE_CHECKING:
     import numpy as np
@@ -77,8 +77,7 @@ KNOWN_TYPES: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 """The same by the type of a ROS message; what odometry was to follow is a velocity command."""
 
 
-@dataclass(frozen=True, slots=True)
-class Signal:
+class Signal(Record):
     """A number over time in a log, what it was to follow, and the variables of the profile that are read from it."""
 
     channel: str
@@ -102,8 +101,7 @@ Columns = tuple[tuple[float, float] | None, ...]
 """A line squeezed into columns: per column its least and its greatest value, None where there is none."""
 
 
-@dataclass(frozen=True, slots=True)
-class Trace:
+class Trace(Record):
     """A signal, and what was wanted of it, squeezed into columns from `start_s` to `end_s` of the log."""
 
     start_s: float

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case, Progress, Request, exit_code, open_case
 from care_core.errors import ExitCode, LogError
+from care_core.records import Record
 
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
     from care_core.report.junit import Suite
 
 
-@dataclass(frozen=True, eq=False)
-class LogSuite:
+class LogSuite(Record, eq=False):
     """A log as a suite, what it means for the process, and its case, None where it could not be read."""
 
     suite: Suite

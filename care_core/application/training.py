@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,8 +13,9 @@ from care_core import plain_yaml
 from care_core.errors import UsageError
 from care_core.files import PROFILE_FILE
 from care_core.profile.model import write_model
-from care_core.profile.schema import parse_schema, read_schema
+from care_core.profile.reading import parse_schema, read_schema
 from care_core.profile.store import CARD_FILE, load_profile
+from care_core.records import asdict
 from care_core.tables.rows import INSTALL_LEARN
 
 if TYPE_CHECKING:

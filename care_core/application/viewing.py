@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case
 from care_core.errors import CareError
+from care_core.records import Record
 
 if TYPE_CHECKING:
     from care_core.ecosystems.vehicles import Kind
@@ -32,8 +32,7 @@ PX4_LEVELS = {"emergency": "FATAL", "alert": "FATAL", "critical": "FATAL", "erro
 """Levels of PX4's logged messages that ask for attention."""
 
 
-@dataclass(frozen=True, slots=True)
-class LogMessage:
+class LogMessage(Record):
     """Something the robot's software said, `time_s` after the start of the log."""
 
     time_s: float
@@ -111,8 +110,7 @@ def what_would_fit(case: Case) -> list[str]:
     return [f"for {name}: {advice}" for advice in to_have(nearest.missed)] + [own]
 
 
-@dataclass(frozen=True, slots=True)
-class Installed:
+class Installed(Record):
     """A profile that came with the program, and its model card."""
 
     name: str
@@ -141,8 +139,7 @@ def _card(folder: Path) -> str:
     return "\n".join(texts) if texts else "It has no model card.\n"
 
 
-@dataclass(frozen=True)
-class Past:
+class Past(Record):
     """A run that was triaged before."""
 
     at: str

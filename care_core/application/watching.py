@@ -9,9 +9,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from care_core.history.watched import Ledger
 from care_core.logs.digest import log_digest
 from care_core.logs.finished import ABANDONED_S, QUIET_S, Patience, Sight, is_as_it_was, is_one, look
 from care_core.parallel import Failed, each
+from care_core.records import Record, Struct, field, replace
 from care_core.report.watching import WatchEntry, judged_entry, unread_entry
 
 LIMIT_S = 600.0
@@ -37,8 +37,7 @@ Triage = tuple[dict[str, Any], int, About]
 """The document, the number of its mission, and what else is remembered."""
 
 
-@dataclass(frozen=True, slots=True)
-class Task:
+class Task(Record):
     """What is to be watched, and how each log is to be judged."""
 
     folders: tuple[Path, ...]
@@ -52,8 +51,7 @@ class Task:
     """Seconds that one log may take."""
 
 
-@dataclass(slots=True)
-class Watcher:
+class Watcher(Struct, eq=False, dict=True):
     """Looks, and gives an entry for each log that is finished and was not dealt with. `history` None: nothing is kept
     beyond this process."""
 
@@ -67,7 +65,6 @@ class Watcher:
     """Logs that were done before this watcher first looked."""
     waiting: tuple[Sight, ...] = ()
     """Logs that were there at the last look and not finished."""
-    _patience: Patience = field(init=False)
     _handled: dict[Path, str] = field(default_factory=dict)
     """Per log the stamp that it had when it was dealt with."""
     _taken: set[Path] = field(default_factory=set)
@@ -77,8 +74,9 @@ class Watcher:
     _there: set[Path] | None = None
     _number: int = 0
 
-    def __post_init__(self) -> None:
-        self._patience = Patience(self.task.quiet_s, self.task.abandoned_s)
+    @cached_property
+    def _patience(self) -> Patience:
+        return Patience(self.task.quiet_s, self.task.abandoned_s)
 
     def look(self) -> Iterator[WatchEntry]:
         """One look at the folders."""

@@ -18,13 +18,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import At
-from care_core.frozen import dataclass
+from care_core.records import Record, replace
 
 _Z = np.linspace(-6.0, 6.0, 2401)
 _CDF = np.array([0.5 * (1.0 + math.erf(z / math.sqrt(2.0))) for z in _Z.tolist()])
@@ -36,8 +35,7 @@ FARTHEST = 3.0
 """Standard deviations beyond which a metric's error counts no more: what is farther came from outside the model."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Kinship:
+class Kinship(Record, eq=False):
     """How the errors of outcomes at m configurations go together with those at this run's, for one mechanism.
 
     Attributes:

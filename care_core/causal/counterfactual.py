@@ -9,7 +9,7 @@ and for another day apart (`Model.training.persistence`).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import LEAST, TAIL, At, Mechanism, columns, restored, transformed
 from care_core.causal.model import UNKNOWN_PERSISTENCE, Mediation, Model, OutcomeRecord, Persistence, StageRecord
 from care_core.causal.places import Places
-from care_core.frozen import dataclass
+from care_core.records import Record, field, replace
 from care_core.run import is_known
 from care_core.variables import Threshold, Variable
 
@@ -32,8 +32,7 @@ Config = Mapping[str, float]
 Conditions = Literal["same", "another day"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Predicted:
+class Predicted(Record, eq=False):
     """An objective under m configurations: expected value, 80 % interval, probability of being met; shape (m,)."""
 
     value: FloatArray
@@ -46,8 +45,7 @@ _Answers = dict[bytes, tuple[float, ...]]
 """The inputs of a mechanism, as the bytes of their values -> what it says of the next run there."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class World:
+class World(Record, eq=False, dict=True):
     """This run, ready to be asked "what if": its configuration, its outcome, and the thresholds in force."""
 
     model: Model
@@ -71,10 +69,13 @@ class World:
     wary_from: Config | None = None
     """Where set, each mechanism counts as bad as it may be (90 %) at other configurations, given what it does at this
     one: what training did not show between the two is not taken for granted."""
-    places: Places = field(default_factory=Places, repr=False)
+    places: Places = field(default_factory=Places)
     """What mechanisms say whatever this run did: worlds that are made of this one ask for most of it again."""
-    _told: dict[str, _Answers] = field(default_factory=dict, init=False, repr=False)
-    """What was worked out already: the search asks for most configurations many times over."""
+
+    @cached_property
+    def _told(self) -> dict[str, _Answers]:
+        """What was worked out already: the search asks for most configurations many times over."""
+        return {}
 
     def predict(self, objective: str, configs: Sequence[Config]) -> Predicted:
         """The objective under each configuration, given what this run met."""
@@ -302,8 +303,7 @@ def known_value(observed: Mapping[str, object], name: str) -> float | None:
     return float(value) if is_known(value) else None  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Next:
+class _Next(Record, eq=False):
     """The next outcome of m configurations: what it is for each of k shares of the noise that may persist, (k, m), and
     how likely each share is, (k,)."""
 

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from care_core.frozen import dataclass
 from care_core.numbers import distinct
+from care_core.records import Record
 from care_core.variables import Role, Variable
 
 FloatArray = NDArray[np.float64]
@@ -21,8 +21,7 @@ BUMP = 0.25
 """Share of the response's range by which an inner value must beat both ends to be an optimum."""
 
 
-@dataclass(frozen=True)
-class Effect:
+class Effect(Record):
     """How far one variable moves another, in standard deviations of the latter, and which way.
 
     `low` and `high` bound the magnitude over bootstrap resamples, None where none were drawn.

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Collection, Iterable
-from dataclasses import field
+from functools import cached_property
 
-from care_core.frozen import dataclass
+from care_core.records import Record, force_setattr
 
 Edge = tuple[str, str]
 """A directed edge as (cause, effect), or a bidirected edge as its two ends in sorted order."""
 
 
-@dataclass(frozen=True)
-class CausalGraph:
+class CausalGraph(Record, dict=True):
     """What Alg. 1 returns: `directed` edges (D) and `bidirected` edges (B, a hidden common cause).
 
     A pair may hold both kinds. The ends of a bidirected edge are kept sorted, whatever order they are given in.
@@ -25,10 +24,6 @@ class CausalGraph:
     nodes: tuple[str, ...]
     directed: frozenset[Edge] = frozenset()
     bidirected: frozenset[Edge] = frozenset()
-    _parents: dict[str, tuple[str, ...]] = field(init=False, repr=False, compare=False)
-    _children: dict[str, tuple[str, ...]] = field(init=False, repr=False, compare=False)
-    _siblings: dict[str, tuple[str, ...]] = field(init=False, repr=False, compare=False)
-    _order: tuple[str, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name, value in {
@@ -36,13 +31,21 @@ class CausalGraph:
             "directed": frozenset(self.directed),
             "bidirected": frozenset((min(a, b), max(a, b)) for a, b in self.bidirected),
         }.items():
-            object.__setattr__(self, name, value)
+            force_setattr(self, name, value)
         self._check_names()
-        both_ways = [*self.bidirected, *((b, a) for a, b in self.bidirected)]
-        object.__setattr__(self, "_parents", _heads(self.nodes, ((b, a) for a, b in self.directed)))
-        object.__setattr__(self, "_children", _heads(self.nodes, self.directed))
-        object.__setattr__(self, "_siblings", _heads(self.nodes, both_ways))
-        object.__setattr__(self, "_order", self._sorted_by_cause())
+        _ = self._order  # a cycle is an error here
+
+    @cached_property
+    def _parents(self) -> dict[str, tuple[str, ...]]:
+        return _heads(self.nodes, ((b, a) for a, b in self.directed))
+
+    @cached_property
+    def _children(self) -> dict[str, tuple[str, ...]]:
+        return _heads(self.nodes, self.directed)
+
+    @cached_property
+    def _siblings(self) -> dict[str, tuple[str, ...]]:
+        return _heads(self.nodes, [*self.bidirected, *((b, a) for a, b in self.bidirected)])
 
     def _check_names(self) -> None:
         known = set(self.nodes)
@@ -54,7 +57,8 @@ class CausalGraph:
             if a == b:
                 raise ValueError(f"edge ({a}, {b}) joins a node to itself")
 
-    def _sorted_by_cause(self) -> tuple[str, ...]:
+    @cached_property
+    def _order(self) -> tuple[str, ...]:
         """Kahn's algorithm, ties in the order of `nodes`."""
         rank = {node: i for i, node in enumerate(self.nodes)}
         missing = {node: len(self._parents[node]) for node in self.nodes}

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.frozen import dataclass
+from care_core.records import Record
 
 FloatArray = NDArray[np.float64]
 BLOCK = 300_000
@@ -24,8 +24,7 @@ FEW = 256
 """Values of an input of which each pair's exponential is worked out once."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Levels:
+class Levels(Record, eq=False):
     """Points by the values that each of their columns takes: most runs leave most options as they are, so n runs have
     far fewer values of an option than n, and the kernel's exponentials are of these alone.
 
@@ -69,8 +68,7 @@ def _alike(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.exp(exponents, out=exponents))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Column:
+class _Column(Record, eq=False):
     """One scaled input of n points. `table`: e_j of its values with each other, None where they are so many that it
     saves nothing; `values` are then the points' own, shape (n,)."""
 
@@ -93,8 +91,7 @@ class _Column:
             self.table.take(self.place[rows], axis=1).take(self.place[i:], axis=0, out=out, mode="clip")
 
 
-@dataclass(frozen=True, eq=False)
-class Kernel:
+class Kernel(Record, eq=False):
     """The covariance above on scaled inputs. `relevance`: shape (p,); amplitudes, `noise`: standard deviations."""
 
     relevance: FloatArray
@@ -160,8 +157,7 @@ class Kernel:
         return self.additive**2 + self.joint**2
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Factor:
+class Factor(Record, eq=False):
     """The Cholesky factor of a covariance, to be asked for L^-1 b: what is explained is the square of that.
 
     numpy solves no triangular system, so the inverses of its blocks on the diagonal are kept beside it.

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from care_core.causal.kernel import Factor, FloatArray, Kernel, Levels
 from care_core.causal.nominal import Nominal
-from care_core.frozen import dataclass
 from care_core.numbers import quantile
+from care_core.records import Record
 
 Transform = Literal["identity", "log", "log1p"]
 LEAST: Mapping[Transform, float] = {"identity": -np.inf, "log": 0.0, "log1p": -1.0}
@@ -44,8 +44,7 @@ def restored(values: FloatArray, transform: Transform) -> FloatArray:
     return np.expm1(values) if transform == "log1p" else values
 
 
-@dataclass(frozen=True, slots=True)
-class Averaging:
+class Averaging(Record):
     """Noise that averages out over the like parts of a mission (its goals): `share` of the noise variance belongs to
     each part alone in missions of `usual` parts; `count` is the input that counts them. One part alone has more."""
 
@@ -54,8 +53,7 @@ class Averaging:
     share: float
 
 
-@dataclass(frozen=True, eq=False)
-class TrainingRuns:
+class TrainingRuns(Record, eq=False, dict=True):
     """The u distinct training inputs of a mechanism. Runs that share theirs are one outcome, their mean, whose noise is
     so much less: the posterior is the same, and a third of a fleet's runs leave all that a stage reads as it is.
 
@@ -76,8 +74,7 @@ class TrainingRuns:
         return Factor.of(covariance)
 
 
-@dataclass(frozen=True, eq=False)
-class Mechanism:
+class Mechanism(Record, eq=False, dict=True):
     """One mechanism: a regression of the (transformed) target on its inputs.
 
     Binary targets are coded -1 and 1 and regressed the same way; `calibration` then turns the regression into
@@ -226,8 +223,7 @@ class Mechanism:
         return self.probability(x) if self.binary else restored(self.latent(x), self.transform)
 
 
-@dataclass(frozen=True, eq=False)
-class At:
+class At(Record, eq=False, dict=True):
     """A mechanism at m places x, shape (m, p). The kernel, which is what costs, is asked once for all that is asked of
     them, and nothing before it is needed."""
 

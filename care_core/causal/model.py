@@ -6,7 +6,6 @@ Files hold these records as they are (`care_core.records`); nothing here knows o
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import field, replace
 from typing import Literal
 
 import numpy as np
@@ -15,12 +14,11 @@ from care_core.causal.effects import Direction
 from care_core.causal.graph import CausalGraph
 from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import TAIL, Mechanism, columns
-from care_core.frozen import dataclass
+from care_core.records import Record, field, replace
 from care_core.variables import Threshold
 
 
-@dataclass(frozen=True, kw_only=True)
-class EdgeRecord:
+class EdgeRecord(Record, kw_only=True):
     """An edge with the share of bootstrap resamples that hold it, and its effect (Eq. 1, scaled) with its interval."""
 
     source: str
@@ -38,8 +36,7 @@ class EdgeRecord:
         return -self.effect if self.direction == "decreasing" else self.effect
 
 
-@dataclass(frozen=True, kw_only=True)
-class EffectRecord:
+class EffectRecord(Record, kw_only=True):
     """Total effect of an option on an objective: identification and Eq. 1 with its bootstrap interval."""
 
     option: str
@@ -74,8 +71,7 @@ class EffectRecord:
         return 1.0 if hidden >= needed else hidden / needed
 
 
-@dataclass(frozen=True, kw_only=True)
-class PathRecord:
+class PathRecord(Record, kw_only=True):
     """A ranked path (Eq. 2) with its bootstrap interval, which way it moves the objective, and each edge's support."""
 
     objective: str
@@ -87,13 +83,12 @@ class PathRecord:
     edge_support: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Summary:
+class Summary(Record, kw_only=True):
     """What the training runs held of one variable: `quantiles` at 0, 5, ... 100 %; `sd` is "spread" in the file."""
 
     count: int
     mean: float
-    sd: float = field(metadata={"alias": "spread"})
+    sd: float = field(name="spread")
     quantiles: tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -139,8 +134,7 @@ class Summary:
         return float(np.interp(share, np.linspace(0, 1, len(self.quantiles)), self.quantiles))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Mediation:
+class Mediation(Record, kw_only=True):
     """Metrics whose errors in a run are part of an objective's, all in standard deviations around the predictions."""
 
     metrics: tuple[str, ...]
@@ -156,8 +150,7 @@ class Mediation:
             raise ValueError("metrics, weights and correlations differ in number")
 
 
-@dataclass(frozen=True, kw_only=True)
-class StageRecord:
+class StageRecord(Record, kw_only=True):
     """One condition on the way to a functional objective: the mission passes when `variable` equals `passes`."""
 
     variable: str
@@ -165,8 +158,7 @@ class StageRecord:
     mechanism: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class OutcomeRecord:
+class OutcomeRecord(Record, kw_only=True):
     """How an objective is predicted: `stages` for a functional one (all must pass, in order), else one mechanism."""
 
     objective: str
@@ -176,8 +168,7 @@ class OutcomeRecord:
     """Of the one mechanism."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class SkillRecord:
+class SkillRecord(Record, kw_only=True):
     """How well the predicted probabilities of an objective fit runs that were held out."""
 
     runs: int
@@ -191,8 +182,7 @@ class SkillRecord:
     """Calibration: mean predicted probability, share that met the threshold, runs; a row a tenth that has runs."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Persistence:
+class Persistence(Record, kw_only=True):
     """Share of an objective's noise variance that a run of the same configuration meets again.
 
     `same`: under the same conditions. `another`: on another day. `pairs`: of repeated training runs that say so, for
@@ -223,8 +213,7 @@ UNKNOWN_PERSISTENCE = Persistence(same=0.5, another=0.25)
 """Where no configuration was run twice: the middle of what is possible, on another day of none to that."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Training:
+class Training(Record, kw_only=True):
     """Where the model came from."""
 
     origin: str
@@ -242,8 +231,7 @@ class Training:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
+class Model(Record, eq=False):
     """What was learned of a platform. `mechanisms` are keyed by the variable they predict (stages: `stage:NAME`)."""
 
     schema_digest: str

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.frozen import dataclass
+from care_core.records import Record
 
 FloatArray = NDArray[np.float64]
 Given = Mapping[str, FloatArray]
@@ -31,8 +31,7 @@ _ARMING_S, _LOITER_S, _LAND_LOW_M, _CONE = 2.0, 5.0, 10.0, 3.0
 _RISE_ACCELERATION, _RISE_JERK, _LANDED_S, _STILL_S = 1.0, 5.0, 2.0, 1.0
 
 
-@dataclass(frozen=True)
-class Formula:
+class Formula(Record):
     """A formula and the names of its arguments."""
 
     arguments: tuple[str, ...]
@@ -42,8 +41,7 @@ class Formula:
 FORMULAS: dict[str, Formula] = {}
 
 
-@dataclass(frozen=True)
-class Nominal:
+class Nominal(Record):
     """A formula with the variables that are its arguments. `inputs` and `scales` follow the formula's arguments."""
 
     kind: str

@@ -9,11 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from care_core.causal.graph import CausalGraph, Edge
-from care_core.frozen import dataclass
+from care_core.records import Record
 
 
-@dataclass(frozen=True)
-class CausalPath:
+class CausalPath(Record):
     """A directed path from an option to an objective. `ace` is Eq. 2 (K = number of edges)."""
 
     nodes: tuple[str, ...]
@@ -24,8 +23,7 @@ class CausalPath:
         return tuple(zip(self.nodes, self.nodes[1:], strict=False))
 
 
-@dataclass(frozen=True, eq=False)
-class Ways:
+class Ways(Record, eq=False, dict=True):
     """The edges of a graph that carry an effect, ready to be asked for paths many times over.
 
     `weight`: effect of each edge on scaled variables; its magnitude counts. An edge without one (its effect is not

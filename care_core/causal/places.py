@@ -9,7 +9,6 @@ import numpy as np
 
 from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import At, Mechanism
-from care_core.frozen import dataclass
 
 MOST = 256
 """Places of one mechanism that are held: each takes two numbers a training run."""
@@ -38,8 +37,7 @@ class Places:
         return _Gathered(mechanism, x, [held[row] if row in held else found[row] for row in rows])
 
 
-@dataclass(frozen=True, eq=False)
-class _Gathered(At):
+class _Gathered(At, eq=False, dict=True):
     """Places that were asked of at different times."""
 
     parts: Sequence[_One]

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from care_core.collect.sampling import points
 from care_core.collect.space import Config, Floats, Space
 from care_core.errors import UsageError
+from care_core.records import Record
 
 CANDIDATES = 384
 """Configurations to choose from; each round draws new ones."""
@@ -30,8 +30,7 @@ _NEAR = 0.15
 """Share of the ranges of two suspects within which one run says what another says."""
 
 
-@dataclass(frozen=True, eq=False)
-class Known:
+class Known(Record, eq=False):
     """What earlier runs gave: their configurations, and per objective its values, NaN where a run has none."""
 
     configs: Sequence[Config]
@@ -117,8 +116,7 @@ def _without(runs: Floats, scores: Floats, at: Floats, suspect: int) -> tuple[Fl
     return model.mean(at[:, seen]), np.maximum(np.diag(covariance), 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class _Process:
+class _Process(Record, eq=False):
     """A fitted Gaussian process; `noise` is its variance on the scale of the scores."""
 
     regressor: Any

@@ -10,7 +10,6 @@ import os
 import shlex
 import string
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -26,6 +25,7 @@ from care_core.errors import UsageError, nearest
 from care_core.files import PROFILE_FILE
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
+from care_core.records import Record
 from care_core.run import Setting
 from care_core.variables import Variable
 
@@ -70,8 +70,7 @@ class _Campaign(BaseModel):
         return self
 
 
-@dataclass(frozen=True, eq=False)
-class Campaign:
+class Campaign(Record, eq=False):
     """A campaign that is sound: every path found, every option known, the reference within all limits."""
 
     path: Path

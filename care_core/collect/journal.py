@@ -11,20 +11,19 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from care_core.collect.sampling import Planned
 from care_core.errors import UsageError
+from care_core.records import Record, Struct, field, plain
 from care_core.tables.rows import TableRow
 
 FILE = "journal.jsonl"
 FORMAT = "care.collect.journal/1"
 
 
-@dataclass(frozen=True, slots=True)
-class Done:
+class Done(Record):
     """A run that is over: its rows (one a mission), or why there are none."""
 
     run: int
@@ -39,8 +38,7 @@ class Done:
     """Options that were driven otherwise than asked, as the log says."""
 
 
-@dataclass(slots=True)
-class Journal:
+class Journal(Struct, eq=False):
     """The journal of a campaign's folder, held by one process at a time. Close it, or use it as a context manager."""
 
     planned: dict[int, Planned] = field(default_factory=dict)
@@ -108,12 +106,12 @@ class Journal:
 
     def plan(self, runs: Sequence[Planned]) -> None:
         """Keep what is to be run next."""
-        self._write({"plan": [asdict(run) for run in runs]})
+        self._write({"plan": [plain(run) for run in runs]})
         self.planned.update({run.number: run for run in runs})
 
     def add(self, done: Done) -> None:
         """Keep a run that is over."""
-        self._write(asdict(done))
+        self._write(plain(done))
         self.done[done.run] = done
 
     def _write(self, entry: Mapping[str, Any]) -> None:

@@ -10,9 +10,9 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 from care_core.errors import UsageError, nearest
+from care_core.records import Record
 
 _ARITHMETIC: Mapping[type, Callable[[float, float], float]] = {
     ast.Add: operator.add,
@@ -29,8 +29,7 @@ _COMPARISONS: Mapping[type, Callable[[float, float], bool]] = {
 _LONGEST = 500
 
 
-@dataclass(frozen=True, eq=False)
-class Limit:
+class Limit(Record, eq=False):
     """One inequality; `holds` says whether a configuration keeps it."""
 
     text: str

@@ -13,7 +13,6 @@ import subprocess
 import sys
 import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from care_core.collect import guard
@@ -25,6 +24,7 @@ from care_core.configs.edit import Wanted, apply_changes
 from care_core.errors import CareError, ConfigError
 from care_core.files import write_atomically
 from care_core.logs.finding import logs_below
+from care_core.records import Record
 from care_core.run import Setting
 from care_core.tables.rows import TableRow, rows_of
 
@@ -42,8 +42,7 @@ class StoppedError(Exception):
     """The campaign is being stopped; nothing is to be recorded of this run."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Ended:
+class _Ended(Record):
     """How an attempt ended: its folder, and why it is of no use ('' where it is)."""
 
     folder: Path

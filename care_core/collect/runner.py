@@ -8,7 +8,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -21,6 +20,7 @@ from care_core.collect.sampling import Planned, one_at_a_time, points, repeat_of
 from care_core.configs.driven import parameter_value, readable
 from care_core.configs.edit import Wanted, apply_changes
 from care_core.errors import UsageError
+from care_core.records import Struct, field
 from care_core.tables.rows import ABOUT, CONDITIONS, TableRow, write_rows, write_table
 
 TABLE = "runs.csv"
@@ -35,8 +35,7 @@ _FIRST_ROUND = 2
 """Adaptive: so many runs an option are spread over the ranges before any is chosen."""
 
 
-@dataclass(slots=True)
-class Collected:
+class Collected(Struct, eq=False):
     """What there is of a campaign: the plan so far, and the runs that are over."""
 
     campaign: Campaign
@@ -188,8 +187,7 @@ def _number(value: Any) -> float:
     return float(value) if isinstance(value, (int, float)) else math.nan
 
 
-@dataclass(slots=True)
-class _Work:
+class _Work(Struct, eq=False):
     """Runs made in slots, and what is said of them."""
 
     found: Collected

@@ -9,13 +9,13 @@ few, which is how robots are driven, nor of the reference itself (`benchmarks.re
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from care_core.collect.space import Config, Floats, Space
 from care_core.errors import UsageError
+from care_core.records import Record
 
 Method = Literal["sobol", "latin_hypercube", "uniform", "one_at_a_time", "adaptive"]
 
@@ -23,8 +23,7 @@ _TRIES = 200
 """So many points may break a limit for each that keeps them all."""
 
 
-@dataclass(frozen=True, slots=True)
-class Planned:
+class Planned(Record):
     """One run to be made: its number from 1, the seed that its command gets, and the run that it repeats."""
 
     number: int

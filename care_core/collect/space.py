@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_core.collect.limits import Limit
 from care_core.errors import UsageError
+from care_core.records import Record
 from care_core.variables import Variable
 
 Floats = NDArray[np.float64]
@@ -20,8 +20,7 @@ _DIGITS = 4
 """Significant digits of a sampled value: what an operator would write."""
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
+class Axis(Record, eq=False):
     """An option that varies: between `low` and `high`, both allowed, in its unit."""
 
     option: Variable
@@ -81,8 +80,7 @@ def _inward(bound: float, *, up: bool) -> float:
     return float(f"{written + (step if up else -step):.6g}")
 
 
-@dataclass(frozen=True, eq=False)
-class Space:
+class Space(Record, eq=False):
     """Everything that a plan may choose from."""
 
     axes: Sequence[Axis]

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from care_core.configs.driven import same_value
 from care_core.configs.formats import ConfigFormat
 from care_core.configs.loading import ConfigFile, resolve
 from care_core.ecosystems.vehicles.self_written import is_self_written
+from care_core.records import Record
 from care_core.run import Setting, shown
 
 
-@dataclass(frozen=True, slots=True)
-class Side:
+class Side(Record):
     """One configuration by its name, with its settings.
 
     `format` is that of a configuration file, None for a log or a report. What a `partial` side does not hold means
@@ -26,8 +25,7 @@ class Side:
     partial: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
+class Difference(Record):
     """A parameter that differs; a side that lacks it is None."""
 
     parameter: str

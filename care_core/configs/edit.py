@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from care_core.configs.driven import as_number, same_value
 from care_core.configs.formats import ConfigFormat, text_for
 from care_core.configs.loading import ConfigFile, guesses, read_configs, read_text, resolve, split_name
 from care_core.errors import ConfigError
+from care_core.records import Record, Struct, field
 from care_core.run import Setting, shown
 from care_core.variables import Variable
 
@@ -34,8 +34,7 @@ _ROUNDED = 1e-3
 _APART = "One file is loaded for both: put one of them into a file of its own, loaded after it."
 
 
-@dataclass(frozen=True, slots=True)
-class Wanted:
+class Wanted(Record):
     """A parameter to set, by the name that the log has for it."""
 
     option: Variable
@@ -45,8 +44,7 @@ class Wanted:
     """What was driven, where a log holds it."""
 
 
-@dataclass(slots=True)
-class Edit:
+class Edit(Struct, eq=False):
     """What was done to one setting of a file, None for parameters that no file held."""
 
     where: str
@@ -64,8 +62,7 @@ class Edit:
         return None if self.held is None else self.held.value
 
 
-@dataclass(slots=True)
-class EditedFile:
+class EditedFile(Struct, eq=False):
     """A file with its text before and after."""
 
     path: Path

@@ -27,6 +27,13 @@ class ConfigFormat(str, Enum):
     ROS2_YAML = "ros2-yaml"
 
 
+_MODULES = {
+    ConfigFormat.ARDUPILOT_PARAM: "care_core.ecosystems.ardupilot.parameter_file",
+    ConfigFormat.QGC_PARAMS: "care_core.ecosystems.px4.parameter_file",
+    ConfigFormat.ROS1_YAML: "care_core.ecosystems.ros.ros1_yaml",
+    ConfigFormat.ROS2_YAML: "care_core.ecosystems.ros.ros2_yaml",
+}
+
 _OF_LOG = {
     "ros1": ConfigFormat.ROS1_YAML,
     "ros2": ConfigFormat.ROS2_YAML,
@@ -43,7 +50,7 @@ _ROS2_KEY = re.compile(r"^[^#\n]*\bros__parameters['\"]?\s*:", re.MULTILINE)
 
 def module_of(format: ConfigFormat) -> ModuleType:
     """The module of a format, imported when it is first asked for: those of YAML take a while."""
-    return import_module(f"care_core.configs.{format.value.replace('-', '_')}")
+    return import_module(_MODULES[format])
 
 
 def format_for(log_format: str, parameters: Iterable[str] = ()) -> ConfigFormat:

@@ -10,14 +10,13 @@ from pathlib import Path
 
 from care_core.configs.formats import ConfigFormat, format_of, module_of
 from care_core.errors import ConfigError
-from care_core.frozen import dataclass
+from care_core.records import Record
 from care_core.run import Find, Setting
 
 _LARGEST_BYTES = 1_000_000
 
 
-@dataclass(frozen=True, slots=True)
-class ConfigFile:
+class ConfigFile(Record):
     """A configuration file as it was named, and what it holds; `source` of a setting is file:line."""
 
     path: str

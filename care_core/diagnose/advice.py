@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 from care_core.diagnose.hypotheses import LATE_S, set_wrong
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ranking import LIKELY
+from care_core.records import replace
 
 ENOUGH = 0.5
 """A change less likely than this to repair the run is no advice."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from care_core.causal.counterfactual import World
@@ -19,6 +18,7 @@ from care_core.ecosystems.findings import Health
 from care_core.numbers import median
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
+from care_core.records import Record, replace
 from care_core.run import ProfileChoice, is_known
 from care_core.variables import Op, OwnLimit, Variable
 
@@ -27,8 +27,7 @@ _OF_80_PERCENT = 2 * 1.2816
 _DIGITS = 3
 
 
-@dataclass(frozen=True, slots=True)
-class Proposal:
+class Proposal(Record):
     """What good runs say of one objective. `low`, `high` and `limit` are ratios where `relative`, else in its unit."""
 
     objective: Variable
@@ -56,8 +55,7 @@ class Proposal:
         return bound.op if bound is not None else "<="
 
 
-@dataclass(frozen=True, slots=True)
-class Refused:
+class Refused(Record):
     """A run, or a whole log (`mission` None), that says nothing of good runs, and why."""
 
     log: Path
@@ -65,8 +63,7 @@ class Refused:
     reason: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Baseline:
+class Baseline(Record, eq=False):
     """What the good runs of some logs propose."""
 
     choice: ProfileChoice

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from care_core.causal.counterfactual import Config, World
 from care_core.diagnose.records import Fix, Prediction
+from care_core.records import replace
 from care_core.variables import Change, Role, Variable
 
 MAX_CHANGES = 4

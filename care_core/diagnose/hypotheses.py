@@ -14,7 +14,6 @@ Where two would each have done alone, both are told; the weights are brought to 
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import replace
 
 from care_core.causal.counterfactual import World
 from care_core.diagnose.ranking import Suspect as Option
@@ -22,6 +21,7 @@ from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import Finding, Severity, Suspect
 from care_core.ecosystems.ranking import LIKELY
 from care_core.profile.schema import Schema
+from care_core.records import replace
 from care_core.run import Evidence, FitVerdict
 
 MISSION_LOST: Mapping[Severity, float] = {"critical": 0.95, "warning": 0.6, "info": 0.05}

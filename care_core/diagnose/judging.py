@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
-from dataclasses import field, replace
 
 from care_core.causal.counterfactual import World
 from care_core.causal.model import Model, Summary
@@ -14,11 +13,11 @@ from care_core.diagnose.reference import Good, Reference, need_of, reference_of
 from care_core.errors import UsageError, nearest
 from care_core.extract.plain import read_plain_runs
 from care_core.extract.read import mission_number, read_runs
-from care_core.frozen import dataclass
 from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
+from care_core.records import Record, field, replace
 from care_core.run import Check, Run, Setting, Unavailable, Value, is_known
 from care_core.text import figures
 from care_core.variables import Role, Threshold, Variable
@@ -31,8 +30,7 @@ UNLIKE = 4.0
 what physics says of the rest is believed, where the profile fits in part only."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class Judged(Record, eq=False):
     """A run with the verdict on each objective. In `run` those are withheld whose value means nothing."""
 
     run: Run

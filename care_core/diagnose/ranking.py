@@ -18,7 +18,7 @@ from care_core.causal.paths import CausalPath, Ways
 from care_core.configs.driven import same_value
 from care_core.diagnose.records import PathNode
 from care_core.diagnose.symptoms import NOTHING, ROUNDING, pointers
-from care_core.frozen import dataclass
+from care_core.records import Record
 from care_core.run import Evidence, Run, is_known
 from care_core.variables import Role
 
@@ -30,8 +30,7 @@ PERMUTATIONS = 12
 """Sampled orders of reset per Shapley estimate, each also taken backwards."""
 
 
-@dataclass(frozen=True, slots=True)
-class Suspect:
+class Suspect(Record):
     """An option off its reference on a directed path to a faulty objective, with what it costs this run."""
 
     option: str

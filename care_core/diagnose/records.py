@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import field
 from typing import Literal
 
 from care_core.ecosystems.findings import NOTHING_SEEN, Health, Severity
 from care_core.ecosystems.ranking import lost_by
-from care_core.frozen import dataclass
+from care_core.records import Record, field
 from care_core.run import FitVerdict, MissionInfo, ProfileChoice, Run, shown
 from care_core.text import figures
 from care_core.variables import Change, Threshold, Variable
@@ -18,8 +17,7 @@ Confidence = Literal["high", "medium", "low"]
 What = Literal["parameter", "hardware", "world", "chance"]
 
 
-@dataclass(frozen=True, slots=True)
-class Need:
+class Need(Record):
     """What the reference configuration would need for this very mission, vehicle and conditions, with its 80 %
     interval."""
 
@@ -28,8 +26,7 @@ class Need:
     high: float
 
 
-@dataclass(frozen=True, slots=True)
-class ObjectiveResult:
+class ObjectiveResult(Record):
     """An objective of this run against its threshold. `reason`: why it was not evaluated, or how it failed."""
 
     variable: Variable
@@ -87,8 +84,7 @@ def overall(objectives: Collection[Status], severities: Collection[Severity], fi
     return "not_evaluated" if "not_evaluated" in objectives or not objectives or fit == "no" else "ok"
 
 
-@dataclass(frozen=True, slots=True)
-class MissionVerdict:
+class MissionVerdict(Record):
     """One mission of a log with what became of it."""
 
     mission: MissionInfo
@@ -98,8 +94,7 @@ class MissionVerdict:
     results: tuple[ObjectiveResult, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Prediction:
+class Prediction(Record):
     """A predicted value of an objective with its 80 % interval, and the probability that it keeps its threshold."""
 
     value: float
@@ -113,8 +108,7 @@ class Prediction:
         return "ok" if self.p_ok >= 0.5 else "fault"
 
 
-@dataclass(frozen=True, slots=True)
-class PathNode:
+class PathNode(Record):
     """One node of a causal path as this run met it: its value, and what the reference configuration would give."""
 
     name: str
@@ -130,16 +124,14 @@ class PathNode:
 NoteKind = Literal["outside_training", "in_the_log", "other"]
 
 
-@dataclass(frozen=True, slots=True)
-class Note:
+class Note(Record):
     """A sentence about a cause: what weakens it, what the log itself says of it, what a change of it needs."""
 
     text: str
     kind: NoteKind = "other"
 
 
-@dataclass(frozen=True, slots=True)
-class Cause:
+class Cause(Record):
     """An option with the path by which it moved a faulty objective in this run.
 
     `path_ace` is the paper's Eq. 2 on scaled variables (it ranks the platform, not this run); `total_effect` the
@@ -166,16 +158,14 @@ class Cause:
     """Not shown to cost this run anything, only not ruled out: what to look at next when no cause convinces."""
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
+class Fault(Record):
     """A faulty objective with its causes, best first."""
 
     objective: ObjectiveResult
     causes: tuple[Cause, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Fix:
+class Fix(Record):
     """A set of changes with its predicted outcome. `p_fixed`: probability that all objectives keep their thresholds."""
 
     changes: tuple[Change, ...]
@@ -188,8 +178,7 @@ class Fix:
         return not all(change.in_support for change in self.changes)
 
 
-@dataclass(frozen=True, slots=True)
-class Circumstance:
+class Circumstance(Record):
     """What this run met and no option set: a rival to the causes named."""
 
     name: str
@@ -206,8 +195,7 @@ class Circumstance:
     text: str
 
 
-@dataclass(frozen=True, slots=True)
-class Experiment:
+class Experiment(Record):
     """What would tell two causes apart: one option changed alone, and the probability of success under each."""
 
     objective: str
@@ -222,8 +210,7 @@ class Experiment:
         return f"{change}: probability of a good {self.objective} is {expected}"
 
 
-@dataclass(frozen=True, slots=True)
-class Hypothesis:
+class Hypothesis(Record):
     """One explanation of the failure; those of a diagnosis add up to 1."""
 
     what: What
@@ -232,8 +219,7 @@ class Hypothesis:
     probability: float
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterChange:
+class ParameterChange(Record):
     """A parameter with another value than in the good run; None where that log does not hold it."""
 
     parameter: str
@@ -247,8 +233,7 @@ class ParameterChange:
         return f"{shown(self.before)} -> {shown(self.after)}"
 
 
-@dataclass(frozen=True, slots=True)
-class Since:
+class Since(Record):
     """What changed since the last good run, options of the profile first. `warnings` say what is odd about that log."""
 
     log: str
@@ -256,16 +241,14 @@ class Since:
     warnings: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Dismissal:
+class Dismissal(Record):
     """A cause that the operator has set aside, and why."""
 
     option: str
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnosis:
+class Diagnosis(Record):
     """The whole answer for one run. `fix` is None when nothing is broken or the engine abstains (`abstained`)."""
 
     profile: ProfileChoice

@@ -8,7 +8,6 @@ a robot that is slower than the profile's by its own speed: nothing says that it
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -16,24 +15,22 @@ from care_core.causal.counterfactual import Config, World
 from care_core.causal.model import Model
 from care_core.configs.driven import option_setting, option_value, same_value
 from care_core.diagnose.records import Need
-from care_core.frozen import dataclass
 from care_core.profile.schema import Schema
+from care_core.records import Record, replace
 from care_core.run import Run, Setting, is_known
 
 FIRMWARE = "PARM"
 """The record in which a vehicle's log tells its parameters with the firmware's defaults."""
 
 
-@dataclass(frozen=True, slots=True)
-class Good:
+class Good(Record):
     """A configuration that the operator vouches for: parameters by their names in the log, and where they are from."""
 
     settings: Mapping[str, Setting]
     source: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Reference:
+class Reference(Record, eq=False):
     """The reference configuration under what this run met, and in one phrase whose it is."""
 
     config: Config

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from care_core.configs.driven import readable, same_value
@@ -15,6 +14,7 @@ from care_core.extract.read import log_info
 from care_core.logs.base import Log
 from care_core.logs.digest import log_digest
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.run import LogInfo, Run, Setting
 from care_core.variables import Variable
 

@@ -15,7 +15,7 @@ import numpy as np
 from care_core.causal.counterfactual import Config, World
 from care_core.causal.graph import Edge
 from care_core.causal.mechanisms import LEAST, Mechanism, columns, transformed
-from care_core.frozen import dataclass
+from care_core.records import Record
 from care_core.run import Evidence
 
 UNLEARNED = 0.02
@@ -26,8 +26,7 @@ _SAID: Mapping[str, float] = {"refusal": 10.0, "found": 5.0}
 others, and what was found to have lost the mission little."""
 
 
-@dataclass(frozen=True, slots=True)
-class Pointer:
+class Pointer(Record):
     """How much of a run's symptoms an option accounts for (0 to 1), and the metric that shows it best, if any."""
 
     share: float

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -13,6 +12,7 @@ from care_core.causal.kernel import FloatArray
 from care_core.diagnose.fixes import candidate_values
 from care_core.diagnose.ranking import Suspect
 from care_core.diagnose.records import Experiment, Fault
+from care_core.records import replace
 from care_core.run import Run, Unavailable
 
 TELLING = 0.15

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
+
+from care_core.records import Record
 
 CONTENT, CONFIDENCE = 0.95, 0.95
 FEW = 5
@@ -23,8 +24,7 @@ MANY = math.ceil(math.log(1 - CONFIDENCE) / math.log(CONTENT))
 _STEPS, _HALVINGS = 400, 60
 
 
-@dataclass(frozen=True, slots=True)
-class Quantile:
+class Quantile(Record):
     """The 95 % quantile of all runs: an interval that holds it with 90 %, whose upper end is the tolerance limit."""
 
     low: float

@@ -7,7 +7,6 @@ comparison and verification come by it too.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
 
 from care_core.causal.counterfactual import World
 from care_core.causal.model import EffectRecord
@@ -40,9 +39,9 @@ from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix,
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import tell_more
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
-from care_core.frozen import dataclass
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
+from care_core.records import Record, replace
 from care_core.run import Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Setting, is_known, shown
 from care_core.text import listed
 from care_core.variables import Variable
@@ -60,8 +59,7 @@ HIGH_SUPPORT, LOW_SUPPORT = 0.8, 0.5
 Progress = Callable[[str, float], None]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Case:
+class _Case(Record, eq=False):
     """What every step of one diagnosis needs."""
 
     profile: Profile

@@ -6,7 +6,6 @@ The report is plain data (`Promise`), so this module knows no file format; `care
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Literal
 
 from care_core.configs.driven import option_value, readable, same_value
@@ -17,6 +16,7 @@ from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
+from care_core.records import Record, replace
 from care_core.run import Run
 from care_core.variables import Threshold, Variable
 
@@ -25,8 +25,7 @@ Outcome = Literal["recovered", "kept", "unchanged", "better", "worse", "broken",
 Verdict = Literal["fixed_as_promised", "fixed_although", "not_fixed", "change_not_made", "cannot_tell"]
 
 
-@dataclass(frozen=True, slots=True)
-class Before:
+class Before(Record):
     """An objective as the report has it. `need`: what the reference configuration needed for that mission, where the
     threshold is a multiple of it; None where the threshold holds for any mission."""
 
@@ -36,8 +35,7 @@ class Before:
     need: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class PromisedSet:
+class PromisedSet(Record):
     """One set of changes of the report: option -> (from, to), with the outcome it promised."""
 
     changes: Mapping[str, tuple[float, float]]
@@ -46,8 +44,7 @@ class PromisedSet:
     """Per objective the 80 % interval."""
 
 
-@dataclass(frozen=True, slots=True)
-class Promise:
+class Promise(Record):
     """What a report said and promised: the suggested set first, then its alternatives."""
 
     sha256: str
@@ -61,8 +58,7 @@ class Promise:
     sets: tuple[PromisedSet, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class MadeChange:
+class MadeChange(Record):
     """One suggested change and what the next run was driven with."""
 
     option: Variable
@@ -73,8 +69,7 @@ class MadeChange:
     note: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class OtherChange:
+class OtherChange(Record):
     """An option that nobody suggested to change, and that was changed."""
 
     option: Variable
@@ -82,8 +77,7 @@ class OtherChange:
     driven: float
 
 
-@dataclass(frozen=True, slots=True)
-class ObjectiveCheck:
+class ObjectiveCheck(Record):
     """One objective before and after. `inside`: whether the outcome lies in the promised 80 % interval, which is scaled
     to the mission of the run after."""
 
@@ -95,8 +89,7 @@ class ObjectiveCheck:
     inside: bool | None
 
 
-@dataclass(frozen=True, slots=True)
-class Verification:
+class Verification(Record):
     """The whole comparison. `chosen` is 0 where the suggested set was made, else the number of the alternative."""
 
     verdict: Verdict

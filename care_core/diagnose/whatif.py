@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from care_core.causal.counterfactual import World
 from care_core.configs.driven import option_value
@@ -15,14 +14,14 @@ from care_core.ecosystems.ranking import lost_by
 from care_core.errors import UsageError, nearest
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
+from care_core.records import Record
 from care_core.run import ProfileChoice, Run, Setting
 from care_core.variables import Change, Role, Variable
 
 NO_MISSION_HINT = "Ask with the log of a mission, or with another flight of this one: --mission N."
 
 
-@dataclass(frozen=True, slots=True)
-class Outlook:
+class Outlook(Record):
     """One objective under the changes, beside what this run had."""
 
     objective: ObjectiveResult
@@ -31,8 +30,7 @@ class Outlook:
     """Predicted for the run's own configuration: what another run without changes would give."""
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(Record):
     """What the changes are predicted to do. The probability is that of meeting every threshold."""
 
     changes: tuple[Change, ...]
@@ -47,8 +45,7 @@ class Answer:
         return not all(change.in_support for change in self.changes)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Question:
+class Question(Record, eq=False):
     """A run ready to be asked "what if"; `ask` is pure and takes milliseconds."""
 
     profile: ProfileChoice

@@ -6,11 +6,11 @@ Each ecosystem is one entry: a module with `examine(log) -> Health` that reads t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from importlib import import_module
 
 from care_core.ecosystems.findings import TOO_SHORT, WHOLE_LOG, Finding, Health
 from care_core.logs.base import Log, LogFormat
+from care_core.records import replace
 
 _ARDUPILOT, _PX4 = "care_core.ecosystems.ardupilot.examining", "care_core.ecosystems.px4.examining"
 _ROS = "care_core.ecosystems.ros.examining"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-from care_core.frozen import dataclass
+from care_core.records import Record
 
 Severity = Literal["info", "warning", "critical"]
 FindingKind = Literal[
@@ -42,8 +42,7 @@ Suspect = Literal["hardware", "world", "parameter", "operation"]
 """What a finding speaks of: a part that failed, what the robot met, how it was set, what its operator did."""
 
 
-@dataclass(frozen=True, slots=True)
-class Moment:
+class Moment(Record):
     """One line of the account: what happened at `time_s` seconds from the start of the log, and where it says so."""
 
     time_s: float
@@ -54,8 +53,7 @@ class Moment:
     """The message type or topic that tells it."""
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(Record):
     """Something that was not as it should be."""
 
     kind: FindingKind
@@ -86,8 +84,7 @@ TOO_SHORT = "too little is recorded to say anything of a run"
 NOT_FLOWN = "the vehicle never armed: no run of it is in this log"
 
 
-@dataclass(frozen=True, slots=True)
-class Health:
+class Health(Record):
     """What happened in a log. `findings` stand in the order told, the first cause first."""
 
     robot: str

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import field
 from typing import Any, TypeGuard, TypeVar
 
 from care_core.ecosystems.how_to_record import how_to_record
 from care_core.errors import ProfileError, nearest
-from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
+from care_core.records import Record, field
 from care_core.run import Check, Evidence, Unavailable, Value
 
 Args = Mapping[str, Any]
@@ -58,8 +57,7 @@ def _is_number(value: object) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Mission:
+class Mission(Record, eq=False):
     """One mission cut out of a log: what extractors see.
 
     `tables` hold the decoded channels of the whole log (times in seconds from its start); `start_s` and `end_s`
@@ -94,8 +92,7 @@ class Mission:
 Compute = Callable[[Mission, Args], Value]
 
 
-@dataclass(frozen=True, slots=True)
-class Extractor:
+class Extractor(Record):
     """A named extractor: the channels and fields it reads (`needs`), its unit, its arguments with their meaning."""
 
     name: str

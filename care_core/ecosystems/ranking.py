@@ -6,9 +6,9 @@ Severe before mild, likely before suspected, causes before symptoms, then in ord
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 
 from care_core.ecosystems.findings import Finding, FindingKind
+from care_core.records import replace
 
 Leads = Mapping[FindingKind, frozenset[FindingKind]]
 """Per kind of finding the kinds that it can bring about."""

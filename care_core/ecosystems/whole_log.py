@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, extractor, missing, numeric, one_of
 from care_core.logs.base import Table, Wanted
+from care_core.records import replace
 from care_core.run import Evidence, Unavailable, Value
 
 KIND = "recording"

@@ -8,16 +8,15 @@ from care_core.configs.driven import readable
 from care_core.ecosystems.measures import find_extractor
 from care_core.errors import CareError
 from care_core.extract.read import mission_kind, read_runs, reading_plan
-from care_core.frozen import dataclass
 from care_core.logs.base import Log
 from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
+from care_core.records import Record
 from care_core.run import MissionInfo, Run, Unavailable
 from care_core.variables import Role, Variable
 
 
-@dataclass(frozen=True, slots=True)
-class Missed:
+class Missed(Record):
     """A variable that the log cannot give, why, and how to have it next time."""
 
     variable: Variable
@@ -25,8 +24,7 @@ class Missed:
     hint: str
 
 
-@dataclass(frozen=True, slots=True)
-class Coverage:
+class Coverage(Record):
     """How much of a profile a log holds: options with a parameter, sources among its channels, matched names."""
 
     schema: Schema
@@ -46,8 +44,7 @@ class Coverage:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Trial:
+class Trial(Record):
     """A profile tried on a log. `obstacle` says why the profile cannot use it, empty when it can."""
 
     coverage: Coverage

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 
 import care_core.ecosystems.ardupilot.measures
 import care_core.ecosystems.ardupilot.measures.requested
@@ -26,12 +25,12 @@ import care_core.ecosystems.whole_log  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
-from care_core.frozen import dataclass
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import Sha256, hashing
 from care_core.logs.plausible import clock_doubt, dead_sources
 from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
+from care_core.records import Record, replace
 from care_core.run import Check, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable
 
@@ -121,8 +120,7 @@ def log_info(log: Log, sha256: str) -> LogInfo:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Source:
+class _Source(Record, eq=False):
     """A log read once by a profile's plan, and the missions found in it."""
 
     schema: Schema

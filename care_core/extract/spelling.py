@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 from care_core.ecosystems.vehicles import Kind, spelled_in, vehicle_of
 from care_core.logs.base import Log
 from care_core.profile.schema import Schema
+from care_core.records import replace
 from care_core.variables import Role, Variable
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from care_core.causal.counterfactual import World, known_value
@@ -11,6 +10,7 @@ from care_core.causal.model import Model
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Confidence, Diagnosis, Status, What
 from care_core.ecosystems.findings import FindingKind, Severity
+from care_core.records import Record, field, replace
 from care_core.run import FitVerdict, is_known
 from care_core.text import clean
 from care_core.variables import Op, Threshold
@@ -23,8 +23,7 @@ TOLD = 0.05
 """Explanations less likely than this are not kept."""
 
 
-@dataclass(frozen=True, slots=True)
-class Explained:
+class Explained(Record):
     """An explanation of a failure. `kind` is that of the finding which speaks for it, None for a parameter."""
 
     what: What
@@ -33,8 +32,7 @@ class Explained:
     kind: FindingKind | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class NamedCause:
+class NamedCause(Record):
     """An option that cost the run something, with what the run had and what would be better."""
 
     option: str
@@ -43,8 +41,7 @@ class NamedCause:
     suggested: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class Seen:
+class Seen(Record):
     """A finding that no other one explains."""
 
     kind: FindingKind
@@ -52,8 +49,7 @@ class Seen:
     severity: Severity
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
+class Asked(Record):
     """What a profile's model needs to be asked about a run: how it was set, what it met, how it ended, its limits."""
 
     config: Mapping[str, float]
@@ -66,8 +62,7 @@ class Asked:
         return World(model, self.config, self.observed, bounds)
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
+class Row(Record):
     """What became of one run. A log that cannot be read is a row too: `status` "unreadable", and `reason` says why."""
 
     log: str

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from math import comb
 from typing import Literal
 
 from care_core.configs.driven import same_value
 from care_core.fleet.rows import Row, distinct
+from care_core.records import Record, replace
 
 FEWEST = 2
 """What one robot has is not shared."""
@@ -27,8 +27,7 @@ Unit = Literal["robot", "run"]
 Kind = Literal["cause", "finding", "breach"]
 
 
-@dataclass(frozen=True, slots=True)
-class Trait:
+class Trait(Record):
     """Something that all affected have and not all others: "firmware" "ArduCopter V4.5.4", or an option's value."""
 
     name: str
@@ -47,8 +46,7 @@ class Trait:
         return self.chance <= SURE
 
 
-@dataclass(frozen=True, slots=True)
-class Since:
+class Since(Record):
     """When it was first there. `earlier`: runs before that were without it; `chance`: that so many come first for some
     pattern if the order says nothing."""
 
@@ -63,8 +61,7 @@ class Since:
         return self.chance <= SURE
 
 
-@dataclass(frozen=True, slots=True)
-class Pattern:
+class Pattern(Record):
     """One thing on several robots."""
 
     kind: Kind

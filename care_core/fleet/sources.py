@@ -9,7 +9,6 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from glob import glob, has_magic
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -18,6 +17,7 @@ from urllib.parse import urlsplit
 from care_core.errors import LogError, UsageError
 from care_core.limits import MEBIBYTE, megabytes
 from care_core.logs.finding import LOG_SUFFIXES, SHARED_SUFFIX, find_logs, is_log, is_recorder_folder
+from care_core.records import Record
 
 INSTALL = "Install what it needs with: pip install 'care-tui[fleet]'"
 
@@ -29,8 +29,7 @@ _BLOCK = 4 * MEBIBYTE
 _METADATA = "metadata.yaml"
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
+class Source(Record):
     """A log and how to come by it; it can be sent to another machine."""
 
     name: str

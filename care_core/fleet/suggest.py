@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from statistics import fmean
 from typing import Literal
 
@@ -25,6 +24,7 @@ from care_core.errors import CareError
 from care_core.fleet.rows import Row, distinct
 from care_core.fleet.shared import FEWEST, Unit, name_of, unit_of
 from care_core.profile.store import Profile, load_profile
+from care_core.records import Record, replace
 from care_core.variables import Variable
 
 Effect = Literal["helped", "not helped", "harmed", "unharmed", "has it", "unknown"]
@@ -34,8 +34,7 @@ MOST_TRIED = 16
 """Values that are tried, the most often named ones: what only one run of hundreds names helps no majority."""
 
 
-@dataclass(frozen=True, slots=True)
-class Outlook:
+class Outlook(Record):
     """One robot under the change. Probabilities are those of its runs that failed, else of all, on average."""
 
     name: str
@@ -46,8 +45,7 @@ class Outlook:
     why: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Suggestion:
+class Suggestion(Record):
     """One option at one value on every robot of a profile, with what it would do to each."""
 
     profile: str
@@ -65,8 +63,7 @@ class Suggestion:
         return sum(outlook.is_failing for outlook in self.outlooks)
 
 
-@dataclass(frozen=True, slots=True)
-class Silence:
+class Silence(Record):
     """Why no change is suggested to the robots of a profile, and the best one that was found."""
 
     profile: str
@@ -152,8 +149,7 @@ def _tried(
     ]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Answer:
+class _Answer(Record, eq=False):
     """What a model says of a run: the probabilities that it meets every limit, unchanged and then with each candidate,
     and the one from which on a change of this run is advice."""
 
@@ -174,8 +170,7 @@ def _answer(row: Row, model: Model, candidates: Sequence[tuple[Variable, float]]
     return _Answer((1.0 - row.broken) * world.probability([config, *changed]), enough(float(odds)))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Run:
+class _Run(Record, eq=False):
     """One run under one candidate."""
 
     row: Row

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from care_core.errors import ExitCode
 from care_core.fleet.rows import Row
 from care_core.fleet.shared import Pattern, shared
 from care_core.fleet.suggest import Silence, Suggestion, suggest
+from care_core.records import Record
 
 
-@dataclass(frozen=True, slots=True)
-class Fleet:
+class Fleet(Record):
     """The rows in the order of their logs, what they share, and for each profile what is suggested."""
 
     rows: tuple[Row, ...]

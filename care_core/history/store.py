@@ -12,13 +12,12 @@ import sqlite3
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, field
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 from care_core.errors import CareError
-from care_core.frozen import dataclass
+from care_core.records import Record, field, plain
 from care_core.run import Robot
 
 SWITCH = "CARE_HISTORY"
@@ -57,8 +56,7 @@ class HistoryError(CareError):
     """The store cannot be used; the work it would have recorded is not affected."""
 
 
-@dataclass(frozen=True, slots=True)
-class About:
+class About(Record):
     """What is remembered of a run beside its document: what belongs to one robot and is no part of a report."""
 
     robot: Robot | None = None
@@ -67,8 +65,7 @@ class About:
     settings: Mapping[str, float | str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class Triaged:
+class Triaged(Record):
     """One remembered triage."""
 
     at: str
@@ -84,8 +81,7 @@ class Triaged:
     """All parameters that somebody sets, as driven; empty where the log holds none."""
 
 
-@dataclass(frozen=True, slots=True)
-class Verified:
+class Verified(Record):
     """One remembered verification. `worked` is None where the change was not made or nobody could tell."""
 
     at: str
@@ -108,8 +104,7 @@ def history_path() -> Path | None:
     return user_data_path("care", appauthor=False) / "history.sqlite3"
 
 
-@dataclass(frozen=True, slots=True)
-class History:
+class History(Record):
     """The store at a path. Every call opens, works in one transaction, and closes: processes may share it."""
 
     path: Path
@@ -256,7 +251,7 @@ class History:
 def insert_triage(connection: sqlite3.Connection, document: Mapping[str, Any], mission: int, about: About) -> None:
     """Put a triage into the store, in the transaction of whoever has more to write with it."""
     log, profile = document["log"], document["profile"] or {"name": "", "version": ""}
-    robot = None if about.robot is None else asdict(about.robot)
+    robot = None if about.robot is None else plain(about.robot)
     told = {"robot": robot, "asked": about.asked, "firmware": about.firmware}
     settings = zlib.compress(json.dumps(about.settings).encode()) if about.settings else None
     connection.execute(

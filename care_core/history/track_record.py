@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 from care_core.files import write_atomically
 from care_core.history.store import Triaged, Verified
+from care_core.records import Record
 
 EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 """Promises are compared with outcomes in these bins of probability."""
@@ -21,8 +21,7 @@ _BLOCKS = "▁▂▃▄▅▆▇█"
 _ASCII = "_.-~=*#@"
 
 
-@dataclass(frozen=True, slots=True)
-class Bin:
+class Bin(Record):
     """Fixes promised at about the same probability: how many, the mean promise, how many worked."""
 
     low: float
@@ -32,8 +31,7 @@ class Bin:
     worked: int
 
 
-@dataclass(frozen=True, slots=True)
-class TrackRecord:
+class TrackRecord(Record):
     """Of the fixes that were promised and really made, how many worked."""
 
     count: int

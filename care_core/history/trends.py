@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise, permutations
 from typing import Any, Literal
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from care_core.configs.driven import same_value
 from care_core.history.store import Triaged
+from care_core.records import Record, replace
 from care_core.run import Robot
 
 Direction = Literal["worse", "better", "none", "constant", "too few"]
@@ -35,8 +35,7 @@ _SAME_SHARE, _SAME = 0.05, 0.5
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Changed:
+class Changed(Record):
     """A parameter, or the firmware, that differs from the run before."""
 
     name: str
@@ -44,8 +43,7 @@ class Changed:
     after: float | str
 
 
-@dataclass(frozen=True, slots=True)
-class Since:
+class Since(Record):
     """The run from which on an objective is different: medians before and from then on (of yes and no the shares), and
     what changed at this run."""
 
@@ -56,8 +54,7 @@ class Since:
     changed: tuple[Changed, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Trend:
+class Trend(Record):
     """How an objective went over runs, oldest first. `tau` is Kendall's, -1 to 1; `p` of the trend, None where there is
     no test."""
 
@@ -71,8 +68,7 @@ class Trend:
     since: Since | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class MissionRuns:
+class MissionRuns(Record):
     """Runs of one robot that were asked the same, judged by one profile, oldest first."""
 
     profile: str
@@ -80,8 +76,7 @@ class MissionRuns:
     trends: tuple[Trend, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class RobotRuns:
+class RobotRuns(Record):
     """All runs of one robot (None: nothing says whose they are), oldest first; `faults` is the trend of having one."""
 
     robot: Robot | None

@@ -10,11 +10,11 @@ import os
 import socket
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from care_core.history.store import About, History, insert_triage
+from care_core.records import Record
 
 Claim = Literal["mine", "done", "taken"]
 """What became of a claim: it is granted; the log is done already; another watcher is at it."""
@@ -23,8 +23,7 @@ MOST_ATTEMPTS = 3
 """A log whose triage ended the program, or took too long, so often is not tried again."""
 
 
-@dataclass(frozen=True, slots=True)
-class Ledger:
+class Ledger(Record):
     """The book that the watchers of a history keep. Every call may raise HistoryError."""
 
     history: History

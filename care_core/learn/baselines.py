@@ -6,7 +6,6 @@ None of them can say why. Each takes the same training table and the same run.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -16,6 +15,7 @@ from sklearn.ensemble import ExtraTreesClassifier, GradientBoostingClassifier
 from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import columns
 from care_core.profile.schema import Schema
+from care_core.records import Record
 from care_core.variables import Variable
 
 Config = Mapping[str, float]
@@ -30,8 +30,7 @@ def largest_deviation(config: Config, reference: Config, schema: Schema, suspect
     return sorted(suspects, key=lambda name: (-distance[name], name))
 
 
-@dataclass(frozen=True)
-class Predicate:
+class Predicate(Record):
     """ "Option within [low, high]": what cooperative bug isolation counts."""
 
     low: float

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -15,14 +14,14 @@ from care_core.errors import LearningError
 from care_core.learn.processes import answers
 from care_core.learn.structure import learn_structure
 from care_core.profile.schema import Schema
+from care_core.records import Record
 
 SHARE = 0.632
 """Share of the runs in a resample: as many different runs as a bootstrap resample has. They are drawn without
 replacement, since a run that is there twice passes for two independent ones in every test of the graph search."""
 
 
-@dataclass(frozen=True)
-class Reaches:
+class Reaches(Record):
     """That an option has a directed path to an objective, whichever metrics it goes through."""
 
     option: str

@@ -11,7 +11,6 @@ objective directly, against Problem 2.1, and the model card says so.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -23,6 +22,7 @@ from care_core.learn.regression import Regressions
 from care_core.learn.screening import discoveries
 from care_core.learn.table import varying
 from care_core.profile.schema import Schema
+from care_core.records import Record
 from care_core.variables import Variable
 
 RATE = 0.05
@@ -36,8 +36,7 @@ DirectEdge = tuple[str, str, float]
 """An option, the objective it acts on beyond the metrics, and the p-value."""
 
 
-@dataclass(frozen=True)
-class Completion:
+class Completion(Record):
     """The completed graph, the option -> objective edges in it, and one sentence for each edge that was added."""
 
     graph: CausalGraph

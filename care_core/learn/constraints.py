@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 
 from care_core.profile.schema import Schema
+from care_core.records import Record, field
 from care_core.variables import Role
 
 O, C, M, Y = Role.OPTION, Role.CONTEXT, Role.METRIC, Role.OBJECTIVE  # noqa: E741
@@ -31,8 +31,7 @@ RANDOMISED: Mapping[tuple[Role, Role], str] = {
 }
 
 
-@dataclass(frozen=True)
-class Constraints:
+class Constraints(Record):
     """The rules of one schema, by role."""
 
     roles: Mapping[str, Role]

@@ -12,7 +12,6 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache, partial
 from itertools import combinations
@@ -30,6 +29,7 @@ from scipy.special import erfc, ndtri
 
 from care_core.learn.constraints import Constraints
 from care_core.learn.table import FloatArray, normal_scores
+from care_core.records import Record
 
 IntArray = NDArray[np.int64]
 SeparatingSets = dict[tuple[int, int], frozenset[int]]
@@ -56,8 +56,7 @@ class Mark(Enum):
     CIRCLE = "o"
 
 
-@dataclass(frozen=True)
-class PagEdge:
+class PagEdge(Record):
     """An edge `a *-* b` with the marks at its two ends; a comes before b in the graph's nodes."""
 
     a: str
@@ -66,8 +65,7 @@ class PagEdge:
     at_b: Mark
 
 
-@dataclass(frozen=True)
-class Pag:
+class Pag(Record):
     """A partial ancestral graph: what the independences among the variables say of their causes."""
 
     nodes: tuple[str, ...]

@@ -9,7 +9,6 @@ et al. 2005); and, where the folder holds them, the predictions that were publis
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -18,6 +17,7 @@ from care_core.causal.model import Model
 from care_core.learn.fault_files import FaultFile
 from care_core.learn.naming import by_bug_isolation, by_deviation, by_engine, by_paper_rule, outside_support, taught_by
 from care_core.profile.schema import Schema
+from care_core.records import Record
 
 CAUSES = 3
 """Causes named per fault, one rule for all faults; `ALSO` are reported beside it."""
@@ -30,8 +30,7 @@ Answers = Mapping[str, frozenset[str]]
 """Fault to the options named."""
 
 
-@dataclass(frozen=True)
-class Scores:
+class Scores(Record):
     """The paper's measures over all cells, as fractions. `rmse`: standard deviations of the objective, see `score`."""
 
     accuracy: float
@@ -41,8 +40,7 @@ class Scores:
     rmse: float
 
 
-@dataclass(frozen=True, eq=False)
-class Evaluation:
+class Evaluation(Record, eq=False):
     """`scores` by number of causes named per fault and by method; `predicted` for `CAUSES`, per method and fault.
 
     `outside` lists the (fault, true cause) pairs whose faulty value the profile's training never met.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
 from care_core.errors import LearningError
 from care_core.profile.schema import Schema
+from care_core.records import Record
 
 FAULTY_RUNS = 2
 """The first rows of a fault file are the faulty runs; the others were given with them."""
@@ -18,8 +18,7 @@ FAULTY_RUNS = 2
 _FAULT_FILE = re.compile(r"(?P<robot>.+)_fault_(?P<objective>.+)_(?P<number>\d+)\.csv")
 
 
-@dataclass(frozen=True, eq=False)
-class FaultFile:
+class FaultFile(Record, eq=False):
     """One fault: its runs (the faulty ones first), the objective that it breaks, and what is known of its causes."""
 
     name: str

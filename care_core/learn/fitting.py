@@ -7,7 +7,6 @@ an input that explains nothing ends near zero and costs nothing, which is what m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -20,10 +19,10 @@ from care_core.causal.kernel import FloatArray, Kernel
 from care_core.causal.mechanisms import JITTER, Mechanism, Transform, solve, transformed
 from care_core.causal.nominal import Nominal
 from care_core.errors import LearningError
+from care_core.records import Record, replace
 
 
-@dataclass(frozen=True)
-class Effort:
+class Effort(Record):
     """How hard to fit: training rows a mechanism keeps (more are thinned at random: a kernel over n rows costs n^2
     memory and n^3 time) and steps of the optimiser."""
 
@@ -66,16 +65,14 @@ class Fold(NamedTuple):
     kept: Rows
 
 
-@dataclass(frozen=True, eq=False)
-class Fitted:
+class Fitted(Record, eq=False):
     """A mechanism, and how badly it predicts runs that it does not know: mean negative log likelihood."""
 
     mechanism: Mechanism
     loss: float
 
 
-@dataclass(frozen=True)
-class Inputs:
+class Inputs(Record):
     """What a mechanism may depend on: names, which of them act as ratios, and which the regression may read; the
     others are arguments of the nominal only. Arrays have shape (len(names),)."""
 

@@ -7,16 +7,15 @@ changes with the hash seed, so the functional is written here, from the same par
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 
 from ananke.graphs import ADMG
 from ananke.identification import OneLineID
 
 from care_core.causal.graph import CausalGraph
+from care_core.records import Record
 
 
-@dataclass(frozen=True)
-class Identification:
+class Identification(Record):
     """Whether p(objective | do(option)) follows from the runs, and how.
 
     `functional` is empty where it does not. With `by_adjustment`, averaging p(objective | option, adjustment) over

@@ -8,7 +8,6 @@ over the training runs that have all of them, and kept only where it predicts ot
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -22,6 +21,7 @@ from care_core.causal.model import Mediation, OutcomeRecord
 from care_core.learn.fitting import left_out
 from care_core.learn.relative import left_out_together
 from care_core.profile.schema import Schema
+from care_core.records import replace
 from care_core.variables import Role
 
 MOST = 3

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -18,6 +17,7 @@ from care_core.learn.fault_files import FAULTY_RUNS, FaultFile
 from care_core.learn.outcomes import met
 from care_core.learn.transfer import carry_over
 from care_core.profile.schema import Schema
+from care_core.records import replace
 from care_core.variables import Threshold
 
 SLOPES = 3

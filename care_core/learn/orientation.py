@@ -6,7 +6,6 @@ Arrowheads and tails that FCI found stay; only circles are resolved. Domain cons
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from care_core.causal.graph import Edge
 from care_core.learn.constraints import Constraints
 from care_core.learn.discovery import Mark, Pag, PagEdge
 from care_core.learn.table import FloatArray
+from care_core.records import Record
 from care_core.variables import Role
 
 BINS = 8
@@ -27,8 +27,7 @@ RESTARTS = 4
 ITERATIONS = 150
 
 
-@dataclass(frozen=True)
-class Resolved:
+class Resolved(Record):
     """The edges of the mixed graph, and what had to give way for it to have no cycle."""
 
     directed: frozenset[Edge]
@@ -72,8 +71,7 @@ def resolve(
     return Resolved(frozenset(directed), frozenset(bidirected), tuple(notes))
 
 
-@dataclass(frozen=True)
-class _Reading:
+class _Reading(Record):
     """What an edge may become: its directed `ways`, best first; none means bidirected."""
 
     pair: Edge

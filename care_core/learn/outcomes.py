@@ -9,7 +9,6 @@ which it exists.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -38,6 +37,7 @@ from care_core.learn.knowledge import with_known
 from care_core.learn.relative import left_out_together, needs
 from care_core.learn.table import varying
 from care_core.profile.schema import Schema
+from care_core.records import Record, replace
 from care_core.variables import Events, Role, Variable
 
 MIN_CLASS = 5
@@ -48,8 +48,7 @@ FEW_RUNS = 250
 without it: 71 and 65 of 77 from 150 runs, 78 and 62 of 79 from 200, 78 and 76 of 78 from 300."""
 
 
-@dataclass(frozen=True)
-class Stage:
+class Stage(Record):
     """A stage as found in the table. `reached` and `passed` have shape (n,); the latter counts only where reached."""
 
     variable: str
@@ -178,8 +177,7 @@ def fit_outcomes(
     return put_together(sought, [question.answer() for one in sought for question in one.questions])
 
 
-@dataclass(frozen=True, eq=False)
-class Sought:
+class Sought(Record, eq=False):
     """An objective, its stages if it has any, and the questions whose answers are its mechanisms: one each."""
 
     objective: str
@@ -269,8 +267,7 @@ def ask_total(
     return ask(sets, name, frame, schema, rng, effort=effort)
 
 
-@dataclass(frozen=True, eq=False)
-class _Set:
+class _Set(Record, eq=False):
     """Inputs that a target may be read from, their values in the known runs, shape (n, p), the runs that a fit keeps,
     and what is added to its loss."""
 
@@ -280,8 +277,7 @@ class _Set:
     penalty: float
 
 
-@dataclass(frozen=True, eq=False)
-class Question:
+class Question(Record, eq=False):
     """A target as a function of the input set that predicts left-out runs best.
 
     What chance decides was drawn when it was asked, so any process may answer it, in any order.
@@ -369,8 +365,7 @@ def _is_binary(y: FloatArray) -> bool:
     return set(np.unique(y)) <= {0.0, 1.0}
 
 
-@dataclass(frozen=True)
-class _Parts:
+class _Parts(Record):
     """How many like parts the missions have that hold a target, and the variance of their mean that each part alone
     explains."""
 

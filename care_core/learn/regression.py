@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from care_core.learn.table import FloatArray, normal_scores
+from care_core.records import Record
 
 ROWS_PER_COLUMN = 3
 """Runs that each fitted column must have; with fewer, only options that matter marginally are held."""
@@ -87,8 +87,7 @@ class Regressions:
         return self._fits[key]
 
 
-@dataclass(frozen=True, eq=False)
-class _Design:
+class _Design(Record, eq=False):
     """A design matrix `x` of shape (n, q) with the pseudo-inverse of x'x, its rank, and what only each block holds.
 
     Metrics of missions that never flew are missing together: columns repeat each other, and only what is a block's

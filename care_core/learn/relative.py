@@ -6,14 +6,13 @@ how bad a run was, look at the ratio. Mechanisms do not: they take the nominal o
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from care_core.causal.kernel import FloatArray
 from care_core.profile.schema import Schema
+from care_core.records import replace
 from care_core.variables import Role, Variable
 
 ENOUGH_PARTS = 10

@@ -9,7 +9,6 @@ the strongest recorded one explains.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -18,10 +17,10 @@ from care_core.learn.fitting import MIN_ROWS
 from care_core.learn.outcomes import badness
 from care_core.learn.table import FloatArray, normal_scores, varying
 from care_core.profile.schema import Schema
+from care_core.records import Record
 
 
-@dataclass(frozen=True)
-class Robustness:
+class Robustness(Record):
     """`value`: share of both that a hidden cause must explain. `strongest`: share of the objective that any other
     recorded option or context explains."""
 

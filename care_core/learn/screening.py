@@ -5,8 +5,6 @@ The search grows steeply with the number of options, and a vehicle has hundreds 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -15,6 +13,7 @@ from scipy.stats import false_discovery_control
 
 from care_core.learn.table import FloatArray, normal_scores
 from care_core.profile.schema import Schema
+from care_core.records import Record
 
 BINS = 5
 LEAST_COUNT = 5
@@ -23,8 +22,7 @@ CUTS = ndtri(np.arange(1, BINS) / BINS)
 """Normal scores are standardised, so the normal quantiles cut them into equally filled bins."""
 
 
-@dataclass(frozen=True, eq=False)
-class Screening:
+class Screening(Record, eq=False):
     """`p_values`: one row an option, one column a metric or objective. Constant options have p = 1."""
 
     kept: tuple[str, ...]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -19,14 +18,14 @@ from care_core.learn.relative import relative
 from care_core.learn.screening import pairwise_correlation, screen_options
 from care_core.learn.table import normal_scores, varying
 from care_core.profile.schema import Schema
+from care_core.records import Record
 from care_core.variables import Role
 
 REPEATS = 0.98
 """Rank correlation from which two metrics say the same thing."""
 
 
-@dataclass(frozen=True, eq=False)
-class Structure:
+class Structure(Record, eq=False):
     """What was learned. `graph` has all variables of the schema; those set aside stand alone in it."""
 
     graph: CausalGraph

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -43,6 +42,7 @@ from care_core.learn.skill import cross_validated_skill
 from care_core.learn.structure import Structure, learn_structure
 from care_core.learn.table import varying
 from care_core.profile.schema import Schema
+from care_core.records import Record, replace
 
 Edge = tuple[str, str]
 Progress = Callable[[str, float], None]
@@ -57,8 +57,7 @@ WITNESS_Z = 1.96
 QUANTILES = np.linspace(0, 1, 21)
 
 
-@dataclass(frozen=True)
-class TrainSettings:
+class TrainSettings(Record):
     """What steers training. `n_jobs` processes share the bootstrap; the answer does not depend on them."""
 
     seed: int = 0
@@ -98,8 +97,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, report:
     return assemble(frame, schema, learned, settings, rng, report)
 
 
-@dataclass(frozen=True, eq=False)
-class Learned:
+class Learned(Record, eq=False):
     """A graph as found in runs, the share of resamples that hold each finding, and the mechanisms on it."""
 
     graph: CausalGraph
@@ -141,8 +139,7 @@ def assemble(
     )
 
 
-@dataclass(frozen=True)
-class _Resamples:
+class _Resamples(Record):
     """Row numbers of each bootstrap resample, shape (EFFECT_RESAMPLES, n): the same for every mechanism."""
 
     rows: NDArray[np.int64]
@@ -152,8 +149,7 @@ class _Resamples:
         return cls(rng.integers(0, n, size=(EFFECT_RESAMPLES, n)))
 
 
-@dataclass(frozen=True)
-class _Measured:
+class _Measured(Record):
     """Eq. 1 on the whole table, and its magnitude in each resample, shape (EFFECT_RESAMPLES,)."""
 
     effect: Effect

@@ -9,9 +9,7 @@ near them it is theirs.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -31,6 +29,7 @@ from care_core.learn.relative import ENOUGH_PARTS, missions_of, relative
 from care_core.learn.screening import screen_options
 from care_core.learn.train import Learned, TrainSettings, assemble
 from care_core.profile.schema import Schema
+from care_core.records import Record, replace
 from care_core.variables import Role
 
 TRUST = 10.0
@@ -43,8 +42,7 @@ ENOUGH_FOR_EFFECTS = 100
 Progress = Callable[[str, float], None]
 
 
-@dataclass(frozen=True)
-class OutOfSupport:
+class OutOfSupport(Record):
     """An option of the target that left what the source was trained on, and the two spans."""
 
     option: str
@@ -86,9 +84,9 @@ def _shifted_only(source: Model, schema: Schema, frame: pd.DataFrame, settings: 
         *(f"{option}." for option in out_of_support(source, schema, frame)),
     )
     runs = source.training.runs + len(frame)
-    training = dataclasses.replace(source.training, origin=_origin(source, settings), runs=runs, notes=notes)
+    training = replace(source.training, origin=_origin(source, settings), runs=runs, notes=notes)
     summaries = {name: summary.with_values(ratios[name]) for name, summary in source.summaries.items()}
-    return dataclasses.replace(
+    return replace(
         source,
         schema_digest=schema.digest,
         outcomes=outcomes,
@@ -171,7 +169,7 @@ def carry_over(
         known = rows & frame[list(names)].notna().all(axis=1).to_numpy() & (values > LEAST[mechanism.transform])
         effort = METRIC if schema.variables[name].role is Role.METRIC and key == name else OUTCOME
         read = {mechanism.inputs[place] for place in mechanism.reads} | set(causes_of(name, graph, schema))
-        inputs = dataclasses.replace(inputs_of(names, schema), read=np.array([name in read for name in names]))
+        inputs = replace(inputs_of(names, schema), read=np.array([name in read for name in names]))
         x = frame.loc[known, list(inputs.names)].to_numpy(dtype=float)
         groups = np.arange(len(x)) if missions is None else missions[known]
         mechanisms[key] = started_from(mechanism, x, values[known], inputs, groups, rng, effort)
@@ -281,13 +279,13 @@ def _with_regression(
     share = _share(before, coded)
     rest = fit(x, coded - share * before, inputs, binary=False, effort=effort, transform="identity", groups=groups)
     mechanism = rest.mechanism
-    carried = dataclasses.replace(mechanism, transform=source.transform, binary=source.binary, prior=(source, share))
+    carried = replace(mechanism, transform=source.transform, binary=source.binary, prior=(source, share))
     if not source.binary:
         return Fitted(carried, rest.loss)
     errors, _ = left_out(mechanism.kernel, mechanism.points, mechanism.targets, groups)
     held_out = coded - mechanism.scale * errors
     calibration = logistic(held_out, y)
-    return Fitted(dataclasses.replace(carried, calibration=calibration), _loss_of_odds(calibration, held_out, y))
+    return Fitted(replace(carried, calibration=calibration), _loss_of_odds(calibration, held_out, y))
 
 
 def _coded(source: Mechanism, y: FloatArray) -> FloatArray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from care_core.configs.driven import option_value, readable
@@ -14,6 +13,7 @@ from care_core.lint import ardupilot, contradictions, generic, navigation
 from care_core.lint.reading import read_document
 from care_core.lint.records import Document, Entry, Finding, Severity
 from care_core.metadata.navigation import DISTRIBUTIONS
+from care_core.records import Record
 from care_core.run import Setting
 
 if TYPE_CHECKING:
@@ -23,8 +23,7 @@ _VEHICLES = ("copter", "plane", "rover", "sub", "tracker", "blimp")
 _MAY_BE_ELSEWHERE = frozenset({"unknown-key", "misplaced-key", "not-loaded"})
 
 
-@dataclass(frozen=True, slots=True)
-class Linted:
+class Linted(Record):
     """One file and what was found in it, in the order of its lines."""
 
     document: Document

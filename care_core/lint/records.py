@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
 from care_core.configs.formats import ConfigFormat
+from care_core.records import Record
 
 
 class Severity(str, Enum):
@@ -20,8 +20,7 @@ class Severity(str, Enum):
     """Worth a look, and often meant."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(Record):
     """A value in a file: the keys that lead to it, and where it stands, from 1."""
 
     keys: tuple[str, ...]
@@ -42,8 +41,7 @@ class Entry:
         return None if isinstance(self.value, str) else float(self.value)
 
 
-@dataclass(frozen=True, slots=True)
-class Document:
+class Document(Record):
     """A configuration file, read as far as it can be."""
 
     path: Path
@@ -55,8 +53,7 @@ class Document:
     namespace: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(Record):
     """Something wrong at one place of a file."""
 
     rule: str

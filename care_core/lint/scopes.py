@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 
 from care_core.configs.formats import ConfigFormat
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.records import Document, Entry
 from care_core.metadata import navigation
 from care_core.metadata.navigation import Ros
+from care_core.records import Struct, field
 
 Keys = tuple[str, ...]
 
@@ -39,8 +39,7 @@ _TOGETHER = {"RotationShimController": "primary_controller"}
 """A plugin that hands its own parameters on to another, and the key that names that one."""
 
 
-@dataclass(slots=True)
-class Place:
+class Place(Struct, eq=False):
     """A value with who reads it: `owners` is empty where nobody knows."""
 
     entry: Entry
@@ -51,8 +50,7 @@ class Place:
     """The keys that lead to the owner."""
 
 
-@dataclass(slots=True)
-class Scoped:
+class Scoped(Struct, eq=False):
     """A file's values with their readers, and the parts that nothing loads."""
 
     ros: Ros

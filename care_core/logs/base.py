@@ -8,7 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from care_core.frozen import dataclass
+from care_core.records import Record
 from care_core.run import Damage, Setting
 
 if TYPE_CHECKING:  # a log is told by its first bytes before anything needs numbers
@@ -31,8 +31,7 @@ class LogFormat(str, Enum):
     MCAP = "mcap"
 
 
-@dataclass(frozen=True, slots=True)
-class Channel:
+class Channel(Record):
     """A topic or message type: what it carries and how often (`rate_hz` over the channel's own span)."""
 
     name: str
@@ -81,8 +80,7 @@ class LazyColumns(Mapping[str, Any]):
     def kind(self, name: str) -> Kind: ...
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Table:
+class Table(Record, eq=False):
     """Decoded messages of one channel.
 
     `t` has shape (n,), seconds since the start of the log. Each column has shape (n,): float64 for numbers,

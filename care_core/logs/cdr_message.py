@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from care_core.logs.ros_message import (
     read_elements,
     read_numbers,
 )
+from care_core.records import Struct
 
 HEADER_SIZE = 4
 _BIG, _LITTLE = b"\x00\x00", b"\x00\x01"
@@ -35,8 +36,7 @@ _WIDTHS = (4, 2)
 _MAX_PADDING = 3
 
 
-@dataclass(slots=True)
-class CdrDecoder:
+class CdrDecoder(Struct, eq=False, dict=True):
     """Fulfils `Decoder` for messages with an encapsulation header; the steps of an endianness are made when met."""
 
     type_name: str
@@ -44,14 +44,21 @@ class CdrDecoder:
     wanted: Sequence[str]
     zero_ns: int
     wide: int = 4
-    paths: tuple[str, ...] = field(init=False)
-    is_number: tuple[bool, ...] = field(init=False)
-    _by_header: dict[bytes, MessageDecoder] = field(init=False)
 
     def __post_init__(self) -> None:
-        usual = self._compile("<")
-        self._by_header = {_LITTLE: usual}
-        self.paths, self.is_number = usual.paths, usual.is_number
+        _ = self._by_header  # a type that nobody can decode is an error here
+
+    @cached_property
+    def _by_header(self) -> dict[bytes, MessageDecoder]:
+        return {_LITTLE: self._compile("<")}
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        return self._by_header[_LITTLE].paths
+
+    @property
+    def is_number(self) -> tuple[bool, ...]:
+        return self._by_header[_LITTLE].is_number
 
     def decode(self, buffer: Buffer, pos: int, end: int) -> list[Any]:
         """The wanted values of the message at buffer[pos:end]. Raises MalformedMessageError."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.frozen import dataclass
+from care_core.records import Record, Struct
 from care_core.run import Damage
 
 Floats = NDArray[np.float64]
@@ -28,8 +28,7 @@ PAUSE_S = 86_400.0
 _STEADY = 20  # records in a row that agree with each other say what the clock is
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Clock:
+class Clock(Record, eq=False):
     """Seconds since the start of a log. `places` are the bytes from which on `shifts` are taken off the stamps."""
 
     first_s: float
@@ -93,8 +92,7 @@ def clock_of(pieces: Iterable[tuple[Floats, Offsets]]) -> tuple[Clock, list[tupl
     return clock, sorted(spans), jumps
 
 
-@dataclass(slots=True)
-class _Run:
+class _Run(Struct, eq=False):
     """Records in a row in which each stamp follows from the one before: how many, the bytes of the first and the last,
     and their stamps."""
 

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 
 from care_core import limits
 from care_core.errors import LogError
-from care_core.frozen import dataclass
 from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, shortest, wall_clock
 from care_core.logs.base import Channel, Kind, LazyColumns, LogFormat, Table, Wanted
 from care_core.logs.clock import Clock, clock_of
 from care_core.logs.damage import summarised
 from care_core.logs.mapped import Bytes, FileArray, Offsets, give_back, stored_in
+from care_core.records import Record
 from care_core.run import Damage, Setting
 
 Floats = NDArray[np.float64]
@@ -60,8 +60,7 @@ class RecordField(NamedTuple):
         return "text" if self.dtype.kind == "S" else "other" if self.dtype.shape else "number"
 
 
-@dataclass(frozen=True, slots=True)
-class Format:
+class Format(Record):
     """One message type as declared by an FMT record at byte `byte`."""
 
     type: int

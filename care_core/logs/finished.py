@@ -10,12 +10,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from care_core.logs.finding import LOG_SUFFIXES, SHARED_SUFFIX, begins_like_a_log
 from care_core.logs.recording import ROS1_SUFFIXES, ROS2_SUFFIXES, parse_part
 from care_core.logs.ros_metadata import FILE_NAME, parse_metadata
+from care_core.records import Record, Struct, field
 
 QUIET_S = 10.0
 """A recorder that writes less often than this, and a mount that tells of a change later, want a longer time: NFS keeps
@@ -34,8 +34,7 @@ _BAG_HEAD_BYTES = 4096
 _INDEX_POS = re.compile(rb"index_pos=(.{8})", re.DOTALL)
 
 
-@dataclass(frozen=True, slots=True)
-class Sight:
+class Sight(Record):
     """A log as it lies there: a file, or the folder of one recording."""
 
     path: Path
@@ -45,15 +44,13 @@ class Sight:
     """What says that it is not finished; empty where nothing does."""
 
 
-@dataclass(frozen=True, slots=True)
-class _File:
+class _File(Record):
     name: str
     size: int
     written_ns: int
 
 
-@dataclass(slots=True)
-class Patience:
+class Patience(Struct, eq=False):
     """How long each log has been at rest. Times are seconds of a clock that only goes forward."""
 
     quiet_s: float = QUIET_S

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from care_core.logs.ros_message import Buffer, MalformedMessageError
+from care_core.records import Record
 
 _NANOSECONDS = ("nsec", "nanosec", "nsecs")
 _SECONDS = ("sec", "secs")
 
 
-@dataclass(frozen=True, slots=True)
-class JsonDecoder:
+class JsonDecoder(Record):
     """Fulfils `Decoder`."""
 
     paths: tuple[str, ...]

@@ -8,7 +8,6 @@ between them. Everything works on whole arrays: nothing here loops over packets.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
 from typing import Any, NamedTuple
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.logs.mapped import Bytes, FileArray
+from care_core.records import Record
 
 Offsets = NDArray[np.int64]
 
@@ -43,8 +43,7 @@ class PacketField(NamedTuple):
     dtype: np.dtype[Any]
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
+class Message(Record):
     """One message of the MAVLink definitions. `extra` is what its checksum adds."""
 
     id: int
@@ -53,8 +52,7 @@ class Message:
     fields: Mapping[str, PacketField]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Packets:
+class Packets(Record, eq=False):
     """Packets of a file, arrays of shape (n,): first byte of the stamp, one past the last byte, message, sender."""
 
     start: Offsets

@@ -9,7 +9,6 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from io import BytesIO
 from typing import Any, NamedTuple
 
@@ -25,6 +24,7 @@ from care_core.logs.compression import CannotUnpackError, Unpacker
 from care_core.logs.mapped import FileBytes
 from care_core.logs.message_index import ChunkIndex, MessageIndex
 from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Source
+from care_core.records import Record, Struct, field
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -47,8 +47,7 @@ _STRETCH = 1 << 16
 """Bytes of messages that are taken at a time."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class McapChunk:
+class McapChunk(Record, eq=False):
     """A chunk: where its packed records lie in the file."""
 
     pos: int
@@ -97,15 +96,14 @@ class McapChunk:
         return ""
 
 
-@dataclass(slots=True)
-class McapContents:
+class McapContents(Struct, eq=False):
     """What a walk over a file finds."""
 
     profile: str = ""
     schemas: dict[int, records.Schema] = field(default_factory=dict)
     channels: dict[int, records.Channel] = field(default_factory=dict)
     chunks: list[McapChunk] = field(default_factory=list)
-    index: MessageIndex = field(init=False)
+    index: MessageIndex = field(default_factory=lambda: MessageIndex([], ENTRY))
     metadata: list[records.Metadata] = field(default_factory=list)
     statistics: records.Statistics | None = None
     flaws: dict[str, Flaw] = field(default_factory=dict)

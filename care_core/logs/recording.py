@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from care_core.errors import LogError
 from care_core.logs.ros_log import Flaw
 from care_core.logs.ros_metadata import FILE_NAME, Metadata, parse_metadata
+from care_core.records import Record, field
 
 ROS2_SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 ROS1_SUFFIXES = (".bag", ".bag.active")
@@ -22,8 +22,7 @@ _DATE = re.compile(r"\d{4}(-\d\d){5}")
 """What `rosbag record` puts into the name of each part: when that part was begun."""
 
 
-@dataclass(frozen=True, slots=True)
-class Recording:
+class Recording(Record):
     """The files of a recording in order, what is said beside them, and the files that are missing."""
 
     files: tuple[Path, ...]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +18,7 @@ from care_core.logs.compression import CannotUnpackError, Unpacker
 from care_core.logs.mapped import FileBytes
 from care_core.logs.message_index import ChunkIndex, MessageIndex
 from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Source
+from care_core.records import Record, Struct, field
 
 MAGIC = b"#ROSBAG V2.0\n"
 
@@ -36,8 +36,7 @@ _MOST_AHEAD = 16
 _IS_MESSAGE = b"\x04\x00\x00\x00op=\x02"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BagChunk:
+class BagChunk(Record, eq=False):
     """A chunk: where its data lies in the file, and per connection id the entries of its messages."""
 
     pos: int
@@ -73,13 +72,12 @@ class BagChunk:
         return unpack.stretch(self.start, self.end, self.size, needed)
 
 
-@dataclass(slots=True)
-class BagContents:
+class BagContents(Struct, eq=False):
     """What a walk over a bag finds."""
 
     connections: dict[int, Connection] = field(default_factory=dict)
     chunks: list[BagChunk] = field(default_factory=list)
-    index: MessageIndex = field(init=False)
+    index: MessageIndex = field(default_factory=lambda: MessageIndex([], ENTRY))
     flaws: dict[str, Flaw] = field(default_factory=dict)
     is_encrypted: bool = False
 

@@ -6,7 +6,6 @@ import shutil
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -26,6 +25,7 @@ from care_core.logs.recording import recording_at
 from care_core.logs.ros_log import Connection, Flaw, Message, RosLog
 from care_core.logs.ros_metadata import Metadata, parse_metadata
 from care_core.logs.sqlite_pages import MAGIC, BrokenCellError, Pages, StoredRow, is_blob, is_text, promised_size
+from care_core.records import Struct, field
 
 _WHAT = "a SQLite file"
 _SOUND = " AND ".join(f"typeof({column}) = 'integer'" for column in ("id", "topic_id", "timestamp"))
@@ -134,8 +134,7 @@ class Db3Part:
         return pages
 
 
-@dataclass(slots=True)
-class _Contents:
+class _Contents(Struct, eq=False):
     """What a bag's tables hold beside the messages' data; `topics` has name, type and serialisation by id."""
 
     topics: dict[int, tuple[str, str, str]] = field(default_factory=dict)

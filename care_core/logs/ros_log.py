@@ -6,7 +6,6 @@ The files (`Part`) know where messages lie; this module knows what they mean.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from functools import cached_property
 from pathlib import Path
@@ -26,6 +25,7 @@ from care_core.logs.ros_message import Buffer, Decoder, MalformedMessageError, s
 from care_core.logs.ros_metadata import Metadata
 from care_core.logs.ros_settings import setting_fields, settings_in
 from care_core.logs.ros_types import cdr_types
+from care_core.records import Record, Struct, field, replace
 from care_core.run import Damage, Setting
 from care_core.text import clock
 
@@ -50,8 +50,7 @@ Message = tuple[int, int, Buffer, int, int]
 """Connection number, record time in ns, and where the message lies: buffer, begin, end."""
 
 
-@dataclass(frozen=True, slots=True)
-class Connection:
+class Connection(Record):
     """A publisher's side of a topic; the same topic may have several, even of different types."""
 
     topic: str
@@ -63,8 +62,7 @@ class Connection:
     """What the definition is written in, where there is a choice: `ros2msg` or `ros2idl`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Flaw:
+class Flaw(Record):
     """What is broken in a part, at which byte, at which record time; `cuts`: nothing after it is known."""
 
     what: str
@@ -117,8 +115,7 @@ class Part(Protocol):
         """The wanted messages, in any order of the connections."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Broken:
+class _Broken(Record):
     """Messages of a topic that cannot be decoded: why the first one cannot, when it was, how many there are."""
 
     why: str
@@ -404,16 +401,14 @@ class RosLog:
             yield Damage(text, None, self._seconds(at))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Piece:
+class _Piece(Record, eq=False):
     """Decoded messages of one connection: record times in ns, and a column per path."""
 
     times_ns: NDArray[np.int64]
     columns: Mapping[str, NDArray[Any]]
 
 
-@dataclass(slots=True)
-class _Gathered:
+class _Gathered(Struct, eq=False):
     """Decoded messages of one connection as they come."""
 
     decoder: Decoder

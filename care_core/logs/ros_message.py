@@ -10,13 +10,13 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import count
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from care_core import limits
+from care_core.records import Record, Struct, field
 
 Buffer = bytes
 Step = Callable[[Buffer, int, int, list[Any]], int]
@@ -56,8 +56,7 @@ class Decoder(Protocol):
         """The wanted values of the message at buffer[pos:end]. Raises MalformedMessageError."""
 
 
-@dataclass(frozen=True, slots=True)
-class MessageDecoder:
+class MessageDecoder(Record):
     """The steps of one message, fulfilling `Decoder` where the message begins at `pos` itself."""
 
     paths: tuple[str, ...]
@@ -195,8 +194,7 @@ def compile_decoder(
         raise MalformedMessageError("an array of its definition is too long") from err
 
 
-@dataclass(slots=True)
-class _Plan:
+class _Plan(Struct, eq=False):
     """The steps of one message, gathered field by field; `pending` is a stretch of fixed size."""
 
     types: Types

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 from care_core import plain_yaml
+from care_core.records import Record, field, replace
 from care_core.run import Setting
 
 FILE_NAME = "metadata.yaml"
@@ -21,8 +21,7 @@ _NO_DISTRO = "rosbags"
 _UNSET_NS = 2**63 - 1
 
 
-@dataclass(frozen=True, slots=True)
-class Metadata:
+class Metadata(Record):
     """What is known beside the messages; empty or None where it is not said."""
 
     distro: str = ""

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.frozen import dataclass
 from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted
+from care_core.records import Record
 
 Floats = NDArray[np.float64]
 Sample = tuple[float, tuple[Any, ...]]
@@ -68,8 +68,7 @@ def as_dataflash(log: Log) -> Log:
     return _Declared(log) if log.format in (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT) else log
 
 
-@dataclass(frozen=True, eq=False)
-class _Declared:
+class _Declared(Record, eq=False):
     """A DataFlash log whose declarations may be broken: a field that holds text for numbers, or numbers for text, is as
     good as absent."""
 
@@ -89,8 +88,7 @@ def _as_expected(table: Table) -> Table:
     return table if len(names) == len(table.columns) else Table(table.t, {name: table[name] for name in names})
 
 
-@dataclass(frozen=True, eq=False)
-class _Telemetry:
+class _Telemetry(Record, eq=False, dict=True):
     """A telemetry log with the messages of a DataFlash log beside its own. Everything else is the log's."""
 
     log: Log

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from care_core.metadata.fact import Fact, number
 from care_core.metadata.families import expanded
 from care_core.metadata.words import word_of
+from care_core.records import Record
 
 _TABLE = Path(__file__).with_name("ardupilot.tsv")
 SOURCE = "ArduPilot's parameter list"
@@ -29,8 +29,7 @@ RELEASES: Mapping[str, tuple[str, ...]] = {
 NAMES = {"C": "Copter", "P": "Plane", "R": "Rover", "S": "Sub", "T": "Tracker", "B": "Blimp"}
 
 
-@dataclass(frozen=True, slots=True)
-class Release:
+class Release(Record):
     """A release of one vehicle's firmware."""
 
     vehicle: str
@@ -44,8 +43,7 @@ class Release:
 ALL = tuple(Release(vehicle, version) for vehicle, versions in RELEASES.items() for version in versions)
 
 
-@dataclass(frozen=True, slots=True)
-class _Row:
+class _Row(Record):
     releases: frozenset[Release]
     cells: tuple[str, ...]
 

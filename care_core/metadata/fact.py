@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
+
+from care_core.records import Record
 
 FactType = Literal["float", "int", "bool", "enum", "str", "list", ""]
 
 
-@dataclass(frozen=True, slots=True)
-class Fact:
+class Fact(Record):
     """What a table says of a parameter; None or empty where its source says nothing.
 
     Values that are listed are exhaustive only where no range is given: ArduPilot lists presets beside a range.

@@ -9,7 +9,6 @@ import math
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -33,9 +32,8 @@ from care_core.causal.model import (
 from care_core.causal.nominal import FORMULAS, Nominal
 from care_core.errors import ProfileError
 from care_core.files import replace_file, sync_folder
-from care_core.frozen import dataclass
 from care_core.numbers import six_digits
-from care_core.records import UnfitError, plain, read
+from care_core.records import Record, UnfitError, asdict, field, plain, read, replace
 
 ARCHIVE = b"PK\x03\x04"
 _DAMAGED = (ValueError, TypeError, KeyError, EOFError, OverflowError, RuntimeError)
@@ -45,15 +43,13 @@ PRIOR = "prior:"
 """Begins the key of a mechanism that belongs to the platform a profile was carried over from."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _NominalRecord:
+class _NominalRecord(Record, kw_only=True):
     kind: str
     inputs: tuple[str, ...]
     scales: tuple[float, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
-class _AveragingRecord:
+class _AveragingRecord(Record, kw_only=True):
     count: str
     usual: float
     share: float
@@ -63,8 +59,7 @@ class _AveragingRecord:
             raise ValueError("usual should be above 0, share from 0 to 1")
 
 
-@dataclass(frozen=True, kw_only=True)
-class _MechanismRecord:
+class _MechanismRecord(Record, kw_only=True):
     target: str
     inputs: tuple[str, ...]
     reads: tuple[str, ...] | None = None
@@ -77,8 +72,7 @@ class _MechanismRecord:
     """Key of the mechanism of another platform that this one starts from."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _ModelFile:
+class _ModelFile(Record, kw_only=True):
     model_version: Literal[1]
     schema_digest: str
     nodes: tuple[str, ...]

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import field, replace
-from pathlib import Path
 from typing import Any, Literal
 
 from care_core.causal.nominal import Nominal, nominal
 from care_core.configs.driven import same_value
-from care_core.errors import ProfileError
-from care_core.frozen import dataclass
+from care_core.records import Record, field, replace
 from care_core.run import Evidence
 from care_core.variables import Role, Threshold, Variable
 
@@ -19,8 +16,7 @@ Side = Literal["low", "high"]
 """On which side of what training saw a value is bad."""
 
 
-@dataclass(frozen=True, slots=True)
-class EvidenceRule:
+class EvidenceRule(Record):
     """What a message of the log says about a mission: the options that its check reads, or what the run met."""
 
     text: str
@@ -51,8 +47,7 @@ def _is_default(option: Variable, value: float) -> bool:
     return option.default is not None and same_value(value, option.default)
 
 
-@dataclass(frozen=True, slots=True)
-class Schema:
+class Schema(Record):
     """A platform as people described it. `variables` keeps the order of the file."""
 
     name: str
@@ -80,7 +75,7 @@ class Schema:
     """Parameter that names a part of the stack -> what its value contains where it is the part learned from."""
     firmware_window: tuple[tuple[int, ...], tuple[int, ...]] | None = None
     """First and last version of the firmware that the profile is good for, as far as each is written."""
-    digest: str = field(default="", compare=False)
+    digest: str = ""
     """SHA-256 of the variables' names, roles, types, ranges and extraction: what a model was learned for."""
 
     def of(self, role: Role) -> tuple[Variable, ...]:
@@ -134,31 +129,3 @@ class Schema:
         if declared is None:
             return None
         return nominal(declared.kind, declared.args, {v.name: v.unit for v in self.variables.values()})
-
-
-def read_schema(path: Path) -> Schema:
-    """Read and check a `profile.yaml`.
-
-    Raises:
-        ProfileError: no such file, not YAML, or a key or value that does not belong, with the nearest known key.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as err:
-        raise ProfileError(f"Cannot read the profile: {err.strerror}.", where=str(path)) from err
-    except UnicodeDecodeError as err:
-        raise ProfileError("Not a profile: it is not text.", where=str(path)) from err
-    from care_core.profile.kept import keep, kept
-
-    schema = kept(text)
-    if schema is None:
-        schema = parse_schema(text, path)
-        keep(text, schema)
-    return schema
-
-
-def parse_schema(text: str, path: Path) -> Schema:
-    """Check the text of a `profile.yaml`; `path` names it in errors. Raises ProfileError as `read_schema`."""
-    from care_core.profile.schema_file import parsed  # pydantic, and a second of a slow processor
-
-    return parsed(text, path)

@@ -13,23 +13,19 @@ that stands beside it, for any where none does.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.errors import ConfigError, nearest
-from care_core.frozen import dataclass
 from care_core.profile.schema import Schema
+from care_core.records import Record, replace
 from care_core.variables import OwnLimit, Role, Variable
 
 if TYPE_CHECKING:
     from care_core.profile.site_file import Limit
 
-SITE_SCHEMA = "care.site/1"
 
-
-@dataclass(frozen=True, slots=True)
-class Site:
+class Site(Record):
     """Limits by profile and objective, and the file that they stand in."""
 
     path: Path

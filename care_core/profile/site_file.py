@@ -10,7 +10,8 @@ from pydantic import Field, ValidationError, model_validator
 from care_core import plain_yaml
 from care_core.errors import ConfigError
 from care_core.profile.schema_file import Bound, Strict
-from care_core.profile.site import SITE_SCHEMA
+
+SITE_SCHEMA = "care.site/1"
 
 
 class Limit(Bound):

@@ -8,15 +8,15 @@ from pathlib import Path
 from care_core.causal.model import Model
 from care_core.errors import ProfileError, nearest
 from care_core.files import PROFILE_FILE, profile_folders
-from care_core.frozen import dataclass
 from care_core.profile.model import read_model
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
+from care_core.records import Record
 
 CARD_FILE = "MODEL_CARD.md"
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(Record, eq=False, dict=True):
     """A platform: what people wrote (`schema`) and what was learned (`model`, read when first needed)."""
 
     path: Path

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
 from care_core.diagnose.baseline import Baseline, Proposal, Refused, over
 from care_core.diagnose.tolerance import CONFIDENCE, CONTENT
+from care_core.records import field
 from care_core.report.document import ProfileEntry, profile_entry
 from care_core.report.happened import FitEntry, fit_entry
-from care_core.report.published import Strict
+from care_core.report.published import Document
 from care_core.report.wording import fit_text
 from care_core.text import clean, wrapped
 from care_core.variables import Op
@@ -20,8 +20,7 @@ SCHEMA_ID: Final = "care.baseline/1"
 OPTIONS_SHOWN = 6
 
 
-@dataclass(frozen=True, kw_only=True)
-class RefusedEntry(Strict):
+class RefusedEntry(Document, kw_only=True):
     """A run that says nothing of good runs; `mission` is null where the whole log does not, or holds one."""
 
     log: str
@@ -29,8 +28,7 @@ class RefusedEntry(Strict):
     reason: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class OverEntry(Strict):
+class OverEntry(Document, kw_only=True):
     """A run that counts, and the limits of the profile that it breaks."""
 
     log: str
@@ -38,8 +36,7 @@ class OverEntry(Strict):
     limits: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class SeenEntry(Strict):
+class SeenEntry(Document, kw_only=True):
     """What the runs had: how many, and the least, middle and most of them."""
 
     runs: int
@@ -48,8 +45,7 @@ class SeenEntry(Strict):
     high: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class QuantileEntry(Strict):
+class QuantileEntry(Document, kw_only=True):
     """Where what 95 % of such runs stay within lies, with 90 %."""
 
     low: float
@@ -57,8 +53,7 @@ class QuantileEntry(Strict):
     method: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class ProposalEntry(Strict):
+class ProposalEntry(Document, kw_only=True):
     """A limit: `ratio` times what the reference configuration needs, or a `value` in the unit that belongs to
     `mission`; both null with a `reason` where none is proposed. `seen` and `quantile` are ratios where it is one."""
 
@@ -74,11 +69,10 @@ class ProposalEntry(Strict):
     reason: str | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class BaselineDocument(Strict):
+class BaselineDocument(Document, kw_only=True):
     """Limits proposed from good runs, as `care baseline --json` prints them."""
 
-    schema_: Literal["care.baseline/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.baseline/1"] = field(default=SCHEMA_ID, name="schema")
     profile: ProfileEntry
     fit: FitEntry
     logs: int

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
-from care_core.report.published import Strict
+from care_core.records import field
+from care_core.report.published import Document
 from care_core.text import clean, wrapped
 
 SCHEMA_ID: Final = "care.doctor/1"
 _WIDTH = 16
 
 
-@dataclass(frozen=True, kw_only=True)
-class CheckEntry(Strict):
+class CheckEntry(Document, kw_only=True):
     """`do` is empty where nothing is to be done."""
 
     name: str
@@ -23,11 +22,10 @@ class CheckEntry(Strict):
     do: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class DoctorDocument(Strict):
+class DoctorDocument(Document, kw_only=True):
     """What `care doctor --json` prints; `status` is the worst of the checks."""
 
-    schema_: Literal["care.doctor/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.doctor/1"] = field(default=SCHEMA_ID, name="schema")
     version: str
     status: Literal["ok", "warn", "fail"]
     checks: list[CheckEntry]

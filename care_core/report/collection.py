@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
-from care_core.report.published import Strict
+from care_core.records import field
+from care_core.report.published import Document
 from care_core.text import clean, wrapped
 
 SCHEMA_ID: Final = "care.collect/1"
@@ -14,22 +14,19 @@ SCHEMA_ID: Final = "care.collect/1"
 _MOST_FAILURES = 10
 
 
-@dataclass(frozen=True, kw_only=True)
-class VariedOption(Strict):
+class VariedOption(Document, kw_only=True):
     option: str
     low: float
     high: float
     reference: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class LeftOutOption(Strict):
+class LeftOutOption(Document, kw_only=True):
     option: str
     reason: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class CollectedRun(Strict):
+class CollectedRun(Document, kw_only=True):
     run: int
     repeats: int | None
     """The run whose configuration it repeats."""
@@ -45,11 +42,10 @@ class CollectedRun(Strict):
     """Options that the log says were driven otherwise than asked."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class CollectDocument(Strict):
+class CollectDocument(Document, kw_only=True):
     """A campaign as it stands, as `care collect --json` prints it."""
 
-    schema_: Literal["care.collect/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.collect/1"] = field(default=SCHEMA_ID, name="schema")
     campaign: str
     profile: str
     sampling: str

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
 from typing import Any, Final, Literal
 
 from care_core.configs.changes import apply_commands, unified_diff
@@ -25,8 +24,8 @@ from care_core.diagnose.records import (
     Since,
     Status,
 )
-from care_core.frozen import dataclass
 from care_core.numbers import six_digits
+from care_core.records import field
 from care_core.report.happened import (
     FindingEntry,
     FitEntry,
@@ -37,7 +36,7 @@ from care_core.report.happened import (
     fit_entry,
     hypothesis_entries,
 )
-from care_core.report.published import Strict
+from care_core.report.published import Document
 from care_core.run import Evidence, ProfileChoice, Value, is_known
 from care_core.text import clean
 from care_core.variables import ASSUMED, Change, Kind, Op, Threshold
@@ -45,22 +44,19 @@ from care_core.variables import ASSUMED, Change, Kind, Op, Threshold
 SCHEMA_ID: Final = "care.triage/1"
 
 
-@dataclass(frozen=True, kw_only=True)
-class ProfileEntry(Strict):
+class ProfileEntry(Document, kw_only=True):
     name: str
     version: str
     platform: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class DamageEntry(Strict):
+class DamageEntry(Document, kw_only=True):
     what: str
     byte: int | None
     time_s: float | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class LogEntry(Strict):
+class LogEntry(Document, kw_only=True):
     path: str
     format: str
     start: str | None
@@ -69,14 +65,12 @@ class LogEntry(Strict):
     sha256: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class ThresholdEntry(Strict):
+class ThresholdEntry(Document, kw_only=True):
     op: Op
     value: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class NeedEntry(Strict):
+class NeedEntry(Document, kw_only=True):
     """What the reference configuration would need for this mission, with its 80 % interval."""
 
     value: float
@@ -84,8 +78,7 @@ class NeedEntry(Strict):
     high: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class ObjectiveEntry(Strict):
+class ObjectiveEntry(Document, kw_only=True):
     name: str
     value: float | None
     unit: str
@@ -98,20 +91,17 @@ class ObjectiveEntry(Strict):
     reason: str | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class PredictedValue(Strict):
+class PredictedValue(Document, kw_only=True):
     value: float
     low: float
     high: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class PredictedObjective(PredictedValue):
+class PredictedObjective(PredictedValue, kw_only=True):
     status: Status
 
 
-@dataclass(frozen=True, kw_only=True)
-class CauseEntry(Strict):
+class CauseEntry(Document, kw_only=True):
     rank: int
     option: str
     path: list[str]
@@ -129,17 +119,15 @@ class CauseEntry(Strict):
     notes: list[str]
 
 
-@dataclass(frozen=True, kw_only=True)
-class FaultEntry(Strict):
+class FaultEntry(Document, kw_only=True):
     objective: str
     causes: list[CauseEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChangeEntry(Strict):
+class ChangeEntry(Document, kw_only=True):
     option: str
     parameter: str | list[str]
-    from_: int | float = field(metadata={"alias": "from"})
+    from_: int | float = field(name="from")
     to: int | float
     assumed: bool = False
     """Whether no source holds `from`."""
@@ -151,8 +139,7 @@ class ChangeEntry(Strict):
         return f"from {self.from_:g}{ASSUMED if self.assumed else ''} to {self.to:g}"
 
 
-@dataclass(frozen=True, kw_only=True)
-class FixSet(Strict):
+class FixSet(Document, kw_only=True):
     changes: list[ChangeEntry]
     p_fixed: float
     guess: bool = False
@@ -160,21 +147,18 @@ class FixSet(Strict):
     predicted: dict[str, PredictedObjective]
 
 
-@dataclass(frozen=True, kw_only=True)
-class FixEntry(FixSet):
+class FixEntry(FixSet, kw_only=True):
     alternatives: list[FixSet]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ParameterChangeEntry(Strict):
+class ParameterChangeEntry(Document, kw_only=True):
     parameter: str
     option: str | None
-    from_: float | str | None = field(metadata={"alias": "from"})
+    from_: float | str | None = field(name="from")
     to: float | str | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class SinceEntry(Strict):
+class SinceEntry(Document, kw_only=True):
     """What changed since a good run; `warnings` say what is odd about that log."""
 
     log: str
@@ -182,8 +166,7 @@ class SinceEntry(Strict):
     changes: list[ParameterChangeEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class EvidenceEntry(Strict):
+class EvidenceEntry(Document, kw_only=True):
     """A message of the log that speaks about the failure."""
 
     time_s: float | None
@@ -193,8 +176,7 @@ class EvidenceEntry(Strict):
     says: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class CircumstanceEntry(Strict):
+class CircumstanceEntry(Document, kw_only=True):
     """What the run met and no option set; `low` to `high` is where 95 % of the training runs lie."""
 
     circumstance: str
@@ -206,16 +188,14 @@ class CircumstanceEntry(Strict):
     text: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class DismissedEntry(Strict):
+class DismissedEntry(Document, kw_only=True):
     """A cause that the operator has set aside."""
 
     option: str
     reason: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class MissionEntry(Strict):
+class MissionEntry(Document, kw_only=True):
     """A mission of the log with what became of it; `judged` is the one that the document is about."""
 
     index: int
@@ -227,11 +207,10 @@ class MissionEntry(Strict):
     judged: bool
 
 
-@dataclass(frozen=True, kw_only=True)
-class TriageDocument(Strict):
+class TriageDocument(Document, kw_only=True):
     """The answer for one run, as `care triage --json` prints it."""
 
-    schema_: Literal["care.triage/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.triage/1"] = field(default=SCHEMA_ID, name="schema")
     fit: FitEntry = field(default_factory=lambda: FitEntry(verdict="fits", reasons=[]))
     profile: ProfileEntry | None
     """None where no profile fits the log."""
@@ -263,8 +242,7 @@ class TriageDocument(Strict):
     dismissed: list[DismissedEntry] = field(default_factory=list)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Report(TriageDocument):
+class Report(TriageDocument, kw_only=True):
     """The document with the diff and the commands that apply it."""
 
     diff: str

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from datetime import datetime
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
@@ -19,8 +18,9 @@ from care_core.fleet.sources import INSTALL
 from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
 from care_core.fleet.together import Fleet
 from care_core.numbers import six_digits
+from care_core.records import field
 from care_core.report.document import estimate, plain_number
-from care_core.report.published import Strict
+from care_core.report.published import Document
 from care_core.run import FitVerdict
 from care_core.text import clean, listed, wrapped
 
@@ -34,31 +34,27 @@ _SHORT = 30
 """Letters in brackets that stand on one line with the name before them."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class ExplainedEntry(Strict):
+class ExplainedEntry(Document, kw_only=True):
     what: What
     name: str
     probability: float
     kind: FindingKind | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class CauseEntry(Strict):
+class CauseEntry(Document, kw_only=True):
     option: str
     confidence: Confidence
     current: int | float
     suggested: int | float | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class SeenEntry(Strict):
+class SeenEntry(Document, kw_only=True):
     kind: FindingKind
     title: str
     severity: Severity
 
 
-@dataclass(frozen=True, kw_only=True)
-class RowEntry(Strict):
+class RowEntry(Document, kw_only=True):
     """One log. `robot` is null where the log names none, `called` is what people call it; `copy_of` names the log whose
     copy it is; `off` holds the options that are off their reference, with what they are."""
 
@@ -88,8 +84,7 @@ class RowEntry(Strict):
     off: dict[str, int | float]
 
 
-@dataclass(frozen=True, kw_only=True)
-class TraitEntry(Strict):
+class TraitEntry(Document, kw_only=True):
     """What all affected have; of the `others` so many have it too. `chance`: that some trait of the `compared` sets so
     many apart by chance."""
 
@@ -102,8 +97,7 @@ class TraitEntry(Strict):
     compared: int
 
 
-@dataclass(frozen=True, kw_only=True)
-class SinceEntry(Strict):
+class SinceEntry(Document, kw_only=True):
     """`earlier` runs before `start` were without it, of the `later` ones so many had it. `chance`: that all runs
     without it come first if the order says nothing."""
 
@@ -114,8 +108,7 @@ class SinceEntry(Strict):
     chance: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class PatternEntry(Strict):
+class PatternEntry(Document, kw_only=True):
     kind: Kind
     what: str
     name: str
@@ -131,8 +124,7 @@ class PatternEntry(Strict):
     traits: list[TraitEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class OutlookEntry(Strict):
+class OutlookEntry(Document, kw_only=True):
     name: str
     effect: Effect
     fails_now: bool
@@ -141,8 +133,7 @@ class OutlookEntry(Strict):
     why: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChangeEntry(Strict):
+class ChangeEntry(Document, kw_only=True):
     option: str
     parameter: str | list[str]
     to: int | float
@@ -150,8 +141,7 @@ class ChangeEntry(Strict):
     outlooks: list[OutlookEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class SuggestionEntry(Strict):
+class SuggestionEntry(Document, kw_only=True):
     """`change` is null where none is suggested, and `reason` says why; `best` is the best that was found then."""
 
     profile: str
@@ -160,11 +150,10 @@ class SuggestionEntry(Strict):
     best: ChangeEntry | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class FleetDocument(Strict):
+class FleetDocument(Document, kw_only=True):
     """What `care fleet --json` prints."""
 
-    schema_: Literal["care.fleet/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.fleet/1"] = field(default=SCHEMA_ID, name="schema")
     rows: list[RowEntry]
     shared: list[PatternEntry]
     suggestions: list[SuggestionEntry]

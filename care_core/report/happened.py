@@ -11,9 +11,8 @@ from typing import TypeVar
 
 from care_core.diagnose.records import Hypothesis, What
 from care_core.ecosystems.findings import Finding, FindingKind, Health, Moment, Severity
-from care_core.frozen import dataclass
 from care_core.numbers import six_digits
-from care_core.report.published import Strict
+from care_core.report.published import Document
 from care_core.report.wording import SEVERITY_WORDS, hypothesis_text, noted
 from care_core.run import Fit, FitVerdict
 from care_core.text import clean, seconds, wrapped
@@ -27,16 +26,14 @@ HYPOTHESES_SHOWN = 4
 M = TypeVar("M", bound="Moment | MomentEntry")
 
 
-@dataclass(frozen=True, kw_only=True)
-class FitEntry(Strict):
+class FitEntry(Document, kw_only=True):
     """How well the profile fits the log; `reasons` say what is missing or differs."""
 
     verdict: FitVerdict
     reasons: list[str]
 
 
-@dataclass(frozen=True, kw_only=True)
-class MomentEntry(Strict):
+class MomentEntry(Document, kw_only=True):
     """A line of the account; `time_s` counts from the start of the log, null where its source has no time."""
 
     time_s: float | None
@@ -45,8 +42,7 @@ class MomentEntry(Strict):
     source: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class ConsequenceEntry(Strict):
+class ConsequenceEntry(Document, kw_only=True):
     """A later finding that an earlier one explains."""
 
     kind: FindingKind
@@ -55,8 +51,7 @@ class ConsequenceEntry(Strict):
     severity: Severity
 
 
-@dataclass(frozen=True, kw_only=True)
-class FindingEntry(Strict):
+class FindingEntry(Document, kw_only=True):
     """Something that was not as it should be; what it explains is folded under it."""
 
     kind: FindingKind
@@ -70,8 +65,7 @@ class FindingEntry(Strict):
     consequences: list[ConsequenceEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class HypothesisEntry(Strict):
+class HypothesisEntry(Document, kw_only=True):
     """One explanation of the failure; their probabilities add up to 1. A parameter is named by its option."""
 
     what: What

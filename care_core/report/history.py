@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -11,7 +10,8 @@ from care_core.diagnose.records import Status, overall
 from care_core.history.store import HistoryError, Triaged, Verified
 from care_core.history.track_record import TrackRecord, sparkline, track_record, trends
 from care_core.history.trends import LEAST_RUNS, Direction, RobotRuns, Trend, by_robot
-from care_core.report.published import Strict
+from care_core.records import field
+from care_core.report.published import Document
 from care_core.report.wording import fit_words
 from care_core.run import FitVerdict, Robot
 from care_core.text import clean, wrapped
@@ -23,8 +23,7 @@ _CHANGES = 4
 """Most parameters that are named of those that changed at a run."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class RobotEntry(Strict):
+class RobotEntry(Document, kw_only=True):
     """`is_sure`: it tells this robot from others of its kind."""
 
     id: str
@@ -33,8 +32,7 @@ class RobotEntry(Strict):
     is_sure: bool
 
 
-@dataclass(frozen=True, kw_only=True)
-class PastTriage(Strict):
+class PastTriage(Document, kw_only=True):
     """`profile` is empty where none fitted, `fit` says how well it did; `verdict` says in words how the run went;
     `options` are those that the suggested fix changes, none without a fix."""
 
@@ -50,8 +48,7 @@ class PastTriage(Strict):
     p_fixed: float | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class PromiseBin(Strict):
+class PromiseBin(Document, kw_only=True):
     low: float
     high: float
     count: int
@@ -59,8 +56,7 @@ class PromiseBin(Strict):
     worked: int
 
 
-@dataclass(frozen=True, kw_only=True)
-class PromiseRecord(Strict):
+class PromiseRecord(Document, kw_only=True):
     """Of `count` fixes that were made and verified, `worked` did; by the promises `expected` should have."""
 
     count: int
@@ -69,17 +65,15 @@ class PromiseRecord(Strict):
     bins: list[PromiseBin]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChangedEntry(Strict):
+class ChangedEntry(Document, kw_only=True):
     """A parameter, or the firmware, that differs from the run before."""
 
     name: str
-    from_: float | str = field(metadata={"alias": "from"})
+    from_: float | str = field(name="from")
     to: float | str
 
 
-@dataclass(frozen=True, kw_only=True)
-class SinceEntry(Strict):
+class SinceEntry(Document, kw_only=True):
     """The run from which on an objective is different, and what changed at it."""
 
     at: str
@@ -90,8 +84,7 @@ class SinceEntry(Strict):
     changed: list[ChangedEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class TrendEntry(Strict):
+class TrendEntry(Document, kw_only=True):
     """How an objective went, oldest first; `unit` "x": a multiple of what the reference configuration needs. `p` is
     corrected for how many tests were made."""
 
@@ -104,8 +97,7 @@ class TrendEntry(Strict):
     since: SinceEntry | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class MissionRunsEntry(Strict):
+class MissionRunsEntry(Document, kw_only=True):
     """Runs that were asked the same, judged by one profile (empty: none fitted)."""
 
     profile: str
@@ -113,8 +105,7 @@ class MissionRunsEntry(Strict):
     trends: list[TrendEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class RobotRunsEntry(Strict):
+class RobotRunsEntry(Document, kw_only=True):
     """`robot` is None for runs of which nothing says whose they are; `faults` is the trend of having a fault."""
 
     robot: RobotEntry | None
@@ -124,11 +115,10 @@ class RobotRunsEntry(Strict):
     missions: list[MissionRunsEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class HistoryDocument(Strict):
+class HistoryDocument(Document, kw_only=True):
     """What `care history --json` prints; trends run from the oldest to the newest."""
 
-    schema_: Literal["care.history/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.history/1"] = field(default=SCHEMA_ID, name="schema")
     triages: list[PastTriage]
     trends: dict[str, list[float]]
     robots: list[RobotRunsEntry] = field(default_factory=list)

@@ -6,13 +6,13 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any, Final, Literal
 
 from care_core.ecosystems.findings import Health
 from care_core.extract.coverage import Missed, Trial
 from care_core.logs.base import Log
+from care_core.records import field
 from care_core.report.happened import (
     FindingEntry,
     FitEntry,
@@ -23,7 +23,7 @@ from care_core.report.happened import (
     finding_lines,
     fit_entry,
 )
-from care_core.report.published import Strict
+from care_core.report.published import Document
 from care_core.report.wording import fit_text
 from care_core.run import Damage, MissionInfo, ProfileChoice
 from care_core.text import WIDTH, clean, clock, wrapped
@@ -36,23 +36,20 @@ MOST_DAMAGE, MOST_CHANGED = 8, 10
 _NUMBER = re.compile(r"\d+")
 
 
-@dataclass(frozen=True, kw_only=True)
-class DamageEntry(Strict):
+class DamageEntry(Document, kw_only=True):
     what: str
     byte: int | None
     time_s: float | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReadShare(Strict):
+class ReadShare(Document, kw_only=True):
     """Seconds of the log that could be read, and about how many it had, null where nothing tells."""
 
     to_s: float
     about_s: float | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class LogEntry(Strict):
+class LogEntry(Document, kw_only=True):
     path: str
     format: str
     start: str | None
@@ -63,16 +60,14 @@ class LogEntry(Strict):
     read: ReadShare
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChannelEntry(Strict):
+class ChannelEntry(Document, kw_only=True):
     name: str
     type: str
     count: int
     rate_hz: float | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class ChangeEntry(Strict):
+class ChangeEntry(Document, kw_only=True):
     """A parameter that was changed while the log was recorded."""
 
     name: str
@@ -81,15 +76,13 @@ class ChangeEntry(Strict):
     time_s: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class ParameterEntry(Strict):
+class ParameterEntry(Document, kw_only=True):
     count: int
     sources: dict[str, int]
     changed: list[ChangeEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class MissionEntry(Strict):
+class MissionEntry(Document, kw_only=True):
     """A mission; its times are null where the log stamps nothing around it."""
 
     index: int
@@ -100,16 +93,14 @@ class MissionEntry(Strict):
     mismatch: str | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class MissedEntry(Strict):
+class MissedEntry(Document, kw_only=True):
     name: str
     role: Literal["option", "context", "metric", "objective"]
     reason: str
     hint: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class ProfileEntry(Strict):
+class ProfileEntry(Document, kw_only=True):
     """An installed profile: whether it can use the log, what of it is there, and what it would miss."""
 
     name: str
@@ -125,9 +116,8 @@ class ProfileEntry(Strict):
     missed: list[MissedEntry]
 
 
-@dataclass(frozen=True, kw_only=True)
-class InspectDocument(Strict):
-    schema_: Literal["care.inspect/1"] = field(default=INSPECT_ID, metadata={"alias": "schema"})
+class InspectDocument(Document, kw_only=True):
+    schema_: Literal["care.inspect/1"] = field(default=INSPECT_ID, name="schema")
     fit: FitEntry
     """How well the profile fits that fits best."""
     account: list[MomentEntry]

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 from xml.etree import ElementTree
 
+from care_core.records import Record
 from care_core.report.document import FaultEntry, ObjectiveEntry, Report, wanted_text
 from care_core.report.happened import finding_sentence
 from care_core.report.wording import chance, fit_text, hypothesis_text, noted
@@ -28,8 +28,7 @@ _HOST = "localhost"
 """Likewise a host; whose computer it was is nobody's business."""
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
+class Case(Record):
     """An objective, with what is to be said of it where it did not pass."""
 
     name: str
@@ -38,8 +37,7 @@ class Case:
     text: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Suite:
+class Suite(Record):
     """A log."""
 
     name: str

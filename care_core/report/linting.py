@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
 from care_core.lint.linting import Linted
 from care_core.lint.records import Finding, Severity
 from care_core.lint.rules import RULES
-from care_core.report.published import Strict
+from care_core.records import field
+from care_core.report.published import Document
 from care_core.text import clean, wrapped
 
 SCHEMA_ID: Final = "care.lint/1"
@@ -17,8 +17,7 @@ _SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 _INDENT = "    "
 
 
-@dataclass(frozen=True, kw_only=True)
-class FindingEntry(Strict):
+class FindingEntry(Document, kw_only=True):
     """Something wrong at one place of a file; line and column from 1."""
 
     rule: str
@@ -32,8 +31,7 @@ class FindingEntry(Strict):
     source: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class FileEntry(Strict):
+class FileEntry(Document, kw_only=True):
     """A file that was read, with how many values it has."""
 
     file: str
@@ -41,11 +39,10 @@ class FileEntry(Strict):
     values: int
 
 
-@dataclass(frozen=True, kw_only=True)
-class LintDocument(Strict):
+class LintDocument(Document, kw_only=True):
     """What is wrong with configuration files, as `care lint --json` prints it."""
 
-    schema_: Literal["care.lint/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.lint/1"] = field(default=SCHEMA_ID, name="schema")
     target: str
     files: list[FileEntry]
     findings: list[FindingEntry]

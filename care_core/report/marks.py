@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from care_core.records import Record
 from care_core.report.wording import noted
 
 if TYPE_CHECKING:
@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from care_core.ecosystems.findings import Severity
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
+class Mark(Record):
     """Something that happened, on an axis of time; the gravest have the least `rank`."""
 
     time_s: float

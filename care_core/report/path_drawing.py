@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
 
 from care_core.diagnose.records import Cause, Fault, PathNode
+from care_core.records import Record
 from care_core.text import clean, figures
 
 MOST = 4
@@ -28,8 +28,7 @@ Place = tuple[int, int]
 """Column and row."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Edge:
+class _Edge(Record):
     """A step: `via` are the rows it passes in the columns between."""
 
     start: str
@@ -106,8 +105,7 @@ def _lines(node: PathNode, cause: Cause, fault: Fault) -> tuple[str, ...]:
     return tuple(clean(line) for line in (node.name, here, expected))
 
 
-@dataclass(frozen=True)
-class _Drawing:
+class _Drawing(Record):
     places: Mapping[str, Place]
     texts: Mapping[str, tuple[str, ...]]
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from html import escape
 
 from care_core.diagnose.records import Fault
+from care_core.records import Record
 from care_core.report.marks import Mark
 from care_core.text import clean, figures
 
@@ -47,8 +47,7 @@ _STEPS_OF_TIME = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(Record):
     """A signal; `segments` are apart where the log has a gap."""
 
     name: str
@@ -57,16 +56,14 @@ class Line:
     """Whether it is what another line was to follow."""
 
 
-@dataclass(frozen=True, slots=True)
-class Limit:
+class Limit(Record):
     """A value that the signal was to keep, and whose limit it is."""
 
     value: float
     words: str
 
 
-@dataclass(frozen=True, slots=True)
-class Band:
+class Band(Record):
     """The time of a finding that these signals show."""
 
     start_s: float
@@ -75,8 +72,7 @@ class Band:
     words: str
 
 
-@dataclass(frozen=True, slots=True)
-class Plot:
+class Plot(Record):
     """Signals of one unit over the mission."""
 
     words: str
@@ -97,8 +93,7 @@ class Plot:
         return self.words or self.source
 
 
-@dataclass(frozen=True, slots=True)
-class Drawn:
+class Drawn(Record):
     """What a page draws beside its text: the paths of the causes, and signals from `start_s` to `end_s` of the log."""
 
     faults: tuple[Fault, ...] = ()
@@ -242,8 +237,7 @@ def _told(plot: Plot, drawn: Drawn) -> str:
     return f"{drawn.end_s - drawn.start_s:.0f} s from {drawn.since}. {'; '.join(parts)}."
 
 
-@dataclass(frozen=True, slots=True)
-class _Frame:
+class _Frame(Record):
     """From seconds and values to places."""
 
     start_s: float

@@ -1,26 +1,18 @@
-"""The frame of every published document: a frozen dataclass whose keys and types are an interface.
+"""The frame of every published document: a record whose keys and types are an interface.
 
-Each document names its format in `schema_`. Its JSON Schema is made by pydantic, from the same annotations.
+Each document names its format in `schema_`. Its JSON Schema is made from the same annotations.
 """
 
 from __future__ import annotations
 
 import json
-from inspect import cleandoc
-from typing import Any, ClassVar
+from typing import Any
 
-from care_core.records import plain
+from care_core.records import Record, plain
 
 
-class Strict:
-    """Nothing unknown, no number that JSON does not have. Subclasses are dataclasses, frozen and by keyword."""
-
-    __pydantic_config__: ClassVar[dict[str, Any]] = {"extra": "forbid", "allow_inf_nan": False}
-
-    def __init_subclass__(cls) -> None:
-        # pydantic takes the text of a dataclass for one that dataclasses wrote
-        described = {} if cls.__doc__ is None else {"json_schema_extra": {"description": cleandoc(cls.__doc__)}}
-        cls.__pydantic_config__ = Strict.__pydantic_config__ | described
+class Document(Record):
+    """Nothing unknown, no number that JSON does not have. Fields of its kinds are given by keyword."""
 
     def plain(self) -> dict[str, Any]:
         """In dicts and lists, under the names that files have."""
@@ -34,10 +26,11 @@ class Strict:
     @classmethod
     def json_schema(cls) -> dict[str, Any]:
         """The JSON Schema of the document."""
-        from pydantic import TypeAdapter
+        from msgspec.json import schema
+        from msgspec.structs import fields
 
-        schema = TypeAdapter(cls).json_schema(by_alias=True, mode="serialization")
-        return schema | {"title": getattr(cls, "schema_", cls.__name__)}
+        names = [field.default for field in fields(cls) if field.encode_name == "schema"]
+        return schema(cls) | {"title": names[0] if names else cls.__name__}
 
 
 def to_json(values: Any, indent: int | None = 2) -> str:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from care_core import plain_yaml
 from care_core.errors import ConfigError, UsageError
-from care_core.records import UnfitError, key_of, read
+from care_core.records import UnfitError, read
 from care_core.report.document import SCHEMA_ID, ProfileEntry, TriageDocument
 from care_core.text import clean
 
@@ -30,7 +29,7 @@ def read_report(path: str | Path) -> TriageDocument:
             hint="Write one with 'care triage LOG --yaml --out FILE'.",
             where=str(path),
         )
-    known = {key_of(field) for field in fields(TriageDocument)}
+    known = set(TriageDocument.__struct_encode_fields__)
     try:
         # A later version of this program may add keys; what this one knows must be sound.
         return read(TriageDocument, {key: value for key, value in data.items() if key in known})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -19,6 +18,7 @@ from care_core.diagnose.verify import (
     Verification,
 )
 from care_core.errors import ExitCode, UsageError
+from care_core.records import field
 from care_core.report.document import (
     ObjectiveEntry,
     ProfileEntry,
@@ -26,7 +26,7 @@ from care_core.report.document import (
     objective_entry,
     plain_number,
 )
-from care_core.report.published import Strict
+from care_core.report.published import Document
 from care_core.report.reading import profile_of
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import Run
@@ -51,40 +51,35 @@ _MADE_WORDS: Mapping[Made, str] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class VerifiedLog(Strict):
+class VerifiedLog(Document, kw_only=True):
     path: str
     sha256: str
     start: str | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class CheckedChange(Strict):
+class CheckedChange(Document, kw_only=True):
     """`driven` is the next run's value, null where the log does not hold it."""
 
     option: str
-    from_: int | float = field(metadata={"alias": "from"})
+    from_: int | float = field(name="from")
     to: int | float
     driven: int | float | None
     made: Made
     note: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class OtherChangeEntry(Strict):
+class OtherChangeEntry(Document, kw_only=True):
     option: str
-    from_: int | float = field(metadata={"alias": "from"})
+    from_: int | float = field(name="from")
     to: int | float
 
 
-@dataclass(frozen=True, kw_only=True)
-class Interval(Strict):
+class Interval(Document, kw_only=True):
     low: float
     high: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class CheckedObjective(Strict):
+class CheckedObjective(Document, kw_only=True):
     """An objective in both runs; `inside` says whether the outcome lies in the promised 80 % interval."""
 
     before: ObjectiveEntry
@@ -94,11 +89,10 @@ class CheckedObjective(Strict):
     inside: bool | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class VerifyDocument(Strict):
+class VerifyDocument(Document, kw_only=True):
     """Whether the fix of a report did what it promised, as `care verify --json` prints it."""
 
-    schema_: Literal["care.verify/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.verify/1"] = field(default=SCHEMA_ID, name="schema")
     profile: ProfileEntry
     report_log: VerifiedLog
     log: VerifiedLog

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from care_core.records import field
 from care_core.report.happened import HypothesisEntry
 from care_core.report.history import RobotEntry, profile_of, robot_entry, status_of, verdict_of
-from care_core.report.published import Strict
+from care_core.report.published import Document
 from care_core.report.wording import hypothesis_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.run import FitVerdict, Robot
@@ -26,12 +26,11 @@ _ROBOT_SHARE, _LOG_SHARE = 0.18, 0.27
 """Of the columns of a line; the cause takes what is left."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class WatchEntry(Strict):
+class WatchEntry(Document, kw_only=True):
     """One log. `says` is the likeliest cause, or why nothing is judged; `unfinished` why it was judged though nobody
     closed it; `is_new` is false where another watcher judged it, or an earlier call of `care`."""
 
-    schema_: Literal["care.watch/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.watch/1"] = field(default=SCHEMA_ID, name="schema")
     number: int
     at: str
     log: str

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
 
 from care_core.diagnose.whatif import Answer, Outlook, Question
 from care_core.numbers import six_digits
+from care_core.records import field
 from care_core.report.document import (
     ObjectiveEntry,
     PredictedObjective,
@@ -20,7 +20,7 @@ from care_core.report.document import (
     profile_entry,
 )
 from care_core.report.happened import FitEntry, fit_entry
-from care_core.report.published import Strict
+from care_core.report.published import Document
 from care_core.report.wording import chance, fit_text
 from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, listed, wrapped
@@ -28,29 +28,26 @@ from care_core.text import clean, listed, wrapped
 SCHEMA_ID: Final = "care.whatif/1"
 
 
-@dataclass(frozen=True, kw_only=True)
-class AskedChange(Strict):
+class AskedChange(Document, kw_only=True):
     option: str
-    from_: int | float = field(metadata={"alias": "from"})
+    from_: int | float = field(name="from")
     to: int | float
     assumed: bool
     """Whether no source holds `from`."""
     notes: list[str]
 
 
-@dataclass(frozen=True, kw_only=True)
-class OutlookEntry(Strict):
+class OutlookEntry(Document, kw_only=True):
     objective: ObjectiveEntry
     predicted: PredictedObjective | None
     p_ok: float | None
     p_ok_unchanged: float | None
 
 
-@dataclass(frozen=True, kw_only=True)
-class WhatIfDocument(Strict):
+class WhatIfDocument(Document, kw_only=True):
     """The predicted outcome of this run under changed options, as `care whatif --json` prints it."""
 
-    schema_: Literal["care.whatif/1"] = field(default=SCHEMA_ID, metadata={"alias": "schema"})
+    schema_: Literal["care.whatif/1"] = field(default=SCHEMA_ID, name="schema")
     fit: FitEntry
     profile: ProfileEntry
     log: str

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from io import StringIO
 from typing import Any
 
@@ -13,7 +12,7 @@ from care_core.report.wording import fit_text, said_without_profile
 
 STATUS_WORDS = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
 
-_UNPUBLISHED = {own.name for own in fields(Report)} - {own.name for own in fields(TriageDocument)}
+_UNPUBLISHED = set(Report.__struct_fields__) - set(TriageDocument.__struct_fields__)
 _YAML_WIDTH = 100
 
 

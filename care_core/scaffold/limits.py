@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from care_core.diagnose.tolerance import upper_quantile
 from care_core.ecosystems.examine import examine
+from care_core.records import Record
 from care_core.scaffold.measures import Measure, Measures
 from care_core.variables import RelativeThreshold, Role, Threshold, Variable
 
@@ -16,8 +16,7 @@ RATIO = 1.3
 much they differ."""
 
 
-@dataclass(frozen=True, slots=True)
-class Limit:
+class Limit(Record):
     """A bound, and where it comes from. None: the objective brings its own."""
 
     bound: Threshold | RelativeThreshold

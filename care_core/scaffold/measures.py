@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS
@@ -12,6 +11,7 @@ from care_core.ecosystems.vehicles import vehicle_of
 from care_core.errors import CareError
 from care_core.extract.read import read_runs
 from care_core.profile.schema import Schema
+from care_core.records import Record, Struct, field, replace
 from care_core.run import Run, Unavailable, is_known
 from care_core.scaffold.seen import Seen
 from care_core.variables import Extract, Role, Threshold, Variable
@@ -50,8 +50,7 @@ _MOST_SIGNALS = 40
 _WHY_SHORT = 90
 
 
-@dataclass(frozen=True, slots=True)
-class Measure:
+class Measure(Record):
     """A variable whose extractor answers, with a value a run (None where it does not), in the order of the runs."""
 
     variable: Variable
@@ -62,8 +61,7 @@ class Measure:
         return tuple(value for value in self.values if value is not None)
 
 
-@dataclass(slots=True)
-class Measures:
+class Measures(Struct, eq=False):
     """What the logs give, what they do not, and the runs they were tried on."""
 
     kept: list[Measure] = field(default_factory=list)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from care_core.ecosystems.measures import MISSION_KINDS
@@ -12,6 +11,7 @@ from care_core.ecosystems.ros.measures.drive import GOAL_TIMEOUT_S, TOLERANCE_M,
 from care_core.ecosystems.vehicles import vehicle_of
 from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
+from care_core.records import Record
 from care_core.scaffold.seen import Seen
 
 _TYPES = {"odometry": ("Odometry",), "commands": ("Twist", "TwistStamped"), "battery": ("BatteryState",)}
@@ -21,8 +21,7 @@ _SLACK = 2.0
 """A goal may take this times the longest that was reached."""
 
 
-@dataclass(frozen=True, slots=True)
-class Missions:
+class Missions(Record):
     """The section, with what is said of its keys, and whether all logs hold the same mission."""
 
     spec: Mapping[str, Any]

@@ -6,11 +6,11 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 
 from care_core.configs.driven import same_value
 from care_core.metadata.fact import Fact
 from care_core.metadata.navigation import fact_of
+from care_core.records import Record, Struct, field
 from care_core.run import Setting
 from care_core.scaffold.never import SAFETY, reason_against
 from care_core.scaffold.seen import Ecosystem, Seen
@@ -24,16 +24,14 @@ _WHOLE = 20.0
 """Vehicles log every parameter as a float. One that is whole and as large as this loses nothing by being an integer."""
 
 
-@dataclass(frozen=True, slots=True)
-class Option:
+class Option(Record):
     """A variable, and where what is said of it comes from."""
 
     variable: Variable
     remark: str
 
 
-@dataclass(slots=True)
-class Options:
+class Options(Struct, eq=False):
     """What became an option, and the parameters that did not, by reason."""
 
     chosen: list[Option] = field(default_factory=list)
@@ -43,8 +41,7 @@ class Options:
         self.left.setdefault(reason, []).append(parameter)
 
 
-@dataclass(frozen=True, slots=True)
-class _Driven:
+class _Driven(Record):
     """A parameter over all logs that hold it: every setting, and the value at the end of each log."""
 
     name: str

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from care_core.ecosystems.vehicles import vehicle_of
 from care_core.errors import LogError, UsageError
 from care_core.extract.read import reading_plan
-from care_core.profile.schema import Schema, parse_schema
+from care_core.profile.reading import parse_schema
+from care_core.profile.schema import Schema
+from care_core.records import Record, replace
 from care_core.scaffold.limits import Limit, good_runs, limits
 from care_core.scaffold.measures import Measure, Measures, find_measures
 from care_core.scaffold.missions import Missions, find_missions
@@ -22,8 +23,7 @@ from care_core.variables import RelativeThreshold, Role, Threshold, Variable
 _ONLY_SAID = "only said in /rosout (record parameter_updates or /parameter_events, or give their file with --config)"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Scaffold:
+class Scaffold(Record, eq=False):
     """A profile that was written from logs, and what it was made of."""
 
     text: str

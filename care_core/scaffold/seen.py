@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.opening import open_log
 from care_core.logs.telemetry import as_dataflash
+from care_core.records import Record
 from care_core.run import Setting
 
 Ecosystem = Literal["ardupilot", "px4", "ros1", "ros2"]
@@ -17,8 +17,7 @@ Ecosystem = Literal["ardupilot", "px4", "ros1", "ros2"]
 _ARDUPILOT = (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT, LogFormat.MAVLINK_TLOG)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class Seen(Record, eq=False):
     """A log as far as a profile is made of it."""
 
     path: Path

@@ -15,7 +15,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
@@ -26,21 +25,20 @@ from care_core.logs.opening import open_log
 from care_core.parallel import Failed, each
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
+from care_core.records import Record, Struct, field
 from care_core.tables.rows import TableRow, rows_of
 
 Report = Callable[[str, float], None]
 
 
-@dataclass(frozen=True, slots=True)
-class Failure:
+class Failure(Record):
     """A log that gave no runs, and why."""
 
     path: Path
     reason: str
 
 
-@dataclass(slots=True)
-class Ingested:
+class Ingested(Struct, eq=False):
     """The rows and failures of logs, in the order in which the logs were named; `resumed` of them were done before."""
 
     rows: list[TableRow] = field(default_factory=list)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from care_core.errors import UsageError
 from care_core.profile.schema import Schema
+from care_core.records import Record
 from care_core.tables.rows import INSTALL_LEARN
 from care_core.variables import Role, Variable
 
@@ -23,8 +23,7 @@ RUNS_FILE = "runs.csv"
 Columns = Mapping[str, Sequence[float | None]]
 
 
-@dataclass(frozen=True, slots=True)
-class Readiness:
+class Readiness(Record):
     """What stands between a table of runs and a model. `obstacles` make learning impossible, `gaps` make it poorer."""
 
     runs: int

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +11,7 @@ import care_core
 from care_core.application.case import SUFFIXES, Case, ReportFormat, Request, exit_code
 from care_core.application.remembering import remember_triage
 from care_core.errors import ExitCode, LogError, UsageError
+from care_core.records import replace
 from care_tui.commands.arguments import (
     Anonymous,
     AsJson,

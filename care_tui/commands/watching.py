@@ -10,13 +10,14 @@ import sys
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from care_core.errors import ExitCode, UsageError
+from care_core.records import Struct, field
 from care_tui.commands.arguments import ProfileName, RobotName, Site, Thresholds, bounds
 from care_tui.commands.past import NoHistory
 from care_tui.console import emit, painted, say
@@ -142,8 +143,7 @@ def _look(watcher: Watcher, screen: _Screen, notifier: Notifier | None) -> float
     return watcher.pause_s(time.monotonic() - began - spent_s)
 
 
-@dataclass(slots=True)
-class _Screen:
+class _Screen(Struct, eq=False, dict=True):
     """What is printed, and what the operator types. While the app is open, lines wait."""
 
     is_json: bool
@@ -154,12 +154,14 @@ class _Screen:
     _held: list[str] = field(default_factory=list)
     _app: subprocess.Popen[bytes] | None = None
     _status: str = ""
-    _listens: bool = field(init=False)
-    _in_place: bool = field(init=False)
 
-    def __post_init__(self) -> None:
-        self._listens = not self.is_json and all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr))
-        self._in_place = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+    @cached_property
+    def _listens(self) -> bool:
+        return not self.is_json and all(stream.isatty() for stream in (sys.stdin, sys.stdout, sys.stderr))
+
+    @cached_property
+    def _in_place(self) -> bool:
+        return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
     def begin(self, folders: Sequence[Path]) -> None:
         say(f"watching {', '.join(map(str, folders))}")

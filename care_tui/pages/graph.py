@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from textual.content import Content
 
 from care_core.application.case import Case
+from care_core.records import Record
 from care_core.run import is_known
 from care_core.text import figures
 from care_tui.pages.page import Page, View, sentence
@@ -24,8 +24,7 @@ NARROW = 66
 """Cells that the words of a neighbour need."""
 
 
-@dataclass(frozen=True, slots=True)
-class Link:
+class Link(Record):
     """A neighbour of the variable in view."""
 
     name: str

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Generic, Literal, TypeVar, cast
 
 from textual.content import Content
 
 from care_core.errors import CareError
+from care_core.records import Record
 from care_tui.render.rows import Glyphs, Row, Rows, error_rows
 from care_tui.widgets.choices import NOTHING, Listing
 
@@ -25,8 +25,7 @@ def sentence(words: str) -> Rows:
     return Rows([Row(Content(words))])
 
 
-@dataclass(frozen=True, slots=True)
-class View:
+class View(Record):
     """What a screen shows: a title, a list (may be empty), and the text beside the item under the cursor."""
 
     title: Content

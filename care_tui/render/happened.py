@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
 from care_core.ecosystems.findings import Finding, Health, Moment, Severity
+from care_core.records import Record
 from care_core.report.marks import Mark
 from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
 from care_core.text import clean, seconds
@@ -19,8 +19,7 @@ TIME_WIDTH, KIND_WIDTH = 8, 10
 _COLOURS: dict[Severity, str] = {"critical": "bold $text-error", "warning": "$text-warning", "info": ""}
 
 
-@dataclass(frozen=True, slots=True)
-class Told:
+class Told(Record):
     """A line of the pane: a finding, one that `cause` led to, or a moment of the account."""
 
     what: Finding | Moment

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from rich.cells import cell_len
@@ -23,6 +22,7 @@ from care_core.diagnose.records import (
     Status,
 )
 from care_core.errors import CareError
+from care_core.records import Record
 from care_core.text import clean
 from care_core.variables import ASSUMED, Threshold, Variable
 
@@ -33,8 +33,7 @@ FEW_RESAMPLES = 0.5
 """Edges that fewer bootstrap resamples hold are flagged."""
 
 
-@dataclass(frozen=True, slots=True)
-class Glyphs:
+class Glyphs(Record):
     """Every character outside ASCII that the app draws with, chosen here and nowhere else."""
 
     ok: str

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tempfile
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
@@ -16,6 +15,7 @@ from textual.binding import Binding, BindingType
 from care_core.application.case import Case, Request
 from care_core.diagnose.records import Fix
 from care_core.errors import CareError
+from care_core.records import Record, replace
 from care_core.report.wording import critical
 from care_tui.clipboard import fits, osc52
 from care_tui.jobs import CAUSES, Engine, Job
@@ -56,8 +56,7 @@ FOLLOW = {"graph", "history"}
 """Made anew each time: one follows what the operator looks at, the other what was remembered since."""
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(Record):
     """Where the operator stands: a step, or a view beside it, and the item under the cursor."""
 
     step: int

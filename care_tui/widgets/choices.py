@@ -12,11 +12,11 @@ from textual.events import Click, Resize
 from textual.geometry import Size
 from textual.message import Message
 
+from care_core.records import Record
 from care_tui.widgets.line_view import MARGIN, SCROLL_KEYS, LineView
 
 
-@dataclass(frozen=True, slots=True)
-class Listing:
+class Listing(Record):
     """What a list holds: `count` items of `height` lines each, built when they come into view.
 
     `item` gives the lines of one item for a width in cells; `words` what `/` searches in.

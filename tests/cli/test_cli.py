@@ -8,7 +8,6 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from care_core.application.case import Case, Request
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import NOTHING_SEEN
 from care_core.profile.store import load_profile
+from care_core.records import replace
 from care_core.tables.rows import ABOUT
 from care_tui import __version__, console
 from care_tui.cli import FAMILIES, command_line, route

@@ -13,7 +13,7 @@ from care_core import plain_yaml
 from care_core.collect.campaign import Campaign, read_campaign
 from care_core.collect.sampling import points
 from care_core.logs.opening import open_log
-from care_core.profile.schema import read_schema
+from care_core.profile.reading import read_schema
 from care_core.tables.rows import TableRow, rows_of, write_table
 from care_samples.parameters import read_parameters
 from care_samples.robot.__main__ import main

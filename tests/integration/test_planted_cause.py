@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from care_core.ecosystems.findings import NOTHING_SEEN, Finding
 from care_core.learn.train import train
 from care_core.profile.model import write_model
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.run import ProfileChoice, Run, Unavailable
 from care_core.variables import Extract, Role, Variable
 from tests.planted import (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ import pytest
 import care_core
 from care_core.diagnose.records import Hypothesis
 from care_core.errors import UsageError
+from care_core.records import replace
 
 ROOT = Path(__file__).parents[2]
 SAMPLE = ROOT / "samples" / "arducopter_failed.BIN"

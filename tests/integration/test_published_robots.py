@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from care_core.extract.select import choose_profile, sound_profiles
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 from care_core.profile.store import load_profile
+from care_core.records import replace
 from care_core.run import Unavailable
 from tests.conftest import Care
 

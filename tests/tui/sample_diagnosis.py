@@ -5,8 +5,6 @@ The faulty flight landed at 16 cm/s instead of 50: land_time grew, and with it m
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from care_core.diagnose.records import (
     Cause,
     Diagnosis,
@@ -19,6 +17,7 @@ from care_core.diagnose.records import (
     Prediction,
 )
 from care_core.ecosystems.findings import Finding, Health, Moment
+from care_core.records import replace
 from care_core.run import Damage, Evidence, Fit, FitVerdict, LogInfo, MissionInfo, ProfileChoice, Run, Setting
 from care_core.variables import Change, Role, Threshold, Variable
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from textual.widgets import Input, Static
 
+from care_core.records import replace
 from care_tui.screens.export import ExportDialog, OverwriteDialog
 from care_tui.screens.walk import WalkScreen
 from care_tui.widgets.lines import Lines

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from care_core.application.case import Case, Progress, Request
 from care_core.diagnose.records import Diagnosis, Hypothesis, MissionVerdict
 from care_core.ecosystems.findings import Health
+from care_core.records import replace
 from care_core.run import Check, MissionInfo
 from care_tui.app import CareApp
 from care_tui.settings import Settings

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ from care_core.application.remembering import remember_triage
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError
 from care_core.history.store import History
+from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.settings import Settings
 from tests.tui import sample_diagnosis as sample

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from textual.widgets import Static
 from care_core.application.case import Case, Request
 from care_core.errors import UsageError
 from care_core.files import bundled
+from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.pages.history import HistoryPage
 from care_tui.render.plot import dots_across, plot

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from care_core.diagnose.records import Circumstance, Diagnosis, Fault
 from care_core.errors import ExitCode
+from care_core.records import replace
 from care_tui.app import CareApp
 from care_tui.screens.export import ExportDialog, OverwriteDialog
 from care_tui.screens.help import HelpScreen

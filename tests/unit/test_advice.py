@@ -3,13 +3,12 @@ something failed that no parameter repairs."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from care_core.diagnose.advice import believed, by_chance, falls_short, nearest, outweighed
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
 from care_core.ecosystems.findings import Finding
+from care_core.records import replace
 from care_core.variables import Threshold
 from tests.made import LAND_SPEED, TIME, made_diagnosis
 

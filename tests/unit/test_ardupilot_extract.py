@@ -20,7 +20,8 @@ from care_core.ecosystems.ardupilot.measures.series import statistic
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission, find_extractor, merge_needs
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
 from care_core.run import Unavailable, Value, is_known
 from care_core.variables import Role
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from care_core.ecosystems.ardupilot.measures.flight import analyse
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
 from care_core.ecosystems.vehicles import is_skid_steered
 from care_core.logs.base import Table
+from care_core.records import replace
 from care_core.run import Unavailable, Value
 
 KIND = MISSION_KINDS["ardupilot_flight"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from care_core.diagnose.baseline import differing, for_any_mission, missions, propose, refusal
@@ -11,6 +9,7 @@ from care_core.diagnose.judging import Judged, judge
 from care_core.ecosystems.findings import NOTHING_SEEN, Finding
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.run import Check, Evidence, Run
 from care_core.variables import OwnLimit, RelativeThreshold, Role, Variable
 from tests.planted import SCHEMA, TIME, planted_run, with_variable

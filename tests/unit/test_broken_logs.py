@@ -21,7 +21,7 @@ from care_core.extract.read import read_run
 from care_core.logs import mapped
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.opening import open_log
-from care_core.profile.schema import read_schema
+from care_core.profile.reading import read_schema
 from care_core.profile.store import load_profile
 from care_core.run import is_known
 from tests.rewritten import write_text, write_ulog

@@ -8,7 +8,8 @@ import pytest
 
 from care_core.ecosystems.measures import MISSION_KINDS, find_extractor
 from care_core.extract.read import reading_plan
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
 from care_core.variables import Role
 
 PROFILES = sorted((Path(__file__).resolve().parents[2] / "profiles").glob("*/profile.yaml"))

@@ -1,11 +1,10 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 from care_core.causal.graph import CausalGraph
 from care_core.causal.model import SkillRecord
 from care_core.learn.card import model_card
 from care_core.profile.store import Profile
+from care_core.records import replace
 from tests.planted import SCHEMA
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +13,7 @@ from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import ConfigFormat, format_for, write_params
 from care_core.configs.loading import guesses, read_config, read_configs, resolve
 from care_core.errors import ConfigError
+from care_core.records import replace
 from care_core.run import Setting
 from care_core.variables import Change, Role, Variable
 from tests.made import DRIVEN, LAND_SPEED, made_diagnosis

@@ -1,12 +1,11 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.learn.constraints import Constraints
+from care_core.records import replace
 from care_core.variables import Role
 from tests.simulated import schema_of
 

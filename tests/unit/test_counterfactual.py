@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from care_core.causal.counterfactual import World
 from care_core.causal.mechanisms import TAIL
 from care_core.causal.model import Persistence
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.run import Unavailable
 from care_core.variables import Threshold
 from tests.planted import CALM, DEFAULTS, OPTIONS, SCHEMA, fly_many, planted_run, world_of

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from care_core.learn.evaluation import CAUSES, evaluate
 from care_core.learn.fault_files import read_faults
 from care_core.learn.naming import by_deviation, by_paper_rule, usual_values
 from care_core.profile.store import Profile, load_profile
+from care_core.records import replace
 from tests.planted import DEFAULTS, OPTIONS, SCHEMA, draw_noise, fly
 
 NAMES = [option.name for option in OPTIONS]

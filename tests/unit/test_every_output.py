@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +13,7 @@ from care_core.application.case import Reading
 from care_core.diagnose.records import Diagnosis, Fix
 from care_core.diagnose.whatif import question
 from care_core.history.store import Triaged
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.history import history_document, history_json, history_text
 from care_core.report.html import to_html

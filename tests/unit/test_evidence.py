@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -18,8 +17,10 @@ from care_core.diagnose.triage import diagnose, triage
 from care_core.errors import ProfileError
 from care_core.extract.select import choose_profile
 from care_core.logs.opening import open_log
-from care_core.profile.schema import EvidenceRule, Schema, Side, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import EvidenceRule, Schema, Side
 from care_core.profile.store import Profile, load_profile
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.markdown import to_markdown
 from care_core.report.terminal import to_text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from care_core.extract.fit import fit_of
 from care_core.extract.select import choose_profile
 from care_core.logs.opening import open_log
 from care_core.profile.store import load_profile
+from care_core.records import replace
 from tests.courier import TOLERANCE, USUAL, deliver
 
 PLUGIN = "/controller_server.FollowPath.plugin"

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.optimize import check_grad
@@ -20,6 +18,7 @@ from care_core.learn.fitting import (
     fit_mechanism,
 )
 from care_core.learn.skill import calibration_error
+from care_core.records import replace
 
 RNG = np.random.default_rng
 FULL = Effort(points=300, iterations=60)

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -21,6 +19,7 @@ from care_core.diagnose.fixes import (
     to_fix,
 )
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.variables import Role, Variable
 from tests.planted import DEFAULTS, OPTIONS, planted_run, planted_world, world_of
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ from care_core.diagnose.records import Status
 from care_core.errors import ExitCode, UsageError
 from care_core.fleet.rows import Row, by_folder, row_of, unreadable
 from care_core.fleet.together import Fleet, together
+from care_core.records import replace
 from care_core.report.fleet import check_parquet_path, fleet_json, fleet_schema, short_names, write_parquet
 from care_core.run import Robot
 from care_tui.render.fleet import MOST_ROWS, fleet_text
@@ -110,7 +110,7 @@ def test_parquet_holds_a_row_a_log_and_replaces_no_recording(tmp_path: Path) -> 
     ],
 )
 def test_the_exit_code_is_that_of_the_worst(statuses: list[str], code: ExitCode) -> None:
-    rows = [replace(unreadable(f"{n}.BIN", "why"), status=status) for n, status in enumerate(statuses)]  # type: ignore[arg-type]
+    rows = [replace(unreadable(f"{n}.BIN", "why"), status=status) for n, status in enumerate(statuses)]
     assert Fleet(tuple(rows), (), ()).exit_code == code
 
 

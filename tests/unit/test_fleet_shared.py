@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import count
 from math import comb
 from typing import Any
@@ -15,6 +14,7 @@ from hypothesis import strategies as st
 from care_core.fleet.rows import Asked, Explained, Row, Seen
 from care_core.fleet.shared import MAYBE, shared
 from care_core.fleet.together import together
+from care_core.records import replace
 from care_core.report.fleet import shared_lines
 
 _digests = count()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -17,6 +16,7 @@ from care_core.fleet.sources import Source
 from care_core.fleet.suggest import Silence, Suggestion, suggest
 from care_core.fleet.together import together
 from care_core.profile.store import Profile, load_profile
+from care_core.records import replace
 from care_core.report.fleet import suggestion_lines
 
 ROOT = Path(__file__).parents[2]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,9 @@ from care_core.errors import ProfileError
 from care_core.extract.read import read_run
 from care_core.extract.select import choose_profile
 from care_core.logs.opening import open_log
-from care_core.profile.schema import parse_schema
+from care_core.profile.reading import parse_schema
 from care_core.profile.store import Profile, load_profile
+from care_core.records import replace
 from care_core.run import Unavailable
 from tests.goal_drives import GOAL_S, drive
 

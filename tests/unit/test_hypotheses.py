@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -11,6 +9,7 @@ from hypothesis import strategies as st
 from care_core.diagnose.hypotheses import unasked, weigh
 from care_core.diagnose.records import Hypothesis
 from care_core.ecosystems.findings import Finding, Severity, Suspect
+from care_core.records import replace
 from care_core.run import Evidence
 
 

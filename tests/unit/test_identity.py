@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +12,14 @@ import pytest
 from care_core.extract.identity import identify, named, robot_of
 from care_core.logs.base import LogFormat
 from care_core.logs.opening import open_log
+from care_core.records import field
 from care_core.run import Setting
 from tests.made import MadeLog, T
 
 BOARD = "CubeOrange 003E0031 3532510E 38303638"
 
 
-@dataclass
-class _Log(MadeLog):
+class _Log(MadeLog, eq=False):
     numbers: Mapping[str, float] = field(default_factory=dict)
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
@@ -53,8 +52,7 @@ def test_a_name_cannot_steer_a_terminal() -> None:
     assert robot_of(saying(facts={"robot": "\x1b[31mred"})) == "\\x1b[31mred"
 
 
-@dataclass
-class Told(MadeLog):
+class Told(MadeLog, eq=False):
     """A log that holds parameters as well."""
 
     told: Mapping[str, float | str] = field(default_factory=dict)

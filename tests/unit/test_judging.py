@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,6 +7,7 @@ from hypothesis import strategies as st
 from care_core.causal.graph import CausalGraph
 from care_core.causal.model import Model, Summary, Training
 from care_core.diagnose.judging import judge, thresholds_in_force
+from care_core.records import replace
 from care_core.run import Unavailable, Value
 from care_core.variables import Threshold
 from tests.planted import SCHEMA, TIME, planted_run, with_variable

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,6 +14,7 @@ from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import NOTHING_SEEN
 from care_core.errors import ExitCode
 from care_core.files import bundled
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.junit import suite_of, to_junit, unreadable
 from tests.made import HOSTILE, made_diagnosis

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,9 @@ from care_core.errors import ProfileError
 from care_core.learn.fitting import Effort
 from care_core.learn.knowledge import with_known
 from care_core.learn.outcomes import FEW_RUNS, fit_total
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
+from care_core.records import replace
 from tests.planted import SCHEMA, fly_many
 
 BARE = CausalGraph(tuple(SCHEMA.variables))

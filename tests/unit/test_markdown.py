@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 from care_core.diagnose.records import Since
 from care_core.ecosystems.findings import Finding, Moment
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.markdown import LONGEST, to_markdown
 from tests.made import made_diagnosis

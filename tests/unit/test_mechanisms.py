@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +9,7 @@ from hypothesis.extra.numpy import arrays
 from care_core.causal import kernel as kernels
 from care_core.causal.kernel import FloatArray, Kernel
 from care_core.causal.mechanisms import JITTER, LEAST, TAIL, Mechanism, Transform, columns, restored, solve, transformed
+from care_core.records import replace
 
 SETTINGS = st.floats(-1e3, 1e3)
 

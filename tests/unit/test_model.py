@@ -5,7 +5,6 @@ import io
 import json
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from care_core.causal.model import Summary
 from care_core.errors import ProfileError
 from care_core.profile.model import read_model, write_model
 from care_core.profile.store import Profile
+from care_core.records import replace
 from tests.planted import DEFAULTS
 
 Arrays = dict[str, np.ndarray[Any, Any]]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +27,8 @@ from care_core.ecosystems.ros.measures.drive import (
 from care_core.extract.read import read_run
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
-from care_core.profile.schema import read_schema
+from care_core.profile.reading import read_schema
+from care_core.records import replace
 from care_core.run import Unavailable, Value, is_known
 
 KIND = MISSION_KINDS["actionlib_goals"]

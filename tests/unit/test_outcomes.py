@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 import pytest
@@ -25,6 +23,7 @@ from care_core.learn.outcomes import (
 from care_core.learn.train import with_weak
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.variables import Role, Threshold, Variable
 from tests.planted import SCHEMA, SUCCESS, TIME, fly_many
 

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,6 +7,7 @@ from care_core.causal import places as module
 from care_core.causal.kernel import Factor, FloatArray
 from care_core.causal.mechanisms import Averaging
 from care_core.causal.places import Places
+from care_core.records import replace
 from tests.unit.test_mechanisms import mechanism
 
 X = np.random.default_rng(3).uniform(1, 2, size=(6, 2))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -16,7 +15,8 @@ from care_core.diagnose.judging import beyond_training, judge, unread_options, v
 from care_core.ecosystems.ardupilot.measures.modes import mode_names
 from care_core.ecosystems.measures import Mission
 from care_core.logs.base import Table
-from care_core.profile.schema import read_schema
+from care_core.profile.reading import read_schema
+from care_core.records import replace
 from care_core.report.terminal import to_text
 from care_core.run import Check, MissionInfo, Unavailable, Value, is_known
 from tests.made import made_diagnosis, made_run

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,6 +15,7 @@ from care_core.application.plotting import MOST_POINTS, drawn_of, thinned
 from care_core.application.sharing import Sharing
 from care_core.diagnose.records import Fault, PathNode
 from care_core.files import bundled
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.html import to_html
 from care_core.report.marks import Mark
@@ -41,7 +41,7 @@ def test_thinning_keeps_the_extremes_and_few_points(count: int, seed: int, most:
 
 def made_plot(values: list[float], **more: object) -> Plot:
     points = tuple((float(i), value) for i, value in enumerate(values))
-    return replace(Plot("height", "POS Alt", "m", ("climb",), (Line("Alt", (points,)),)), **more)  # type: ignore[arg-type]
+    return replace(Plot("height", "POS Alt", "m", ("climb",), (Line("Alt", (points,)),)), **more)
 
 
 @pytest.mark.parametrize("values", [[1.0], [5.0] * 10, [0.0, 1e9, -1e9], [1e-12, 2e-12], [0.0, 0.0]])

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,6 +7,7 @@ import pytest
 from care_core.causal.model import Model
 from care_core.profile.check import problems
 from care_core.profile.store import Profile, available_profiles, load_profile
+from care_core.records import replace
 from tests.conftest import Care
 
 

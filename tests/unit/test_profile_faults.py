@@ -11,7 +11,7 @@ from care_core.ecosystems.measures import points
 from care_core.errors import ProfileError
 from care_core.extract.read import reading_plan
 from care_core.files import own_profiles
-from care_core.profile.schema import parse_schema
+from care_core.profile.reading import parse_schema
 from care_core.profile.store import available_profiles, load_profile
 from tests.conftest import Care
 

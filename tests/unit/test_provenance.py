@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +15,10 @@ from care_core.diagnose.since import compare
 from care_core.ecosystems.vehicles.self_written import SELF_WRITTEN, is_self_written
 from care_core.logs.base import Log
 from care_core.logs.opening import open_log
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, load_profile
+from care_core.records import replace
 from care_core.run import Run, Setting
 from care_core.text import clock
 from tests.made import made_run

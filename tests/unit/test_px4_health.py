@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,11 @@ import numpy as np
 from care_core.ecosystems.findings import Health
 from care_core.ecosystems.px4.examining import examine
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.records import Struct, field
 from care_core.run import Damage, Setting
 
 
-@dataclass
-class MadeLog:
+class MadeLog(Struct, eq=False):
     """A ULog of tables."""
 
     tables: Mapping[str, Table]

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +21,7 @@ from care_core.diagnose.ranking import (
 )
 from care_core.diagnose.reference import profile_config
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.variables import Threshold
 from tests.planted import BOUNDS, DEFAULTS, OPTIONS, SCHEMA, planted_run, planted_world, with_variable, world_of
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -19,12 +18,12 @@ from care_core.errors import ProfileError, UsageError
 from care_core.extract.read import read_run, read_runs, reading_plan
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.profile.schema import EvidenceRule, Schema
+from care_core.records import Struct, field
 from care_core.run import Damage, Evidence, Setting, Unavailable, Value
 from care_core.variables import Extract, Role, Threshold, Variable
 
 
-@dataclass
-class MadeLog:
+class MadeLog(Struct, eq=False):
     """A log with a `track` of x over time and markers where missions begin and end."""
 
     path: Path

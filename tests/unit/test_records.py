@@ -2,13 +2,11 @@ from __future__ import annotations
 
 import gc
 import weakref
-from dataclasses import dataclass
 
-from care_core.records import read
+from care_core.records import Record, read
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(Record):
     value: float | None
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from care_core.diagnose.judging import judge
 from care_core.diagnose.reference import Good
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.run import Run, Setting
 from care_core.variables import RelativeThreshold, Threshold
 from tests.planted import DEFAULTS, SCHEMA, TIME, planted_run, with_variable

@@ -14,7 +14,8 @@ from care_core.learn.outcomes import fit_total, inputs_of, met
 from care_core.learn.relative import left_out_together, missions_of, needs, relative
 from care_core.learn.repeats import repeated
 from care_core.learn.structure import learn_structure
-from care_core.profile.schema import Schema, parse_schema
+from care_core.profile.reading import parse_schema
+from care_core.profile.schema import Schema
 
 TEXT = """
 schema_version: 1

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import pytest
 
@@ -12,6 +11,7 @@ from care_core.diagnose.judging import Judged, judge, with_repeats
 from care_core.diagnose.triage import triage
 from care_core.errors import UsageError
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.run import ProfileChoice
 from tests.planted import DEFAULTS, SCHEMA, planted_run, run_of
 

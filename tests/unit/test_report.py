@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -19,6 +18,7 @@ from care_core.diagnose.triage import unjudged
 from care_core.ecosystems.findings import NOTHING_SEEN
 from care_core.errors import UsageError
 from care_core.files import write_atomically
+from care_core.records import replace
 from care_core.report.document import build_document, json_schema
 from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from html.parser import HTMLParser
 
 from care_core.diagnose.records import Circumstance, Dismissal
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown

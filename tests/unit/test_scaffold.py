@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from care_core import plain_yaml
 from care_core.errors import UsageError
 from care_core.logs.base import LogFormat
 from care_core.metadata.navigation import fact_of
+from care_core.records import field
 from care_core.run import Setting
 from care_core.scaffold.limits import RATIO, limits
 from care_core.scaffold.measures import Measure
@@ -29,8 +29,7 @@ from tests.made import MadeLog
 from tests.ros_samples import ROS2, SECOND_NS, START_NS, McapFile, cdr, make
 
 
-@dataclass
-class SetLog(MadeLog):
+class SetLog(MadeLog, eq=False):
     """A made log that holds parameters."""
 
     parameters: Mapping[str, Any] = field(default_factory=dict)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +13,7 @@ from care_core.extract.read import reading_plan
 from care_core.extract.select import choose_profile, fitting_profile
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.profile.schema import Schema
+from care_core.records import Record, Struct, field, replace
 from care_core.run import FITS, Damage, Fit, Setting
 from care_core.variables import Role, Variable
 
@@ -22,8 +22,7 @@ SOURCES = tuple(
 )
 
 
-@dataclass
-class NamedLog:
+class NamedLog(Struct, eq=False):
     """A log of which only names matter."""
 
     parameters: tuple[str, ...] = ()
@@ -45,8 +44,7 @@ class NamedLog:
         raise AssertionError("choosing a profile decodes nothing")
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(Record):
     schema: Schema
 
 
@@ -136,5 +134,5 @@ def test_a_boat_fits_a_rovers_profile_in_part() -> None:
     rover = candidate("wheels", "A", match={"vehicle": "rover"})
     log = NamedLog(("A",), SOURCES, {"firmware": "ArduRover V4.5.4", "vehicle": "rover"})
     assert choose_profile(log, [rover])[1].fit == FITS
-    boat = replace(log, facts={"firmware": "ArduRover V4.5.4", "vehicle": "boat"})
+    boat = NamedLog(("A",), SOURCES, {"firmware": "ArduRover V4.5.4", "vehicle": "boat"})
     assert choose_profile(boat, [rover])[1].fit == Fit("partly", ("this is a boat, the profile was learned on wheels",))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,6 +12,7 @@ from care_core.application.signals import Signal, signals_of, trace_of, whole_of
 from care_core.application.viewing import messages_of
 from care_core.errors import CareError
 from care_core.logs.base import LogFormat
+from care_core.records import replace
 from care_tui.render.plot import plot
 from tests.made import MadeLog, T
 from tests.tui import sample_diagnosis as sample

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ from care_core.errors import ConfigError
 from care_core.profile.schema import Schema
 from care_core.profile.site import load_site, site_path
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.run import Unavailable
 from care_core.variables import Role, Threshold, Variable
 from tests.planted import SCHEMA, planted_run, with_variable

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import cast
 
 import pytest
@@ -15,6 +14,7 @@ from care_core.extract.spelling import spelled
 from care_core.logs.base import Log, LogFormat
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
+from care_core.records import Struct, field
 from care_core.run import Setting
 from care_core.variables import Change, Role, Variable
 
@@ -22,8 +22,7 @@ SPEED = Variable("WPNAV_SPEED", Role.OPTION, parameters=("WPNAV_SPEED",), range=
 SCHEMA = Schema("copter", "1", "copter", "", {}, ("dataflash-bin",), False, {}, (), {"WPNAV_SPEED": SPEED})
 
 
-@dataclass
-class Flown:
+class Flown(Struct, eq=False):
     """A log of which only firmware and parameters matter."""
 
     held: Mapping[str, float]

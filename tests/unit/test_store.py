@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,6 +8,7 @@ import pytest
 from care_core.errors import ProfileError
 from care_core.files import PROFILE_FILE
 from care_core.profile.store import Profile, available_profiles, load_profile
+from care_core.records import replace
 from tests.planted import SCHEMA
 
 YAML = """\

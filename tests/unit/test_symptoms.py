@@ -1,13 +1,12 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from care_core.diagnose import symptoms
 from care_core.diagnose.ranking import suspects
 from care_core.diagnose.symptoms import pointers
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.run import Evidence
 from tests.planted import planted_world
 

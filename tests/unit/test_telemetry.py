@@ -11,7 +11,8 @@ from care_core.extract.coverage import cover
 from care_core.extract.read import read_run
 from care_core.logs.opening import open_log
 from care_core.logs.telemetry import as_dataflash
-from care_core.profile.schema import Schema, read_schema
+from care_core.profile.reading import read_schema
+from care_core.profile.schema import Schema
 from care_core.run import Run, Unavailable, is_known
 from tests.groundstation import write_tlog
 from tests.rewritten import write_text

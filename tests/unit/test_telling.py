@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
 from care_core.ecosystems.ranking import OVER_S, SLACK_S, Leads, lost_by, told
+from care_core.records import replace
 
 LEADS: Leads = {"laser": frozenset({"planner"}), "planner": frozenset({"control"}), "battery": frozenset({"drive"})}
 KINDS: tuple[FindingKind, ...] = ("laser", "planner", "control", "battery", "drive")

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from care_core.learn.outcomes import inputs_of
 from care_core.learn.transfer import carry_over, out_of_support, started_from, update
 from care_core.profile.model import read_model, write_model
 from care_core.profile.store import Profile
+from care_core.records import replace
 from tests.planted import DEFAULTS, SCHEMA, SETTINGS, fly_many
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -17,6 +16,7 @@ from care_core.diagnose.judging import judge
 from care_core.diagnose.records import Need
 from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, _notes, verify
 from care_core.errors import ConfigError
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.reading import read_report
 from care_core.report.writers import to_json, to_yaml

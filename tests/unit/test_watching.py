@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 from hashlib import sha256
 from multiprocessing import get_context
 from pathlib import Path
@@ -24,6 +23,7 @@ from care_core.errors import UsageError
 from care_core.history.store import About, History
 from care_core.history.watched import MOST_ATTEMPTS, Ledger
 from care_core.parallel import Failed
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.watching import WatchEntry, entry_json, entry_line, judged_entry, unread_entry, watch_schema
 from care_core.report.writers import published

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +13,7 @@ from care_core.diagnose.whatif import Question, parse_change, question
 from care_core.ecosystems.findings import Finding, Health
 from care_core.errors import UsageError
 from care_core.profile.store import Profile
+from care_core.records import replace
 from care_core.report.whatif import whatif_document, whatif_text
 from care_core.run import ProfileChoice
 from tests.conftest import Care

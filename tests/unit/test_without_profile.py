@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from care_core.ecosystems.measures import MISSION_KINDS, Mission
 from care_core.errors import ExitCode
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
+from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.html import to_html
 from care_core.report.markdown import to_markdown

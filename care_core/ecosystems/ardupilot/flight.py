@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import field
 from functools import cached_property
 from typing import TypeVar
 
@@ -18,9 +17,9 @@ from numpy.typing import NDArray
 from care_core.ecosystems.ardupilot.messages import Floats, instances
 from care_core.ecosystems.vehicles import Vehicle, vehicle_of, way_of, with_said
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX
-from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median, pieces
+from care_core.records import Record, field
 from care_core.run import Setting
 
 Mask = NDArray[np.bool_]
@@ -91,8 +90,7 @@ _ACRO = frozenset((1, 13, 14))
 """Copter modes in which any attitude is meant: acro, sport, flip."""
 
 
-@dataclass(frozen=True, eq=False)
-class Flight:
+class Flight(Record, eq=False, dict=True):
     """One log. Times are seconds since its start; spans are (start, end)."""
 
     tables: Mapping[str, Table]
@@ -105,7 +103,7 @@ class Flight:
     """Whether the log is damaged at its end: what was not yet may still have come."""
     clock_jumps: bool = False
     """Whether its clock jumps inside it: two logs in one, or damage; then what lies between two records is unknown."""
-    _known: dict[str, tuple[Table, ...]] = field(default_factory=dict, repr=False)
+    _known: dict[str, tuple[Table, ...]] = field(default_factory=dict)
 
     def all(self, name: str, *fields: str) -> tuple[Table, ...]:
         """The instances of a message that have these fields."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +19,7 @@ from care_core.ecosystems.timeline import account_of, counted, damage_of, gaps, 
 from care_core.ecosystems.vehicles import mode_name, vehicle_of
 from care_core.ecosystems.vehicles.arming import KILLED, KILLED_ALOFT_M
 from care_core.logs.base import Log, Table, Wanted
+from care_core.records import Record
 
 Floats = NDArray[np.float64]
 Span = tuple[float, float]
@@ -42,8 +42,7 @@ _IDLE_S = 60.0
 _TOO_SHORT_S = 2.0
 
 
-@dataclass(frozen=True, slots=True)
-class Flag:
+class Flag(Record):
     """A flag of the vehicle, what it means while armed, and of what kind the finding is (None: told, no finding)."""
 
     topic: str
@@ -128,8 +127,7 @@ _SPOKEN_LEVELS = frozenset(("EMERGENCY", "ALERT", "CRITICAL", "ERROR", "WARNING"
 _SPOKEN_BY = re.compile(r"\[(commander|navigator|failsafe|flight_mode_manager|vtol_att_control|land_detector)\]")
 
 
-@dataclass(frozen=True)
-class Px4Flight:
+class Px4Flight(Record, dict=True):
     """One log of a PX4 vehicle."""
 
     tables: Mapping[str, Table]

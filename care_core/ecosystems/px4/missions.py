@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.ecosystems.vehicles.arming import KILLED, KILLED_ALOFT_M
 from care_core.ecosystems.vehicles.modes import Way
 from care_core.logs.base import Table, Wanted
+from care_core.records import replace
 from care_core.run import Check, Evidence, Unavailable, Value
 
 _BARELY_M = 0.5

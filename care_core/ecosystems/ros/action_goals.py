@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from care_core.ecosystems.ros import plan
 from care_core.logs.base import Table
+from care_core.records import Record
 
 Outcome = Literal["reached", "cancelled", "aborted", "rejected", "lost", "replaced", ""]
 """How a goal ended; empty where the recording does not say."""
@@ -23,8 +23,7 @@ _ROS2: dict[int, Outcome] = {4: "reached", 5: "cancelled", 6: "aborted"}
 _STATUS_TOPIC = "/_action/status"
 
 
-@dataclass(frozen=True, slots=True)
-class Goal:
+class Goal(Record):
     """A goal of an action: when it was sent, when and how it ended; where it lies, m, nan where that is not said."""
 
     action: str

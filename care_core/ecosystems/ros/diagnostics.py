@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from care_core.ecosystems.ros import plan
 from care_core.ecosystems.ros.recording import Recording
+from care_core.records import Record
 
 WORDS = {0: "OK", 1: "WARN", 2: "ERROR", 3: "STALE"}
 """Levels of diagnostic_msgs/DiagnosticStatus."""
 
 
-@dataclass(frozen=True, slots=True)
-class Report:
+class Report(Record):
     """What diagnostics said of a part when its level changed."""
 
     time_s: float

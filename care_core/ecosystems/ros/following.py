@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from care_core.ecosystems.ros.recording import Bools, Commands, Floats, Odometry, Recording
 from care_core.numbers import median
+from care_core.records import Record
 
 ANSWER_S = 1.0
 """Within this time a drive follows: a step of 1 m/s at 1 m/s^2."""
@@ -19,8 +18,7 @@ _THIN = 2.5
 """Commands may come this many times later than usual before they count as ceased: recordings are thinned."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Following:
+class Following(Record, eq=False):
     """Per odometry sample the commands of the last second: the least and the most that was asked for.
 
     `asked` is False where no command was in force, `to_move` True where every command of that second asked for motion.

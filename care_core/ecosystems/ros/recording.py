@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +15,7 @@ from care_core.ecosystems.ros.action_goals import Goal, goals_of
 from care_core.logs.base import Channel, Table
 from care_core.logs.ros_log import RosLog
 from care_core.numbers import median, quantile
+from care_core.records import Record
 from care_core.run import Damage, Setting
 
 Floats = NDArray[np.float64]
@@ -49,8 +49,7 @@ _STILL_M = 2.0
 """Way by its speed that no noise of a speed makes while a position stays the same to the last digit."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Odometry:
+class Odometry(Record, eq=False):
     """What odometry says: s, m, rad, m/s, rad/s, each of shape (n,), in order of time."""
 
     topic: str
@@ -81,8 +80,7 @@ class Odometry:
         return not np.ptp(self.x) and not np.ptp(self.y) and self.way_m > _STILL_M
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Commands:
+class Commands(Record, eq=False):
     """Velocity commands: s, m/s, rad/s, each of shape (n,), in order of time."""
 
     topic: str
@@ -92,8 +90,7 @@ class Commands:
     turn: Floats
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Scans:
+class Scans(Record, eq=False):
     """Scans of one laser. `ranges` has shape (n, rays), m, nan where nothing came back; `angles` (rays,), rad."""
 
     topic: str
@@ -105,8 +102,7 @@ class Scans:
     range_max: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Battery:
+class Battery(Record, eq=False):
     """A battery: s, V, A (positive: drawn; nan where it is not measured), each of shape (n,)."""
 
     topic: str
@@ -115,8 +111,7 @@ class Battery:
     current: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class Said:
+class Said(Record):
     """A message of a node: `level` as ROS 1 has them."""
 
     time_s: float
@@ -125,8 +120,7 @@ class Said:
     text: str
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(Record, eq=False, dict=True):
     """A recording, read once.
 
     `times` holds the record times of every topic, `tables` what was decoded, both by topic.

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import field
 
 from care_core.ecosystems.vehicles.modes import mode_name
 from care_core.ecosystems.vehicles.vehicle import Kind
-from care_core.frozen import dataclass
+from care_core.records import Record, field
 
 _FLIGHT_MODE, _EKF_PRIMARY, _FENCE = 10, 24, 9
 FAILSAFE = re.compile(
@@ -18,8 +17,7 @@ FAILSAFE = re.compile(
 _FENCES = ((1, "upper altitude"), (2, "circle"), (4, "polygon"), (8, "lower altitude"))
 
 
-@dataclass(frozen=True, slots=True)
-class Subsystem:
+class Subsystem(Record):
     """A subsystem that reports errors."""
 
     what: str

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from care_core.ecosystems.vehicles.frames import Arm, arms_of, frame_of
 from care_core.ecosystems.vehicles.settings import Driven, code
-from care_core.frozen import dataclass
+from care_core.records import Record
 
 _FUNCTIONS = {**{32 + n: n for n in range(1, 9)}, **{73 + n: n for n in range(9, 13)}}
 """SERVOn_FUNCTION -> motor number: k_motor1 to k_motor8 are 33 to 40, k_motor9 to k_motor12 are 82 to 85
@@ -16,8 +16,7 @@ _OUTPUTS = 32
 _ON_AXIS_DEG = 10.0
 
 
-@dataclass(frozen=True, slots=True)
-class Motor:
+class Motor(Record):
     """A motor of a multicopter. Factors are the shares of a demand that it gives, at most 0.5; see `frames`."""
 
     number: int

@@ -12,7 +12,7 @@ from collections.abc import Container, Iterator, Mapping, Sequence
 from functools import cache
 
 from care_core.ecosystems.vehicles.vehicle import Kind
-from care_core.frozen import dataclass
+from care_core.records import Record
 
 Version = tuple[int, ...]
 _FIRST: Version = (0,)
@@ -20,8 +20,7 @@ _47, _471 = (4, 7), (4, 7, 1)
 _36, _34, _33, _35, _42, _46 = (3, 6), (3, 4), (3, 3), (3, 5), (4, 2), (4, 6)
 
 
-@dataclass(frozen=True, slots=True)
-class Spelling:
+class Spelling(Record):
     """A parameter as one firmware names it. A value under this name is `scale` times the value under the first."""
 
     name: str

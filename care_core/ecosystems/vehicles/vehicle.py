@@ -8,7 +8,7 @@ from typing import Literal
 
 from care_core.ecosystems.vehicles.frames import CLASSES, TYPES, frame_of
 from care_core.ecosystems.vehicles.settings import Driven, code
-from care_core.frozen import dataclass
+from care_core.records import Record
 
 Kind = Literal[
     "copter", "plane", "quadplane", "rover", "sub", "heli", "tracker", "blimp", "px4", "unknown"
@@ -46,8 +46,7 @@ def flies(kind: Kind) -> bool:
     return kind not in _GROUNDED
 
 
-@dataclass(frozen=True, slots=True)
-class Vehicle:
+class Vehicle(Record):
     """What a vehicle is."""
 
     kind: Kind

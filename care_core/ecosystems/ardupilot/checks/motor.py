@@ -19,9 +19,9 @@ from care_core.ecosystems.ardupilot.measure import Calibration, lasting, likely,
 from care_core.ecosystems.ardupilot.messages import Floats
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.vehicles import Motor, motors_of
-from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median, pieces, quantile
+from care_core.records import Record
 
 READS: Wanted = {
     "RCOU": tuple(f"C{n}" for n in range(1, 15)),
@@ -58,8 +58,7 @@ _THRUST_LOSS = re.compile(r"Potential Thrust Loss \((\d+)\)")
 _SOURCE = "RCOU of each motor against the middle of the others"
 
 
-@dataclass(frozen=True, eq=False)
-class _Outputs:
+class _Outputs(Record, eq=False):
     """What the motors were asked for, microseconds from the least to the most."""
 
     motors: tuple[Motor, ...]

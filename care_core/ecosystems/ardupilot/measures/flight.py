@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from care_core.ecosystems.ardupilot.measures.modes import MODES, kind_flown, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import ITEMS, Asked, Item, asked, home_of, items_of
 from care_core.ecosystems.measures import Mission, has, merge_needs
-from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import distinct, known_median, median
+from care_core.records import Record
 from care_core.run import Unavailable
 
 NEEDS: Wanted = merge_needs(
@@ -81,8 +81,7 @@ class Phase(NamedTuple):
         return self.end_s - self.start_s
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Track:
+class Track(Record, eq=False):
     """Where the vehicle was: arrays of shape (n,), seconds of the log and metres from home."""
 
     t: Floats
@@ -101,8 +100,7 @@ class Track:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Flight:
+class Flight(Record, eq=False):
     """One flight. `phases` holds only what was completed, by name and index (legs count from 1, the rest is 0);
     of a drive, the mission as far as it went."""
 

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
-from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
+from care_core.records import Record
 from care_core.run import Unavailable, Value
 
 Floats = NDArray[np.float64]
@@ -48,8 +48,7 @@ _LEVEL_M = 0.5
 _METRES_PER_DEGREE = 111_319.49
 
 
-@dataclass(frozen=True, slots=True)
-class Item:
+class Item(Record):
     """One mission item: command, its first two parameters, place in degrees, height in metres and its frame."""
 
     command: int
@@ -61,8 +60,7 @@ class Item:
     frame: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Asked:
+class Asked(Record, eq=False):
     """A mission in metres from home. Legs begin above home, at the height of the take-off."""
 
     points: Floats

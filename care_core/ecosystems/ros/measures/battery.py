@@ -6,8 +6,8 @@ import numpy as np
 
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
 from care_core.ecosystems.ros.measures.drive import BATTERY_FIELDS, Floats, has, topics
-from care_core.frozen import dataclass
 from care_core.logs.plausible import is_alive
+from care_core.records import Record
 from care_core.run import Unavailable, Value
 
 _LEAST_V, _MOST_V = 2.0, 1e3
@@ -86,8 +86,7 @@ def battery_voltage(mission: Mission, args: Args) -> Value:
     return float(inside[0] if args.get("of") == "start" else inside.min())
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Battery:
+class _Battery(Record, eq=False):
     """Battery of the whole log: s, V, A, Ah, each of shape (n,)."""
 
     t: Floats

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from enum import IntEnum
 from itertools import pairwise
 
@@ -15,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.measures import Args, Mission, missing
-from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
 from care_core.logs.plausible import APART, STAMP, is_simulated, never_moved, stamps_pace
+from care_core.records import Record, replace
 from care_core.run import Unavailable
 
 Floats = NDArray[np.float64]
@@ -64,8 +63,7 @@ class Status(IntEnum):
     LOST = 9
 
 
-@dataclass(frozen=True, slots=True)
-class Topics:
+class Topics(Record):
     """Where a platform's log holds what is not the goal server's own."""
 
     odometry: str
@@ -82,8 +80,7 @@ def topics(spec: Args) -> Topics:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Leg:
+class Leg(Record):
     """One goal: where it lies (m, rad; nan where the log does not say), when it was sent, when and how it ended.
 
     `status` is None where the log holds no answer.
@@ -160,8 +157,7 @@ Recoveries = Sequence[tuple[float, str]]
 """Time and name of each recovery behavior that ran."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Poses:
+class Poses(Record, eq=False):
     """Poses of the robot in a frame: s, m, rad, all shape (n,)."""
 
     t: Floats
@@ -171,8 +167,7 @@ class Poses:
     frame: str
 
 
-@dataclass(frozen=True, slots=True)
-class GoalServer:
+class GoalServer(Record):
     """How the log of a kind of goal server tells its goals: one a mission kind, see `actionlib` and `nav2`."""
 
     needs: Callable[[Args], Wanted]
@@ -192,8 +187,7 @@ def goal_server(spec: Args) -> GoalServer:
     return GOAL_SERVERS[str(spec.get("kind", "actionlib_goals"))]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Odometry:
+class Odometry(Record, eq=False):
     """Odometry while a goal is active: m, rad, m/s, rad/s; `dt` is what each sample speaks for. All shape (n,)."""
 
     t: Floats
@@ -221,8 +215,7 @@ class Odometry:
         return np.hypot(np.diff(self.x, prepend=self.x[:1]), np.diff(self.y, prepend=self.y[:1]))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Commands:
+class Commands(Record, eq=False):
     """Velocity commands while a goal is active: m/s, rad/s; `dt` is how long each was in force. All shape (n,)."""
 
     t: Floats
@@ -239,8 +232,7 @@ class Commands:
         return np.asarray((np.abs(self.speed) < MOVING_MPS) & (np.abs(self.turn) >= TURNING_RADPS))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Drive:
+class Drive(Record, eq=False):
     """What extractors share. `odometry` and `commands` are None where the log lacks them, odometry also where it cannot
     be right: `doubt` says why."""
 

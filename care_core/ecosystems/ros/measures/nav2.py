@@ -24,8 +24,8 @@ from care_core.ecosystems.ros.measures.drive import (
 )
 from care_core.ecosystems.ros.measures.goals import ROSOUT, GoalMissions
 from care_core.ecosystems.ros.measures.requested import PER_GOAL, PER_METRE, divided
-from care_core.frozen import dataclass
 from care_core.logs.base import Table, Wanted
+from care_core.records import Record, Struct
 from care_core.run import Unavailable, Value
 
 KIND = "nav2_goals"
@@ -67,8 +67,7 @@ _SAME_MOMENT_S = 1.0
 """RViz publishes the goal about when the action server accepts it."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Place:
+class _Place(Record):
     """Where a goal lies: m, rad, and the frame."""
 
     x: float = math.nan
@@ -77,8 +76,7 @@ class _Place:
     frame: str = ""
 
 
-@dataclass(slots=True)
-class _Goal:
+class _Goal(Struct, eq=False):
     """A goal as its states tell it."""
 
     sent_s: float

@@ -1,0 +1,62 @@
+"""Profiles that were found sound, in the user's cache folder: checking a `profile.yaml` anew takes ten times as long.
+
+An entry is named by a hash of the profile's text and of the program that checked it, and begins with the hash of its
+own rest, so none is ever out of date or half written; all may be deleted at any time. It holds values, nothing that
+runs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from functools import cache
+from pathlib import Path
+
+import care_core
+from care_core.profile.schema import Schema
+from care_core.records import UnfitError, plain, read
+
+_MOST = 64
+"""Entries that are kept; the ones that were written first go first."""
+
+
+def cached(text: str) -> Schema | None:
+    """The schema of a `profile.yaml` with this text, None where it is not in the cache."""
+    try:
+        digest, _, stored = _entry(text).read_text(encoding="utf-8").partition("\n")
+        if hashlib.sha256(stored.encode()).hexdigest() != digest:
+            return None
+        return read(Schema, json.loads(stored))
+    except (OSError, ValueError, UnfitError):
+        return None
+
+
+def store(text: str, schema: Schema) -> None:
+    """Keep a sound profile. A folder that cannot be written to costs time later, and nothing else."""
+    from care_core.files import replace_file
+
+    path = _entry(text)
+    try:
+        stored = json.dumps(plain(schema), ensure_ascii=False, separators=(",", ":"))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, f"{hashlib.sha256(stored.encode()).hexdigest()}\n{stored}".encode())
+        for old in sorted(path.parent.glob("*.json"), key=lambda entry: -entry.stat().st_mtime)[_MOST:]:
+            old.unlink(missing_ok=True)
+    except (OSError, ValueError, TypeError):
+        return
+
+
+def _entry(text: str) -> Path:
+    from platformdirs import user_cache_path
+
+    name = hashlib.sha256(_program() + text.encode()).hexdigest()
+    return user_cache_path("care", appauthor=False) / "profiles" / f"{name}.json"
+
+
+@cache
+def _program() -> bytes:
+    """What tells one version of the program from another: the sizes and times of its source files."""
+    folder = Path(care_core.__file__).parent
+    stats = [os.stat(entry) for entry in sorted(folder.rglob("*.py"))]
+    return ",".join(f"{stat.st_size}:{stat.st_mtime_ns}" for stat in stats).encode()
