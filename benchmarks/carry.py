@@ -29,6 +29,7 @@ from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import Mechanism
 from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.diagnose.judging import read_and_judge, world_of
+from care_core.ecosystems.registry import run_model
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, fit_total, groups_that_move_together, met
 from care_core.learn.relative import relative
@@ -156,7 +157,7 @@ def ask_resets(profile: Profile, folder: Path, kind: str, found: Carried) -> Non
         truth = json.loads(line)
         if truth["ok"] or truth["hardware"] or truth["setting"]["vehicle"] != kind or not truth["tried"]:
             continue
-        judged = read_and_judge(open_log(folder / f"{truth['tag']}.BIN"), profile)
+        judged = read_and_judge(run_model(open_log(folder / f"{truth['tag']}.BIN")), profile)
         world = world_of(judged, profile)
         changed = [{**world.config, **{o: world.reference[o] for o in row["reset"]}} for row in truth["tried"]]
         found.reset_odds.extend(map(float, world.probability(changed)))

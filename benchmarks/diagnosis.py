@@ -30,6 +30,7 @@ from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.reference import profile_config
 from care_core.diagnose.triage import triage
+from care_core.ecosystems.registry import run_model
 from care_core.extract.select import choose_profile
 from care_core.learn.baselines import PlainClassifier, cooperative_bug_isolation, largest_deviation
 from care_core.learn.skill import all_met, calibration_error, held_out_probabilities, reliability
@@ -174,14 +175,14 @@ def evaluate(profile: Profile, shared: Path, peers: Peers | None, *, verbose: bo
     for truth in truths:
         log = open_log(folder / truth["log"])
         choice = choose_profile(log, [profile])[1]
-        judged = read_and_judge(log, profile, thresholds=LIMITS[platform])
+        judged = read_and_judge(run_model(log), profile, thresholds=LIMITS[platform])
         diagnosis = triage(judged, profile, choice, top=10)
         if not diagnosis.faults:
             # The outside measurement says failed, the log says just inside: the operator lowers the threshold to match.
             tally.too_close.append(truth["tag"])
             near = [r for r in diagnosis.objectives if _is_near(r, truth, platform)]
             tightened = {r.variable.name: LOWERED * r.value for r in near if r.value is not None}
-            judged = read_and_judge(log, profile, thresholds={**LIMITS[platform], **tightened})
+            judged = read_and_judge(run_model(log), profile, thresholds={**LIMITS[platform], **tightened})
             diagnosis = triage(judged, profile, choice, top=10)
         _count(tally, diagnosis, truth, platform, reference, world_of(judged, profile), peers, verbose)
     return tally

@@ -23,6 +23,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.examining import find, flight_of
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.registry import run_model
 from care_core.errors import LogError
 from care_core.logs.opening import open_log
 from care_core.records import Record
@@ -61,7 +62,7 @@ def read(logs: Path, table: Path) -> Iterator[Flown]:
             log = open_log(logs / f"{row['tag']}.BIN")
         except LogError:
             continue
-        flight = flight_of(log)
+        flight = flight_of(run_model(log))
         start = time.perf_counter()
         findings = find(flight)
         took = time.perf_counter() - start

@@ -58,7 +58,7 @@ from care_core.logs.opening import open_log
 started = time.perf_counter()
 log = open_log(Path(sys.argv[1]))
 profile, _ = choose(log)
-read_run(log, profile.schema, sha256=str)
+read_run(run_model(log), profile.schema, sha256=str)
 print(time.perf_counter() - started)
 """
 SELECT = """

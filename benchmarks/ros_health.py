@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.examining import examine
 from care_core.ecosystems.ros.recording import Recording
@@ -71,7 +72,7 @@ def driven(folder: Path) -> Iterator[Driven]:
         commands = Recording.read(log).commands if isinstance(log, RosLog) else None
         began_s = (float(commands.t[0]) if commands else 0.0) + failed.get("fail_at", 0.0)
         start = time.perf_counter()
-        findings = examine(log).findings
+        findings = examine(RunModel(log)).findings
         took = time.perf_counter() - start
         yield Driven(row["tag"], failed.get("fail_kind", ""), began_s, row["ok"], row.get("cause", ""), findings, took)
 
@@ -140,7 +141,7 @@ def main() -> None:
     print(false_alarms(((one.tag, one.findings) for one in missions if not one.failure), "nothing failed"))
     if args.healthy:
         bags = sorted(args.healthy.rglob("*.bag"))
-        looks = ((bag.name, examine(open_log(bag)).findings) for bag in bags)
+        looks = ((bag.name, examine(RunModel(open_log(bag))).findings) for bag in bags)
         print(false_alarms(looks, "healthy hardware, any parameters"))
     took = [one.seconds for one in missions]
     print(f"reading, account and checks: {1000 * np.median(took):.0f} ms a mission, at most {1000 * max(took):.0f}")

@@ -33,6 +33,7 @@ from care_core.diagnose.judging import Judged, read_and_judge, world_of
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Diagnosis
 from care_core.diagnose.triage import triage
+from care_core.ecosystems.registry import run_model
 from care_core.extract.select import choose_profile
 from care_core.learn.baselines import PlainClassifier
 from care_core.learn.fitting import Effort
@@ -218,7 +219,7 @@ def judge_faults(profile: Profile, folder: Path, peer: PlainClassifier) -> Fault
         if truth["ok"] or not fixing:
             continue
         log = open_log(folder / f"{truth['tag']}.BIN")
-        judged = read_and_judge(log, profile)
+        judged = read_and_judge(run_model(log), profile)
         diagnosis = triage(judged, profile, choose_profile(log, [profile])[1], top=10)
         _count(found, judged, diagnosis, profile, truth, fixing, peer)
     return found

@@ -53,6 +53,7 @@ class Target(NamedTuple):
 
 def read_log(path: Path) -> Answer:
     """Everything that a log can be asked for, and what its profile makes of it."""
+    from care_core.ecosystems.registry import run_model
     from care_core.extract.read import read_run
     from care_core.logs.opening import open_log
 
@@ -62,7 +63,9 @@ def read_log(path: Path) -> Answer:
     log.settings()
     words = [log.format.value, str(len(channels)), str(sum(map(len, tables.values())) > 0), str(log.start is not None)]
     words += sorted({damage.what for damage in log.damage}) + sorted(log.facts)
-    run = read_run(log, _schema("move_base" if log.format.value.startswith(("ros", "mcap")) else "arducopter"))
+    run = read_run(
+        run_model(log), _schema("move_base" if log.format.value.startswith(("ros", "mcap")) else "arducopter")
+    )
     return " ".join([*words, *(f"{name} {type(value).__name__}" for name, value in run.objectives.items())])
 
 

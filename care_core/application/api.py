@@ -35,6 +35,7 @@ def inspect(log: str | Path) -> InspectDocument:
         LogError: the log cannot be read.
     """
     from care_core.ecosystems.examine import examine
+    from care_core.ecosystems.registry import run_model
     from care_core.extract.coverage import try_on
     from care_core.extract.select import sound_profiles
     from care_core.report.inspection import build_inspection
@@ -46,7 +47,7 @@ def inspect(log: str | Path) -> InspectDocument:
         choice = choose(found)[1]
     except LogError as err:  # not a message is left of it, which is worth a look too
         choice = ProfileChoice("", "", "", "", Fit("no", (err.message.rstrip("."),)))
-    return build_inspection(found, trials, choice, examine(found))
+    return build_inspection(found, trials, choice, examine(run_model(found)))
 
 
 def triage(asked: Request | str | Path, progress: Progress = _silent) -> Case:

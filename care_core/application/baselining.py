@@ -15,6 +15,7 @@ from care_core.records import replace
 if TYPE_CHECKING:
     from care_core.diagnose.baseline import Baseline, Proposal, Refused
     from care_core.diagnose.judging import Judged
+    from care_core.ecosystems.registry import run_model
     from care_core.logs.base import Log
     from care_core.profile.store import Profile
     from care_core.run import ProfileChoice
@@ -73,9 +74,9 @@ def _runs_of(log: Log, profile: Profile) -> tuple[list[Judged], list[Refused]]:
     from care_core.extract.read import read_runs
 
     schema = for_any_mission(profile.schema)
-    health = examine(log)
+    health = examine(run_model(log))
     good, bad = [], []
-    for run in read_runs(log, schema):
+    for run in read_runs(run_model(log), schema):
         judged = judge(run, schema, profile.model)
         reason = refusal(judged, health)
         if reason:

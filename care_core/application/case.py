@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from care_core.diagnose.records import Diagnosis, Fix
     from care_core.diagnose.reference import Good
     from care_core.diagnose.whatif import Question
+    from care_core.ecosystems.base import RunModel
     from care_core.ecosystems.findings import Health
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
@@ -137,17 +138,18 @@ def open_case(request: Request, progress: Progress) -> Case:
     configs = read_configs(request.configs)
     with watching(progress) as progress, opened(request.log, progress) as (log, sha256):
         profile, choice = choose(log, request.profile)
+        model = _model_of(log, profile)
         progress("looking at what happened", 0.1)
-        health = examine(log)
+        health = examine(model)
         reading = None
         if profile is not None:
             try:
-                reading = _read(log, profile, choice, health, request, configs, progress, sha256)
+                reading = _read(model, profile, choice, health, request, configs, progress, sha256)
             except NoMissionError as err:
                 reason = err.message[:1].lower() + err.message[1:].rstrip(".")
                 choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, reason)))
         if reading is None:
-            diagnosis = _of_robot(_plainly(log, choice, health, request, sha256), log, request)
+            diagnosis = _of_robot(_plainly(model, choice, health, request, sha256), log, request)
             return Case(diagnosis, (), log, None, request.configs)
         diagnosis = _of_robot(_diagnose(reading, request, progress), log, request)
     return Case(diagnosis, reading.profile.schema.options, log, reading, request.configs)
@@ -161,7 +163,20 @@ def read_case(request: Request, progress: Progress) -> Reading:
     configs = read_configs(request.configs)
     with opened(request.log) as (log, sha256):
         profile, choice = fitting(log, request.profile)
-        return _read(log, profile, choice, examine(log), request, configs, progress, sha256)
+        model = _model_of(log, profile)
+        return _read(model, profile, choice, examine(model), request, configs, progress, sha256)
+
+
+def _model_of(log: Log, profile: Profile | None) -> RunModel:
+    """The model of a log's run, which decodes at once what the health checks and whoever judges will read."""
+    from care_core.ecosystems.registry import run_model
+    from care_core.extract.plain import plain_plans
+    from care_core.extract.read import reading_plan
+
+    model = run_model(log)
+    for plan in plain_plans(log) if profile is None else (reading_plan(profile.schema),):
+        model.expect(plan)
+    return model
 
 
 def _of_robot(diagnosis: Diagnosis, log: Log, request: Request) -> Diagnosis:
@@ -215,21 +230,21 @@ def _candidates(log: Log, name: str | None) -> tuple[list[Profile], str]:
     return [replace(profile, schema=spelled(profile.schema, log)) for profile in profiles], left_out
 
 
-def _plainly(log: Log, choice: ProfileChoice, health: Health, request: Request, sha256: Sha256) -> Diagnosis:
+def _plainly(model: RunModel, choice: ProfileChoice, health: Health, request: Request, sha256: Sha256) -> Diagnosis:
     """The diagnosis of a log that no profile fits: by what its robot says of itself, where it holds a run at all."""
     from care_core.diagnose.judging import judge_plainly
     from care_core.diagnose.triage import unjudged, without_profile
     from care_core.extract.read import log_info
 
-    judged = judge_plainly(log, mission=request.mission, sha256=sha256)
+    judged = judge_plainly(model, mission=request.mission, sha256=sha256)
     if judged is not None:
         return without_profile(judged, choice, health)
-    settings = {name: history[-1] for name, history in log.settings().items()}
-    return unjudged(log_info(log, sha256()), settings, choice, health)
+    settings = {name: history[-1] for name, history in model.log.settings().items()}
+    return unjudged(log_info(model.log, sha256()), settings, choice, health)
 
 
 def _read(
-    log: Log,
+    model: RunModel,
     profile: Profile,
     choice: ProfileChoice,
     health: Health,
@@ -239,18 +254,27 @@ def _read(
     sha256: Sha256,
 ) -> Reading:
     from care_core.diagnose.judging import read_and_judge, with_repeats
+    from care_core.ecosystems.registry import run_model
 
     progress("reading the log", 0.2)
     profile = with_own_limits(profile, request.site)
     good = good_of(request.reference, profile) or _as_driven(request.since)
     judged = read_and_judge(
-        log, profile, configs=configs, thresholds=request.thresholds, mission=request.mission, good=good, sha256=sha256
+        model,
+        profile,
+        configs=configs,
+        thresholds=request.thresholds,
+        mission=request.mission,
+        good=good,
+        sha256=sha256,
     )
     repeats = []
     for path in request.repeats:
         with opened(path) as (other, digest):
             repeats.append(
-                read_and_judge(other, profile, configs=configs, thresholds=request.thresholds, good=good, sha256=digest)
+                read_and_judge(
+                    run_model(other), profile, configs=configs, thresholds=request.thresholds, good=good, sha256=digest
+                )
             )
     return Reading(profile, choice, configs, with_repeats(judged, repeats), health)
 

@@ -10,10 +10,10 @@ from care_core.configs.driven import readable, same_value
 from care_core.configs.loading import ConfigFile, resolve
 from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, Status
 from care_core.diagnose.reference import Good, Reference, need_of, reference_of
+from care_core.ecosystems.base import RunModel
 from care_core.errors import UsageError, nearest
 from care_core.extract.plain import read_plain_runs
 from care_core.extract.read import mission_number, read_runs
-from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
@@ -58,7 +58,7 @@ class Judged(Record, eq=False):
 
 
 def read_and_judge(
-    log: Log,
+    model: RunModel,
     profile: Profile,
     *,
     configs: Sequence[ConfigFile] = (),
@@ -82,7 +82,7 @@ def read_and_judge(
     schema = profile.schema
     check_wishes(schema, (), thresholds or {})
     given = resolve(configs, (parameter for option in schema.options for parameter in readable(option)))
-    runs = read_runs(log, schema, overrides=given, sha256=sha256)
+    runs = read_runs(model, schema, overrides=given, sha256=sha256)
     judged = [judge(run, schema, profile.model, thresholds, good) for run in runs]
     verdicts = tuple(verdict(one) for one in judged)
     return replace(
@@ -90,7 +90,7 @@ def read_and_judge(
     )
 
 
-def judge_plainly(log: Log, *, mission: int | None = None, sha256: Sha256 | None = None) -> Judged | None:
+def judge_plainly(model: RunModel, *, mission: int | None = None, sha256: Sha256 | None = None) -> Judged | None:
     """Judge one run of a log that no profile fits by what its robot says of itself; None where the log holds no run.
 
     Without a profile there is no limit, so no value of the run is judged, only what it did.
@@ -98,7 +98,7 @@ def judge_plainly(log: Log, *, mission: int | None = None, sha256: Sha256 | None
     Raises:
         CareError: the log holds no such mission.
     """
-    runs = read_plain_runs(log, sha256)
+    runs = read_plain_runs(model, sha256)
     if not runs:
         return None
     judged = [Judged(run, {}, {}, (), tuple(map(_judge_check, run.checks))) for run in runs]

@@ -8,6 +8,7 @@ from pathlib import Path
 from care_core.configs.driven import readable, same_value
 from care_core.diagnose.judging import Judged, read_and_judge
 from care_core.diagnose.records import Cause, Diagnosis, Note, ParameterChange, Since
+from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.errors import CareError
 from care_core.extract.read import log_info
@@ -28,7 +29,7 @@ def compare(judged: Judged, good: Log, profile: Profile) -> Since:
     """
     run = judged.run
     try:
-        other = read_and_judge(good, profile, thresholds=judged.own)
+        other = read_and_judge(run_model(good), profile, thresholds=judged.own)
     except CareError as err:
         info = log_info(good, log_digest(good.path))
         before = {name: history[-1] for name, history in good.settings().items()}

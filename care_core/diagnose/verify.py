@@ -12,6 +12,7 @@ from care_core.configs.driven import option_value, readable, same_value
 from care_core.diagnose.judging import Judged, read_and_judge, thresholds_in_force
 from care_core.diagnose.records import ObjectiveResult, Status
 from care_core.diagnose.reference import Good
+from care_core.ecosystems.registry import run_model
 from care_core.logs.base import Log
 from care_core.logs.digest import Sha256
 from care_core.profile.schema import Schema
@@ -133,7 +134,7 @@ def verify_log(
         if before.threshold is not None and before.need is None
     }
     own = {name: bound.value for name, bound in wanted.items() if name not in usual or usual[name].value != bound.value}
-    judged = read_and_judge(log, profile, thresholds=own, mission=mission, good=good, sha256=sha256)
+    judged = read_and_judge(run_model(log), profile, thresholds=own, mission=mission, good=good, sha256=sha256)
     found = verify(promise, judged, schema, _doubt(promise, judged.run, schema))
     return judged.run, replace(found, notes=tuple(_notes(promise, judged.run, schema)))
 

@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 
 from care_core.configs.driven import readable
 from care_core.ecosystems.measures import find_extractor
+from care_core.ecosystems.registry import run_model
 from care_core.errors import CareError
 from care_core.extract.read import mission_kind, read_runs, reading_plan
 from care_core.logs.base import Log
@@ -97,7 +98,7 @@ def try_on(log: Log, schema: Schema) -> Trial:
         obstacle = "none of its parameters or sources are in the log"
     else:
         try:
-            runs = read_runs(log, schema)
+            runs = read_runs(run_model(log), schema)
         except CareError as err:
             obstacle = _no_mission(schema, channels) or err.message
     lost = _missed_values(schema, reading_plan(schema).keys() - channels, runs[-1] if runs else None)

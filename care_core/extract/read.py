@@ -23,12 +23,12 @@ import care_core.ecosystems.ros.measures.navigation
 import care_core.ecosystems.ros.measures.requested
 import care_core.ecosystems.whole_log  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.digest import Sha256, hashing
 from care_core.logs.plausible import clock_doubt, dead_sources
-from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.run import Check, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
@@ -36,7 +36,7 @@ from care_core.variables import Role, Variable
 
 
 def read_run(
-    log: Log,
+    model: RunModel,
     schema: Schema,
     *,
     overrides: Mapping[str, Setting] | None = None,
@@ -54,7 +54,7 @@ def read_run(
         NoMissionError: the log holds no mission of its kind.
         UsageError: there is no mission of that number.
     """
-    source = _Source.read(log, schema, sha256)
+    source = _Source.read(model, schema, sha256)
     return source.run(mission_number(mission, len(source.missions)) - 1, overrides or {})
 
 
@@ -67,10 +67,10 @@ def mission_number(asked: int | None, count: int) -> int:
 
 
 def read_runs(
-    log: Log, schema: Schema, *, overrides: Mapping[str, Setting] | None = None, sha256: Sha256 | None = None
+    model: RunModel, schema: Schema, *, overrides: Mapping[str, Setting] | None = None, sha256: Sha256 | None = None
 ) -> tuple[Run, ...]:
     """Read every mission of a log, in time order; arguments and errors are those of `read_run`."""
-    source = _Source.read(log, schema, sha256)
+    source = _Source.read(model, schema, sha256)
     return tuple(source.run(index, overrides or {}) for index in range(len(source.missions)))
 
 
@@ -134,13 +134,13 @@ class _Source(Record, eq=False):
     """Per mission why its times cannot be right, empty where they can."""
 
     @classmethod
-    def read(cls, log: Log, schema: Schema, sha256: Sha256 | None = None) -> _Source:
+    def read(cls, model: RunModel, schema: Schema, sha256: Sha256 | None = None) -> _Source:
+        log = model.log
         if sha256 is None:
             with hashing(log.path) as digest:
-                return cls.read(log, schema, digest)
+                return cls.read(model, schema, digest)
         kind = mission_kind(schema)
-        plan = reading_plan(schema)
-        tables = as_dataflash(log).read(plan)
+        tables = model.tables(reading_plan(schema))
         settings = log.settings()
         found = kind.missions(tables, log.duration_s, schema.mission)
         missions = tuple(one for one in found if math.isfinite(one.start_s) and math.isfinite(one.end_s))

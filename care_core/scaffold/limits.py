@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from care_core.diagnose.tolerance import upper_quantile
 from care_core.ecosystems.examine import examine
+from care_core.ecosystems.registry import run_model
 from care_core.records import Record
 from care_core.scaffold.measures import Measure, Measures
 from care_core.variables import RelativeThreshold, Role, Threshold, Variable
@@ -27,7 +28,7 @@ def good_runs(measures: Measures) -> tuple[int, ...]:
     """Places of the runs that met every functional objective, in logs without a critical finding."""
     functional = [one for one in measures.of(Role.OBJECTIVE) if one.variable.kind == "functional"]
     critical = {
-        id(seen): any(finding.severity == "critical" for finding in examine(seen.log).findings)
+        id(seen): any(finding.severity == "critical" for finding in examine(run_model(seen.log)).findings)
         for seen in {id(seen): seen for seen, _ in measures.runs}.values()
     }
     return tuple(

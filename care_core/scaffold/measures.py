@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS
+from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.vehicles import vehicle_of
 from care_core.errors import CareError
 from care_core.extract.read import read_runs
@@ -88,7 +89,7 @@ def find_measures(logs: Sequence[Seen], spec: Mapping[str, Any], bundled: Sequen
     found = Measures()
     for log in logs:
         try:
-            found.runs += [(log, run) for run in read_runs(log.log, trial, sha256=_unread)]
+            found.runs += [(log, run) for run in read_runs(run_model(log.log), trial, sha256=_unread)]
         except CareError as err:
             found.without[str(log.path)] = err.message
     for variable in candidates:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from care_core.diagnose.judging import judge
+from care_core.ecosystems.registry import run_model
 from care_core.errors import UsageError
 from care_core.extract.read import read_runs
 from care_core.logs.opening import open_log
@@ -28,7 +29,7 @@ def rows_of(path: Path, schema: Schema, overrides: Mapping[str, Setting] | None 
 
     `overrides` are settings by the name of the parameter in the log, for options that the log does not hold.
     """
-    runs = read_runs(open_log(path), schema, overrides=overrides)
+    runs = read_runs(run_model(open_log(path)), schema, overrides=overrides)
     return [_row(path, judge(run, schema, None).run, schema) for run in runs]
 
 

@@ -22,6 +22,7 @@ import pytest
 import care_core
 from care_core.application.case import Request, exit_code
 from care_core.diagnose.judging import judge
+from care_core.ecosystems.registry import run_model
 from care_core.errors import CareError, ExitCode, LogError
 from care_core.extract.read import read_run
 from care_core.extract.select import choose_profile
@@ -154,7 +155,7 @@ def _judge(path: Path, profile: Profile | None) -> Verdict:
     if profile is not None:
         choose_profile(log, [profile])
     schema = nav2_drive.schema() if profile is None else profile.schema
-    run = read_run(log, schema)
+    run = read_run(run_model(log), schema)
     statuses = {result.status for result in judge(run, schema, None if profile is None else profile.model).results}
     if "fault" in statuses:
         return _verdict(ExitCode.FAULT, run.mission)

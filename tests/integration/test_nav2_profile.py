@@ -10,6 +10,7 @@ import pytest
 
 from care_core.configs.driven import option_value, readable
 from care_core.configs.loading import read_configs, resolve
+from care_core.ecosystems.registry import run_model
 from care_core.extract.read import read_run
 from care_core.logs.opening import open_log
 from care_core.profile.store import load_profile
@@ -37,7 +38,7 @@ def drive(path: Path, *, arrives: bool = True, **changed: float) -> Path:
 
 
 def test_a_drive_is_read_under_the_names_of_nav2(tmp_path: Path) -> None:
-    run = read_run(open_log(drive(tmp_path / "a.mcap")), load_profile("nav2").schema)
+    run = read_run(run_model(open_log(drive(tmp_path / "a.mcap"))), load_profile("nav2").schema)
     assert run.config["path_dist_scale"] == 32.0
     assert run.config["controller_frequency"] == 20.0
     assert len(run.config) == 13

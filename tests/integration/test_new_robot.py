@@ -147,9 +147,10 @@ def test_the_files_to_begin_with_hold_the_defaults(tmp_path: Path) -> None:
 
 def test_healthy_drives_raise_hardly_an_alarm(tmp_path: Path) -> None:
     from care_core.ecosystems.examine import examine
+    from care_core.ecosystems.registry import run_model
 
     alarms = 0
     for seed in range(12):
         write_bag(tmp_path / f"{seed}.bag", Robot({}, Conditions.of(seed)).run(), DEFAULTS)
-        alarms += bool(examine(open_log(tmp_path / f"{seed}.bag")).findings)
+        alarms += bool(examine(run_model(open_log(tmp_path / f"{seed}.bag"))).findings)
     assert alarms <= 1

@@ -8,13 +8,14 @@ import pytest
 
 from care_core.ecosystems.ardupilot.examining import find, flight_of
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.registry import run_model
 from care_core.logs.opening import open_log
 
 GOOD = Path(__file__).parents[1] / "data" / "arducopter_good.BIN"
 
 
 def findings_of(path: Path) -> tuple[Finding, ...]:
-    return find(flight_of(open_log(path)))
+    return find(flight_of(run_model(open_log(path))))
 
 
 def test_a_good_flight_is_silent() -> None:

@@ -16,6 +16,7 @@ from rosbags.rosbag1 import Reader, Writer
 
 from care_core import limits
 from care_core.ecosystems.examine import examine
+from care_core.ecosystems.registry import run_model
 from care_core.errors import CareError, LogError
 from care_core.extract.read import read_run
 from care_core.logs import mapped
@@ -157,8 +158,8 @@ def test_a_field_declared_as_what_it_is_not(is_text: bool, name: str, tmp_path: 
     path.write_bytes(raw)
     log = read_all(path)
     assert log is not None
-    examine(log)
-    read_run(log, load_profile("arducopter").schema)
+    examine(run_model(log))
+    read_run(run_model(log), load_profile("arducopter").schema)
 
 
 def test_a_parameter_of_px4_whose_default_is_text(tmp_path: Path) -> None:
@@ -191,9 +192,9 @@ def test_a_bag_whose_definitions_are_not_those_of_ros(old: bytes, new: bytes, tm
         for connection, time_ns, raw in bag.messages():
             made.write(written[connection.id], time_ns, raw)
     log = open_log(tmp_path / "a.bag")
-    examine(log)
+    examine(run_model(log))
     with suppress(CareError):  # there may be no mission left
-        read_run(log, load_profile("move_base").schema)
+        read_run(run_model(log), load_profile("move_base").schema)
 
 
 @pytest.mark.parametrize("kind", MAKERS)
@@ -219,14 +220,14 @@ def test_a_log_with_a_flipped_bit(kind: LogFormat, tmp_path: Path) -> None:
 def test_a_flipped_bit_makes_no_mission_succeed_and_no_absurd_value(tmp_path: Path) -> None:
     schema = read_schema(ROOT / "profiles" / "arducopter" / "profile.yaml")
     whole, path, rng = SAMPLE.read_bytes(), tmp_path / "a.BIN", np.random.default_rng(2)
-    sound = read_run(open_log(SAMPLE), schema)
+    sound = read_run(run_model(open_log(SAMPLE)), schema)
     for _ in range(25):
         broken = bytearray(whole)
         for at in rng.integers(100_000, len(whole), 8).tolist():
             broken[at] ^= 1 << int(rng.integers(8))
         path.write_bytes(broken)
         try:
-            run = read_run(open_log(path), schema)
+            run = read_run(run_model(open_log(path)), schema)
         except CareError:
             continue
         assert run.objectives["mission_success"] != 1.0 or sound.objectives["mission_success"] == 1.0

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from care_core.ecosystems.registry import run_model
 from care_core.errors import ProfileError
 from care_core.extract.read import read_run
 from care_core.logs.opening import open_log
@@ -89,7 +90,7 @@ def test_without_stamps_there_is_no_mission_to_judge(tmp_path: Path) -> None:
     head = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format\nFMT, 13, 4, EV, B, Id\nFMT, 1, 19, ATT, cc, Roll,Pitch\n"
     path.write_text(head + "EV, 10\nATT, 1, 2\nEV, 11\n")
     with pytest.raises(ProfileError, match="No message of the log has a time stamp"):
-        read_run(open_log(path), load_profile("arducopter").schema)
+        read_run(run_model(open_log(path)), load_profile("arducopter").schema)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from care_core.diagnose.circumstances import circumstances
 from care_core.diagnose.judging import judge, read_and_judge, world_of
 from care_core.diagnose.tell_more import experiment
 from care_core.diagnose.triage import diagnose, triage
+from care_core.ecosystems.registry import run_model
 from care_core.errors import ProfileError
 from care_core.extract.select import choose_profile
 from care_core.logs.opening import open_log
@@ -215,7 +216,7 @@ def test_every_recorded_refusal_names_the_option_that_set_its_check_off(recorded
     seen: list[str] = []
     for path in sorted((recorded / "data/arducopter/faults").glob("*.BIN")):
         log = open_log(path)
-        judged = read_and_judge(log, profile)
+        judged = read_and_judge(run_model(log), profile)
         if not any(
             e.kind == "refusal" for e in judged.run.evidence
         ):  # explaining the others would take most of the time

@@ -11,6 +11,7 @@ import pytest
 from care_core.causal.mechanisms import Averaging
 from care_core.diagnose.judging import Judged, judge, read_and_judge
 from care_core.diagnose.triage import triage
+from care_core.ecosystems.registry import run_model
 from care_core.errors import ProfileError
 from care_core.extract.read import read_run
 from care_core.extract.select import choose_profile
@@ -31,7 +32,7 @@ def profile() -> Profile:
 
 
 def judged(path: Path, profile: Profile, **thresholds: float) -> Judged:
-    return read_and_judge(open_log(path), profile, thresholds=thresholds)
+    return read_and_judge(run_model(open_log(path)), profile, thresholds=thresholds)
 
 
 def verdicts(one: Judged) -> dict[str, str]:
@@ -39,7 +40,7 @@ def verdicts(one: Judged) -> dict[str, str]:
 
 
 def test_what_was_asked_is_read_from_the_goals(tmp_path: Path, profile: Profile) -> None:
-    run = read_run(open_log(drive(tmp_path / "a.bag", SQUARE)), profile.schema)
+    run = read_run(run_model(open_log(drive(tmp_path / "a.bag", SQUARE))), profile.schema)
     asked = {name: run.context[name] for name in ("goals_asked", "goal_distance", "goal_turn")}
     assert asked == pytest.approx({"goals_asked": 3, "goal_distance": 6, "goal_turn": math.pi / 3}, abs=0.01)
     assert run.metrics["traveled_distance"] == pytest.approx(1.0, rel=0.02)
@@ -49,7 +50,7 @@ def test_what_was_asked_is_read_from_the_goals(tmp_path: Path, profile: Profile)
 
 def test_a_given_up_drive_of_the_profiles_own_goals_was_asked_for_all(tmp_path: Path, profile: Profile) -> None:
     own = [(goal[0], goal[1]) for goal in profile.schema.mission["goals"]]
-    run = read_run(open_log(drive(tmp_path / "a.bag", own[:2])), profile.schema)
+    run = read_run(run_model(open_log(drive(tmp_path / "a.bag", own[:2]))), profile.schema)
     assert run.mission.fits
     assert run.context["goals_asked"] == 5
     assert run.context["goal_distance"] == pytest.approx(2.916, abs=0.01)
@@ -67,7 +68,7 @@ def test_a_drive_at_the_reference_is_fine_on_other_goals(tmp_path: Path, profile
 
 def test_a_slow_drive_is_laid_to_the_speed_with_low_confidence(tmp_path: Path, profile: Profile) -> None:
     log = open_log(drive(tmp_path / "a.bag", SQUARE, speed=0.25))
-    diagnosis = triage(read_and_judge(log, profile), profile, choose_profile(log, [profile])[1])
+    diagnosis = triage(read_and_judge(run_model(log), profile), profile, choose_profile(log, [profile])[1])
     assert "mission_time" in {fault.objective.name for fault in diagnosis.faults}
     causes = [cause for fault in diagnosis.faults for cause in fault.causes]
     assert causes[0].option.name == "max_vel_trans"
@@ -96,7 +97,7 @@ def test_without_odometry_nothing_says_what_was_asked(tmp_path: Path, profile: P
 
 def test_a_breach_that_the_log_cannot_tell_is_none(tmp_path: Path, profile: Profile) -> None:
     own = [(goal[0], goal[1]) for goal in profile.schema.mission["goals"]]
-    run = read_run(open_log(drive(tmp_path / "a.bag", own)), profile.schema)
+    run = read_run(run_model(open_log(drive(tmp_path / "a.bag", own))), profile.schema)
 
     def energy(value: float, **thresholds: float) -> tuple[str, str]:
         one = judge(replace(run, objectives={**run.objectives, "energy": value}), profile.schema, None, thresholds)

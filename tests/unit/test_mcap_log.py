@@ -12,6 +12,7 @@ from mcap.writer import CompressionType, IndexType
 from rosbags.rosbag2 import StoragePlugin
 
 from care_core.ecosystems.examine import examine
+from care_core.ecosystems.registry import run_model
 from care_core.logs.base import LogFormat
 from care_core.logs.mcap_log import McapLog
 from care_core.logs.opening import open_log
@@ -173,7 +174,7 @@ def test_a_file_with_nothing_to_decode_still_tells_when_its_messages_came(tmp_pa
         log_file.add("/proto", "x.Odometry", START_NS, b"\x08\x01", text="", language="protobuf", encoding="protobuf")
     log = open_log(path)
     assert [(channel.name, channel.count) for channel in log.channels()] == [("/proto", 1)]
-    health = examine(log)
+    health = examine(run_model(log))
     assert health.too_little == "its messages are (protobuf), not ROS 1, CDR or JSON: only when they came is known"
 
 

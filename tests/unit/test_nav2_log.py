@@ -9,6 +9,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 from care_core.configs.formats import format_for, write_params
 from care_core.configs.loading import read_configs, resolve
+from care_core.ecosystems.registry import run_model
 from care_core.extract.read import read_run
 from care_core.logs.opening import open_log
 from care_core.run import is_known
@@ -22,7 +23,7 @@ def test_a_recorded_nav2_drive(tmp_path: Path, plugin: StoragePlugin) -> None:
     log = open_log(recorded(tmp_path / "drive", plugin))
     params = tmp_path / "nav2.yaml"
     params.write_text("/**: {ros__parameters: {FollowPath: {max_vel_x: 0.26}}}\n")
-    run = read_run(log, schema(), overrides=resolve(read_configs([params]), [MAX_VEL]))
+    run = read_run(run_model(log), schema(), overrides=resolve(read_configs([params]), [MAX_VEL]))
     values = {name: run.value(name) for name in schema().variables}
     assert all(is_known(value) for value in values.values()), values
     assert values == pytest.approx(

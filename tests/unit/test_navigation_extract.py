@@ -14,6 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission, find_extractor
+from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.ros.measures import battery as battery_extractors
 from care_core.ecosystems.ros.measures import navigation
 from care_core.ecosystems.ros.measures.actionlib import GOAL_FIELDS, RECOVERY_FIELDS, RESULT_FIELDS
@@ -338,7 +339,7 @@ def test_recorded_faults(recorded: Path) -> None:
     folder = recorded / "data" / "move_base" / "faults"
     lines = (folder / "truth.jsonl").read_text(encoding="utf-8").splitlines()
     for truth in [json.loads(line) for line in lines][::3]:
-        run = read_run(open_log(folder / f"{truth['tag']}.bag"), schema)
+        run = read_run(run_model(open_log(folder / f"{truth['tag']}.bag")), schema)
         assert run.config == pytest.approx(truth["config"])
         assert run.mission.fits
         assert run.mission.ended

@@ -12,6 +12,7 @@ from care_core.configs.loading import read_configs, resolve
 from care_core.diagnose import provenance
 from care_core.diagnose.judging import judge
 from care_core.diagnose.since import compare
+from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.vehicles.self_written import SELF_WRITTEN, is_self_written
 from care_core.logs.base import Log
 from care_core.logs.opening import open_log
@@ -130,7 +131,7 @@ def sample_run(arducopter: Profile, **values: float) -> tuple[Run, Log]:
     from care_core.extract.read import read_run
 
     log = open_log(SAMPLE)
-    run = read_run(log, arducopter.schema)
+    run = read_run(run_model(log), arducopter.schema)
     changed = {name: replace(run.settings[name], value=value) for name, value in values.items()}
     return replace(run, settings={**run.settings, **changed}), log
 

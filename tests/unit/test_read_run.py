@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from care_core.configs.driven import disagreements, in_force, option_value
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Args, Mission, MissionKind, extractor
+from care_core.ecosystems.registry import run_model
 from care_core.errors import ProfileError, UsageError
 from care_core.extract.read import read_run, read_runs, reading_plan
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
@@ -140,7 +141,7 @@ def as_driven(*values: Setting) -> dict[str, tuple[Setting, ...]]:
 
 def test_a_run_holds_what_the_log_drove_and_its_provenance(log: MadeLog) -> None:
     log.known = as_driven(Setting("SPEED", 3.0, "PARM"))
-    run = read_run(log, made_schema())
+    run = read_run(run_model(log), made_schema())
     assert run.config == {"speed": 3.0}
     assert run.metrics["distance"] == 20.0
     assert isinstance(run.metrics["untold"], Unavailable)
@@ -156,17 +157,17 @@ def test_the_value_in_force_when_the_mission_ends_counts(log: MadeLog) -> None:
         Setting("SPEED", 4.0, "PARM", changed_at_s=9.0),
         Setting("SPEED", 5.0, "PARM", changed_at_s=11.0),
     )
-    assert read_run(log, made_schema()).config["speed"] == 4.0
+    assert read_run(run_model(log), made_schema()).config["speed"] == 4.0
 
 
 def test_any_parameter_of_an_option_will_do(log: MadeLog) -> None:
     log.known = as_driven(Setting("SPD_OLD", 7.0, "PARM"))
-    assert read_run(log, made_schema()).config["speed"] == 7.0
+    assert read_run(run_model(log), made_schema()).config["speed"] == 7.0
 
 
 def test_simulator_parameters_are_never_options(log: MadeLog) -> None:
     log.known = as_driven(Setting("SIM_WIND", 9.0, "PARM"))
-    assert "wind" not in read_run(log, made_schema()).config
+    assert "wind" not in read_run(run_model(log), made_schema()).config
 
 
 def test_words_become_the_numbers_that_options_use() -> None:
@@ -185,7 +186,7 @@ def test_a_file_fills_what_the_log_lacks_and_is_contradicted_by_what_it_holds(lo
         "/nav/local/brake": Setting("local/brake", "true", "b.yaml:2"),
     }
     schema = made_schema()
-    run = read_run(log, schema, overrides=overrides)
+    run = read_run(run_model(log), schema, overrides=overrides)
     assert run.config == {"speed": 3.0, "brake": 1.0}
     assert run.settings["/nav/local/brake"].source == "b.yaml:2"
     (sentence,) = disagreements(schema.options, run.settings, overrides)
@@ -196,7 +197,7 @@ def test_a_file_fills_what_the_log_lacks_and_is_contradicted_by_what_it_holds(lo
 def test_every_objective_is_read_and_none_judged(log: MadeLog) -> None:
     log.spans = ((0.0, 20.0, False),)
     schema = made_schema(0.0, mission={"kind": "made", "mismatch": "it has 3 waypoints, not 5"})
-    run = read_run(log, schema)
+    run = read_run(run_model(log), schema)
     assert run.objectives == {"success": 0.0, "energy": 4.0}
     assert (run.mission.ended, run.mission.fits, run.mission.mismatch) == (False, False, "it has 3 waypoints, not 5")
 
@@ -210,30 +211,30 @@ def test_a_log_that_breaks_off_while_a_mission_lasts_does_not_end_it(
     log: MadeLog, end_s: float, damage_s: float | None, ended: bool
 ) -> None:
     log.spans, log.damage = ((0.0, end_s, True),), (Damage("cut", 7, damage_s),)
-    assert read_run(log, made_schema()).mission.ended is ended
+    assert read_run(run_model(log), made_schema()).mission.ended is ended
 
 
 def test_the_last_mission_is_taken_unless_another_is_named(log: MadeLog) -> None:
     log.spans = ((0.0, 5.0, True), (6.0, 9.0, True))
     schema = made_schema()
-    assert read_run(log, schema).metrics["distance"] == 6.0
-    assert read_run(log, schema, mission=1).metrics["distance"] == 10.0
-    assert [run.mission.index for run in read_runs(log, schema)] == [1, 2]
+    assert read_run(run_model(log), schema).metrics["distance"] == 6.0
+    assert read_run(run_model(log), schema, mission=1).metrics["distance"] == 10.0
+    assert [run.mission.index for run in read_runs(run_model(log), schema)] == [1, 2]
     with pytest.raises(UsageError, match="1 to 2"):
-        read_run(log, schema, mission=3)
+        read_run(run_model(log), schema, mission=3)
     with pytest.raises(UsageError):
-        read_run(log, schema, mission=0)
+        read_run(run_model(log), schema, mission=0)
 
 
 def test_a_log_without_a_mission_is_refused(log: MadeLog) -> None:
     log.spans = ()
     with pytest.raises(ProfileError, match="no mission"):
-        read_run(log, made_schema())
+        read_run(run_model(log), made_schema())
 
 
 def test_a_profile_of_a_published_table_reads_no_log(log: MadeLog) -> None:
     with pytest.raises(ProfileError, match="reads no logs"):
-        read_run(log, made_schema(mission={}))
+        read_run(run_model(log), made_schema(mission={}))
 
 
 def test_an_unknown_mission_kind_names_the_nearest() -> None:
@@ -242,7 +243,7 @@ def test_an_unknown_mission_kind_names_the_nearest() -> None:
 
 
 def test_rules_of_the_profile_add_options_to_evidence(log: MadeLog) -> None:
-    (evidence,) = read_run(log, made_schema()).evidence
+    (evidence,) = read_run(run_model(log), made_schema()).evidence
     assert evidence.options == ("speed", "brake")
     assert evidence.says == "too fast"
 
@@ -255,11 +256,11 @@ def test_what_changed_during_the_mission_is_kept(log: MadeLog) -> None:
         Setting("SPEED", 6.0, "PARM", changed_at_s=15.0),
     )
     log.spans = ((1.0, 10.0, True),)
-    run = read_run(log, made_schema())
+    run = read_run(run_model(log), made_schema())
     assert run.config["speed"] == 5.0
     assert [setting.value for setting in run.changes["SPEED"]] == [4.0, 5.0]
     log.spans = ((5.0, 10.0, True),)
-    assert read_run(log, made_schema()).changes == {}
+    assert read_run(run_model(log), made_schema()).changes == {}
 
 
 @given(st.lists(st.floats(0, 100), max_size=6), st.floats(0, 100))

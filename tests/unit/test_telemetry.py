@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from care_core.ecosystems.registry import run_model
 from care_core.extract.coverage import cover
 from care_core.extract.read import read_run
 from care_core.logs.opening import open_log
@@ -30,13 +31,13 @@ def schema() -> Schema:
 
 @pytest.fixture(scope="module")
 def recorded(schema: Schema) -> Run:
-    return read_run(open_log(SAMPLE), schema)
+    return read_run(run_model(open_log(SAMPLE)), schema)
 
 
 @pytest.fixture(scope="module", params=[True, False], ids=["with_texts", "numbers_only"])
 def heard(request: pytest.FixtureRequest, schema: Schema, tmp_path_factory: pytest.TempPathFactory) -> Run:
     path = write_tlog(tmp_path_factory.mktemp("tlog") / "a.tlog", SAMPLE, np.random.default_rng(3), texts=request.param)
-    return read_run(open_log(path), schema)
+    return read_run(run_model(open_log(path)), schema)
 
 
 def test_objectives_agree_with_the_vehicles_own_log(recorded: Run, heard: Run) -> None:
@@ -79,7 +80,7 @@ def test_the_profile_finds_its_sources_in_telemetry(schema: Schema, tmp_path: Pa
 
 
 def test_a_text_log_gives_the_same_run(recorded: Run, schema: Schema, tmp_path: Path) -> None:
-    run = read_run(open_log(write_text(tmp_path / "a.log", SAMPLE)), schema)
+    run = read_run(run_model(open_log(write_text(tmp_path / "a.log", SAMPLE))), schema)
     assert run.config == {name: pytest.approx(value, rel=1e-6) for name, value in recorded.config.items()}
     for values, own in ((run.objectives, recorded.objectives), (run.metrics, recorded.metrics)):
         for name, value in own.items():

@@ -14,6 +14,7 @@ from care_core.application.case import Request, exit_code, open_case
 from care_core.diagnose.judging import judge_plainly
 from care_core.diagnose.records import overall
 from care_core.ecosystems.measures import MISSION_KINDS, Mission
+from care_core.ecosystems.registry import run_model
 from care_core.errors import ExitCode
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
@@ -199,14 +200,14 @@ def test_goals_reached_are_fine_failed_ones_a_fault_and_cancelled_ones_neither()
 
 
 def test_a_recorded_drive_is_judged_without_its_profile(tmp_path: Path) -> None:
-    found = judge_plainly(open_log(recorded(tmp_path / "drive", StoragePlugin.MCAP)))
+    found = judge_plainly(run_model(open_log(recorded(tmp_path / "drive", StoragePlugin.MCAP))))
     assert found is not None
     assert [check.variable.name for check in found.checks] == ["goals_reached"]
 
 
 def test_a_log_without_a_run_is_not_judged(tmp_path: Path) -> None:
     write_bag(tmp_path / "a.bag")
-    assert judge_plainly(open_log(tmp_path / "a.bag")) is None
+    assert judge_plainly(run_model(open_log(tmp_path / "a.bag"))) is None
 
 
 # --- the whole -----------------------------------------------------------------------------------------------------

@@ -1,1 +1,37 @@
 """ArduPilot: what its logs say, the model of a flight or drive, health checks and measures of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.findings import Health
+from care_core.logs.base import Channel, Log, LogFormat
+
+
+class ArduPilot(Ecosystem):
+    """Copters, planes, rovers and submarines that run ArduPilot."""
+
+    name = "ardupilot"
+    title = "ArduPilot"
+    formats = (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT, LogFormat.MAVLINK_TLOG)
+
+    def model(self, log: Log) -> RunModel:
+        from care_core.logs.telemetry import as_dataflash
+
+        return RunModel(as_dataflash(log))
+
+    def examine(self, model: RunModel) -> Health:
+        from care_core.ecosystems.ardupilot.examining import examine
+
+        return examine(model)
+
+    def checks(self) -> tuple[Check[Any], ...]:
+        return ()
+
+    def missions(self, channels: tuple[Channel, ...]) -> Iterator[Mapping[str, Any]]:
+        yield {"kind": "ardupilot_flight"}
+
+
+ECOSYSTEM = ArduPilot()

@@ -10,11 +10,11 @@ from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.explains import LEADS
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.messages import expanded
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, Health
 from care_core.ecosystems.ranking import told
-from care_core.logs.base import Log, LogFormat, Wanted
+from care_core.logs.base import LogFormat, Wanted
 from care_core.logs.plausible import clock_doubt, plausible
-from care_core.logs.telemetry import as_dataflash
 
 _TOO_SHORT_S = 2.0
 _TELLING = ("MODE", "MSG", "ATT", "IMU")
@@ -34,9 +34,9 @@ def _plan() -> Wanted:
 READS: Wanted = _plan()
 
 
-def flight_of(log: Log) -> Flight:
+def flight_of(model: RunModel) -> Flight:
     """The flight that a DataFlash or telemetry log holds."""
-    tables = plausible(as_dataflash(log).read(READS))
+    log, tables = model.log, plausible(model.tables(READS))
     end_s, is_telemetry = log.duration_s, log.format is LogFormat.MAVLINK_TLOG
     breaks_off = any(damage.time_s is None or damage.time_s >= end_s - _LAST_S for damage in log.damage)
     clock_jumps = any(damage.is_jump for damage in log.damage)
@@ -50,13 +50,13 @@ def find(of: Flight) -> tuple[Finding, ...]:
     return told(found, LEADS, of.down_s)
 
 
-def examine(log: Log) -> Health:
+def examine(model: RunModel) -> Health:
     """What happened in a DataFlash or telemetry log."""
-    flight = flight_of(log)
+    flight = flight_of(model)
     is_readable = flight.end_s >= _TOO_SHORT_S and any(name in flight.tables for name in _TELLING)
     findings = find(flight) if is_readable else ()
     too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
     if not too_little and not findings:
         # Times that cannot be are no reason to keep quiet about what was found, but none to call the rest fine.
         too_little = clock_doubt(flight.tables, 0.0, flight.end_s)
-    return Health(flight.vehicle.title, timeline.account(flight, log.damage), findings, too_little)
+    return Health(flight.vehicle.title, timeline.account(flight, model.log.damage), findings, too_little)

@@ -13,12 +13,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health, Moment, Severity, Suspect
 from care_core.ecosystems.ranking import Leads, told
 from care_core.ecosystems.timeline import account_of, counted, damage_of, gaps, parameter_changes, repeats
 from care_core.ecosystems.vehicles import mode_name, vehicle_of
 from care_core.ecosystems.vehicles.arming import KILLED, KILLED_ALOFT_M
-from care_core.logs.base import Log, Table, Wanted
+from care_core.logs.base import Table, Wanted
 from care_core.records import Record
 
 Floats = NDArray[np.float64]
@@ -190,9 +191,9 @@ class Px4Flight(Record, dict=True):
         return tuple((t, _SPEAKER.sub("", text)) for t, _, text in self.words if _PREFLIGHT.search(text))
 
 
-def examine(log: Log) -> Health:
+def examine(model: RunModel) -> Health:
     """What happened in a ULog."""
-    tables = log.read({name: fields for name, fields in READS.items() if fields})
+    log, tables = model.log, model.tables({name: fields for name, fields in READS.items() if fields})
     flight = Px4Flight(tables, _end(tables, log.duration_s))
     vehicle = vehicle_of(log.facts, log.settings())
     hardware = log.facts.get("hardware", "")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import cast
 
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Health
 from care_core.ecosystems.ros import plan
 from care_core.ecosystems.ros.finding import find
 from care_core.ecosystems.ros.recording import STREAM_MESSAGES, Recording
 from care_core.ecosystems.ros.timeline import account
-from care_core.logs.base import Log
 from care_core.logs.ros_log import RosLog
 from care_core.text import listed
 
@@ -31,9 +31,9 @@ _TELLING = ("odometry", "goals", "commands", "laser", "battery", "messages")
 _STACKS = {"move_base": "move_base", "nav2": "Nav2"}
 
 
-def examine(log: Log) -> Health:
+def examine(model: RunModel) -> Health:
     """What happened in a ROS 1 bag or a ROS 2 recording."""
-    recording = Recording.read(cast(RosLog, log))
+    recording = Recording.read(cast(RosLog, model.log))
     findings = find(recording)
     return Health(_robot(recording), account(recording), findings, "" if findings else _too_little(recording))
 

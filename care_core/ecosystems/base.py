@@ -1,0 +1,108 @@
+"""What an ecosystem is: the logs it writes, the model of a run in them, health checks and mission kinds.
+
+One package each (`ardupilot`, `px4`, `ros`), and one line each in `registry`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, ClassVar, Generic, TypeVar
+
+from care_core.ecosystems.findings import Finding, FindingKind, Health
+from care_core.ecosystems.measures import merge_needs
+from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted
+from care_core.records import Record
+
+Explains = Mapping[FindingKind, frozenset[FindingKind]]
+"""Per kind of finding the kinds that it can bring about."""
+
+
+class Limit(Record):
+    """A number that a check compares with: what it bounds, and where it comes from."""
+
+    name: str
+    value: float
+    unit: str
+    source: str
+    """Documentation, source line, physics, or the runs on which it was measured."""
+
+
+class Limits(list[Limit]):
+    """The limits of a check, each declared where it is used: `FEWEST = LIMITS.add("fewest satellites", 6, "", ...)`."""
+
+    def add(self, name: str, value: float, unit: str, source: str) -> float:
+        """Declares a limit and answers its value."""
+        self.append(Limit(name, value, unit, source))
+        return value
+
+
+R = TypeVar("R", bound="RunModel")
+
+
+class Check(Record, Generic[R], eq=False):
+    """A health check: a pure function of the run model that yields findings, nothing where the log tells too little."""
+
+    name: str
+    looks_for: str
+    """What it finds, in one clause."""
+    reads: Wanted
+    """Messages and fields by today's names; of ROS, message types and fields."""
+    limits: Limits
+    find: Callable[[R], Iterable[Finding]]
+
+
+class RunModel:
+    """A log as its ecosystem understands it: when it was armed, flown, driven. Everything is worked out when it is
+    first asked for, and a message is decoded once for all who said beforehand that they will read it."""
+
+    def __init__(self, log: Log) -> None:
+        self.log = log
+        self._expected: Wanted = {}
+        self._read: Wanted = {}
+        self._tables: dict[str, Table] = {}
+
+    def expect(self, plan: Wanted) -> None:
+        """Says that these channels and fields will be read, so that one pass over the log decodes them with others."""
+        self._expected = merge_needs((self._expected, plan))
+
+    def tables(self, plan: Wanted) -> dict[str, Table]:
+        """The channels and fields of a plan that the log holds, as recorded."""
+        if self._lacks(plan):
+            self.expect(plan)
+            lacking = {name: fields for name, fields in self._expected.items() if self._lacks({name: fields})}
+            self._tables |= self.decode(lacking)
+            self._read = self._expected
+        wanted = ((name, self._tables[name], fields) for name, fields in plan.items() if name in self._tables)
+        return {name: table for name, table, fields in wanted if any(field in table.columns for field in fields)}
+
+    def decode(self, wanted: Wanted) -> Mapping[str, Table]:
+        """One pass over the log."""
+        return self.log.read(wanted)
+
+    def _lacks(self, plan: Wanted) -> bool:
+        return any(field not in self._read.get(name, ()) for name, fields in plan.items() for field in fields)
+
+
+class Ecosystem(ABC):
+    """Everything that the program knows of one ecosystem. What is heavy is imported by the method that needs it."""
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    formats: ClassVar[tuple[LogFormat, ...]]
+
+    @abstractmethod
+    def model(self, log: Log) -> RunModel:
+        """The run model of a log; nothing is read yet."""
+
+    @abstractmethod
+    def examine(self, model: RunModel) -> Health:
+        """What happened, and what is wrong."""
+
+    @abstractmethod
+    def checks(self) -> tuple[Check[Any], ...]:
+        """Its health checks."""
+
+    @abstractmethod
+    def missions(self, channels: tuple[Channel, ...]) -> Iterator[Mapping[str, Any]]:
+        """The mission sections under which a log without a profile may hold runs, the likeliest first."""

@@ -1,0 +1,31 @@
+"""The ecosystems that the program knows: a new one is one package and one line here."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+
+from care_core.ecosystems.base import Ecosystem, RunModel
+from care_core.logs.base import Log, LogFormat
+
+_PACKAGES = (
+    "care_core.ecosystems.ardupilot",
+    "care_core.ecosystems.px4",
+    "care_core.ecosystems.ros",
+)
+
+
+@cache
+def ecosystems() -> tuple[Ecosystem, ...]:
+    """All ecosystems."""
+    return tuple(import_module(package).ECOSYSTEM for package in _PACKAGES)
+
+
+def ecosystem_of(format: LogFormat) -> Ecosystem:
+    """The ecosystem that writes logs of a format."""
+    return next(ecosystem for ecosystem in ecosystems() if format in ecosystem.formats)
+
+
+def run_model(log: Log) -> RunModel:
+    """The run model of a log; nothing is read yet."""
+    return ecosystem_of(log.format).model(log)
