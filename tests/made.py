@@ -19,7 +19,7 @@ from care_core.diagnose.records import (
     PathNode,
     Prediction,
 )
-from care_core.ecosystems.findings import Finding, Health, Moment
+from care_core.ecosystems.findings import Event, Finding, Health
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.records import Struct, field
 from care_core.run import Damage, Evidence, Fit, LogInfo, MissionInfo, ProfileChoice, Run, Setting, Unavailable
@@ -67,7 +67,7 @@ class MadeLog(Struct, eq=False):
 _LOST = Finding("attitude", "control was lost", 61.5, 70.0, "critical", "80 degrees off", "ATT")
 HEALTH = Health(
     "ArduCopter V4.5.4, quad X",
-    (Moment(1.0, "arming", "armed", "ARM"), Moment(3.0, "message", HOSTILE, "MSG")),
+    (Event(1.0, "arming", "armed", "ARM"), Event(3.0, "message", HOSTILE, "MSG")),
     (Finding("motor", f"motor 2 {HOSTILE}", 61.0, 70.0, "critical", f"93 % {HOSTILE}", "RCOU", consequences=(_LOST,)),),
 )
 

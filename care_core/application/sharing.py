@@ -16,7 +16,7 @@ from typing import cast
 
 from care_core.application.case import Case
 from care_core.diagnose.records import Diagnosis
-from care_core.ecosystems.findings import Moment
+from care_core.ecosystems.findings import Event
 from care_core.records import Record, replace
 from care_core.variables import Variable
 
@@ -120,18 +120,18 @@ class Hider(Record):
         """The diagnosis without its log's name, place, hash and date, and with every text hidden that needs it."""
         run, health = diagnosis.run, diagnosis.health
         log = replace(run.log, path=f"log{Path(run.log.path).suffix}", start=None, sha256="", robot=None)
-        account = tuple(self._moment(one) for one in health.account)
+        timeline = tuple(self._event(one) for one in health.timeline)
         evidence = tuple(replace(one, text=self.said(one.text)) for one in run.evidence)
         since = diagnosis.since and replace(diagnosis.since, log="good log")
         told = replace(
             diagnosis,
             run=replace(run, log=log, evidence=evidence),
-            health=replace(health, account=account, robot=self.text(health.robot)),
+            health=replace(health, timeline=timeline, robot=self.text(health.robot)),
             since=since,
         )
         return cast("Diagnosis", mapped(told, self.text))
 
-    def _moment(self, one: Moment) -> Moment:
+    def _event(self, one: Event) -> Event:
         if one.kind not in _TEXTUAL:
             return one
         text = self.text(one.text) if one.kind in ("vehicle", "mission") else self.said(one.text)

@@ -50,7 +50,7 @@ MIN_CONTRIBUTION = 0.02
 """Probability an option must cost before it is called a cause of this run."""
 MIN_PROBABILITY = 0.2
 """Best probability below which the engine abstains: a confident wrong answer costs a field day."""
-CONVINCING, LEADS = 0.5, 3
+CONVINCING, EXPLAINS = 0.5, 3
 """A cause that costs less than this leaves room for others: up to so many options are then named in all."""
 SURE, UNSURE = 0.4, 0.1
 """Contributions from which a cause may be called high confidence, and below which it is low."""
@@ -225,9 +225,9 @@ def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], to
     named = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION]
     if not first and (not named or named[0].contribution < CONVINCING):
         weak = [suspect for suspect in found if suspect.contribution < MIN_CONTRIBUTION <= suspect.weight]
-        named = [suspect for suspect in found if suspect in named or suspect in weak[: max(0, LEADS - len(named))]]
+        named = [suspect for suspect in found if suspect in named or suspect in weak[: max(0, EXPLAINS - len(named))]]
         weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION > suspect.weight]
-        named += [*weak, *others][: max(0, LEADS - len(named))]
+        named += [*weak, *others][: max(0, EXPLAINS - len(named))]
     named = first + [suspect for suspect in named if suspect not in first]
     return tuple(_cause(case, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
 

@@ -9,13 +9,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
-from care_core.ecosystems.findings import Finding, FindingKind, Health
+from care_core.ecosystems.findings import Finding, Health
 from care_core.ecosystems.measures import merge_needs
 from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted
 from care_core.records import Record
-
-Explains = Mapping[FindingKind, frozenset[FindingKind]]
-"""Per kind of finding the kinds that it can bring about."""
 
 
 class Limit(Record):

@@ -1,4 +1,4 @@
-"""What a look at any log answers: moments and findings. Plain values, read by reports and the app."""
+"""What a look at any log answers: a timeline of events, and findings. Plain values, read by reports and the app."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ Suspect = Literal["hardware", "world", "parameter", "operation"]
 """What a finding speaks of: a part that failed, what the robot met, how it was set, what its operator did."""
 
 
-class Moment(Record):
-    """One line of the account: what happened at `time_s` seconds from the start of the log, and where it says so."""
+class Event(Record):
+    """One line of the timeline: what happened at `time_s` seconds from the start of the log, and where it says so."""
 
     time_s: float
     kind: str
@@ -89,7 +89,7 @@ class Health(Record):
 
     robot: str
     """What it is, in a few words: "ArduCopter V4.5.4, quad X"; "ROS 1 robot with move_base"."""
-    account: tuple[Moment, ...]
+    timeline: tuple[Event, ...]
     findings: tuple[Finding, ...]
     too_little: str = ""
     """Why the log holds too little to say how a run went: it is too short, or no run is in it."""

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from care_core.ecosystems.findings import Finding, FindingKind
 from care_core.records import replace
 
-Leads = Mapping[FindingKind, frozenset[FindingKind]]
+Explains = Mapping[FindingKind, frozenset[FindingKind]]
 """Per kind of finding the kinds that it can bring about."""
 
 SLACK_S = 1.5
@@ -26,18 +26,20 @@ ON_GROUND: frozenset[FindingKind] = frozenset(("prearm",))
 _SEVERITY = {"critical": 0, "warning": 1, "info": 2}
 
 
-def told(findings: Iterable[Finding], leads: Leads, impact_s: float | None = None) -> tuple[Finding, ...]:
+def rank_findings(
+    findings: Iterable[Finding], explains: Explains, impact_s: float | None = None
+) -> tuple[Finding, ...]:
     """Findings in the order told: causes first, what each explains folded under it, what comes after the impact last.
 
     A finding is explained by one that is told before it and began before it, whose kind can lead to its kind, directly
     or by others, and that is not much less sure: a part that surely failed is no consequence of a mere suspicion.
 
     Args:
-        leads: which kind can bring about which.
+        explains: which kind can bring about which.
         impact_s: when the vehicle was down against its will, None where it was not.
     """
     marked = [replace(f, after_impact=impact_s is not None and f.onset_s > impact_s) for f in findings]
-    reach = _closure(leads)
+    reach = _closure(explains)
     roots: list[tuple[Finding, list[Finding]]] = []
     for finding in sorted(marked, key=lambda f: _place(f, marked, reach)):
         cause = next((entry for entry in roots if _explains(entry[0], finding, reach)), None)
@@ -61,7 +63,7 @@ def lost_by(findings: Iterable[Finding], *, is_judged: bool) -> tuple[str, ...]:
     )
 
 
-def _place(finding: Finding, every: Iterable[Finding], reach: Leads) -> tuple[bool, int, bool, bool, float, bool]:
+def _place(finding: Finding, every: Iterable[Finding], reach: Explains) -> tuple[bool, int, bool, bool, float, bool]:
     """Sorts findings: one whose cause was seen within the slack after it comes after that cause."""
     causes = (
         other.onset_s
@@ -80,7 +82,7 @@ def _rank(finding: Finding) -> tuple[bool, int, bool, bool]:
     return finding.after_impact, _SEVERITY[finding.severity], not likely, finding.kind in SYMPTOMS
 
 
-def _explains(cause: Finding, finding: Finding, reach: Leads) -> bool:
+def _explains(cause: Finding, finding: Finding, reach: Explains) -> bool:
     return (
         not (finding.severity == "info" and finding.suspect == "parameter")  # it was set so before anything failed
         and finding.kind in reach.get(cause.kind, frozenset())
@@ -95,13 +97,13 @@ def _only_set(cause: Finding, finding: Finding) -> bool:
     return cause.suspect == "parameter" and finding.suspect == "hardware"
 
 
-def _closure(leads: Leads) -> dict[FindingKind, frozenset[FindingKind]]:
+def _closure(explains: Explains) -> dict[FindingKind, frozenset[FindingKind]]:
     """Every kind with all that it leads to by any number of steps."""
-    reach = {kind: set(after) for kind, after in leads.items()}
+    reach = {kind: set(after) for kind, after in explains.items()}
     while True:
         grown = {kind: after.union(*(reach.get(one, set()) for one in after)) for kind, after in reach.items()}
         if grown == reach:
             return {
-                kind: frozenset(after - (ON_GROUND - leads.get(kind, frozenset()))) for kind, after in reach.items()
+                kind: frozenset(after - (ON_GROUND - explains.get(kind, frozenset()))) for kind, after in reach.items()
             }
         reach = grown

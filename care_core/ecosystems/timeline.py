@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from care_core.ecosystems.findings import Moment
+from care_core.ecosystems.findings import Event
 from care_core.ecosystems.vehicles import is_self_written
 from care_core.logs.base import Table
 from care_core.numbers import Floats, ascending, distinct, median, pauses
@@ -18,13 +18,13 @@ from care_core.run import Damage, Setting, shown
 Span = tuple[float, float]
 
 MOST = 40
-"""Lines of an account; of a longer one the least telling are left out."""
+"""Lines of a timeline; of a longer one the least telling are left out."""
 
 _KEPT_LONGEST = ("vehicle", "crash", "failsafe", "arming", "error", "log", "flight", "battery", "gps", "radio", "mode",
                  "parameter", "event", "message", "mission")  # fmt: skip
 _AT_ONCE = ("vehicle", "crash", "failsafe", "error", "event", "arming", "battery", "gps", "radio", "mode", "flight",
             "mission", "message", "parameter", "log")  # fmt: skip
-"""Kinds of moments as they stand where several happen at once: what happened before what followed from it."""
+"""Kinds of events as they stand where several happen at once: what happened before what followed from it."""
 
 _NUMBERS = re.compile(r"\d+(?:\.\d+)?")
 _TELLING = re.compile(
@@ -44,25 +44,25 @@ _CLEARLY = 3.0
 _SWITCHED_WITHIN_S = 2.0
 
 
-def account_of(moments: Iterable[Moment], introduction: Moment, most: int = MOST) -> tuple[Moment, ...]:
-    """An account: the introduction, then everything in order of time, the most telling where there is too much."""
-    return (introduction, *_kept(sorted(moments, key=_place), most - 1))
+def timeline_of(events: Iterable[Event], introduction: Event, most: int = MOST) -> tuple[Event, ...]:
+    """A timeline: the introduction, then everything in order of time, the most telling where there is too much."""
+    return (introduction, *_kept(sorted(events, key=_place), most - 1))
 
 
-def repeats(moments: Sequence[Moment]) -> Iterator[Moment]:
+def repeats(events: Sequence[Event]) -> Iterator[Event]:
     """Moments that differ in nothing but numbers as one, with their count and when the last one was."""
-    groups: dict[tuple[str, str], list[Moment]] = {}
-    for moment in moments:
-        groups.setdefault((moment.kind, _NUMBERS.sub("#", moment.text)), []).append(moment)
+    groups: dict[tuple[str, str], list[Event]] = {}
+    for event in events:
+        groups.setdefault((event.kind, _NUMBERS.sub("#", event.text)), []).append(event)
     for several in groups.values():
         first = several[0]
         again = f" ({len(several)} times until {several[-1].time_s:.0f} s)" if len(several) > 1 else ""
-        yield Moment(first.time_s, first.kind, first.text + again, first.source)
+        yield Event(first.time_s, first.kind, first.text + again, first.source)
 
 
 def parameter_changes(
     settings: Mapping[str, tuple[Setting, ...]], armed: Sequence[Span], source: str
-) -> Iterator[Moment]:
+) -> Iterator[Event]:
     """Parameters changed while armed one by one, those changed on the ground together."""
     ground: dict[str, tuple[float, str]] = {}
     for name, history in settings.items():
@@ -74,7 +74,7 @@ def parameter_changes(
                 continue
             change = f"from {shown(before.value)} to {shown(after.value)}"
             if within(armed, t):
-                yield Moment(t, "parameter", f"{name} changed {change} while armed", source)
+                yield Event(t, "parameter", f"{name} changed {change} while armed", source)
             else:
                 ground[name] = (ground.get(name, (t,))[0], f"{name} {change}")
     if ground:
@@ -82,10 +82,10 @@ def parameter_changes(
         more = f" and {len(named) - _CHANGES_NAMED} more" if len(named) > _CHANGES_NAMED else ""
         what = "parameter changed" if len(named) == 1 else f"{len(named)} parameters changed"
         text = f"{what} while disarmed: {', '.join(change for _, change in named[:_CHANGES_NAMED])}{more}"
-        yield Moment(named[0][0], "parameter", text, source)
+        yield Event(named[0][0], "parameter", text, source)
 
 
-def gaps(tables: Iterable[Table], armed: Sequence[Span]) -> Iterator[Moment]:
+def gaps(tables: Iterable[Table], armed: Sequence[Span]) -> Iterator[Event]:
     """The longest time in which nothing at all was recorded while armed, and while disarmed if it is long."""
     told = [table for table in tables if len(table) > _GAP_MEDIANS]
     starts, ends = pauses(map(_known, told), _PAUSE_S)
@@ -104,7 +104,7 @@ def gaps(tables: Iterable[Table], armed: Sequence[Span]) -> Iterator[Moment]:
         if lasted:
             start, end = max(lasted, key=lambda pause: pause[1] - pause[0])
             more = f", the longest of {len(lasted)} gaps" if len(lasted) > 1 else ""
-            yield Moment(start, "log", f"nothing is recorded for {end - start:.1f} s{when}{more}", "the log")
+            yield Event(start, "log", f"nothing is recorded for {end - start:.1f} s{when}{more}", "the log")
 
 
 def _known(table: Table) -> Floats:
@@ -129,13 +129,13 @@ def _usual_step(tables: Sequence[Table]) -> float:
     return float(median(steps)) if len(steps) else 0.0
 
 
-def damage_of(damage: Sequence[Damage]) -> Iterator[Moment]:
+def damage_of(damage: Sequence[Damage]) -> Iterator[Event]:
     """What is broken in a log, in one line."""
     if damage:
         first = damage[0]
         text = first.what if first.what.startswith("the log") else f"damage in the log: {first.what}"
         more = f", and {counted(len(damage) - 1, 'more place')}" if len(damage) > 1 else ""
-        yield Moment(math.nan if first.time_s is None else first.time_s, "log", text + more, "the log")
+        yield Event(math.nan if first.time_s is None else first.time_s, "log", text + more, "the log")
 
 
 def counted(number: int, what: str, plural: str = "s") -> str:
@@ -148,23 +148,23 @@ def within(spans: Iterable[Span], t: float) -> bool:
     return any(start <= t <= end for start, end in spans)
 
 
-def _place(moment: Moment) -> tuple[bool, float, int]:
-    """Where a moment stands: by time to a tenth of a second, then by kind; what has no time comes last."""
-    known = math.isfinite(moment.time_s)
-    return not known, round(moment.time_s, 1) if known else 0.0, _AT_ONCE.index(moment.kind)
+def _place(event: Event) -> tuple[bool, float, int]:
+    """Where a event stands: by time to a tenth of a second, then by kind; what has no time comes last."""
+    known = math.isfinite(event.time_s)
+    return not known, round(event.time_s, 1) if known else 0.0, _AT_ONCE.index(event.kind)
 
 
-def _kept(moments: Sequence[Moment], most: int) -> list[Moment]:
-    """At most so many moments in their order, the most telling ones."""
-    if len(moments) <= most:
-        return list(moments)
+def _kept(events: Sequence[Event], most: int) -> list[Event]:
+    """At most so many events in their order, the most telling ones."""
+    if len(events) <= most:
+        return list(events)
     order = {kind: place for place, kind in enumerate(_KEPT_LONGEST)}
 
     def weight(at: int) -> tuple[float, int]:
-        moment = moments[at]
-        is_promoted = moment.kind == "message" and _TELLING.search(moment.text) is not None
-        return (order["error"] + 0.5 if is_promoted else order[moment.kind]), at
+        event = events[at]
+        is_promoted = event.kind == "message" and _TELLING.search(event.text) is not None
+        return (order["error"] + 0.5 if is_promoted else order[event.kind]), at
 
-    chosen = set(sorted(range(len(moments)), key=weight)[: most - 1])
-    rest = Moment(math.nan, "message", f"and {len(moments) - len(chosen)} more moments of less weight", "the log")
-    return [*(moment for at, moment in enumerate(moments) if at in chosen), rest]
+    chosen = set(sorted(range(len(events)), key=weight)[: most - 1])
+    rest = Event(math.nan, "message", f"and {len(events) - len(chosen)} more events of less weight", "the log")
+    return [*(event for at, event in enumerate(events) if at in chosen), rest]

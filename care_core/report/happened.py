@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
 from care_core.diagnose.records import Hypothesis, What
-from care_core.ecosystems.findings import Finding, FindingKind, Health, Moment, Severity
+from care_core.ecosystems.findings import Event, Finding, FindingKind, Health, Severity
 from care_core.numbers import six_digits
 from care_core.report.published import Document
 from care_core.report.wording import SEVERITY_WORDS, hypothesis_text, noted
@@ -23,7 +23,7 @@ LED_TO_SHOWN = 4
 HYPOTHESES_SHOWN = 4
 
 
-M = TypeVar("M", bound="Moment | MomentEntry")
+M = TypeVar("M", bound="Event | MomentEntry")
 
 
 class FitEntry(Document, kw_only=True):
@@ -80,7 +80,7 @@ def fit_entry(fit: Fit) -> FitEntry:
 def account_entries(health: Health) -> list[MomentEntry]:
     return [
         MomentEntry(time_s=_finite(one.time_s), kind=one.kind, text=clean(one.text), source=clean(one.source))
-        for one in health.account
+        for one in health.timeline
     ]
 
 
@@ -125,7 +125,7 @@ def finding_text(finding: Finding) -> str:
     return f"{finding.title} at {seconds(finding.onset_s)}"
 
 
-def account_lines(account: Sequence[Moment | MomentEntry], robot: str = "", most: int = MOMENTS_SHOWN) -> Iterator[str]:
+def account_lines(account: Sequence[Event | MomentEntry], robot: str = "", most: int = MOMENTS_SHOWN) -> Iterator[str]:
     """The account as text; of a long one the lines that say most about a failure."""
     if not account:
         return

@@ -52,7 +52,7 @@ def marks_of(diagnosis: Diagnosis) -> list[Mark]:
     rests on."""
     findings = [one for found in noted(diagnosis.health.findings) for one in (found, *found.consequences)]
     marks = [Mark(f.onset_s, f.severity, f.title, _RANKS[f.severity]) for f in findings]
-    account = diagnosis.health.account
+    account = diagnosis.health.timeline
     marks += [Mark(one.time_s, one.kind, one.text, _RANKS[one.kind]) for one in account if one.kind in _RANKS]
     said = {mark.words for mark in marks}
     evidence = (part for part in diagnosis.run.evidence if part.text not in said)

@@ -28,8 +28,8 @@ def to_text(diagnosis: Diagnosis) -> str:
     sections = [
         _headline(diagnosis),
         hypothesis_lines(diagnosis.hypotheses, diagnosis.health.findings),
-        finding_lines(health.findings) if health.account or health.findings else (),
-        account_lines(health.account, health.robot),
+        finding_lines(health.findings) if health.timeline or health.findings else (),
+        account_lines(health.timeline, health.robot),
         _origin(diagnosis),
         _missions(diagnosis),
         _objectives(diagnosis),
@@ -92,7 +92,7 @@ def _measured(objective: ObjectiveResult) -> str:
 
 def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     run, profile = diagnosis.run, diagnosis.profile
-    told = ("vehicle", "frame") if diagnosis.health.account else ()  # the account begins with them
+    told = ("vehicle", "frame") if diagnosis.health.timeline else ()  # the account begins with them
     facts = "".join(f", {name} {fact}" for name, fact in run.log.facts.items() if name not in told)
     mission = f"{run.noun} {run.mission.index} of {run.mission.count}"
     duration = f"{run.mission.end_s - run.mission.start_s:.0f} s"

@@ -11,7 +11,14 @@ from care_core.application.viewing import what_would_fit
 from care_core.ecosystems.findings import Health
 from care_tui.pages.page import Fetch, View
 from care_tui.pages.step import StepPage
-from care_tui.render.happened import Told, fit_rows, told, told_item, told_rows, verdict_line
+from care_tui.render.happened import (
+    FindingRow,
+    fit_rows,
+    health_row_details,
+    health_row_item,
+    health_rows,
+    verdict_line,
+)
 from care_tui.render.objectives import run_rows
 from care_tui.render.rows import Row, Rows
 from care_tui.screens.panes import PanesScreen
@@ -29,7 +36,7 @@ class AccountPage(StepPage):
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"pick", "again"})
     LIST = "most"
 
-    _told: tuple[Health, list[Told]] | None = None
+    _rows: tuple[Health, list[FindingRow]] | None = None
 
     def __init__(self, screen: PanesScreen) -> None:
         super().__init__(screen)
@@ -46,23 +53,23 @@ class AccountPage(StepPage):
         self._advice.start(lambda: what_would_fit(case))
 
     @property
-    def _lines(self) -> list[Told]:
+    def _lines(self) -> list[FindingRow]:
         """The lines of the pane, made once for a log."""
         health = self.session.diagnosis.health
-        if self._told is None or self._told[0] is not health:
-            self._told = health, told(health)
-        return self._told[1]
+        if self._rows is None or self._rows[0] is not health:
+            self._rows = health, health_rows(health)
+        return self._rows[1]
 
     def view(self) -> View:
         diagnosis, glyphs, lines = self.session.diagnosis, self.glyphs, self._lines
-        listing = Listing(len(lines), lambda i, _width: (told_item(lines[i], glyphs),), lambda i: lines[i].words)
+        listing = Listing(len(lines), lambda i, _width: (health_row_item(lines[i], glyphs),), lambda i: lines[i].words)
         return View(verdict_line(diagnosis, glyphs), self._detail, listing)
 
     def _detail(self, index: int | None) -> Rows:
         diagnosis = self.session.diagnosis
         found = self._advice.answer
         fit = fit_rows(diagnosis, found if isinstance(found, list) else [])
-        rows = [] if index is None else told_rows(self._lines[index])
+        rows = [] if index is None else health_row_details(self._lines[index])
         parts = [part for part in (rows, fit, run_rows(diagnosis).rows) if part]
         return Rows(row for place, part in enumerate(parts) for row in ([Row(Content())] if place else []) + [*part])
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
-from care_core.ecosystems.findings import Finding, Health, Moment, Severity
+from care_core.ecosystems.findings import Event, Finding, Health, Severity
 from care_core.records import Record
 from care_core.report.marks import Mark
 from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
@@ -19,10 +19,10 @@ TIME_WIDTH, KIND_WIDTH = 8, 10
 _COLOURS: dict[Severity, str] = {"critical": "bold $text-error", "warning": "$text-warning", "info": ""}
 
 
-class Told(Record):
-    """A line of the pane: a finding, one that `cause` led to, or a moment of the account."""
+class FindingRow(Record):
+    """A line of the pane: a finding, one that `cause` led to, or an event of the timeline."""
 
-    what: Finding | Moment
+    what: Finding | Event
     cause: Finding | None = None
 
     @property
@@ -37,18 +37,18 @@ class Told(Record):
         return f"{self.what.kind} {self.what.text}"
 
 
-def told(health: Health) -> list[Told]:
+def health_rows(health: Health) -> list[FindingRow]:
     """Findings, the first cause first and what each led to below it; then the account in order of time."""
     lines = []
     for finding in noted(health.findings):
-        lines += [Told(finding), *(Told(below, finding) for below in finding.consequences)]
-    return [*lines, *(Told(moment) for moment in health.account)]
+        lines += [FindingRow(finding), *(FindingRow(below, finding) for below in finding.consequences)]
+    return [*lines, *(FindingRow(event) for event in health.timeline)]
 
 
-def told_item(one: Told, glyphs: Glyphs) -> Content:
-    """One line of the pane. A finding has a sign and a word, what it led to is set in, a moment is plain."""
+def health_row_item(one: FindingRow, glyphs: Glyphs) -> Content:
+    """One line of the pane. A finding has a sign and a word, what it led to is set in, an event is plain."""
     time = f"{seconds(one.time_s):>{TIME_WIDTH}}  "
-    if isinstance(one.what, Moment):
+    if isinstance(one.what, Event):
         return Content.assemble("  ", padded(one.what.kind, KIND_WIDTH), time, text(one.what.text))
     late = "  (after it was down)" if one.what.after_impact else ""
     if one.cause is not None:
@@ -58,9 +58,9 @@ def told_item(one: Told, glyphs: Glyphs) -> Content:
     return Content.assemble(head, time, text(one.what.title, "bold"), text(late))
 
 
-def told_rows(one: Told) -> list[Row]:
+def health_row_details(one: FindingRow) -> list[Row]:
     """All about one line of the pane."""
-    if isinstance(one.what, Moment):
+    if isinstance(one.what, Event):
         return [labelled(seconds(one.what.time_s), one.what.text), labelled("From", one.what.source)]
     return finding_rows(one.what, one.cause)
 

@@ -16,7 +16,7 @@ from care_core.diagnose.records import (
     PathNode,
     Prediction,
 )
-from care_core.ecosystems.findings import Finding, Health, Moment
+from care_core.ecosystems.findings import Event, Finding, Health
 from care_core.records import replace
 from care_core.run import Damage, Evidence, Fit, FitVerdict, LogInfo, MissionInfo, ProfileChoice, Run, Setting
 from care_core.variables import Change, Role, Threshold, Variable
@@ -190,10 +190,10 @@ LOW_SATELLITES = Finding("gps", "few satellites", 3.0, 8.0, "warning", "5, 6 are
 HEALTH = Health(
     "ArduCopter V4.3.6, quad X",
     (
-        Moment(1.0, "vehicle", "ArduCopter V4.3.6", "MSG"),
-        Moment(12.4, "arming", "armed", "EV"),
-        Moment(60.0, "mode", f"AUTO {HOSTILE}", "MODE"),
-        Moment(137.4, "error", "crash check", "ERR"),
+        Event(1.0, "vehicle", "ArduCopter V4.3.6", "MSG"),
+        Event(12.4, "arming", "armed", "EV"),
+        Event(60.0, "mode", f"AUTO {HOSTILE}", "MODE"),
+        Event(137.4, "error", "crash check", "ERR"),
     ),
     (MOTOR, LOW_SATELLITES),
 )

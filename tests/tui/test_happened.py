@@ -49,7 +49,7 @@ async def test_the_first_step_tells_what_happened_the_first_cause_first(make_app
 
 
 async def test_that_nothing_was_found_is_said_plainly(make_app: MakeApp) -> None:
-    healthy = replace(sample.all_ok(), health=Health("Rover V4.5", sample.HEALTH.account, ()))
+    healthy = replace(sample.all_ok(), health=Health("Rover V4.5", sample.HEALTH.timeline, ()))
     app = make_app(healthy)
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "1")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from care_core.diagnose.records import Since
-from care_core.ecosystems.findings import Finding, Moment
+from care_core.ecosystems.findings import Event, Finding
 from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.markdown import LONGEST, to_markdown
@@ -24,7 +24,7 @@ def test_it_has_no_table_and_folds_the_difference_and_the_account() -> None:
 def test_a_text_of_a_log_calls_nobody_and_links_nowhere() -> None:
     made = made_diagnosis()
     said = "@everyone see https://evil.example/x or www.evil.example <img src=x> ![a](b) ```"
-    health = replace(made.health, account=(Moment(1.0, "message", said, "MSG"),))
+    health = replace(made.health, timeline=(Event(1.0, "message", said, "MSG"),))
     text = to_markdown(build_document(replace(made, health=health)))
     assert "@" not in text.replace("@@ -1 +1 @@", "")
     assert "(at)everyone" in text
@@ -42,11 +42,11 @@ def test_a_difference_with_fences_in_it_stays_a_code_block() -> None:
 def test_it_is_never_longer_than_a_post_and_says_what_it_left_out() -> None:
     made = made_diagnosis()
     many = tuple(Finding("gps", f"finding {n}", 1.0, 2.0, "warning", "x" * 2000, "GPS") for n in range(200))
-    moments = tuple(Moment(float(n), "message", "y" * 2000, "MSG") for n in range(200))
+    moments = tuple(Event(float(n), "message", "y" * 2000, "MSG") for n in range(200))
     report = build_document(
         replace(
             made,
-            health=replace(made.health, findings=many, account=moments),
+            health=replace(made.health, findings=many, timeline=moments),
             since=Since("/a/good.BIN", (), tuple("z" * 900 for _ in range(100))),
             notes=tuple(f"{n} {'n' * 900}" for n in range(100)),
         )

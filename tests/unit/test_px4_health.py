@@ -60,7 +60,7 @@ def words(*said: tuple[float, str, str]) -> Table:
 
 
 def texts(health: Health, kind: str = "") -> list[str]:
-    return [moment.text for moment in health.account if not kind or moment.kind == kind]
+    return [moment.text for moment in health.timeline if not kind or moment.kind == kind]
 
 
 FLOWN = states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 4), (10, 17), (20, 3), (40, 5)],

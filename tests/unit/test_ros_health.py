@@ -154,11 +154,11 @@ def test_a_planner_without_a_cause_is_suspected_of_its_parameters(tmp_path: Path
 def test_the_account_tells_goals_and_groups_messages(tmp_path: Path) -> None:
     said = [(10.0 + n, WARN, "local_costmap", f"Map update took {n}.5 seconds") for n in range(20)]
     health = looked_at(Drive(outcome=ABORTED, said=said), tmp_path)
-    texts = [one.text for one in health.account]
+    texts = [one.text for one in health.timeline]
     assert any(text.startswith("goal 1") and "aborted after 39 s" in text for text in texts)
     assert sum("Map update" in text for text in texts) == 1
     assert any("(20 times, until 29.0 s)" in text for text in texts)
-    assert [one.time_s for one in health.account] == sorted(one.time_s for one in health.account)
+    assert [one.time_s for one in health.timeline] == sorted(one.time_s for one in health.timeline)
     assert len(texts) <= 40
 
 
@@ -203,7 +203,7 @@ def test_an_empty_recording_is_said_to_be_empty(tmp_path: Path) -> None:
         pass
     health = examine(RunModel(open_log(tmp_path / "empty.mcap")))
     assert health.too_little
-    assert any("nothing was recorded" in one.text for one in health.account)
+    assert any("nothing was recorded" in one.text for one in health.timeline)
 
 
 def test_other_containers_are_looked_at_alike(tmp_path: Path) -> None:
@@ -272,7 +272,7 @@ def test_whatever_messages_hold_a_look_at_them_succeeds(seed: int, tmp_path: Pat
                     log.add(topic, kind, when, cdr(random_message(ROS2, kind, rng)))
     health = examine(RunModel(open_log(tmp_path / "random.mcap")))
     assert all(one.title and one.evidence for one in health.findings)
-    assert len(health.account) <= 60
+    assert len(health.timeline) <= 60
 
 
 @pytest.mark.parametrize("wrong", [{"parent": 7}, {"x": "far"}, {"child": None}])

@@ -6,10 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
-from care_core.ecosystems.ranking import OVER_S, SLACK_S, Leads, lost_by, told
+from care_core.ecosystems.ranking import OVER_S, SLACK_S, Explains, lost_by, rank_findings
 from care_core.records import replace
 
-LEADS: Leads = {"laser": frozenset({"planner"}), "planner": frozenset({"control"}), "battery": frozenset({"drive"})}
+EXPLAINS: Explains = {
+    "laser": frozenset({"planner"}),
+    "planner": frozenset({"control"}),
+    "battery": frozenset({"drive"}),
+}
 KINDS: tuple[FindingKind, ...] = ("laser", "planner", "control", "battery", "drive")
 SEVERITIES: tuple[Severity, ...] = ("critical", "warning", "info")
 
@@ -19,14 +23,16 @@ def finding(kind: FindingKind, onset_s: float, severity: Severity = "critical") 
 
 
 def test_what_a_cause_leads_to_by_several_steps_folds_under_it() -> None:
-    (root,) = told([finding("control", 9.0), finding("laser", 1.0), finding("planner", 5.0)], LEADS)
+    (root,) = rank_findings([finding("control", 9.0), finding("laser", 1.0), finding("planner", 5.0)], EXPLAINS)
     assert (root.kind, [one.kind for one in root.consequences]) == ("laser", ["planner", "control"])
 
 
 def test_a_cause_seen_just_after_its_consequence_still_leads_it() -> None:
-    (root,) = told([finding("planner", 5.0), finding("laser", 5.0 + SLACK_S)], LEADS)
+    (root,) = rank_findings([finding("planner", 5.0), finding("laser", 5.0 + SLACK_S)], EXPLAINS)
     assert (root.kind, [one.kind for one in root.consequences]) == ("laser", ["planner"])
-    assert [one.kind for one in told([finding("planner", 5.0), finding("laser", 5.1 + SLACK_S)], LEADS)] == [
+    assert [
+        one.kind for one in rank_findings([finding("planner", 5.0), finding("laser", 5.1 + SLACK_S)], EXPLAINS)
+    ] == [
         "planner",
         "laser",
     ]
@@ -34,12 +40,14 @@ def test_a_cause_seen_just_after_its_consequence_still_leads_it() -> None:
 
 def test_what_was_over_long_before_brings_nothing_about() -> None:
     soon, late = finding("planner", 2.0 + OVER_S), finding("planner", 2.1 + OVER_S)
-    assert len(told([finding("laser", 1.0), soon], LEADS)) == 1
-    assert len(told([finding("laser", 1.0), late], LEADS)) == 2
+    assert len(rank_findings([finding("laser", 1.0), soon], EXPLAINS)) == 1
+    assert len(rank_findings([finding("laser", 1.0), late], EXPLAINS)) == 2
 
 
 def test_a_lesser_finding_explains_no_worse_one() -> None:
-    assert [one.kind for one in told([finding("laser", 1.0, "warning"), finding("planner", 5.0)], LEADS)] == [
+    assert [
+        one.kind for one in rank_findings([finding("laser", 1.0, "warning"), finding("planner", 5.0)], EXPLAINS)
+    ] == [
         "planner",
         "laser",
     ]
@@ -48,33 +56,33 @@ def test_a_lesser_finding_explains_no_worse_one() -> None:
 def test_what_is_likely_is_told_before_suspicions_and_is_no_consequence_of_one() -> None:
     suspected = replace(finding("laser", 1.0), probability=0.2)
     likely = replace(finding("planner", 5.0), probability=0.9)
-    assert [one.kind for one in told([suspected, likely], LEADS)] == ["planner", "laser"]
+    assert [one.kind for one in rank_findings([suspected, likely], EXPLAINS)] == ["planner", "laser"]
 
 
 def test_a_part_that_surely_failed_is_not_what_a_setting_led_to() -> None:
     by_setting = replace(finding("laser", 1.0), probability=0.8, suspect="parameter")
     part = replace(finding("planner", 5.0), probability=0.6)
-    assert [one.kind for one in told([by_setting, part], LEADS)] == ["laser", "planner"]
-    (root,) = told([by_setting, replace(part, probability=0.3)], LEADS)
+    assert [one.kind for one in rank_findings([by_setting, part], EXPLAINS)] == ["laser", "planner"]
+    (root,) = rank_findings([by_setting, replace(part, probability=0.3)], EXPLAINS)
     assert root.kind == "laser"
 
 
 def test_a_symptom_is_told_after_a_cause_of_its_weight() -> None:
-    assert [one.kind for one in told([finding("attitude", 1.0), finding("battery", 9.0)], {})] == [
+    assert [one.kind for one in rank_findings([finding("attitude", 1.0), finding("battery", 9.0)], {})] == [
         "battery",
         "attitude",
     ]
 
 
 def test_what_comes_after_the_impact_is_told_last() -> None:
-    first, last = told([finding("laser", 8.0), finding("drive", 2.0, "warning")], LEADS, impact_s=5.0)
+    first, last = rank_findings([finding("laser", 8.0), finding("drive", 2.0, "warning")], EXPLAINS, impact_s=5.0)
     assert (first.kind, first.after_impact, last.kind, last.after_impact) == ("drive", False, "laser", True)
 
 
 @given(st.lists(st.tuples(st.sampled_from(KINDS), st.floats(0, 20), st.sampled_from(SEVERITIES)), max_size=8))
 def test_every_finding_is_told_once(given_ones: list[tuple[FindingKind, float, Severity]]) -> None:
     findings = [finding(*one) for one in given_ones]
-    said = [(one.kind, one.onset_s) for root in told(findings, LEADS) for one in (root, *root.consequences)]
+    said = [(one.kind, one.onset_s) for root in rank_findings(findings, EXPLAINS) for one in (root, *root.consequences)]
     assert sorted(said) == sorted((one.kind, one.onset_s) for one in findings)
 
 

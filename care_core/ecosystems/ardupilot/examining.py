@@ -7,12 +7,12 @@ import numpy as np
 from care_core.ecosystems.ardupilot import flight as course
 from care_core.ecosystems.ardupilot import timeline
 from care_core.ecosystems.ardupilot.checks import CHECKS
-from care_core.ecosystems.ardupilot.explains import LEADS
+from care_core.ecosystems.ardupilot.explains import EXPLAINS
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, Health
-from care_core.ecosystems.ranking import told
+from care_core.ecosystems.ranking import rank_findings
 from care_core.logs.base import LogFormat, Wanted
 from care_core.logs.plausible import clock_doubt, plausible
 
@@ -47,7 +47,7 @@ def find(of: Flight) -> tuple[Finding, ...]:
     """Findings of a flight in the order told: the first cause first, its consequences under it."""
     with np.errstate(all="ignore"):
         found = [finding for check in CHECKS for finding in check.find(of)]
-    return told(found, LEADS, of.down_s)
+    return rank_findings(found, EXPLAINS, of.down_s)
 
 
 def examine(model: RunModel) -> Health:
@@ -59,4 +59,4 @@ def examine(model: RunModel) -> Health:
     if not too_little and not findings:
         # Times that cannot be are no reason to keep quiet about what was found, but none to call the rest fine.
         too_little = clock_doubt(flight.tables, 0.0, flight.end_s)
-    return Health(flight.vehicle.title, timeline.account(flight, model.log.damage), findings, too_little)
+    return Health(flight.vehicle.title, timeline.timeline(flight, model.log.damage), findings, too_little)

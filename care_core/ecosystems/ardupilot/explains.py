@@ -8,7 +8,7 @@ from care_core.ecosystems.findings import FindingKind
 
 _FALL: frozenset[FindingKind] = frozenset(("attitude", "crash", "takeoff", "log"))
 
-LEADS: Mapping[FindingKind, frozenset[FindingKind]] = {
+EXPLAINS: Mapping[FindingKind, frozenset[FindingKind]] = {
     "vibration": frozenset(("imu", "estimator", "barometer", "tuning", "compass", "thrust", *_FALL)),
     "imu": frozenset(("vibration", "estimator", "tuning", "thrust", *_FALL)),
     "motor": frozenset(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight, Span
-from care_core.ecosystems.findings import Moment
+from care_core.ecosystems.findings import Event
 from care_core.logs.base import Table
 
 _CELL_LOW_V, _CELL_FULL_V = 3.5, 4.25
@@ -28,7 +28,7 @@ def cells(volts: float) -> int | None:
     return possible[0] if len(possible) == 1 else None
 
 
-def supply(flight: Flight) -> Iterator[Moment]:
+def supply(flight: Flight) -> Iterator[Event]:
     """Moments about supplies: at each first arming, and the worst while armed."""
     for battery, table in enumerate(flight.all("BAT", "Volt"), start=1):
         yield from _battery(flight, table, f"battery {battery}" if battery > 1 else "battery")
@@ -40,10 +40,10 @@ def supply(flight: Flight) -> Iterator[Moment]:
         worst = _worst(flight.armed, strength, "RXRSSI")
         if worst is not None and worst["RXRSSI"][0] < _WEAK * strength["RXRSSI"].max():
             text = f"radio at its weakest while armed: {worst['RXRSSI'][0] / strength['RXRSSI'].max():.0%} of its best"
-            yield Moment(float(worst.t[0]), "radio", text, "RSSI")
+            yield Event(float(worst.t[0]), "radio", text, "RSSI")
 
 
-def _battery(flight: Flight, table: Table, name: str) -> Iterator[Moment]:
+def _battery(flight: Flight, table: Table, name: str) -> Iterator[Event]:
     sane = table.where(np.isfinite(table["Volt"]) & np.isfinite(table.t))
     if not len(sane) or sane["Volt"].max() < _DEAD_V:
         return
@@ -51,30 +51,30 @@ def _battery(flight: Flight, table: Table, name: str) -> Iterator[Moment]:
     volts = float(before["Volt"][-1])
     count = cells(volts)
     pack = f" ({count} cells)" if count and count > 1 else ""
-    yield Moment(at, "battery", f"{name} at {volts:.1f} V{pack}", "BAT")
+    yield Event(at, "battery", f"{name} at {volts:.1f} V{pack}", "BAT")
     worst = _worst(flight.armed, sane, "Volt")
     if worst is None or worst["Volt"][0] > _SAGS * volts:
         return
     amps = f" at {worst['Curr'][0]:.0f} A" if "Curr" in worst.columns and worst["Curr"][0] > 0.5 else ""
     text = f"{name} at its lowest while armed: {worst['Volt'][0]:.1f} V{amps}"
-    yield Moment(float(worst.t[0]), "battery", text, "BAT")
+    yield Event(float(worst.t[0]), "battery", text, "BAT")
 
 
-def _gps(flight: Flight, table: Table) -> Iterator[Moment]:
+def _gps(flight: Flight, table: Table) -> Iterator[Event]:
     sane = table.where(np.isfinite(table["Status"]) & np.isfinite(table.t))
     if not len(sane):
         return
     at, before = _at_start(flight, sane)
-    yield Moment(at, "gps", _fix_words(before, len(before) - 1), "GPS")
+    yield Event(at, "gps", _fix_words(before, len(before) - 1), "GPS")
     if not flight.armed or before["Status"][-1] < _3D:
         return
     armed = [sane.between(*span) for span in flight.armed]
     lost = [float(part.t[part["Status"] < _3D][0]) for part in armed if len(part) and (part["Status"] < _3D).any()]
     if lost:
-        yield Moment(lost[0], "gps", "GPS lost its 3D fix while armed", "GPS")
+        yield Event(lost[0], "gps", "GPS lost its 3D fix while armed", "GPS")
     worst = _worst(flight.armed, sane, "NSats")
     if worst is not None and worst["NSats"][0] < _few(before):
-        yield Moment(float(worst.t[0]), "gps", f"fewest satellites while armed: {worst['NSats'][0]:.0f}", "GPS")
+        yield Event(float(worst.t[0]), "gps", f"fewest satellites while armed: {worst['NSats'][0]:.0f}", "GPS")
 
 
 def _few(before: Table) -> float:

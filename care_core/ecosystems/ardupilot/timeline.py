@@ -21,14 +21,14 @@ from care_core.ecosystems.ardupilot.texts import (
     refusal,
     says_what_is_recorded,
 )
-from care_core.ecosystems.findings import Moment
+from care_core.ecosystems.findings import Event
 from care_core.ecosystems.timeline import (
-    account_of,
     counted,
     damage_of,
     gaps,
     parameter_changes,
     repeats,
+    timeline_of,
 )
 from care_core.ecosystems.vehicles import (
     FAILSAFE,
@@ -80,7 +80,7 @@ _SWITCHED_OFF_S = 0.05
 _IN_AIR_M, _LIFTED_M = 2.0, 0.5
 
 
-def account(flight: Flight, damage: Sequence[Damage] = ()) -> tuple[Moment, ...]:
+def timeline(flight: Flight, damage: Sequence[Damage] = ()) -> tuple[Event, ...]:
     """The account of a flight.
 
     Args:
@@ -101,35 +101,35 @@ def account(flight: Flight, damage: Sequence[Damage] = ()) -> tuple[Moment, ...]
         *_clock(flight),
         *_end(flight),
     ]
-    return account_of(_once(found), _introduced(flight, vehicle))
+    return timeline_of(_once(found), _introduced(flight, vehicle))
 
 
-def _introduced(flight: Flight, vehicle: Vehicle) -> Moment:
+def _introduced(flight: Flight, vehicle: Vehicle) -> Event:
     parts = [vehicle.title]
     motors = motors_of(flight.settings, flight.outputs)
     if motors and vehicle.kind == "quadplane":
         parts.append(f"{len(motors)} lift motors")
     if vehicle.kind == "unknown" and "vehicle" in flight.facts:
         parts.append("neither ArduPilot nor PX4 by what it says of itself")
-    return Moment(0.0, "vehicle", ", ".join(parts), "MSG" if vehicle.firmware else "the log")
+    return Event(0.0, "vehicle", ", ".join(parts), "MSG" if vehicle.firmware else "the log")
 
 
 # --- arming ----------------------------------------------------------------------------------------------------
 
 
-def _arming(flight: Flight) -> Iterator[Moment]:
+def _arming(flight: Flight) -> Iterator[Event]:
     armed_at: float | None = None
     for t, is_armed, how in _armings(flight):
         if is_armed:
             armed_at = t
-            yield Moment(t, "arming", " ".join(filter(None, ("armed", how))), "ARM")
+            yield Event(t, "arming", " ".join(filter(None, ("armed", how))), "ARM")
         else:
             lasted = f", armed for {t - armed_at:.0f} s" if armed_at is not None else ""
-            yield Moment(t, "arming", " ".join(filter(None, ("disarmed", how))) + lasted, "ARM")
+            yield Event(t, "arming", " ".join(filter(None, ("disarmed", how))) + lasted, "ARM")
             armed_at = None
     if not flight.arm_changes and flight.armed:
         how = "it is written while armed only (LOG_DISARMED 0)" if flight.is_written_armed else "by its throttle"
-        yield Moment(flight.armed[0][0], "arming", f"armed: the log tells of no arming, {how}", "the log")
+        yield Event(flight.armed[0][0], "arming", f"armed: the log tells of no arming, {how}", "the log")
     yield from _refusals(flight)
 
 
@@ -151,7 +151,7 @@ def _armings(flight: Flight) -> list[tuple[float, bool, str]]:
     return [one for at, one in enumerate(known) if at == 0 or known[at - 1][1] != one[1]]
 
 
-def _refusals(flight: Flight) -> Iterator[Moment]:
+def _refusals(flight: Flight) -> Iterator[Event]:
     """Refusals of arming, each complaint once between two armings; the last one of a vehicle that never armed leads."""
     refused = [(t, text) for t, text in flight.messages if refusal(text) is not None]
     if not refused:
@@ -160,12 +160,12 @@ def _refusals(flight: Flight) -> Iterator[Moment]:
     if not flight.armed:
         standing = dict.fromkeys(refusal(text) or "" for t, text in refused if t >= refused[-1][0] - 1.0)
         what = f"it never armed: {'; '.join(standing)}"
-        yield Moment(refused[-1][0], "arming", f"{what} ({counted(len(refused), 'refusal')})", "MSG")
+        yield Event(refused[-1][0], "arming", f"{what} ({counted(len(refused), 'refusal')})", "MSG")
     for _, several in groupby(refused, key=lambda one: sum(t <= one[0] for t in armed)):
         complaints = list(several)
         tried = {refusal(text) for _, text in complaints if text.startswith("Arm: ")}
         yield from repeats([
-            Moment(t, "arming", f"Arm: {refusal(text)}" if refusal(text) in tried else text, "MSG")
+            Event(t, "arming", f"Arm: {refusal(text)}" if refusal(text) in tried else text, "MSG")
             for t, text in complaints
         ])  # fmt: skip
 
@@ -173,17 +173,17 @@ def _refusals(flight: Flight) -> Iterator[Moment]:
 # --- modes, errors, events -------------------------------------------------------------------------------------
 
 
-def _modes(flight: Flight, vehicle: Vehicle) -> Iterator[Moment]:
+def _modes(flight: Flight, vehicle: Vehicle) -> Iterator[Event]:
     entered = [(t, name, why) for t, name, why in _entered(flight, vehicle)]
     changes = [one for at, one in enumerate(entered) if at == 0 or entered[at - 1][1] != one[1]]
     for flurry in _flurries(changes):
         t, name, why = flurry[0]
         if len(flurry) < _FLURRY:
             for t, name, why in flurry:
-                yield Moment(t, "mode", f"{_mode(name)}{f' ({why})' if why else ''}", "MODE")
+                yield Event(t, "mode", f"{_mode(name)}{f' ({why})' if why else ''}", "MODE")
         else:
             names = list(dict.fromkeys(name for _, name, _ in flurry))
-            yield Moment(t, "mode", f"mode changed {len(flurry)} times at once: {', '.join(names)}", "MODE")
+            yield Event(t, "mode", f"mode changed {len(flurry)} times at once: {', '.join(names)}", "MODE")
 
 
 def _entered(flight: Flight, vehicle: Vehicle) -> Iterator[tuple[float, str, str]]:
@@ -217,7 +217,7 @@ def _flurries(changes: Sequence[tuple[float, str, str]]) -> Iterator[list[tuple[
         yield flurry
 
 
-def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Moment]:
+def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Event]:
     """ERR records; one that is over again is one line with how long it lasted, and so is one that is said again."""
     table = flight.one("ERR", "Subsys", "ECode")
     if table is None:
@@ -239,12 +239,12 @@ def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Moment]:
         lasted.setdefault((subsystem, code), []).append((t, after[0] if after and ends else math.inf))
     for (subsystem, code), times in lasted.items():
         kind = {"failsafe": "failsafe", "crash": "crash"}.get(error_kind(subsystem), "error")
-        yield Moment(times[0][0], kind, error_words(subsystem, code, vehicle.kind) + _lasting(times), "ERR")
+        yield Event(times[0][0], kind, error_words(subsystem, code, vehicle.kind) + _lasting(times), "ERR")
     if lanes:
         t, code = lanes[0]
         told = error_words(_EKF_PRIMARY, code, vehicle.kind)
         again = f", and {counted(len(lanes) - 1, 'more switch', 'es')} until {lanes[-1][0]:.0f} s"
-        yield Moment(t, "error", told + (again if len(lanes) > 1 else ""), "ERR")
+        yield Event(t, "error", told + (again if len(lanes) > 1 else ""), "ERR")
 
 
 def _lasting(times: Sequence[tuple[float, float]]) -> str:
@@ -263,7 +263,7 @@ def _numbered(flight: Flight) -> list[tuple[float, int]]:
     return list(zip(table.t.tolist(), table["Id"].astype(int).tolist(), strict=True))
 
 
-def _events(flight: Flight) -> Iterator[Moment]:
+def _events(flight: Flight) -> Iterator[Event]:
     ended = [end for _, end in flight.armed]
     numbered = _numbered(flight)
     aligned: set[Span] = set()
@@ -275,16 +275,16 @@ def _events(flight: Flight) -> Iterator[Moment]:
         if number == _YAW_RESET and span is not None and span not in aligned:
             aligned.add(span)  # the first climb aligns the estimator's heading
         elif number != _INTERLOCK_OFF or not any(t - 1.0 <= end <= t + _SPOOL_DOWN_S for end in ended):
-            told.append(Moment(t, "event", event_words(number), "EV"))
+            told.append(Event(t, "event", event_words(number), "EV"))
     yield from repeats(told)
 
 
-def _flown(flight: Flight) -> Iterator[Moment]:
+def _flown(flight: Flight) -> Iterator[Event]:
     """Taking off and landing, as the vehicle's own detector says."""
     for start, end in flight.armed:
         top = _highest(flight, start, end)
         if top is not None and top[1] > _IN_AIR_M:
-            yield Moment(top[0], "flight", f"highest point, {top[1]:.1f} m", "POS")
+            yield Event(top[0], "flight", f"highest point, {top[1]:.1f} m", "POS")
         if top is not None and top[1] < _LIFTED_M:
             continue  # the land detector of old firmware goes by throttle alone
         state = ""
@@ -294,7 +294,7 @@ def _flown(flight: Flight) -> Iterator[Moment]:
             if is_switched_off:
                 continue  # disarming says so itself, wherever the vehicle is
             if what and what != state and (state or what == "took off") and start <= t <= end:
-                yield Moment(t, "flight", what, "EV")
+                yield Event(t, "flight", what, "EV")
                 state = what
 
 
@@ -314,18 +314,18 @@ def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | 
 # --- what it said ----------------------------------------------------------------------------------------------
 
 
-def _texts(flight: Flight) -> Iterator[Moment]:
+def _texts(flight: Flight) -> Iterator[Event]:
     """The vehicle's texts but for those of every flight; mission items that follow each other are one line."""
     said = [(t, text) for t, text in flight.messages if refusal(text) is None]
     items: list[tuple[float, int, str]] = []
-    told: list[Moment] = []
+    told: list[Event] = []
     for t, text in said:
         item = mission_item(text)
         if item is not None:
             items.append((t, *item))
         elif not is_routine(text) and not _is_recorded(text, t, flight):
             kind = "crash" if "crash" in text.casefold() else "failsafe" if FAILSAFE.search(text) else "message"
-            told.append(Moment(t, kind, text, "MSG"))
+            told.append(Event(t, kind, text, "MSG"))
     yield from repeats(told)
     yield from _mission(flight, items)
 
@@ -337,7 +337,7 @@ def _is_recorded(text: str, t: float, flight: Flight) -> bool:
     )
 
 
-def _mission(flight: Flight, items: Sequence[tuple[float, int, str]]) -> Iterator[Moment]:
+def _mission(flight: Flight, items: Sequence[tuple[float, int, str]]) -> Iterator[Event]:
     """The mission of each arming in one line."""
     for start, end in flight.armed:
         own = [(t, number, what) for t, number, what in items if start <= t <= end and number > 0]
@@ -347,7 +347,7 @@ def _mission(flight: Flight, items: Sequence[tuple[float, int, str]]) -> Iterato
         last = own[-1]
         text = f"mission: items {own[0][1]} to {max(number for _, number, _ in own)}"
         done = f", reached {_ranges(reached)}" if reached else ", none reached"
-        yield Moment(own[0][0], "mission", f"{text} until {last[0]:.0f} s{done}", "MSG")
+        yield Event(own[0][0], "mission", f"{text} until {last[0]:.0f} s{done}", "MSG")
 
 
 def _ranges(numbers: Sequence[int]) -> str:
@@ -365,12 +365,12 @@ def _ranges(numbers: Sequence[int]) -> str:
 # --- the end --------------- ---------------------------------------------------------------------------------
 
 
-def _clock(flight: Flight) -> Iterator[Moment]:
+def _clock(flight: Flight) -> Iterator[Event]:
     if "clock" in flight.facts:
-        yield Moment(0.0, "log", f"the log has no times: they are {flight.facts['clock']}", "the log")
+        yield Event(0.0, "log", f"the log has no times: they are {flight.facts['clock']}", "the log")
 
 
-def _end(flight: Flight) -> Iterator[Moment]:
+def _end(flight: Flight) -> Iterator[Event]:
     """A log that ends while the vehicle is armed says nothing of how the flight ended."""
     changes = _armings(flight)
     is_armed = changes[-1][1] if changes else bool(flight.armed) and flight.armed[-1][1] > flight.end_s - 1.0
@@ -383,13 +383,13 @@ def _end(flight: Flight) -> Iterator[Moment]:
         if known.any() and t[known][-1] > flight.end_s - 5.0 and height[known][-1] > _IN_AIR_M:
             where = f" in the air, {height[known][-1]:.0f} m up"
     text = f"the log ends{where} with the vehicle armed: power lost, or the recording stopped"
-    yield Moment(flight.end_s, "log", text, "the log")
+    yield Event(flight.end_s, "log", text, "the log")
 
 
 # --- putting it together ---------------------------------------------------------------------------------------
 
 
-def _once(moments: Sequence[Moment]) -> list[Moment]:
+def _once(moments: Sequence[Event]) -> list[Event]:
     """Without crashes and failsafes that were said twice: their text tells more than their ERR record."""
     texts = [one for one in moments if one.source == "MSG"]
     return [
@@ -400,6 +400,6 @@ def _once(moments: Sequence[Moment]) -> list[Moment]:
     ]  # fmt: skip
 
 
-def _same_subject(record: Moment, text: Moment) -> bool:
+def _same_subject(record: Event, text: Event) -> bool:
     is_near = abs(text.time_s - record.time_s) < _SAME_S and record.kind == text.kind
     return is_near and record.text.split(maxsplit=1)[0].casefold() in text.text.casefold()

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.base import RunModel
-from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health, Moment, Severity, Suspect
-from care_core.ecosystems.ranking import Leads, told
-from care_core.ecosystems.timeline import account_of, counted, damage_of, gaps, parameter_changes, repeats
+from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Event, Finding, FindingKind, Health, Severity, Suspect
+from care_core.ecosystems.ranking import Explains, rank_findings
+from care_core.ecosystems.timeline import counted, damage_of, gaps, parameter_changes, repeats, timeline_of
 from care_core.ecosystems.vehicles import mode_name, vehicle_of
 from care_core.ecosystems.vehicles.arming import KILLED, KILLED_ALOFT_M
 from care_core.logs.base import Table, Wanted
@@ -93,7 +93,7 @@ _RATIOS: Mapping[str, tuple[str, FindingKind]] = {
 _WARNINGS = {1: "low", 2: "critical", 3: "at its emergency level", 4: "failed"}
 """battery_status.warning."""
 
-LEADS: Leads = {
+EXPLAINS: Explains = {
     "motor": frozenset(("attitude", "crash", "vibration")), "battery": frozenset(("motor", "crash")),
     "gps": frozenset(("estimator", "planner")), "compass": frozenset(("estimator", "attitude")),
     "vibration": frozenset(("estimator", "attitude")), "estimator": frozenset(("attitude", "crash")),
@@ -197,7 +197,7 @@ def examine(model: RunModel) -> Health:
     flight = Px4Flight(tables, _end(tables, log.duration_s))
     vehicle = vehicle_of(log.facts, log.settings())
     hardware = log.facts.get("hardware", "")
-    introduction = Moment(0.0, "vehicle", ", ".join(filter(None, (vehicle.title, hardware))), STATUS)
+    introduction = Event(0.0, "vehicle", ", ".join(filter(None, (vehicle.title, hardware))), STATUS)
     states = tuple(_states(flight))
     moments = [
         *_arming(flight),
@@ -213,9 +213,9 @@ def examine(model: RunModel) -> Health:
         *_cut(flight, log.duration_s),
     ]
     found = [finding for _, finding in states if finding and not _after_kill(flight, finding)]
-    findings = told((*found, *_killed(flight), *_refused(flight)), LEADS)
+    findings = rank_findings((*found, *_killed(flight), *_refused(flight)), EXPLAINS)
     too_little = TOO_SHORT if STATUS not in tables or flight.end_s < _TOO_SHORT_S else "" if flight.armed else NOT_FLOWN
-    return Health(vehicle.title, account_of(moments, introduction), findings, too_little)
+    return Health(vehicle.title, timeline_of(moments, introduction), findings, too_little)
 
 
 def _killed(flight: Px4Flight) -> Iterator[Finding]:
@@ -253,49 +253,49 @@ def _changes(table: Table, field: str) -> Iterator[tuple[float, float]]:
             yield float(table.t[row]), float(values[row])
 
 
-def _arming(flight: Px4Flight) -> Iterator[Moment]:
+def _arming(flight: Px4Flight) -> Iterator[Event]:
     since: float | None = None
     for at, (t, is_armed) in enumerate(flight.arming):
         how = f" {flight.how(t)}" if flight.how(t) else ""
         if is_armed:
             since = t
-            yield Moment(t, "arming", "armed when the log begins" if at == 0 else f"armed{how}", STATUS)
+            yield Event(t, "arming", "armed when the log begins" if at == 0 else f"armed{how}", STATUS)
         elif at:
             lasted = f", armed for {t - since:.0f} s" if since is not None else ""
-            yield Moment(t, "arming", f"disarmed{how}{lasted}", STATUS)
+            yield Event(t, "arming", f"disarmed{how}{lasted}", STATUS)
     if flight.complaints and not flight.armed:
         last = flight.complaints[-1][0]
         standing = dict.fromkeys(text for t, text in flight.complaints if t >= last - _SAID_WITHIN_S)
-        yield Moment(
+        yield Event(
             last, "arming", f"it never armed: {'; '.join(_NOT_READY.sub('', one) for one in standing)}", MESSAGES
         )
     else:
-        yield from repeats([Moment(t, "arming", text, MESSAGES) for t, text in flight.complaints])
+        yield from repeats([Event(t, "arming", text, MESSAGES) for t, text in flight.complaints])
 
 
-def _modes(flight: Px4Flight) -> Iterator[Moment]:
+def _modes(flight: Px4Flight) -> Iterator[Event]:
     table = flight.one(STATUS, "nav_state")
     for t, mode in _changes(table, "nav_state") if table else ():
-        yield Moment(t, "mode", f"mode {mode_name('px4', int(mode))}", STATUS)
+        yield Event(t, "mode", f"mode {mode_name('px4', int(mode))}", STATUS)
 
 
-def _landings(flight: Px4Flight) -> Iterator[Moment]:
+def _landings(flight: Px4Flight) -> Iterator[Event]:
     """Taking off and landing by the land detector, and the highest point between."""
     table = flight.one("vehicle_land_detected", "landed")
     for at, (t, landed) in enumerate(_changes(table, "landed") if table else ()):
         if at or not landed:
-            yield Moment(t, "flight", "landed" if landed else "took off", "vehicle_land_detected")
+            yield Event(t, "flight", "landed" if landed else "took off", "vehicle_land_detected")
     position = flight.one("vehicle_local_position", "z")
     for start, end in flight.armed if position else ():
         part = position.between(start, end) if position else None
         height = part["z"][0] - part["z"] if part is not None and len(part) else np.empty(0)
         if part is not None and len(height) and np.nanmax(height) > _IN_AIR_M:
             top = int(np.nanargmax(height))
-            yield Moment(float(part.t[top]), "flight", f"highest point, {height[top]:.1f} m",
+            yield Event(float(part.t[top]), "flight", f"highest point, {height[top]:.1f} m",
                          "vehicle_local_position")  # fmt: skip
 
 
-def _states(flight: Px4Flight) -> Iterator[tuple[Moment, Finding | None]]:
+def _states(flight: Px4Flight) -> Iterator[tuple[Event, Finding | None]]:
     """What the vehicle's own checks held for wrong while it was armed, each with its finding where it is one."""
     for flag in _FLAGS:
         table = flight.one(flag.topic, flag.field)
@@ -312,7 +312,7 @@ def _states(flight: Px4Flight) -> Iterator[tuple[Moment, Finding | None]]:
 
 def _state(
     flight: Px4Flight, t: Floats, bad: NDArray[np.bool_], flag: Flag, source: str, at_least_s: float = 0.0
-) -> Iterator[tuple[Moment, Finding | None]]:
+) -> Iterator[tuple[Event, Finding | None]]:
     """A state that began while the vehicle was armed; one that held before, or from its first record on, it was armed
     with: flown by a ground station alone it never had a radio to lose."""
     spans = [
@@ -323,7 +323,7 @@ def _state(
     start, end = spans[0]
     lasting = f" ({len(spans)} times until {spans[-1][0]:.0f} s)" if len(spans) > 1 else f" for {end - start:.1f} s"
     kind = "failsafe" if flag.field == "failsafe" else "error"
-    moment = Moment(start, kind, flag.means + lasting, flag.topic)
+    moment = Event(start, kind, flag.means + lasting, flag.topic)
     if flag.kind is None:
         yield moment, None
         return
@@ -344,7 +344,7 @@ def _runs(t: Floats, mask: NDArray[np.bool_]) -> list[Span]:
     return list(zip(t[edges[::2]].tolist(), t[ends].tolist(), strict=True))
 
 
-def _spoken(flight: Px4Flight) -> Iterator[Moment]:
+def _spoken(flight: Px4Flight) -> Iterator[Event]:
     """Warnings of anybody, and what the parts that fly it say."""
     spoken = []
     for t, level, text in flight.words:
@@ -352,11 +352,11 @@ def _spoken(flight: Px4Flight) -> Iterator[Moment]:
         if not is_loud or _PREFLIGHT.search(text) or _ARMED_BY.match(text):
             continue
         kind = "failsafe" if "failsafe" in text.casefold() else "crash" if "crash" in text.casefold() else "message"
-        spoken.append(Moment(t, kind, _SPEAKER.sub("", text), MESSAGES))
+        spoken.append(Event(t, kind, _SPEAKER.sub("", text), MESSAGES))
     yield from repeats(spoken)
 
 
-def _battery(flight: Px4Flight) -> Iterator[Moment]:
+def _battery(flight: Px4Flight) -> Iterator[Event]:
     table = flight.one("battery_status", "voltage_v")
     if table is None:
         return
@@ -368,11 +368,11 @@ def _battery(flight: Px4Flight) -> Iterator[Moment]:
     row = len(before) - 1 if len(before) else 0
     volts, count = float(sane["voltage_v"][row]), int(sane.columns.get("cell_count", np.zeros(len(sane)))[row])
     pack = f" ({count} cells)" if count > 1 else ""
-    yield Moment(max(at, float(sane.t[row])), "battery", f"battery at {volts:.1f} V{pack}", "battery_status")
+    yield Event(max(at, float(sane.t[row])), "battery", f"battery at {volts:.1f} V{pack}", "battery_status")
     yield from _battery_worst(flight, sane, volts)
 
 
-def _battery_worst(flight: Px4Flight, table: Table, volts: float) -> Iterator[Moment]:
+def _battery_worst(flight: Px4Flight, table: Table, volts: float) -> Iterator[Event]:
     parts = [part for span in flight.armed if len(part := table.between(*span))]
     for part in parts:
         low = int(np.argmin(part["voltage_v"]))
@@ -380,14 +380,14 @@ def _battery_worst(flight: Px4Flight, table: Table, volts: float) -> Iterator[Mo
             amps = float(part["current_a"][low]) if "current_a" in part.columns else -1.0
             drawn = f" at {amps:.0f} A" if amps > 0.5 else ""
             text = f"battery at its lowest while armed: {part['voltage_v'][low]:.1f} V{drawn}"
-            yield Moment(float(part.t[low]), "battery", text, "battery_status")
+            yield Event(float(part.t[low]), "battery", text, "battery_status")
         if "warning" in part.columns:
             for t, level in _changes(part, "warning"):
                 if int(level) in _WARNINGS:
-                    yield Moment(t, "battery", f"battery {_WARNINGS[int(level)]}", "battery_status")
+                    yield Event(t, "battery", f"battery {_WARNINGS[int(level)]}", "battery_status")
 
 
-def _gps(flight: Px4Flight) -> Iterator[Moment]:
+def _gps(flight: Px4Flight) -> Iterator[Event]:
     topic = next((name for name in ("vehicle_gps_position", "sensor_gps") if flight.one(name, "fix_type")), "")
     table = flight.one(topic, "fix_type")
     if table is None:
@@ -400,20 +400,20 @@ def _gps(flight: Px4Flight) -> Iterator[Moment]:
         parts.append(f"{table['satellites_used'][row]:.0f} satellites")
     if "hdop" in table.columns and table["hdop"][row] > 0:
         parts.append(f"HDop {table['hdop'][row]:.1f}")
-    yield Moment(max(at, float(table.t[row])), "gps", ", ".join(parts), topic)
+    yield Event(max(at, float(table.t[row])), "gps", ", ".join(parts), topic)
     if table["fix_type"][row] >= _3D:
         lost = [t for t, fix in _changes(table, "fix_type") if fix < _3D and _began(flight, t)]
         if lost:
-            yield Moment(lost[0], "gps", "GPS lost its 3D fix while armed", topic)
+            yield Event(lost[0], "gps", "GPS lost its 3D fix while armed", topic)
 
 
-def _cut(flight: Px4Flight, duration_s: float) -> Iterator[Moment]:
+def _cut(flight: Px4Flight, duration_s: float) -> Iterator[Event]:
     if flight.end_s < duration_s:
         text = f"the recording ends, but for a message stamped {duration_s - flight.end_s:.0f} s later"
-        yield Moment(flight.end_s, "log", text, "the log")
+        yield Event(flight.end_s, "log", text, "the log")
     if flight.arming and flight.arming[-1][1]:
         text = "the log ends with the vehicle armed: power lost, or the recording stopped"
-        yield Moment(flight.end_s, "log", text, "the log")
+        yield Event(flight.end_s, "log", text, "the log")
 
 
 def _refused(flight: Px4Flight) -> Iterable[Finding]:

@@ -9,7 +9,7 @@ from care_core.ecosystems.findings import Health
 from care_core.ecosystems.ros import plan
 from care_core.ecosystems.ros.finding import find
 from care_core.ecosystems.ros.recording import STREAM_MESSAGES, Recording
-from care_core.ecosystems.ros.timeline import account
+from care_core.ecosystems.ros.timeline import timeline
 from care_core.logs.ros_log import RosLog
 from care_core.text import listed
 
@@ -35,7 +35,7 @@ def examine(model: RunModel) -> Health:
     """What happened in a ROS 1 bag or a ROS 2 recording."""
     recording = Recording.read(cast(RosLog, model.log))
     findings = find(recording)
-    return Health(_robot(recording), account(recording), findings, "" if findings else _too_little(recording))
+    return Health(_robot(recording), timeline(recording), findings, "" if findings else _too_little(recording))
 
 
 def _robot(recording: Recording) -> str:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.ranking import Leads, told
+from care_core.ecosystems.ranking import Explains, rank_findings
 from care_core.ecosystems.ros.checks import CHECKS
 from care_core.ecosystems.ros.recording import Recording
 
-LEADS: Leads = {
+EXPLAINS: Explains = {
     "battery": frozenset({"battery", "drive", "commands", "topics", "laser", "cpu"}),
     "cpu": frozenset({"cpu", "control", "tf", "topics", "commands"}),
     "radio": frozenset({"topics", "laser", "localisation", "commands", "drive", "tf", "imu"}),
@@ -29,4 +29,4 @@ the computer busy, so that loops and transforms come late."""
 
 def find(recording: Recording) -> tuple[Finding, ...]:
     """What was not as it should be, in the order told."""
-    return told((finding for check in CHECKS for finding in check(recording)), LEADS)
+    return rank_findings((finding for check in CHECKS for finding in check(recording)), EXPLAINS)

@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from care_core.ecosystems.findings import Moment
+from care_core.ecosystems.findings import Event
 from care_core.ecosystems.ros import plan
 from care_core.ecosystems.ros.diagnostics import reports
 from care_core.ecosystems.ros.recording import ERROR, FATAL, WARN, Floats, Recording
@@ -43,7 +43,7 @@ _REPAIRS = ("spin", "backup", "wait", "driveonheading", "assistedteleop", "clear
 """How the names of Nav2's tree nodes that repair something begin."""
 
 
-def account(recording: Recording) -> tuple[Moment, ...]:
+def timeline(recording: Recording) -> tuple[Event, ...]:
     """The moments of a recording, in order of time."""
     found = [
         *_recorded(recording),
@@ -60,24 +60,24 @@ def account(recording: Recording) -> tuple[Moment, ...]:
     return tuple(sorted(found, key=lambda one: one.time_s))
 
 
-def _recorded(recording: Recording) -> Iterator[Moment]:
+def _recorded(recording: Recording) -> Iterator[Event]:
     count = sum(len(times) for times in recording.times.values())
     if not count:
-        yield Moment(0.0, "error", "nothing was recorded: there is no message in it", "recording")
+        yield Event(0.0, "error", "nothing was recorded: there is no message in it", "recording")
         return
     words = f"{recording.duration_s:.0f} s of {len([1 for times in recording.times.values() if len(times)])} topics"
-    yield Moment(0.0, "recording", f"the recording begins: {words}", "recording")
+    yield Event(0.0, "recording", f"the recording begins: {words}", "recording")
     empty = [one.name for one in recording.channels if not one.count and short_name(one.type) not in _QUIET_TYPES]
     if empty:
-        yield Moment(0.0, "topic", f"no message on {_listed(empty)}", "recording")
+        yield Event(0.0, "topic", f"no message on {_listed(empty)}", "recording")
 
 
-def _damage(recording: Recording) -> Iterator[Moment]:
+def _damage(recording: Recording) -> Iterator[Event]:
     for one in recording.damage:
-        yield Moment(one.time_s if one.time_s is not None else 0.0, "damage", one.what, "recording")
+        yield Event(one.time_s if one.time_s is not None else 0.0, "damage", one.what, "recording")
 
 
-def _goals(recording: Recording) -> Iterator[Moment]:
+def _goals(recording: Recording) -> Iterator[Event]:
     goals = recording.goals
     shown = goals if len(goals) <= GOALS else [goal for goal in goals if goal.outcome != "reached"][:GOALS]
     for number, goal in enumerate(goals, start=1):
@@ -87,13 +87,13 @@ def _goals(recording: Recording) -> Iterator[Moment]:
         took = f"after {goal.end_s - goal.sent_s:.0f} s"
         said = f": {goal.text[:_TEXT]}" if goal.text and goal.failed else ""
         what = f"{goal.outcome} {took}{said}" if goal.outcome else f"still open {took}, when the recording ends"
-        yield Moment(goal.end_s, "goal", f"goal {number}{place}, sent at {goal.sent_s:.1f} s, {what}", goal.action)
+        yield Event(goal.end_s, "goal", f"goal {number}{place}, sent at {goal.sent_s:.1f} s, {what}", goal.action)
     if len(shown) < len(goals):
         reached = sum(goal.outcome == "reached" for goal in goals)
-        yield Moment(goals[0].sent_s, "goal", f"{len(goals)} goals, {reached} reached", goals[0].action)
+        yield Event(goals[0].sent_s, "goal", f"{len(goals)} goals, {reached} reached", goals[0].action)
 
 
-def _recoveries(recording: Recording) -> Iterator[Moment]:
+def _recoveries(recording: Recording) -> Iterator[Event]:
     ran = []
     for topic, table in recording.of(plan.RECOVERY):
         if set(plan.FIELDS[plan.RECOVERY]) <= set(table.columns):
@@ -109,10 +109,10 @@ def _recoveries(recording: Recording) -> Iterator[Moment]:
                     ran.append((t, str(name), topic))
     for name in dict.fromkeys(name for _, name, _ in ran):
         own = [one for one in ran if one[1] == name]
-        yield Moment(own[0][0], "recovery", f"recovery {name}{_times(len(own), own[-1][0])}", own[0][2])
+        yield Event(own[0][0], "recovery", f"recovery {name}{_times(len(own), own[-1][0])}", own[0][2])
 
 
-def _said(recording: Recording) -> Iterator[Moment]:
+def _said(recording: Recording) -> Iterator[Event]:
     kinds: dict[tuple[str, str], list[int]] = {}
     for row, one in enumerate(recording.said):
         if one.level >= WARN:
@@ -123,24 +123,24 @@ def _said(recording: Recording) -> Iterator[Moment]:
         first = said[rows[0]]
         level = _LEVELS.get(first.level, str(first.level))
         text = f"{level} {first.node}: {_cut(first.text)}{_times(len(rows), said[rows[-1]].time_s)}"
-        yield Moment(first.time_s, "error" if first.level >= ERROR else "message", text, "/rosout")
+        yield Event(first.time_s, "error" if first.level >= ERROR else "message", text, "/rosout")
     if len(ranked) > MESSAGES:
         left = ranked[MESSAGES:]
         words = f"{len(left)} more kinds of message, {sum(len(rows) for rows in left)} messages"
-        yield Moment(said[left[0][0]].time_s, "message", words, "/rosout")
+        yield Event(said[left[0][0]].time_s, "message", words, "/rosout")
 
 
-def _diagnostics(recording: Recording) -> Iterator[Moment]:
+def _diagnostics(recording: Recording) -> Iterator[Event]:
     bad = [one for one in reports(recording) if one.level > 0]
-    worst: dict[str, Moment] = {}
+    worst: dict[str, Event] = {}
     for one in sorted(bad, key=lambda one: (_URGENT.get(one.level, 3), one.time_s)):
         said = f': "{_cut(one.message)}"' if one.message else ""
         kind = "error" if one.level == 2 else "diagnostics"
-        worst.setdefault(one.name, Moment(one.time_s, kind, f"diagnostics {one.word} {one.name}{said}", one.topic))
+        worst.setdefault(one.name, Event(one.time_s, kind, f"diagnostics {one.word} {one.name}{said}", one.topic))
     yield from list(worst.values())[:DIAGNOSTICS]
 
 
-def _pauses(recording: Recording) -> Iterator[Moment]:
+def _pauses(recording: Recording) -> Iterator[Event]:
     """Streams that pause, end early, or become slower; those that do so together in one line."""
     paused: dict[tuple[int, int], list[str]] = {}
     for channel in recording.channels:
@@ -152,7 +152,7 @@ def _pauses(recording: Recording) -> Iterator[Moment]:
         row = int(np.argmax(pauses))
         over = ends_early(recording, channel.name)
         if over is not None:
-            yield Moment(over[0], "topic", f"{channel.name} ends; {1 / usual:.3g} Hz before", channel.name)
+            yield Event(over[0], "topic", f"{channel.name} ends; {1 / usual:.3g} Hz before", channel.name)
         if pauses[row] >= max(PAUSE_S, PAUSE_PERIODS * usual):
             paused.setdefault((round(times[row] / 2), round(times[row + 1] / 2)), []).append(channel.name)
         else:
@@ -161,10 +161,10 @@ def _pauses(recording: Recording) -> Iterator[Moment]:
         first = recording.times[names[0]]
         row = int(np.argmax(np.diff(first)))
         words = f"{_listed(names)} {'pause' if len(names) > 1 else 'pauses'} for {first[row + 1] - first[row]:.1f} s"
-        yield Moment(float(first[row]), "topic", words, names[0])
+        yield Event(float(first[row]), "topic", words, names[0])
 
 
-def _slower(topic: str, times: Floats, usual: float) -> Iterator[Moment]:
+def _slower(topic: str, times: Floats, usual: float) -> Iterator[Event]:
     """Where the rate falls to less than half, for good or for a while."""
     window = max(int(SLOWER_S / usual), 10)
     if len(times) < 3 * window:
@@ -175,10 +175,10 @@ def _slower(topic: str, times: Floats, usual: float) -> Iterator[Moment]:
     if len(slow):
         at = float(times[slow[0]])
         words = f"{topic} becomes slower: {window / took[slow].max():.3g} Hz instead of {1 / usual:.3g} Hz"
-        yield Moment(at, "topic", words, topic)
+        yield Event(at, "topic", words, topic)
 
 
-def _lifecycle(recording: Recording) -> Iterator[Moment]:
+def _lifecycle(recording: Recording) -> Iterator[Event]:
     reached: dict[str, list[tuple[float, str]]] = {}
     for topic, table in recording.of(plan.TRANSITION):
         if set(plan.FIELDS[plan.TRANSITION]) <= set(table.columns):
@@ -189,10 +189,10 @@ def _lifecycle(recording: Recording) -> Iterator[Moment]:
         if state in ("active", "inactive", "finalized", "unconfigured", "errorprocessing"):
             nodes = list(dict.fromkeys(node for _, node in own))
             kind = "error" if state == "errorprocessing" else "lifecycle"
-            yield Moment(min(t for t, _ in own), kind, f"{_listed(nodes)}: {state}", "transition_event")
+            yield Event(min(t for t, _ in own), kind, f"{_listed(nodes)}: {state}", "transition_event")
 
 
-def _changes(recording: Recording) -> Iterator[Moment]:
+def _changes(recording: Recording) -> Iterator[Event]:
     """Parameters that were changed while the recording ran."""
     changes: dict[tuple[str, str, str], list[tuple[float, str]]] = {}
     for name, history in recording.settings.items():
@@ -203,30 +203,30 @@ def _changes(recording: Recording) -> Iterator[Moment]:
     ranked = sorted((min(own)[0], what, own) for what, own in changes.items())
     for at, (leaf, was, now), own in ranked[:CHANGES]:
         name = own[0][1] if len(own) == 1 else f"{leaf} of {len(own)} nodes"
-        yield Moment(at, "parameter", f"{name} changed from {was} to {now}", "parameters")
+        yield Event(at, "parameter", f"{name} changed from {was} to {now}", "parameters")
     if len(ranked) > CHANGES:
         words = f"{len(ranked) - CHANGES} more changes of parameters"
-        yield Moment(ranked[CHANGES][0], "parameter", words, "parameters")
+        yield Event(ranked[CHANGES][0], "parameter", words, "parameters")
 
 
-def _motion(recording: Recording) -> Iterator[Moment]:
+def _motion(recording: Recording) -> Iterator[Event]:
     odometry = recording.odometry
     if odometry is not None:
         moving = (np.abs(odometry.speed) > 0.02) | (np.abs(odometry.turn) > 0.05)
         rows = np.flatnonzero(moving)
         if not len(rows):
-            yield Moment(float(odometry.t[-1]), "motion", "the robot never moved", odometry.topic)
+            yield Event(float(odometry.t[-1]), "motion", "the robot never moved", odometry.topic)
         else:
             went = recording.moved_between(float(odometry.t[0]), float(odometry.t[-1]))
             began_s = max(0.0, float(odometry.t[rows[0]]))  # by its own stamp, which may lie before the recording
-            yield Moment(began_s, "motion", "the robot moves for the first time", odometry.topic)
+            yield Event(began_s, "motion", "the robot moves for the first time", odometry.topic)
             if odometry.stands_still:
                 went = odometry.way_m
             words = f"drove {went:.1f} m in all, {quantile(np.abs(odometry.speed), 0.99):.2f} m/s at most"
-            yield Moment(float(odometry.t[-1]), "motion", words, odometry.topic)
+            yield Event(float(odometry.t[-1]), "motion", words, odometry.topic)
     for battery in recording.batteries:
         words = f"battery {battery.voltage[0]:.1f} V at first, {battery.voltage[-1]:.1f} V at last"
-        yield Moment(float(battery.t[-1]), "battery", f"{words}, {battery.voltage.min():.1f} V at least", battery.topic)
+        yield Event(float(battery.t[-1]), "battery", f"{words}, {battery.voltage.min():.1f} V at least", battery.topic)
 
 
 def _times(count: int, last_s: float) -> str:

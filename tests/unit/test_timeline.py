@@ -1,4 +1,4 @@
-"""The account of an ArduPilot flight: what happened, in order of time, said once."""
+"""The timeline of an ArduPilot flight: what happened, in order of time, said once."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.supply import cells
-from care_core.ecosystems.ardupilot.timeline import account
-from care_core.ecosystems.findings import Moment
+from care_core.ecosystems.ardupilot.timeline import timeline
+from care_core.ecosystems.findings import Event
 from care_core.ecosystems.timeline import MOST
 from care_core.logs.base import Table
 from care_core.run import Damage, Setting
@@ -46,32 +46,32 @@ def height_of(*corners: tuple[float, float]) -> Table:
 def told(
     tables: Mapping[str, Table], *, facts: Mapping[str, str] = COPTER, end_s: float = 100.0,
     settings: Mapping[str, tuple[Setting, ...]] | None = None, damage: Sequence[Damage] = (),
-) -> list[Moment]:  # fmt: skip
+) -> list[Event]:  # fmt: skip
     known = {name: (Setting(name, value, "PARM"),) for name, value in QUAD_X.items()} | dict(settings or {})
-    return list(account(Flight(tables, known, facts, end_s), damage))
+    return list(timeline(Flight(tables, known, facts, end_s), damage))
 
 
-def texts(moments: Sequence[Moment], kind: str = "") -> list[str]:
-    return [moment.text for moment in moments if not kind or moment.kind == kind]
+def texts(events: Sequence[Event], kind: str = "") -> list[str]:
+    return [event.text for event in events if not kind or event.kind == kind]
 
 
 ARMED = rows((10.0, 1.0, 0.0, 1.0), (60.0, 0.0, 0.0, 13.0), names=("ArmState", "Forced", "Method"))
 
 
 def test_a_flight_is_told_in_order_of_time() -> None:
-    moments = told({
+    events = told({
         "ARM": ARMED,
         "MODE": rows((0.0, 0, 1), (20.0, 5, 1), (50.0, 6, 3), names=("ModeNum", "Rsn")),
         "EV": rows((10.0, 10), (12.0, 28), (59.0, 18), (60.0, 11), names=("Id",)),
         "POS": height_of((0, 0), (12, 0), (20, 15), (50, 15), (59, 0), (100, 0)),
         "ERR": rows((50.0, 5, 1), (53.5, 5, 0), names=("Subsys", "ECode")),
     })  # fmt: skip
-    assert texts(moments) == [
+    assert texts(events) == [
         "ArduCopter V4.5.4, quad X", "mode Stabilize (by the pilot)", "armed by the ground station", "took off",
         "mode Loiter (by the pilot)", "highest point, 15.0 m", "radio failsafe, over after 3.5 s",
         "mode RTL (radio failsafe)", "landed", "disarmed after landing, armed for 50 s",
     ]  # fmt: skip
-    assert [moment.time_s for moment in moments] == sorted(moment.time_s for moment in moments)
+    assert [event.time_s for event in events] == sorted(event.time_s for event in events)
 
 
 def test_modes_are_named_by_the_vehicle() -> None:
@@ -99,53 +99,53 @@ def test_a_mode_that_flickers_is_told_once() -> None:
 
 def test_a_vehicle_that_never_armed_says_why() -> None:
     complaints = [(5.0 + 30 * n, "PreArm: Compass not calibrated") for n in range(3)]
-    moments = told({"MSG": said(*complaints, (80.0, "Arm: Compass not calibrated"), (80.0, "Arm: Throttle too high"))})
-    assert texts(moments, "arming") == [
+    events = told({"MSG": said(*complaints, (80.0, "Arm: Compass not calibrated"), (80.0, "Arm: Throttle too high"))})
+    assert texts(events, "arming") == [
         "Arm: Compass not calibrated (4 times until 80 s)",
         "it never armed: Compass not calibrated; Throttle too high (5 refusals)", "Arm: Throttle too high",
     ]  # fmt: skip
 
 
 def test_refusals_before_an_arming_are_told_and_no_more() -> None:
-    moments = told({"ARM": ARMED, "MSG": said((4.0, "PreArm: Need 3D Fix"))})
-    assert texts(moments, "arming")[0] == "PreArm: Need 3D Fix"
-    assert not any("never armed" in text for text in texts(moments))
+    events = told({"ARM": ARMED, "MSG": said((4.0, "PreArm: Need 3D Fix"))})
+    assert texts(events, "arming")[0] == "PreArm: Need 3D Fix"
+    assert not any("never armed" in text for text in texts(events))
 
 
 def test_a_crash_is_told_once_and_before_the_disarming() -> None:
-    moments = told({
+    events = told({
         "ARM": rows((10.0, 1.0, 0.0, 1.0), (60.0, 0.0, 0.0, 12.0), names=("ArmState", "Forced", "Method")),
         "MSG": said((60.0, "Crash: Disarming: AngErr=118>30, Accel=2.5<3.0")),
         "ERR": rows((60.0, 12, 1), names=("Subsys", "ECode")),
     })  # fmt: skip
-    assert texts(moments)[-2:] == [
+    assert texts(events)[-2:] == [
         "Crash: Disarming: AngErr=118>30, Accel=2.5<3.0", "disarmed by the crash check, armed for 50 s",
     ]  # fmt: skip
-    assert len(texts(moments, "crash")) == 1
+    assert len(texts(events, "crash")) == 1
 
 
 def test_a_disarming_by_force_in_the_air_is_no_landing() -> None:
-    moments = told({
+    events = told({
         "ARM": rows((10.0, 1.0, 0.0, 1.0), (60.0, 0.0, 1.0, 1.0), names=("ArmState", "Forced", "Method")),
         "EV": rows((12.0, 28), (60.0, 18), names=("Id",)),
         "POS": height_of((0, 0), (12, 0), (20, 15), (100, 15)),
     })  # fmt: skip
-    assert "disarmed by the ground station, by force, armed for 50 s" in texts(moments)
-    assert "landed" not in texts(moments)
+    assert "disarmed by the ground station, by force, armed for 50 s" in texts(events)
+    assert "landed" not in texts(events)
 
 
 def test_repeats_are_one_line_with_their_count() -> None:
     errors = [(20.0 + n, 25.0, 1.0) for n in range(30)]
-    moments = told({"ARM": ARMED, "ERR": rows(*errors, names=("Subsys", "ECode"))})
-    assert texts(moments, "error") == ["potential thrust loss (30 times until 49 s)"]
+    events = told({"ARM": ARMED, "ERR": rows(*errors, names=("Subsys", "ECode"))})
+    assert texts(events, "error") == ["potential thrust loss (30 times until 49 s)"]
 
 
 def test_lanes_that_switch_to_and_fro_are_one_line() -> None:
     lanes = [(20.0 + n, 24.0, float(n % 2)) for n in range(10)]
     spoken = said((20.0, "EKF primary changed:0"), (21.0, "EKF3 lane switch 1"))
-    moments = told({"ARM": ARMED, "ERR": rows(*lanes, names=("Subsys", "ECode")), "MSG": spoken})
-    assert texts(moments, "error") == ["estimator switched to lane 0, and 9 more switches until 29 s"]
-    assert not texts(moments, "message")
+    events = told({"ARM": ARMED, "ERR": rows(*lanes, names=("Subsys", "ECode")), "MSG": spoken})
+    assert texts(events, "error") == ["estimator switched to lane 0, and 9 more switches until 29 s"]
+    assert not texts(events, "message")
 
 
 def test_what_every_start_says_is_left_out() -> None:
@@ -188,16 +188,16 @@ def test_parameters_changed_in_flight_are_told_one_by_one() -> None:
 def test_battery_and_satellites_in_brief() -> None:
     t = np.arange(0.0, 100.0, 1.0)
     volts = np.where((t > 30) & (t < 35), 10.1, 12.4)
-    moments = told({
+    events = told({
         "ARM": ARMED,
         "BAT": Table(t, {"Volt": volts, "Curr": np.where(volts < 11, 45.0, 10.0)}),
         "GPS": Table(t, {"Status": np.where(t == 40, 1.0, 3.0), "NSats": np.where(t == 40, 4.0, 14.0),
                          "HDop": np.full(100, 0.7)}),
     })  # fmt: skip
-    assert texts(moments, "battery") == [
+    assert texts(events, "battery") == [
         "battery at 12.4 V (3 cells)", "battery at its lowest while armed: 10.1 V at 45 A",
     ]  # fmt: skip
-    assert texts(moments, "gps") == [
+    assert texts(events, "gps") == [
         "GPS: 3D fix, 14 satellites, HDop 0.7", "GPS lost its 3D fix while armed", "fewest satellites while armed: 4",
     ]  # fmt: skip
 
@@ -222,18 +222,18 @@ def test_a_log_that_ends_in_the_air_says_so() -> None:
 
 def test_gaps_count_while_armed_but_not_where_recording_pauses_with_the_motors() -> None:
     beats = np.concatenate([np.arange(0.0, 30.0, 0.1), np.arange(37.0, 60.0, 0.1), np.arange(80.0, 100.0, 0.1)])
-    moments = told({"ARM": ARMED, "ATT": Table(beats, {"Roll": np.zeros(len(beats)), "Pitch": np.zeros(len(beats))})})
-    assert texts(moments, "log") == ["nothing is recorded for 7.1 s while armed"]
+    events = told({"ARM": ARMED, "ATT": Table(beats, {"Roll": np.zeros(len(beats)), "Pitch": np.zeros(len(beats))})})
+    assert texts(events, "log") == ["nothing is recorded for 7.1 s while armed"]
 
 
-def test_a_long_account_keeps_what_tells_most() -> None:
+def test_a_long_timeline_keeps_what_tells_most() -> None:
     names = [f"{a}{b}" for a in "abcdefghij" for b in "klmnopqrst"]
     chatter = [(10.5 + n / 10, f"a script says {name}") for n, name in enumerate(names)]
-    moments = told({"ARM": ARMED, "MSG": said(*chatter, (40.0, "Internal error 0x1000"), (41.0, "Crash: Disarming"))})
-    assert len(moments) == MOST
-    assert {"Internal error 0x1000", "Crash: Disarming", "armed by the ground station"} <= set(texts(moments))
-    assert moments[-1].text.startswith("and ")
-    assert math.isnan(moments[-1].time_s)
+    events = told({"ARM": ARMED, "MSG": said(*chatter, (40.0, "Internal error 0x1000"), (41.0, "Crash: Disarming"))})
+    assert len(events) == MOST
+    assert {"Internal error 0x1000", "Crash: Disarming", "armed by the ground station"} <= set(texts(events))
+    assert events[-1].text.startswith("and ")
+    assert math.isnan(events[-1].time_s)
 
 
 def test_a_vehicle_that_says_nothing_is_not_called_a_copter() -> None:
