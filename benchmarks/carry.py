@@ -24,11 +24,11 @@ import pandas as pd
 from threadpoolctl import threadpool_limits
 
 from benchmarks.travel import MEASURED
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import Mechanism
 from care_core.causal.model import Model, OutcomeRecord, Training
-from care_core.diagnose.judging import read_and_judge, world_of
+from care_core.diagnose.judging import query_of, read_and_judge
 from care_core.ecosystems.registry import run_model
 from care_core.learn.fitting import Effort
 from care_core.learn.outcomes import fit_outcomes, fit_total, groups_that_move_together, met
@@ -123,7 +123,7 @@ def ask(model: Model, schema: Schema, rows: pd.DataFrame, medians: Mapping[str, 
         config = {n: float(row[n]) if pd.notna(row[n]) else medians.get(n, np.nan) for n in schema.variables}
         there = {**config, **reference}
         seen = {n: float(row[n]) for n in schema.variables if pd.notna(row[n])}
-        before, after = World(model, config, {}, {}), World(model, config, seen, {})
+        before, after = CounterfactualQuery(model, config, {}, {}), CounterfactualQuery(model, config, seen, {})
         limits = {v.name: v.threshold for v in schema.objectives if v.threshold is not None}
         flagged = False
         for objective in schema.objectives:
@@ -135,7 +135,7 @@ def ask(model: Model, schema: Schema, rows: pd.DataFrame, medians: Mapping[str, 
                 own: Threshold = objective.relative.for_need(float(after.predict(objective.name, [there]).value[0]))
                 flagged |= not own.met(float(row[objective.name]))
         if "mission_success" in model.outcomes:
-            found.odds.append(float(World(model, config, {}, limits).probability([config])[0]))
+            found.odds.append(float(CounterfactualQuery(model, config, {}, limits).probability([config])[0]))
             found.kept.append(float(everything[i]))
         verdicts = [values[i] for values in kept.values()]
         if np.isfinite(verdicts).all() and row["mission_success"] == 1:
@@ -158,9 +158,9 @@ def ask_resets(profile: Profile, folder: Path, kind: str, found: Carried) -> Non
         if truth["ok"] or truth["hardware"] or truth["setting"]["vehicle"] != kind or not truth["tried"]:
             continue
         judged = read_and_judge(run_model(open_log(folder / f"{truth['tag']}.BIN")), profile)
-        world = world_of(judged, profile)
-        changed = [{**world.config, **{o: world.reference[o] for o in row["reset"]}} for row in truth["tried"]]
-        found.reset_odds.extend(map(float, world.probability(changed)))
+        query = query_of(judged, profile)
+        changed = [{**query.config, **{o: query.reference[o] for o in row["reset"]}} for row in truth["tried"]]
+        found.reset_odds.extend(map(float, query.probability(changed)))
         found.reset_kept.extend(float(row["ok"]) for row in truth["tried"])
 
 

@@ -21,11 +21,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from care_core.causal.abduction import Kinship, next_passes
-from care_core.causal.counterfactual import World
+from care_core.causal.abduction import ErrorCovariance, next_passes
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.kernel import FloatArray
-from care_core.causal.model import UNKNOWN_PERSISTENCE
-from care_core.diagnose.judging import read_and_judge, world_of
+from care_core.causal.model import UNKNOWN_CARRY_OVER
+from care_core.diagnose.judging import query_of, read_and_judge
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Diagnosis, ObjectiveResult
 from care_core.diagnose.reference import profile_config
@@ -184,7 +184,7 @@ def evaluate(profile: Profile, shared: Path, peers: Peers | None, *, verbose: bo
             tightened = {r.variable.name: LOWERED * r.value for r in near if r.value is not None}
             judged = read_and_judge(run_model(log), profile, thresholds={**LIMITS[platform], **tightened})
             diagnosis = triage(judged, profile, choice, top=10)
-        _count(tally, diagnosis, truth, platform, reference, world_of(judged, profile), peers, verbose)
+        _count(tally, diagnosis, truth, platform, reference, query_of(judged, profile), peers, verbose)
     return tally
 
 
@@ -220,14 +220,14 @@ def _count(
     truth: Mapping[str, Any],
     platform: str,
     reference: Mapping[str, float],
-    world: World,
+    query: CounterfactualQuery,
     peers: Peers | None,
     verbose: bool,
 ) -> None:
     tally.faults += 1
     tally.wrong_objectives += [f"{truth['tag']} {line}" for line in objectives_differ(diagnosis, truth, platform)]
     tally.abstained += diagnosis.abstained is not None
-    _count_probabilities(tally, truth, reference, world, peers)
+    _count_probabilities(tally, truth, reference, query, peers)
     _count_fix(tally, diagnosis, truth)  # of every fault: one without a known fix can be given one that fails
     fixing = [frozenset(options) for options in truth["fixing"]]
     if not fixing:
@@ -267,25 +267,25 @@ def _count_probabilities(
     tally: Tally,
     truth: Mapping[str, Any],
     reference: Mapping[str, float],
-    world: World,
+    query: CounterfactualQuery,
     peers: Peers | None,
 ) -> None:
     """Predicted probabilities of every reset that was flown, against whether it met all objectives."""
-    changed = [{**world.config, **{name: reference[name] for name in row["reset"]}} for row in truth["tried"]]
-    probabilities = {"care": world.probability(changed)}
+    changed = [{**query.config, **{name: reference[name] for name in row["reset"]}} for row in truth["tried"]]
+    probabilities = {"care": query.probability(changed)}
     if truth.get("repeatable"):  # what the second failure measured was not kept: it is taken to be like the first
-        probabilities["care, told of the second failure"] = replace(world, repeats=(world.observed,)).probability(
+        probabilities["care, told of the second failure"] = replace(query, repeats=(query.observed,)).probability(
             changed
         )
     if peers is not None:
         probabilities["plain classifier"] = peers.classifier.probability(changed)
-        probabilities["plain classifier, same abduction"] = abducted(peers.classifier, world.config, changed, 1)
+        probabilities["plain classifier, same abduction"] = abducted(peers.classifier, query.config, changed, 1)
         if truth.get("repeatable"):
-            probabilities["plain classifier, told of it too"] = abducted(peers.classifier, world.config, changed, 2)
+            probabilities["plain classifier, told of it too"] = abducted(peers.classifier, query.config, changed, 2)
     for name, predicted in probabilities.items():
         tally.probabilities.setdefault(name, []).extend(predicted)
     tally.outcomes.extend(float(row["ok"]) for row in truth["tried"])
-    tally.next_outcomes.extend(_next_outcome(row, truth, world) for row in truth["tried"])
+    tally.next_outcomes.extend(_next_outcome(row, truth, query) for row in truth["tried"])
     tally.clusters.extend([truth["tag"]] * len(changed))
 
 
@@ -293,19 +293,19 @@ def abducted(
     classifier: PlainClassifier, config: Mapping[str, float], changed: Sequence[Mapping[str, float]], failures: int
 ) -> FloatArray:
     """The classifier's probabilities given the failures, as the engine's; nothing is known of its errors."""
-    same, ones = UNKNOWN_PERSISTENCE.same, np.ones(len(changed))
-    kin = Kinship(variance=ones, covariance=same * ones, here=1.0, repeated=same)
+    same, ones = UNKNOWN_CARRY_OVER.same, np.ones(len(changed))
+    errors = ErrorCovariance(variance=ones, covariance=same * ones, here=1.0, repeated=same)
     return next_passes(
-        kin, classifier.probability(changed), float(classifier.probability([config])[0]), [False] * failures
+        errors, classifier.probability(changed), float(classifier.probability([config])[0]), [False] * failures
     )
 
 
-def _next_outcome(row: Mapping[str, Any], truth: Mapping[str, Any], world: World) -> float:
+def _next_outcome(row: Mapping[str, Any], truth: Mapping[str, Any], query: CounterfactualQuery) -> float:
     """Whether the recorded mission met everything: `ok` asks it of two in a row where missions are not repeatable."""
     if not truth.get("repeatable"):
         return float(row["ok"])
     met = []
-    for objective, bound in world.thresholds.items():
+    for objective, bound in query.thresholds.items():
         name = TRUTH_NAMES["move_base"][objective]
         scale = 1 / JOULES_PER_WH if name == "energy_j" else 1.0
         value = row.get(name)

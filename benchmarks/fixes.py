@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from care_core.causal.model import UNKNOWN_PERSISTENCE
+from care_core.causal.model import UNKNOWN_CARRY_OVER
 from care_core.diagnose.judging import judge
 from care_core.diagnose.triage import diagnose
 from care_core.learn.skill import calibration_error, reliability
@@ -26,7 +26,7 @@ from care_core.profile.store import Profile
 from care_core.run import ProfileChoice
 from tests.planted import DEFAULTS, SCHEMA, SETTINGS, draw_config, draw_noise, fly, fly_many, run_of
 
-SAME = UNKNOWN_PERSISTENCE.same
+SAME = UNKNOWN_CARRY_OVER.same
 CHOICE = ProfileChoice("planted", "1", "Simulated robot", "named by the benchmark")
 
 

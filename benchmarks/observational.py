@@ -27,7 +27,7 @@ import pandas as pd
 from joblib import Parallel, delayed
 
 from benchmarks.diagnosis import abducted
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
 from care_core.diagnose.ranking import deviating, suspects
@@ -84,18 +84,20 @@ class _Care:
         seen = {
             v.name: row[v.name] for v in (*self.schema.metrics, *self.schema.objectives) if np.isfinite(row[v.name])
         }
-        world = World(self.model, config, seen, self.bounds, reference=here, variables=self.schema.variables)
+        query = CounterfactualQuery(
+            self.model, config, seen, self.bounds, reference=here, variables=self.schema.variables
+        )
         best: dict[str, float] = {}
         unknown: dict[str, float] = {}
         for objective in self.bounds:
-            for suspect in suspects(world, objective, self.schema.known):
+            for suspect in suspects(query, objective, self.schema.known):
                 if suspect.contribution > 0:
                     kind = best if suspect.is_identified else unknown
                     kind[suspect.option] = max(kind.get(suspect.option, 0.0), suspect.contribution)
-        fresh = World(self.model, config, {}, self.bounds)
+        fresh = CounterfactualQuery(self.model, config, {}, self.bounds)
         asked = [name for name in deviating(config, here) if name not in self.refused]
         resets = [{**config, name: here[name]} for name in asked]
-        promised, told = (_by_option(asked, each.probability(resets)) if asked else {} for each in (fresh, world))
+        promised, told = (_by_option(asked, each.probability(resets)) if asked else {} for each in (fresh, query))
         asks = max(unknown, key=unknown.__getitem__, default=None)
         asks = asks if asks is not None and unknown[asks] > max(best.values(), default=0.0) else None
         ranking = [] if asks else sorted(best, key=lambda name: -best[name])

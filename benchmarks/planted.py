@@ -31,7 +31,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.diagnosis import abducted
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
-from care_core.diagnose.judging import judge, world_of
+from care_core.diagnose.judging import judge, query_of
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Cause, Diagnosis
 from care_core.diagnose.triage import diagnose
@@ -229,7 +229,7 @@ def _judge(
     true = [true_probability(world, reset, noise) for reset in resets]
     gain = {name: kept - now for name, kept in zip(off, true, strict=True)}
     everything = dict.fromkeys(OPTIONS, REFERENCE)
-    engine = world_of(judged, profile)
+    engine = query_of(judged, profile)
     score.asked.extend(engine.probability([*resets, everything]))
     score.plain_asked.extend(plain.probability([*resets, everything]))
     score.plain_abducted.extend(abducted(plain, config, [*resets, everything], 1))

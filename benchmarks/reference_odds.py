@@ -19,7 +19,7 @@ import pandas as pd
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model, Training
 from care_core.collect.sampling import points
@@ -93,11 +93,11 @@ def one(seed: int, runs: int, way: str) -> FloatArray:
     at_reference = np.full((ASKED, len(OPTIONS)), REFERENCE)
     field = np.where(rng.random(at_reference.shape) < OFF, rng.random(at_reference.shape), REFERENCE)
     asked = [dict(zip(SCHEMA.variables, row, strict=False)) for row in (at_reference[0], *field)]
-    world = World(model, asked[0], {}, bounds)
-    told = world.probability(asked)
+    query = CounterfactualQuery(model, asked[0], {}, bounds)
+    told = query.probability(asked)
     flown = drive(field, slower, riskier, rng)
     true, took = met(flown), flown["time"].to_numpy(dtype=float)
-    predicted, ended = world.predict("time", asked[1:]), np.isfinite(took)
+    predicted, ended = query.predict("time", asked[1:]), np.isfinite(took)
     error = np.log(took / predicted.value)[ended]
     return np.array([
         told[0], met(drive(at_reference, slower, riskier, rng)).mean(), told[1:].mean(), true.mean(),

@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from benchmarks.diagnosis import abducted
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model, Training
-from care_core.diagnose.judging import Judged, read_and_judge, world_of
+from care_core.diagnose.judging import Judged, query_of, read_and_judge
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Diagnosis
 from care_core.diagnose.triage import triage
@@ -131,14 +131,14 @@ def _asked(
     found.plain = peer.probability(configs)
     for i, config in enumerate(configs):
         there = {**config, **reference}
-        before = World(model, config, {}, {})
-        after = World(model, config, {str(k): v for k, v in rows.iloc[i].dropna().items()}, {})
+        before = CounterfactualQuery(model, config, {}, {})
+        after = CounterfactualQuery(model, config, {str(k): v for k, v in rows.iloc[i].dropna().items()}, {})
         bounds = {v.name: v.threshold for v in schema.objectives if v.threshold is not None}
         for objective in schema.objectives:
             if objective.relative is not None and objective.name in model.outcomes:
                 need = float(before.predict(objective.name, [there]).value[0])
                 bounds[objective.name] = objective.relative.for_need(need)
-        found.predicted[i] = World(model, config, {}, bounds).probability([config])[0]
+        found.predicted[i] = CounterfactualQuery(model, config, {}, bounds).probability([config])[0]
         for name in MEASURED:
             value = rows[name].iloc[i]
             if not value > 0:
@@ -229,13 +229,13 @@ def _count(
     found: Faults, judged: Judged, diagnosis: Diagnosis, profile: Profile, truth: Mapping[str, object],
     fixing: Sequence[frozenset[str]], peer: PlainClassifier,
 ) -> None:  # fmt: skip
-    world = world_of(judged, profile)
-    reference = world.reference
-    off = deviating(world.config, reference)
+    query = query_of(judged, profile)
+    reference = query.reference
+    off = deviating(query.config, reference)
     causes = sorted((c for fault in diagnosis.faults for c in fault.causes), key=lambda c: (c.rank, -c.contribution))
     rankings = {
         "care": list(dict.fromkeys(cause.option.name for cause in causes)),
-        "plain classifier": peer.rank(world.config, reference, off),
+        "plain classifier": peer.rank(query.config, reference, off),
     }
     true = frozenset().union(*fixing)
     found.flights += 1
@@ -250,10 +250,10 @@ def _count(
         suggested = frozenset(change.option.name for change in diagnosis.fix.changes)
         found.flown += suggested in outcome
         found.confirmed += outcome.get(suggested, False)
-    changed = [{**world.config, **{name: reference[name] for name in row["reset"]}} for row in tried]
-    found.predicted.setdefault("care", []).extend(world.probability(changed))
+    changed = [{**query.config, **{name: reference[name] for name in row["reset"]}} for row in tried]
+    found.predicted.setdefault("care", []).extend(query.probability(changed))
     found.predicted.setdefault("plain classifier", []).extend(peer.probability(changed))
-    found.predicted.setdefault("plain, same abduction", []).extend(abducted(peer, world.config, changed, 1))
+    found.predicted.setdefault("plain, same abduction", []).extend(abducted(peer, query.config, changed, 1))
     found.kept.extend(float(row["ok"]) for row in tried)
     limits: Mapping[str, float] = truth["limits"]  # type: ignore[assignment]
     for name, key in (("mission_time", "armed_time_s"), ("energy", "energy_wh")):

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.graph import CausalGraph
 from care_core.causal.mechanisms import Mechanism
 from care_core.causal.model import Model, OutcomeRecord, Training
@@ -85,8 +85,8 @@ def predicted(
     configs: Sequence[Mapping[str, float]] = [
         {str(key): float(value) for key, value in row.items()} for row in rows.to_dict("records")
     ]
-    world = World(model, configs[0], {}, {}, reference=configs[0], variables=schema.variables)
-    found = world.predict(name, configs)
+    query = CounterfactualQuery(model, configs[0], {}, {}, reference=configs[0], variables=schema.variables)
+    found = query.predict(name, configs)
     seen = rows[name].to_numpy(dtype=float)
     return np.log(seen / found.value), (found.low <= seen) & (seen <= found.high)
 

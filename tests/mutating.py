@@ -40,7 +40,7 @@ from care_core.files import bundled
 from care_core.logs import mavlink_packets
 from care_core.logs.base import LogFormat
 from care_core.logs.dataflash import DataFlashLog, Format
-from care_core.logs.mapped import FileArray
+from care_core.logs.file_windows import FileArray
 from care_core.logs.opening import open_log
 
 MOST_MB, MOST_S = 1000, 20

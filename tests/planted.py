@@ -16,7 +16,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.learn.train import TrainSettings
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
@@ -136,17 +136,17 @@ def planted_run(noise: Mapping[str, float] = CALM, /, **options: float) -> Run:
     return run_of(config, fly(config, noise))
 
 
-def world_of(
+def query_of(
     profile: Profile, run: Run, observed: Mapping[str, object] | None = None, bounds: Mapping[str, Threshold] = BOUNDS
-) -> World:
+) -> CounterfactualQuery:
     """A run ready to be asked, held against the defaults; what it met is read off unless `observed` is given."""
     seen = {**run.metrics, **run.objectives} if observed is None else observed
-    return World(profile.model, run.config, seen, bounds, reference=DEFAULTS, variables=SCHEMA.variables)
+    return CounterfactualQuery(profile.model, run.config, seen, bounds, reference=DEFAULTS, variables=SCHEMA.variables)
 
 
-def planted_world(profile: Profile, /, **options: float) -> World:
+def planted_query(profile: Profile, /, **options: float) -> CounterfactualQuery:
     """The world of a run with these options off their default."""
-    return world_of(profile, planted_run(**options))
+    return query_of(profile, planted_run(**options))
 
 
 def with_variable(schema: Schema, variable: Variable) -> Schema:

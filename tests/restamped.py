@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from care_core.logs.dataflash import DataFlashLog
-from care_core.logs.mapped import FileArray
+from care_core.logs.file_windows import FileArray
 from care_core.logs.mavlink_packets import find_packets
 from tests.groundstation import write_tlog
 

@@ -17,7 +17,7 @@ from care_core.fleet.together import Fleet, together
 from care_core.records import Record, replace
 
 if TYPE_CHECKING:
-    from care_core.causal.counterfactual import World
+    from care_core.causal.counterfactual import CounterfactualQuery
 
 _PACE_LOGS = 5
 """So many logs say how long the rest will take."""
@@ -99,14 +99,14 @@ def triage_one(source: Source, asked: Request) -> Row:
         return replace(unreadable(source.name, f"{err.message} {err.hint}".strip()), folder=source.folder)
 
 
-def _world(case: Case) -> World | None:
+def _world(case: Case) -> CounterfactualQuery | None:
     """The run as the model of its profile is asked about it, None where no mission was judged by one."""
-    from care_core.diagnose.judging import world_of
+    from care_core.diagnose.judging import query_of
 
     reading = case.reading
     if reading is None or reading.judged.run.checks:
         return None
-    return world_of(reading.judged, reading.profile)
+    return query_of(reading.judged, reading.profile)
 
 
 def _silent(_step: str, _share: float) -> None:

@@ -51,7 +51,7 @@ def _bytes(place: int, size: int, spent_s: float) -> str:
 @contextmanager
 def watching(progress: Callable[[str, float], None]) -> Iterator[Watched]:
     """A progress for work in this thread that reads files."""
-    from care_core.logs.mapped import WATCH
+    from care_core.logs.file_windows import WATCH
 
     watched = Watched(progress)
     token = WATCH.set(watched.at)

@@ -2,7 +2,7 @@
 
 Around its mechanism f every run has noise. Two runs of configurations x and x' have values whose errors go together for
 two reasons: what is not known of f at x is partly what is not known at x' (the posterior covariance of f), and what the
-first run met the second meets again (the persistence rho, of the noise variance). So with noise variance s2
+first run met the second meets again (rho, the share of the noise variance that carries over). So with noise variance s2
 
     cov(y', y) = cov(f(x'), f(x)) + rho s2,    var(y) = var f(x) + s2
 
@@ -22,7 +22,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from care_core.causal.kernel import FloatArray
-from care_core.causal.mechanisms import At
+from care_core.causal.mechanisms import Posterior
 from care_core.records import Record, replace
 
 _Z = np.linspace(-6.0, 6.0, 2401)
@@ -35,7 +35,7 @@ FARTHEST = 3.0
 """Standard deviations beyond which a metric's error counts no more: what is farther came from outside the model."""
 
 
-class Kinship(Record, eq=False):
+class ErrorCovariance(Record, eq=False):
     """How the errors of outcomes at m configurations go together with those at this run's, for one mechanism.
 
     Attributes:
@@ -49,62 +49,66 @@ class Kinship(Record, eq=False):
     here: float
     repeated: float
     noise: FloatArray | float = 0.0
-    """What all the noise would add to the covariance if it persisted, shape (m,); `own_noise`: to `repeated`."""
+    """What all the noise would add to the covariance if it carried over, shape (m,); `own_noise`: to `repeated`."""
     own_noise: float = 0.0
 
-    def sharing(self, persistence: float) -> Kinship:
-        """The same where this share of the noise persists besides."""
+    def sharing(self, carry_over: float) -> ErrorCovariance:
+        """The same where this share of the noise carries over besides."""
         return replace(
             self,
-            covariance=self.covariance + persistence * self.noise,
-            repeated=self.repeated + persistence * self.own_noise,
+            covariance=self.covariance + carry_over * self.noise,
+            repeated=self.repeated + carry_over * self.own_noise,
         )
 
 
-def kinship(there: At, here: At, persistence: float) -> Kinship:
+def error_covariance(there: Posterior, here: Posterior, carry_over: float) -> ErrorCovariance:
     """How outcomes at m places go together with those here, at one place.
 
     Args:
-        persistence: share of the noise variance, 0 to 1.
+        carry_over: share of the noise variance, 0 to 1.
     """
     mechanism = there.mechanism
     noise, own = mechanism.noise_at(there.x) ** 2, float(mechanism.noise_at(here.x)[0]) ** 2
     unsure = float(here.variance[0])
-    free = Kinship(there.variance + noise, there.covariance(here), unsure + own, unsure, np.sqrt(noise * own), own)
-    return free.sharing(persistence)
+    free = ErrorCovariance(
+        there.variance + noise, there.covariance(here), unsure + own, unsure, np.sqrt(noise * own), own
+    )
+    return free.sharing(carry_over)
 
 
-def next_value(kin: Kinship, latent: FloatArray, expected: float, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
+def next_value(
+    errors: ErrorCovariance, latent: FloatArray, expected: float, seen: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Centre and standard deviation of the next outcome, both of shape (m,), on the transformed scale.
 
     Args:
         latent: predictions at the m configurations. expected: prediction here. seen: outcomes here, shape (k,), k > 0.
     """
-    mean_variance = (kin.here + (len(seen) - 1) * kin.repeated) / len(seen)
-    centre = latent + kin.covariance / mean_variance * (float(seen.mean()) - expected)
-    return centre, np.sqrt(np.maximum(kin.variance - kin.covariance**2 / mean_variance, 1e-12))
+    mean_variance = (errors.here + (len(seen) - 1) * errors.repeated) / len(seen)
+    centre = latent + errors.covariance / mean_variance * (float(seen.mean()) - expected)
+    return centre, np.sqrt(np.maximum(errors.variance - errors.covariance**2 / mean_variance, 1e-12))
 
 
 def by_mediators(
-    kin: Sequence[Kinship], errors: FloatArray, weights: FloatArray, among: FloatArray
+    covariances: Sequence[ErrorCovariance], errors: FloatArray, weights: FloatArray, among: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """What metrics say of an outcome that k runs do not have: centre and variance of its error at m configurations, as
     shares of its standard deviation and of its variance; shape (m,) each.
 
     Args:
-        kin: of each of q metrics. errors: of them in the runs, shape (k, q). weights: of a metric's error in the
-            outcome's, shape (q,). among: correlations of the metrics' errors, shape (q, q).
+        covariances: of each of q metrics. errors: of them in the runs, shape (k, q). weights: of a metric's error in
+            the outcome's, shape (q,). among: correlations of the metrics' errors, shape (q, q).
     """
     runs = len(errors)
-    seen = np.array([(one.here + (runs - 1) * one.repeated) / runs for one in kin])
-    spread = np.sqrt([one.variance for one in kin])
-    carried = weights[:, None] * np.array([one.covariance for one in kin]) / spread
+    seen = np.array([(one.here + (runs - 1) * one.repeated) / runs for one in covariances])
+    spread = np.sqrt([one.variance for one in covariances])
+    carried = weights[:, None] * np.array([one.covariance for one in covariances]) / spread
     centre: FloatArray = (errors.mean(axis=0) / seen) @ carried
     share = carried / np.sqrt(seen)[:, None]
     return centre, 1.0 - np.einsum("im,ij,jm->m", share, among, share)
 
 
-def next_passes(kin: Kinship, chance: FloatArray, here: float, passed: Sequence[bool]) -> FloatArray:
+def next_passes(errors: ErrorCovariance, chance: FloatArray, here: float, passed: Sequence[bool]) -> FloatArray:
     """Probability that the next run passes, shape (m,).
 
     What runs of this configuration share is integrated out, weighed by how well it explains which of them passed.
@@ -112,8 +116,8 @@ def next_passes(kin: Kinship, chance: FloatArray, here: float, passed: Sequence[
     Args:
         chance: predicted probability at the m configurations. here: predicted probability here. passed: per run.
     """
-    shared = kin.repeated / kin.here
-    to_shared = kin.covariance / np.sqrt(kin.variance * kin.here) / np.sqrt(shared)
+    shared = errors.repeated / errors.here
+    to_shared = errors.covariance / np.sqrt(errors.variance * errors.here) / np.sqrt(shared)
     alike = _cdf((_quantile(np.array(here)) - np.sqrt(shared) * _NODES) / np.sqrt(max(1.0 - shared, 1e-9)))
     weight = _DENSITY * np.prod([alike if ok else 1.0 - alike for ok in passed], axis=0)
     if weight.sum() <= 0:

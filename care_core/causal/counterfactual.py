@@ -3,7 +3,7 @@
 Every objective is predicted from the options alone (its mechanism solved for the exogenous variables, which is what
 interventions set); what the run met, its noise, is read off this run's own outcome and carried over (`abduction`). How
 much of it the next run meets again was estimated from repeated runs where training had them, for the same conditions
-and for another day apart (`Model.training.persistence`).
+and for another day apart (`Model.training.carry_over`).
 """
 
 from __future__ import annotations
@@ -14,11 +14,18 @@ from typing import Literal
 
 import numpy as np
 
-from care_core.causal.abduction import FARTHEST, Kinship, by_mediators, kinship, next_passes, next_value
+from care_core.causal.abduction import (
+    FARTHEST,
+    ErrorCovariance,
+    by_mediators,
+    error_covariance,
+    next_passes,
+    next_value,
+)
 from care_core.causal.kernel import FloatArray
-from care_core.causal.mechanisms import LEAST, TAIL, At, Mechanism, columns, restored, transformed
-from care_core.causal.model import UNKNOWN_PERSISTENCE, Mediation, Model, OutcomeRecord, Persistence, StageRecord
-from care_core.causal.places import Places
+from care_core.causal.mechanisms import LEAST, TAIL, Mechanism, Posterior, columns, restored, transformed
+from care_core.causal.model import UNKNOWN_CARRY_OVER, Mediation, Model, NoiseCarryOver, OutcomeRecord, StageRecord
+from care_core.causal.posteriors import PosteriorCache
 from care_core.records import Record, field, replace
 from care_core.run import is_known
 from care_core.variables import Threshold, Variable
@@ -45,7 +52,7 @@ _Answers = dict[bytes, tuple[float, ...]]
 """The inputs of a mechanism, as the bytes of their values -> what it says of the next run there."""
 
 
-class World(Record, eq=False, dict=True):
+class CounterfactualQuery(Record, eq=False, dict=True):
     """This run, ready to be asked "what if": its configuration, its outcome, and the thresholds in force."""
 
     model: Model
@@ -69,11 +76,11 @@ class World(Record, eq=False, dict=True):
     wary_from: Config | None = None
     """Where set, each mechanism counts as bad as it may be (90 %) at other configurations, given what it does at this
     one: what training did not show between the two is not taken for granted."""
-    places: Places = field(default_factory=Places)
-    """What mechanisms say whatever this run did: worlds that are made of this one ask for most of it again."""
+    posteriors: PosteriorCache = field(default_factory=PosteriorCache)
+    """What mechanisms predict whatever this run did: queries made of this one need most of it again."""
 
     @cached_property
-    def _told(self) -> dict[str, _Answers]:
+    def _answers(self) -> dict[str, _Answers]:
         """What was worked out already: the search asks for most configurations many times over."""
         return {}
 
@@ -113,7 +120,7 @@ class World(Record, eq=False, dict=True):
                 rates[name] = summary.share_meeting(bound)
         return rates
 
-    def ignorance(self, configs: Sequence[Config]) -> FloatArray:
+    def epistemic_ratio(self, configs: Sequence[Config]) -> FloatArray:
         """How little training says about the objectives there: 0 (known) to 1, the least known one's; shape (m,)."""
         keys = [
             key
@@ -121,12 +128,12 @@ class World(Record, eq=False, dict=True):
             if name in self.thresholds
             for key in ([stage.mechanism for stage in outcome.stages] or [outcome.mechanism])
         ]
-        least: FloatArray = np.max([self._ignorance(key, configs) for key in keys], axis=0)
+        least: FloatArray = np.max([self._epistemic_ratio(key, configs) for key in keys], axis=0)
         return least
 
-    def _ignorance(self, key: str, configs: Sequence[Config]) -> FloatArray:
+    def _epistemic_ratio(self, key: str, configs: Sequence[Config]) -> FloatArray:
         mechanism = self.model.mechanisms[key]
-        return self.places.at(mechanism, columns(configs, mechanism.inputs)).ignorance
+        return self.posteriors.at(mechanism, columns(configs, mechanism.inputs)).epistemic_ratio
 
     def _groups(self, names: Mapping[str, FloatArray]) -> list[list[str]]:
         together = [[name for name in group if name in names] for group in self.model.training.moves_together]
@@ -137,12 +144,12 @@ class World(Record, eq=False, dict=True):
         """This run's value of a metric or an objective, None where it has none."""
         return known_value(self.observed, name)
 
-    def _persistence(self, objective: str) -> float:
-        persistence = self._measured(objective)
-        return persistence.same if self.conditions == "same" else persistence.another
+    def _carry_over(self, objective: str) -> float:
+        carry_over = self._measured(objective)
+        return carry_over.same if self.conditions == "same" else carry_over.another
 
-    def _measured(self, objective: str) -> Persistence:
-        return self.model.training.persistence.get(objective, UNKNOWN_PERSISTENCE)
+    def _measured(self, objective: str) -> NoiseCarryOver:
+        return self.model.training.carry_over.get(objective, UNKNOWN_CARRY_OVER)
 
     def _functional(self, outcome: OutcomeRecord, configs: Sequence[Config]) -> Predicted:
         p_ok = self._all_stages(outcome, configs)
@@ -170,14 +177,14 @@ class World(Record, eq=False, dict=True):
         mechanism = self.model.mechanisms[stage.mechanism]
 
         def ask(x: FloatArray) -> tuple[FloatArray]:
-            there = self.places.at(mechanism, x)
+            there = self.posteriors.at(mechanism, x)
             chance = _chance(there, stage.passes, -self._worse(stage.mechanism, there))
             if not passed:
                 return (chance,)
             here = self._at(stage.mechanism, self.config)
-            kin = kinship(there, here, self._persistence(objective))
+            errors = error_covariance(there, here, self._carry_over(objective))
             expected = float(_chance(here, stage.passes)[0])
-            return (np.clip(next_passes(kin, chance, expected, passed), TAIL, 1 - TAIL),)
+            return (np.clip(next_passes(errors, chance, expected, passed), TAIL, 1 - TAIL),)
 
         x = columns(configs, mechanism.inputs)
         probability: FloatArray = self._once(f"{objective}/{stage.mechanism}", mechanism, x, ask)[0]
@@ -194,8 +201,8 @@ class World(Record, eq=False, dict=True):
         Returns:
             Shape (k, m).
         """
-        told = self._told.setdefault(key, {})
-        rows = mechanism.felt(x)
+        told = self._answers.setdefault(key, {})
+        rows = mechanism.active_inputs(x)
         new = {row: i for i, row in enumerate(rows) if row not in told}
         if new:
             told.update(zip(new, zip(*ask(x[list(new.values())]), strict=True), strict=True))
@@ -226,13 +233,13 @@ class World(Record, eq=False, dict=True):
         bad = 1.0 if bound is None or bound.op in ("<=", "<") else -1.0
 
         def ask(x: FloatArray) -> tuple[FloatArray, ...]:
-            there = self.places.at(mechanism, x)
+            there = self.posteriors.at(mechanism, x)
             latent = there.latent + bad * self._worse(outcome.mechanism, there)
             if not len(seen):
                 return latent, np.sqrt(there.variance + mechanism.noise_at(x) ** 2)
             here = self._at(outcome.mechanism, self.config)
-            kin = kinship(there, here, 0.0)
-            pairs = [next_value(kin.sharing(share), latent, float(here.latent[0]), seen) for share in shares]
+            errors = error_covariance(there, here, 0.0)
+            pairs = [next_value(errors.sharing(share), latent, float(here.latent[0]), seen) for share in shares]
             return tuple(part for pair in pairs for part in pair)
 
         told = self._once(outcome.objective, mechanism, columns(configs, mechanism.inputs), ask)
@@ -242,12 +249,12 @@ class World(Record, eq=False, dict=True):
         shift, left = self._by_mediators(outcome.mediation, configs)
         return _Next(centre + sd * shift, sd * np.sqrt(left), np.ones(1))
 
-    def _at(self, key: str, config: Config) -> At:
+    def _at(self, key: str, config: Config) -> Posterior:
         """A mechanism at this run's configuration or at the one that is known, which every question asks about."""
         mechanism = self.model.mechanisms[key]
-        return self.places.at(mechanism, columns([config], mechanism.inputs))
+        return self.posteriors.at(mechanism, columns([config], mechanism.inputs))
 
-    def _worse(self, key: str, there: At) -> FloatArray:
+    def _worse(self, key: str, there: Posterior) -> FloatArray:
         """What a mechanism may do beyond what it is expected to, from the configuration that is known; shape (m,)."""
         if self.wary_from is None:
             return np.zeros(len(there.x))
@@ -262,29 +269,29 @@ class World(Record, eq=False, dict=True):
         nothing = np.zeros(len(configs)), np.ones(len(configs))
         if mediation is None or not self._behind_the_end().isdisjoint(mediation.metrics):
             return nothing
-        kin, errors = [], []
+        covariances, errors = [], []
         for name in mediation.metrics:
             mechanism = self.model.mechanisms[name]
             values = [known_value(seen, name) for seen in (self.observed, *self.repeats)]
             seen = np.array([v for v in values if v is not None and v > LEAST[mechanism.transform]])
             if len(seen) < len(values):
                 return nothing
-            kin.append(self._kinship_of(name, columns(configs, mechanism.inputs)))
+            covariances.append(self._error_covariance(name, columns(configs, mechanism.inputs)))
             error = transformed(seen, mechanism.transform) - self._at(name, self.config).latent
-            far = FARTHEST * np.sqrt(kin[-1].here)
+            far = FARTHEST * np.sqrt(covariances[-1].here)
             errors.append(np.clip(error, -far, far))
-        return by_mediators(kin, np.array(errors).T, np.array(mediation.weights), np.array(mediation.among))
+        return by_mediators(covariances, np.array(errors).T, np.array(mediation.weights), np.array(mediation.among))
 
-    def _kinship_of(self, metric: str, x: FloatArray) -> Kinship:
-        """How the metric's errors at x (m, p) go with those here."""
-        here, persistence = self._at(metric, self.config), self._persistence(metric)
+    def _error_covariance(self, metric: str, x: FloatArray) -> ErrorCovariance:
+        """Of the metric's errors at x (m, p) with those here."""
+        here, carry_over = self._at(metric, self.config), self._carry_over(metric)
 
         def ask(rows: FloatArray) -> tuple[FloatArray, ...]:
-            kin = kinship(self.places.at(here.mechanism, rows), here, persistence)
-            return kin.variance, kin.covariance
+            errors = error_covariance(self.posteriors.at(here.mechanism, rows), here, carry_over)
+            return errors.variance, errors.covariance
 
         variance, covariance = self._once(f"on its way/{metric}", here.mechanism, x, ask)
-        return replace(kinship(here, here, persistence), variance=variance, covariance=covariance)
+        return replace(error_covariance(here, here, carry_over), variance=variance, covariance=covariance)
 
     def _behind_the_end(self) -> frozenset[str]:
         """Metrics that the graph puts behind a stage that this run failed."""
@@ -304,8 +311,8 @@ def known_value(observed: Mapping[str, object], name: str) -> float | None:
 
 
 class _Next(Record, eq=False):
-    """The next outcome of m configurations: what it is for each of k shares of the noise that may persist, (k, m), and
-    how likely each share is, (k,)."""
+    """The next outcome of m configurations: what it is for each of k shares of the noise that may carry over, (k, m),
+    and how likely each share is, (k,)."""
 
     centre: FloatArray
     sd: FloatArray
@@ -333,7 +340,7 @@ class _Next(Record, eq=False):
         return np.asarray((low + high) / 2)
 
 
-def _chance(there: At, passes: float, beyond: FloatArray | float = 0.0) -> FloatArray:
+def _chance(there: Posterior, passes: float, beyond: FloatArray | float = 0.0) -> FloatArray:
     """Probability of passing, the regression moved by `beyond` towards it."""
     one = there.mechanism.probability_of(there.latent + (beyond if passes == 1.0 else -np.asarray(beyond)))
     return one if passes == 1.0 else 1.0 - one

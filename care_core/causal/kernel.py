@@ -24,7 +24,7 @@ FEW = 256
 """Values of an input of which each pair's exponential is worked out once."""
 
 
-class Levels(Record, eq=False):
+class UniqueValues(Record, eq=False):
     """Points by the values that each of their columns takes: most runs leave most options as they are, so n runs have
     far fewer values of an option than n, and the kernel's exponentials are of these alone.
 
@@ -38,7 +38,7 @@ class Levels(Record, eq=False):
     place: NDArray[np.intp]
 
     @classmethod
-    def of(cls, points: FloatArray) -> Levels:
+    def of(cls, points: FloatArray) -> UniqueValues:
         """Of points of shape (n, p)."""
         columns = points.T
         order = columns.argsort(axis=1)
@@ -56,8 +56,8 @@ class Levels(Record, eq=False):
             yield self.values[i:j], place - i
 
 
-def _levels(points: FloatArray | Levels) -> Levels:
-    return points if isinstance(points, Levels) else Levels.of(points)
+def _unique(points: FloatArray | UniqueValues) -> UniqueValues:
+    return points if isinstance(points, UniqueValues) else UniqueValues.of(points)
 
 
 def _alike(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -101,20 +101,20 @@ class Kernel(Record, eq=False):
     idle: int = 0
     """Inputs that were found to explain nothing and left out: each adds an e_j of 1."""
 
-    def __call__(self, a: FloatArray, b: FloatArray | Levels) -> FloatArray:
+    def __call__(self, a: FloatArray, b: FloatArray | UniqueValues) -> FloatArray:
         """Covariance of the noise-free values. a: (m, p), b: (n, p) -> (m, n)."""
-        levels = _levels(b)
-        rows = max(1, BLOCK // max(1, levels.place.size))
-        covariance = np.empty((len(a), levels.place.shape[1]))
+        points = _unique(b)
+        rows = max(1, BLOCK // max(1, points.place.size))
+        covariance = np.empty((len(a), points.place.shape[1]))
         for i in range(0, len(a), rows):
-            covariance[i : i + rows] = self._block(a[i : i + rows], levels).T
+            covariance[i : i + rows] = self._block(a[i : i + rows], points).T
         return covariance
 
-    def among(self, points: FloatArray | Levels) -> FloatArray:
+    def among(self, points: FloatArray | UniqueValues) -> FloatArray:
         """Covariance of n points with each other, shape (n, n): half the work of calling it, and the same numbers."""
-        levels = _levels(points)
-        n = levels.place.shape[1]
-        columns = [_Column.of(*one, scale) for one, scale in zip(levels.columns(), self._scale, strict=True)]
+        points = _unique(points)
+        n = points.place.shape[1]
+        columns = [_Column.of(*one, scale) for one, scale in zip(points.columns(), self._scale, strict=True)]
         covariance = np.empty((n, n))
         for i in range(0, n, SLICE):
             rows = slice(i, i + SLICE)
@@ -128,13 +128,13 @@ class Kernel(Record, eq=False):
             covariance[rows, i:] = covariance[i:, rows].T
         return covariance
 
-    def _block(self, a: FloatArray, levels: Levels) -> FloatArray:
+    def _block(self, a: FloatArray, points: UniqueValues) -> FloatArray:
         """Of n points with m others, a: (m, p) -> (n, m)."""
-        scale = self._scale[levels.column][:, None]
-        alike = _alike(a.T[levels.column] * scale, levels.values[:, None] * scale)
-        shape = levels.place.shape[1], len(a)
+        scale = self._scale[points.column][:, None]
+        alike = _alike(a.T[points.column] * scale, points.values[:, None] * scale)
+        shape = points.place.shape[1], len(a)
         joint, each, e = np.ones(shape), np.full(shape, float(self.idle)), np.empty(shape)
-        for place in levels.place:
+        for place in points.place:
             alike.take(place, axis=0, out=e, mode="clip")  # none is out of range: to say what then saves a copy
             each += e
             joint *= e

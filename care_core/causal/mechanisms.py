@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.causal.kernel import Factor, FloatArray, Kernel, Levels
+from care_core.causal.kernel import Factor, FloatArray, Kernel, UniqueValues
 from care_core.causal.nominal import Nominal
 from care_core.numbers import quantile
 from care_core.records import Record
@@ -62,14 +62,14 @@ class TrainingRuns(Record, eq=False, dict=True):
     """
 
     kernel: Kernel
-    levels: Levels
+    points: UniqueValues
     counts: NDArray[np.intp]
     weights: FloatArray
 
     @cached_property
     def factor(self) -> Factor:
         """Of the covariance of the outcomes."""
-        covariance = self.kernel.among(self.levels)
+        covariance = self.kernel.among(self.points)
         covariance[np.diag_indices_from(covariance)] += (self.kernel.noise**2 + JITTER) / self.counts
         return Factor.of(covariance)
 
@@ -129,30 +129,30 @@ class Mechanism(Record, eq=False, dict=True):
         points = np.empty((len(places), self.points.shape[1]))
         points[place] = self.points
         weights = np.bincount(place, self.weights).astype(np.float64)
-        return TrainingRuns(self.kernel, Levels.of(points), np.bincount(place), weights)
+        return TrainingRuns(self.kernel, UniqueValues.of(points), np.bincount(place), weights)
 
-    def at(self, x: FloatArray) -> At:
+    def posterior(self, x: FloatArray) -> Posterior:
         """The mechanism at places x, shape (m, p)."""
-        return At(self, x)
+        return Posterior(self, x)
 
     def latent(self, x: FloatArray) -> FloatArray:
         """Posterior mean on the transformed scale. x: (m, p) -> (m,)."""
-        return self.at(x).latent
+        return self.posterior(x).latent
 
     def latent_sd(self, x: FloatArray) -> FloatArray:
         """Posterior standard deviation of the noise-free value, shape (m,)."""
-        return self.at(x).latent_sd
+        return self.posterior(x).latent_sd
 
     def known(self, x: FloatArray) -> FloatArray:
         """What physics and the other platform's mechanism say, shape (m,); zero without either."""
-        return self.at(x).known
+        return self.posterior(x).known
 
-    def felt(self, x: FloatArray) -> list[bytes]:
+    def active_inputs(self, x: FloatArray) -> list[bytes]:
         """Of each row of x (m, p) the values of the inputs that anything reads: rows with the same have one answer."""
-        return [row.tobytes() for row in x[:, self._felt]]
+        return [row.tobytes() for row in x[:, self._active]]
 
     @cached_property
-    def _felt(self) -> NDArray[np.int64]:
+    def _active(self) -> NDArray[np.int64]:
         names = {self.inputs[place] for place in self.reads}
         names.update(() if self.nominal is None else self.nominal.inputs)
         names.update(() if self.averaging is None else (self.averaging.count,))
@@ -212,7 +212,7 @@ class Mechanism(Record, eq=False, dict=True):
         was expected there. x: (1, p). An error that no training run had is 0 or 1."""
         if value <= LEAST[self.transform]:
             return 0.0, float(self.expected(x)[0])
-        there = self.at(x)
+        there = self.posterior(x)
         sd = np.sqrt(there.latent_sd**2 + self.noise_at(x) ** 2)
         z = (transformed(np.array([value]), self.transform) - there.latent) / sd
         share = np.searchsorted(self.calibration, z)[0] / len(self.calibration)
@@ -223,7 +223,7 @@ class Mechanism(Record, eq=False, dict=True):
         return self.probability(x) if self.binary else restored(self.latent(x), self.transform)
 
 
-class At(Record, eq=False, dict=True):
+class Posterior(Record, eq=False, dict=True):
     """A mechanism at m places x, shape (m, p). The kernel, which is what costs, is asked once for all that is asked of
     them, and nothing before it is needed."""
 
@@ -250,7 +250,7 @@ class At(Record, eq=False, dict=True):
         return own if self._prior is None else own + self._prior[1] ** 2 * self._prior[0].variance
 
     @property
-    def ignorance(self) -> FloatArray:
+    def epistemic_ratio(self) -> FloatArray:
         """How little the training data say there: posterior over prior variance, 0 (known) to 1 (nothing known).
 
         Shape (m,)."""
@@ -266,7 +266,7 @@ class At(Record, eq=False, dict=True):
             latent += self._prior[1] * self._prior[0].latent
         return latent
 
-    def change_sd(self, here: At) -> FloatArray:
+    def change_sd(self, here: Posterior) -> FloatArray:
         """Posterior standard deviation of f(x) - f(here), shape (m,); `here` is one place.
 
         What is not known at both places cancels, so a small change is known better than either value.
@@ -279,7 +279,7 @@ class At(Record, eq=False, dict=True):
             return sd
         return np.hypot(sd, self._prior[1] * self._prior[0].change_sd(here._prior[0]))
 
-    def covariance(self, here: At) -> FloatArray:
+    def covariance(self, here: Posterior) -> FloatArray:
         """Posterior covariance of the noise-free values with that of one place, shape (m,).
 
         What is not known of the mechanism at one place is partly what is not known at the other.
@@ -298,7 +298,7 @@ class At(Record, eq=False, dict=True):
     @cached_property
     def _cross(self) -> FloatArray:
         """Covariances with the training runs, shape (m, u)."""
-        return self.mechanism.kernel(self._z, self.mechanism.training.levels)
+        return self.mechanism.kernel(self._z, self.mechanism.training.points)
 
     @cached_property
     def half(self) -> FloatArray:
@@ -306,12 +306,12 @@ class At(Record, eq=False, dict=True):
         return self.mechanism.training.factor.whitened(self._cross)
 
     @cached_property
-    def _prior(self) -> tuple[At, float] | None:
+    def _prior(self) -> tuple[Posterior, float] | None:
         """The other platform's mechanism there, and the share of it that is kept."""
         if self.mechanism.prior is None:
             return None
         source, share = self.mechanism.prior
-        return source.at(self.mechanism.columns(self.x, source.inputs)), share
+        return source.posterior(self.mechanism.columns(self.x, source.inputs)), share
 
 
 def solve(kernel: Kernel, points: FloatArray, targets: FloatArray) -> FloatArray:

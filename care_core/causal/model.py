@@ -182,7 +182,7 @@ class SkillRecord(Record, kw_only=True):
     """Calibration: mean predicted probability, share that met the threshold, runs; a row a tenth that has runs."""
 
 
-class Persistence(Record, kw_only=True):
+class NoiseCarryOver(Record, kw_only=True):
     """Share of an objective's noise variance that a run of the same configuration meets again.
 
     `same`: under the same conditions. `another`: on another day. `pairs`: of repeated training runs that say so, for
@@ -209,7 +209,7 @@ class Persistence(Record, kw_only=True):
 
 SHARES = 10
 """Shares of the noise that are told apart."""
-UNKNOWN_PERSISTENCE = Persistence(same=0.5, another=0.25)
+UNKNOWN_CARRY_OVER = NoiseCarryOver(same=0.5, another=0.25)
 """Where no configuration was run twice: the middle of what is possible, on another day of none to that."""
 
 
@@ -226,8 +226,8 @@ class Training(Record, kw_only=True):
     """Option -> objective edges that the metrics do not explain, with the p-value that kept them."""
     moves_together: tuple[tuple[str, ...], ...] = ()
     """Groups of non-functional objectives that rise and fall together (rank correlation above 0.9)."""
-    persistence: Mapping[str, Persistence] = field(default_factory=dict)
-    """Per objective, where training runs were repeated."""
+    carry_over: Mapping[str, NoiseCarryOver] = field(default_factory=dict, name="persistence")
+    """Per objective, where training runs were repeated; "persistence" in the file."""
     notes: tuple[str, ...] = ()
 
 
@@ -247,7 +247,7 @@ class Model(Record, eq=False):
     """By objective, and for `all` of them together."""
     training: Training
     mechanisms: Mapping[str, Mechanism] = field(default_factory=dict)
-    witnesses: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    correlated_metrics: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Per objective the metrics that go with missing it: correlation over the training runs, on scaled values."""
 
     def summary_at(self, name: str, reference: Mapping[str, float]) -> Summary | None:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.configs.driven import same_value
 from care_core.diagnose.judging import Judged
 from care_core.diagnose.tolerance import FEW, Quantile, upper_quantile
@@ -173,7 +173,7 @@ def _spread(objective: Variable, runs: Sequence[Judged], profile: Profile, *, re
     spreads = []
     for judged in runs:
         config = {**judged.reference.config, **judged.run.config}
-        predicted = World(profile.model, config, {}, {}).predict(objective.name, [config])
+        predicted = CounterfactualQuery(profile.model, config, {}, {}).predict(objective.name, [config])
         low, high = float(predicted.low[0]), float(predicted.high[0])
         if low > 0 and math.isfinite(high):
             spreads.append(math.log(high / low) / _OF_80_PERCENT)

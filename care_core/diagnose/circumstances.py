@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.mechanisms import columns
 from care_core.causal.model import Summary
 from care_core.diagnose.records import Circumstance
@@ -27,9 +27,9 @@ RARE = 0.025
 """Share of the training runs that lie farther out than what is called unusual."""
 
 
-def circumstances(run: Run, world: World, schema: Schema) -> tuple[Circumstance, ...]:
+def circumstances(run: Run, query: CounterfactualQuery, schema: Schema) -> tuple[Circumstance, ...]:
     """What this run met and no option set, the rarest first."""
-    found = [*_shown(run, world, schema), *_said(run), *_unsupported(run, world, schema)]
+    found = [*_shown(run, query, schema), *_said(run), *_unsupported(run, query, schema)]
     named: dict[tuple[str, str], Circumstance] = {}
     for one in sorted(found, key=lambda one: one.share):
         named.setdefault((one.name, one.variable), one)
@@ -57,20 +57,22 @@ def _seen(low: float, high: float) -> str:
     return f"always {least}" if least == most else f"{least} to {most}"
 
 
-def _shown(run: Run, world: World, schema: Schema) -> Iterator[Circumstance]:
+def _shown(run: Run, query: CounterfactualQuery, schema: Schema) -> Iterator[Circumstance]:
     for name, sides in schema.circumstances.items():
         for variable, side in ((schema.variables[key], side) for key, side in sides.items()):
             value = run.value(variable.name)
             if not is_known(value):
                 continue
             judge = _context if variable.role is Role.CONTEXT else _metric
-            found = judge(name, variable, side, value, world)
+            found = judge(name, variable, side, value, query)
             if found is not None:
                 yield found
 
 
-def _context(name: str, variable: Variable, side: Side, value: float, world: World) -> Circumstance | None:
-    summary = world.model.summaries.get(variable.name)
+def _context(
+    name: str, variable: Variable, side: Side, value: float, query: CounterfactualQuery
+) -> Circumstance | None:
+    summary = query.model.summaries.get(variable.name)
     if summary is None or _same(value, summary.high if side == "high" else summary.low):
         return None
     above = 1.0 - summary.percentile(value)
@@ -86,11 +88,11 @@ def _context(name: str, variable: Variable, side: Side, value: float, world: Wor
     return Circumstance(name, variable.name, value, variable.unit, low, high, share, text)
 
 
-def _metric(name: str, variable: Variable, side: Side, value: float, world: World) -> Circumstance | None:
-    mechanism, summary = world.model.mechanisms.get(variable.name), world.model.summaries.get(variable.name)
+def _metric(name: str, variable: Variable, side: Side, value: float, query: CounterfactualQuery) -> Circumstance | None:
+    mechanism, summary = query.model.mechanisms.get(variable.name), query.model.summaries.get(variable.name)
     if mechanism is None or mechanism.binary or summary is None:
         return None
-    below, expected = mechanism.residual_share(columns([world.config], mechanism.inputs), value)
+    below, expected = mechanism.residual_share(columns([query.config], mechanism.inputs), value)
     share = 1.0 - below if side == "high" else below
     if share >= RARE:
         return None
@@ -108,10 +110,10 @@ def _said(run: Run) -> Iterator[Circumstance]:
             yield Circumstance(evidence.circumstance, "", None, "", None, None, 0.0, f"the log says: {evidence.text}")
 
 
-def _unsupported(run: Run, world: World, schema: Schema) -> Iterator[Circumstance]:
+def _unsupported(run: Run, query: CounterfactualQuery, schema: Schema) -> Iterator[Circumstance]:
     """Contexts outside everything that training saw, on either side."""
     for variable in schema.contexts:
-        value, summary = run.context.get(variable.name), world.model.summaries.get(variable.name)
+        value, summary = run.context.get(variable.name), query.model.summaries.get(variable.name)
         if summary is None or not is_known(value):
             continue
         least, most = _range_seen(variable, summary)

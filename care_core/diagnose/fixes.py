@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.causal.counterfactual import Config, World
+from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.diagnose.records import Fix, Prediction
 from care_core.records import replace
 from care_core.variables import Change, Role, Variable
@@ -32,13 +32,13 @@ MAX_ALTERNATIVES = 3
 Assignment = Mapping[str, float]
 
 
-def candidate_values(world: World, name: str) -> tuple[float, ...]:
+def candidate_values(query: CounterfactualQuery, name: str) -> tuple[float, ...]:
     """Acceptable values inside the training support, from the reference towards the run's value.
 
     An option marked `safety` is only moved towards its default, never past it, so no value here is looser; codes have
     no order, so of a safety option's codes only the default is left.
     """
-    variable, current, reference = world.variables[name], world.config[name], world.reference[name]
+    variable, current, reference = query.variables[name], query.config[name], query.reference[name]
     if variable.labels:
         codes = () if variable.safety else (code for code, _ in variable.labels)
         steps: Iterable[float] = (reference, *codes)
@@ -49,37 +49,37 @@ def candidate_values(world: World, name: str) -> tuple[float, ...]:
     else:
         steps = np.linspace(reference, current, STEPS + 1)[:-1]
     snapped = dict.fromkeys(variable.snap(float(step)) for step in steps)
-    return tuple(v for v in snapped if v != current and variable.accepts(v) and world.model.supports(name, v))
+    return tuple(v for v in snapped if v != current and variable.accepts(v) and query.model.supports(name, v))
 
 
-def search(world: World, candidates: Collection[str]) -> list[tuple[Assignment, float]]:
+def search(query: CounterfactualQuery, candidates: Collection[str]) -> list[tuple[Assignment, float]]:
     """Best sets of changes by size (index 0: one change), each with the probability that all thresholds are met.
 
     Beam search: every option alone back to its reference (yes-or-no options and codes to any other value), then the
     best sets widened by one option at a time. `settled` then looks for values nearer to the run's.
     """
-    values = {name: found for name in candidates if (found := _starts(world, name))}
+    values = {name: found for name in candidates if (found := _starts(query, name))}
     singles = [{name: value} for name, found in values.items() for value in found]
-    beam = _ranked(world, singles)[:BEAM]
+    beam = _ranked(query, singles)[:BEAM]
     found_sets = []
     while beam:
-        found_sets.append(_surest(world, beam))
+        found_sets.append(_surest(query, beam))
         if len(found_sets) == MAX_CHANGES:
             break
-        beam = _ranked(world, _widened((a for a, _ in beam), values))[:BEAM]
+        beam = _ranked(query, _widened((a for a, _ in beam), values))[:BEAM]
     return found_sets
 
 
-def _starts(world: World, name: str) -> tuple[float, ...]:
-    values = candidate_values(world, name)
-    return values if _is_unordered(world.variables[name]) else values[:1]
+def _starts(query: CounterfactualQuery, name: str) -> tuple[float, ...]:
+    values = candidate_values(query, name)
+    return values if _is_unordered(query.variables[name]) else values[:1]
 
 
 def _is_unordered(option: Variable) -> bool:
     return bool(option.labels) or option.type == "bool"
 
 
-def settled(world: World, assignment: Assignment) -> tuple[Assignment, float]:
+def settled(query: CounterfactualQuery, assignment: Assignment) -> tuple[Assignment, float]:
     """The same options with values as near to the run's as is safe, and the probability of that.
 
     The reference is known to work, a value on the way to it only as far as training shows. So a nearer one is taken
@@ -88,20 +88,20 @@ def settled(world: World, assignment: Assignment) -> tuple[Assignment, float]:
     training, is not known to a step.
     """
     chosen = dict(assignment)
-    before = replace(world, observed={}, repeats=())
-    wary = replace(before, wary_from={**world.config, **chosen})
-    floor = _floor(world, chosen)
+    before = replace(query, observed={}, repeats=())
+    wary = replace(before, wary_from={**query.config, **chosen})
+    floor = _floor(query, chosen)
     for name in assignment:
-        if _is_unordered(world.variables[name]):
+        if _is_unordered(query.variables[name]):
             continue
-        values = candidate_values(world, name)
-        configs = [{**world.config, **chosen, name: value} for value in values]
-        does = world.probability(configs) >= floor
+        values = candidate_values(query, name)
+        configs = [{**query.config, **chosen, name: value} for value in values]
+        does = query.probability(configs) >= floor
         edge = _edge(does)
         if edge:  # most often this run itself leaves nothing but the reference
             edge = _edge(does & (wary.probability(configs) >= _floor(before, assignment)))
         chosen[name] = values[edge]
-    return chosen, float(world.probability([{**world.config, **chosen}])[0])
+    return chosen, float(query.probability([{**query.config, **chosen}])[0])
 
 
 def _edge(does: NDArray[np.bool_]) -> int:
@@ -109,31 +109,31 @@ def _edge(does: NDArray[np.bool_]) -> int:
     return max(0, int(np.argmin(np.append(does, False))) - 2)
 
 
-def _floor(world: World, assignment: Assignment) -> float:
+def _floor(query: CounterfactualQuery, assignment: Assignment) -> float:
     """What a nearer value may come down to; where the change gains next to nothing, the model cannot tell its values
     apart, and there is none."""
-    here, reset = map(float, world.probability([world.config, {**world.config, **assignment}]))
+    here, reset = map(float, query.probability([query.config, {**query.config, **assignment}]))
     return np.inf if reset - here < NEARLY else reset - min(NEARLY, GIVEN_UP * (reset - here))
 
 
-def best_alone(world: World, name: str) -> tuple[float, float] | None:
+def best_alone(query: CounterfactualQuery, name: str) -> tuple[float, float] | None:
     """The value of one option to suggest when nothing else changes, and its probability."""
-    ranked = _ranked(world, [{name: value} for value in _starts(world, name)])
+    ranked = _ranked(query, [{name: value} for value in _starts(query, name)])
     if not ranked:
         return None
-    assignment, probability = settled(world, ranked[0][0])
+    assignment, probability = settled(query, ranked[0][0])
     return assignment[name], probability
 
 
-def needs_unsafe(world: World, enough: float) -> str | None:
+def needs_unsafe(query: CounterfactualQuery, enough: float) -> str | None:
     """A `safety` option that would fix the run only if it were moved past its default, which is never suggested."""
-    for name, option in sorted(world.variables.items()):
-        if option.role is not Role.OPTION or name in world.kept or not option.safety or option.range is None:
+    for name, option in sorted(query.variables.items()):
+        if option.role is not Role.OPTION or name in query.kept or not option.safety or option.range is None:
             continue
         values = {option.snap(float(value)) for value in np.linspace(*option.range, STEPS + 1)}
-        default = world.reference[name]
-        past = [v for v in values if v != default and (v - default) * (world.config[name] - default) <= 0]
-        if past and world.probability([{**world.config, name: value} for value in past]).max() >= enough:
+        default = query.reference[name]
+        past = [v for v in values if v != default and (v - default) * (query.config[name] - default) <= 0]
+        if past and query.probability([{**query.config, name: value} for value in past]).max() >= enough:
             return name
     return None
 
@@ -147,21 +147,21 @@ def _widened(sets: Iterable[Assignment], values: Mapping[str, tuple[float, ...]]
     return list(wider.values())
 
 
-def _surest(world: World, beam: Sequence[tuple[Assignment, float]]) -> tuple[Assignment, float]:
+def _surest(query: CounterfactualQuery, beam: Sequence[tuple[Assignment, float]]) -> tuple[Assignment, float]:
     """The first of the sets, or the one among its equals in probability and fewer in doubt about the mechanisms."""
     equals = [pair for pair in beam if pair[1] >= beam[0][1] - NEARLY]
     if len(equals) == 1:
         return equals[0]
-    doubt = world.ignorance([{**world.config, **assignment} for assignment, _ in equals])
+    doubt = query.epistemic_ratio([{**query.config, **assignment} for assignment, _ in equals])
     return equals[int(np.argmin(np.round(doubt, 2)))]
 
 
-def _ranked(world: World, sets: Sequence[Assignment]) -> list[tuple[Assignment, float]]:
+def _ranked(query: CounterfactualQuery, sets: Sequence[Assignment]) -> list[tuple[Assignment, float]]:
     if not sets:
         return []
-    reached = world.probability([{**world.config, **assignment} for assignment in sets])
+    reached = query.probability([{**query.config, **assignment} for assignment in sets])
     moved = [
-        sum(world.variables[name].distance(world.config[name], value) for name, value in assignment.items())
+        sum(query.variables[name].distance(query.config[name], value) for name, value in assignment.items())
         for assignment in sets
     ]
     order = np.argsort(-(reached - DISTANCE_COST * np.array(moved)), kind="stable")
@@ -177,31 +177,31 @@ def smallest_good(found: list[tuple[Assignment, float]]) -> int:
     return chosen
 
 
-def to_fix(world: World, assignment: Assignment, probability: float) -> Fix:
+def to_fix(query: CounterfactualQuery, assignment: Assignment, probability: float) -> Fix:
     """The set as a record, with every objective's predicted outcome; changes in the order of what each does alone."""
-    alone = {name: world.probability([{**world.config, name: value}])[0] for name, value in assignment.items()}
-    options = world.variables
+    alone = {name: query.probability([{**query.config, name: value}])[0] for name, value in assignment.items()}
+    options = query.variables
     order = sorted(assignment, key=lambda name: (-alone[name], name))
-    config = {**world.config, **assignment}
+    config = {**query.config, **assignment}
     return Fix(
         changes=tuple(
             Change(
                 options[name],
-                world.config[name],
+                query.config[name],
                 assignment[name],
                 change_notes(options[name]),
-                is_assumed=name in world.assumed,
+                is_assumed=name in query.assumed,
             )
             for name in order
         ),
         p_fixed=probability,
-        predicted={name: prediction(world, name, config) for name in world.model.outcomes},
+        predicted={name: prediction(query, name, config) for name in query.model.outcomes},
     )
 
 
-def prediction(world: World, objective: str, config: Config) -> Prediction:
+def prediction(query: CounterfactualQuery, objective: str, config: Config) -> Prediction:
     """The objective's predicted outcome under one configuration."""
-    p = world.predict(objective, [config])
+    p = query.predict(objective, [config])
     p_ok = float(p.p_ok[0])
     return Prediction(float(p.value[0]), float(p.low[0]), float(p.high[0]), None if np.isnan(p_ok) else p_ok)
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose.ranking import Suspect as Option
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import Finding, Severity, Suspect
@@ -60,7 +60,7 @@ def speaking(findings: Iterable[Finding], schema: Schema, config: Mapping[str, f
 
 
 def explain(
-    world: World,
+    query: CounterfactualQuery,
     broken: Sequence[ObjectiveResult],
     found: Mapping[str, Sequence[Option]],
     refused: Container[str],
@@ -79,7 +79,7 @@ def explain(
         refused: options that the check reads which refused this mission: they explain it whole.
         shown: by title, the findings that say which options they speak of (`speaking`).
     """
-    before = replace(world, observed={})
+    before = replace(query, observed={})
     options: dict[str, float] = {}
     chance = []
     for name in (result.variable.name for result in broken):
@@ -128,7 +128,7 @@ def _named_by(finding: Finding, names: Container[str], found: Mapping[str, Seque
     return {option: whole * share / total for option, share in weight.items() if total}
 
 
-def _added(before: World, objective: str) -> tuple[float, float]:
+def _added(before: CounterfactualQuery, objective: str) -> tuple[float, float]:
     """What this configuration adds to the probability that the objective breaks, and what the reference has of it."""
     if objective not in before.model.outcomes:
         return UNKNOWN, UNKNOWN

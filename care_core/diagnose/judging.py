@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping, Sequence
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model, Summary
 from care_core.configs.driven import readable, same_value
 from care_core.configs.loading import ConfigFile, resolve
@@ -164,7 +164,7 @@ def judge(
         )
         return Judged(run, bounds, own, tuple(results), tuple(map(_judge_check, run.checks)))
     reference = reference_of(run, schema, model, good)
-    world = World(
+    query = CounterfactualQuery(
         model,
         {**reference.config, **run.config},
         {**run.metrics, **run.objectives},
@@ -181,7 +181,7 @@ def judge(
             hint = f"give this mission's bound with --threshold {objective.name}=VALUE"
             unlike[objective.name] = Unavailable(f"no mission of the training is like this one: {another}", hint)
             continue
-        need = need_of(objective.name, world)
+        need = need_of(objective.name, query)
         if need is not None:
             needs[objective.name] = need
             bounds[objective.name] = objective.relative.for_need(need.value)
@@ -202,7 +202,7 @@ def judge(
     return Judged(run, bounds, own, tuple(results), tuple(map(_judge_check, run.checks)), reference=reference)
 
 
-def world_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> World:
+def query_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> CounterfactualQuery:
     """This run, ready to be asked. Options that no source holds are taken to be at their reference, and so are those
     that were never read: their value changed nothing.
 
@@ -211,7 +211,7 @@ def world_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> Worl
     """
     run, reference = judged.run, judged.reference.config
     unread = unread_options(profile.schema, run)
-    return World(
+    return CounterfactualQuery(
         profile.model,
         {**reference, **{name: value for name, value in run.config.items() if name not in unread}},
         {**run.metrics, **run.objectives},

@@ -9,7 +9,7 @@ from itertools import permutations
 
 import numpy as np
 
-from care_core.causal.counterfactual import Config, World
+from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.graph import Edge
 from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import columns
@@ -60,7 +60,7 @@ def deviating(config: Config, reference: Config) -> tuple[str, ...]:
 
 
 def suspects(
-    world: World, objective: str, known: Container[Edge] = (), said: Sequence[Evidence] = ()
+    query: CounterfactualQuery, objective: str, known: Container[Edge] = (), said: Sequence[Evidence] = ()
 ) -> tuple[Suspect, ...]:
     """Options off their reference that have a causal path to the objective, the likeliest cause first.
 
@@ -77,15 +77,15 @@ def suspects(
         known: direct effects that people know of, learned or not.
         said: what this run's messages say.
     """
-    off = deviating(world.config, world.reference)
-    paths = best_paths(world.model, objective, off, _mediators(world))
-    effects = {name: world.model.effects.get((name, objective)) for name in paths}
+    off = deviating(query.config, query.reference)
+    paths = best_paths(query.model, objective, off, _mediators(query))
+    effects = {name: query.model.effects.get((name, objective)) for name in paths}
     names = list(paths)
-    learned = [name for name in names if effects[name] is not None and objective in world.model.outcomes]
-    shares = _shapley(learned, lambda sets: world.p_ok(objective, [_reset(world, s) for s in sets]))
+    learned = [name for name in names if effects[name] is not None and objective in query.model.outcomes]
+    shares = _shapley(learned, lambda sets: query.p_ok(objective, [_reset(query, s) for s in sets]))
     contribution = {**dict.fromkeys(names, 0.0), **dict(zip(learned, map(float, shares), strict=True))}
     unexplained = max(0.0, 1.0 - sum(max(0.0, share) for share in contribution.values()))
-    pointer = pointers(world, objective, _acting_where_it_failed(world, objective, names, said), known, said)
+    pointer = pointers(query, objective, _acting_where_it_failed(query, objective, names, said), known, said)
     found = [
         Suspect(
             option=name,
@@ -97,30 +97,32 @@ def suspects(
         )
         for name in names
     ]
-    alone = world.probability([_reset(world, frozenset((name,))) for name in names]) if names else ()
+    alone = query.probability([_reset(query, frozenset((name,))) for name in names]) if names else ()
     repairs = dict(zip(names, map(float, alone), strict=True))
     return tuple(
         sorted(found, key=lambda s: (-round(s.weight, 2), -round(repairs[s.option], 2), -s.total_effect, s.option))
     )
 
 
-def _acting_where_it_failed(world: World, objective: str, names: Sequence[str], said: Sequence[Evidence]) -> list[str]:
+def _acting_where_it_failed(
+    query: CounterfactualQuery, objective: str, names: Sequence[str], said: Sequence[Evidence]
+) -> list[str]:
     """The options that the graph lets act on the stage at which the run failed, and those that a message names; all
     where it tells of none.
 
     One that is hardly off its reference shows in no symptom.
     """
-    outcome = world.model.outcomes.get(objective)
-    names = [n for n in names if world.variables[n].distance(world.config[n], world.reference[n]) > HARDLY]
+    outcome = query.model.outcomes.get(objective)
+    names = [n for n in names if query.variables[n].distance(query.config[n], query.reference[n]) > HARDLY]
     for stage in outcome.stages if outcome is not None else ():
-        seen = world.known(stage.variable)
+        seen = query.known(stage.variable)
         if stage.variable != objective and seen is not None and seen != stage.passes:
-            acting = world.model.graph.ancestors(stage.variable).union(*(message.options for message in said))
+            acting = query.model.graph.ancestors(stage.variable).union(*(message.options for message in said))
             return [name for name in names if name in acting] or names
     return names
 
 
-def not_ruled_out(world: World, objective: str, found: Sequence[Suspect]) -> tuple[Suspect, ...]:
+def not_ruled_out(query: CounterfactualQuery, objective: str, found: Sequence[Suspect]) -> tuple[Suspect, ...]:
     """Other options off their reference, the farthest first: a few hundred runs do not show every effect.
 
     They have no path in the graph, and get a direct one of no effect.
@@ -128,10 +130,10 @@ def not_ruled_out(world: World, objective: str, found: Sequence[Suspect]) -> tup
     named = {suspect.option for suspect in found}
     others = [
         name
-        for name in deviating(world.config, world.reference)
-        if name not in named and (name, objective) not in world.model.effects
+        for name in deviating(query.config, query.reference)
+        if name not in named and (name, objective) not in query.model.effects
     ]
-    others.sort(key=lambda name: -world.variables[name].distance(world.config[name], world.reference[name]))
+    others.sort(key=lambda name: -query.variables[name].distance(query.config[name], query.reference[name]))
     return tuple(Suspect(name, 0.0, CausalPath((name, objective), 0.0), None) for name in others)
 
 
@@ -163,21 +165,21 @@ def best_paths(
     return found
 
 
-def _mediators(world: World) -> frozenset[str]:
+def _mediators(query: CounterfactualQuery) -> frozenset[str]:
     """Metrics and objectives that may have carried this run's fault: known, and no event that stayed away as usual."""
     found = set()
-    for variable in world.variables.values():
+    for variable in query.variables.values():
         if variable.role not in (Role.METRIC, Role.OBJECTIVE):
             continue
-        value, summary = world.observed.get(variable.name), world.model.summaries.get(variable.name)
+        value, summary = query.observed.get(variable.name), query.model.summaries.get(variable.name)
         is_usual = variable.type == "bool" and summary is not None and value == round(summary.quantile(0.5))
         if isinstance(value, (int, float)) and not is_usual:
             found.add(variable.name)
     return frozenset(found)
 
 
-def _reset(world: World, names: frozenset[str]) -> dict[str, float]:
-    return {**world.config, **{name: world.reference[name] for name in names}}
+def _reset(query: CounterfactualQuery, names: frozenset[str]) -> dict[str, float]:
+    return {**query.config, **{name: query.reference[name] for name in names}}
 
 
 def _shapley(names: Sequence[str], worth: Callable[[Sequence[frozenset[str]]], FloatArray]) -> FloatArray:
@@ -204,18 +206,18 @@ def _orders(count: int) -> list[tuple[int, ...]]:
     return drawn + [order[::-1] for order in drawn]
 
 
-def describe_path(path: CausalPath, world: World, run: Run) -> tuple[PathNode, ...]:
+def describe_path(path: CausalPath, query: CounterfactualQuery, run: Run) -> tuple[PathNode, ...]:
     """The path as this run met it: at each node its value, and what the reference configuration would give."""
     nodes = []
     for i, name in enumerate(path.nodes):
         value = run.value(name)
-        edge = world.model.edges.get(path.edges[i]) if i < len(path.edges) else None
+        edge = query.model.edges.get(path.edges[i]) if i < len(path.edges) else None
         nodes.append(
             PathNode(
                 name=name,
-                unit=world.variables[name].unit,
+                unit=query.variables[name].unit,
                 value=value if is_known(value) else None,
-                expected=_expected(name, world),
+                expected=_expected(name, query),
                 effect=None if edge is None else edge.signed_effect,
                 support=None if i == len(path.edges) else 0.0 if edge is None else edge.support,
             )
@@ -223,11 +225,11 @@ def describe_path(path: CausalPath, world: World, run: Run) -> tuple[PathNode, .
     return tuple(nodes)
 
 
-def _expected(name: str, world: World) -> float | None:
-    reference = world.reference
+def _expected(name: str, query: CounterfactualQuery) -> float | None:
+    reference = query.reference
     if name in reference:
         return reference[name]
-    if name in world.model.outcomes:
-        return float(world.predict(name, [reference]).value[0])
-    mechanism = world.model.mechanisms.get(name)
+    if name in query.model.outcomes:
+        return float(query.predict(name, [reference]).value[0])
+    mechanism = query.model.mechanisms.get(name)
     return None if mechanism is None else float(mechanism.expected(columns([reference], mechanism.inputs))[0])

@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 
-from care_core.causal.counterfactual import Config, World
+from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.model import Model
 from care_core.configs.driven import option_setting, option_value, same_value
 from care_core.diagnose.records import Need
@@ -118,10 +118,10 @@ def _by_default(setting: Setting) -> Setting | None:
     return replace(setting, value=setting.default)
 
 
-def need_of(name: str, world: World) -> Need | None:
+def need_of(name: str, query: CounterfactualQuery) -> Need | None:
     """What the reference configuration would need of an objective in this run's place; None where nothing tells."""
-    if name not in world.model.outcomes:
+    if name not in query.model.outcomes:
         return None
-    p = world.predict(name, [world.reference])
+    p = query.predict(name, [query.reference])
     value, low, high = (float(part[0]) for part in (p.value, p.low, p.high))
     return Need(value, low, high) if np.isfinite((value, low, high)).all() and value > 0 else None

@@ -12,7 +12,7 @@ from collections.abc import Container, Mapping, Sequence
 
 import numpy as np
 
-from care_core.causal.counterfactual import Config, World
+from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.graph import Edge
 from care_core.causal.mechanisms import LEAST, Mechanism, columns, transformed
 from care_core.records import Record
@@ -40,7 +40,7 @@ digits would draw lots for the one to be blamed."""
 
 
 def pointers(
-    world: World, objective: str, names: Sequence[str], known: Container[Edge], said: Sequence[Evidence]
+    query: CounterfactualQuery, objective: str, names: Sequence[str], known: Container[Edge], said: Sequence[Evidence]
 ) -> dict[str, Pointer]:
     """What the metrics and the messages of this run say about the options `names`. The shares add up to 1, or are 0.
 
@@ -49,11 +49,11 @@ def pointers(
     goes away when each option alone goes back.
     """
     shown: dict[str, dict[str, float]] = {name: {} for name in names}
-    for metric, correlation in world.model.witnesses.get(objective, {}).items():
-        for name, part in _split(world, metric, correlation, names, known).items():
+    for metric, correlation in query.model.correlated_metrics.get(objective, {}).items():
+        for name, part in _split(query, metric, correlation, names, known).items():
             shown[name][metric] = part
     spoken = dict.fromkeys(names, 0.0)
-    for message in said if world.variables[objective].kind == "functional" else ():
+    for message in said if query.variables[objective].kind == "functional" else ():
         for name in spoken.keys() & set(message.options):
             spoken[name] += _SAID.get(message.kind, SAID) / len(message.options)
     total = {name: spoken[name] + sum(shown[name].values()) for name in names}
@@ -65,16 +65,16 @@ def pointers(
 
 
 def _split(
-    world: World, metric: str, correlation: float, names: Sequence[str], known: Container[Edge]
+    query: CounterfactualQuery, metric: str, correlation: float, names: Sequence[str], known: Container[Edge]
 ) -> Mapping[str, float]:
-    mechanism, seen = world.model.mechanisms[metric], world.known(metric)
+    mechanism, seen = query.model.mechanisms[metric], query.known(metric)
     if seen is None or not names or (not mechanism.binary and seen <= LEAST[mechanism.transform]):
         return {}
-    reference = world.reference
-    configs = [reference, world.config, *({**world.config, name: reference[name]} for name in names)]
-    expected, here, *back = _latent(world, mechanism, configs)
+    reference = query.reference
+    configs = [reference, query.config, *({**query.config, name: reference[name]} for name in names)]
+    expected, here, *back = _latent(query, mechanism, configs)
     value = 2 * seen - 1 if mechanism.binary else float(transformed(np.array(seen), mechanism.transform))
-    scale = _scale(world, metric, mechanism)
+    scale = _scale(query, metric, mechanism)
     off = (value - expected) / scale
     if correlation * off <= 0:
         return {}
@@ -83,19 +83,19 @@ def _split(
         step = float(np.sign(off)) * (here - there) / scale
         moved[name] = step if step > ROUNDING else 0.0
         if (name, metric) in known:
-            moved[name] += UNLEARNED * world.variables[name].distance(reference[name], world.config[name])
+            moved[name] += UNLEARNED * query.variables[name].distance(reference[name], query.config[name])
     whole = sum(moved.values())
     return {name: correlation * off * part / whole for name, part in moved.items() if part > 0}
 
 
-def _scale(world: World, metric: str, mechanism: Mechanism) -> float:
+def _scale(query: CounterfactualQuery, metric: str, mechanism: Mechanism) -> float:
     """How far training runs differ in a metric; of one that has a nominal, in the logarithm of its ratio to it."""
-    summary = world.model.summaries.get(metric)
+    summary = query.model.summaries.get(metric)
     if mechanism.nominal is None or summary is None or not summary.mean > 0:
         return mechanism.scale
     return max(summary.sd / summary.mean, mechanism.scale)
 
 
-def _latent(world: World, mechanism: Mechanism, configs: Sequence[Config]) -> list[float]:
-    latent: list[float] = world.places.at(mechanism, columns(configs, mechanism.inputs)).latent.tolist()
+def _latent(query: CounterfactualQuery, mechanism: Mechanism, configs: Sequence[Config]) -> list[float]:
+    latent: list[float] = query.posteriors.at(mechanism, columns(configs, mechanism.inputs)).latent.tolist()
     return latent

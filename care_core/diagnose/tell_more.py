@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.kernel import FloatArray
 from care_core.diagnose.fixes import candidate_values
 from care_core.diagnose.ranking import Suspect
@@ -25,7 +25,7 @@ MET = "what this run met"
 
 
 def tell_more(
-    world: World,
+    query: CounterfactualQuery,
     faults: Sequence[Fault],
     run: Run,
     unranked: Mapping[str, Sequence[Suspect]],
@@ -42,17 +42,17 @@ def tell_more(
     for fault in faults:
         objective = fault.objective.variable.name
         advice += [
-            f"{_change_back(world, name)} and run again: the training runs cannot tell what it does to {objective}"
+            f"{_change_back(query, name)} and run again: the training runs cannot tell what it does to {objective}"
             for name in [suspect.option for suspect in unranked[objective]][:HYPOTHESES]
-            if name not in world.kept
+            if name not in query.kept
         ]
         advice += [
-            f"{_change_back(world, name)} and run again: a change that nobody chose for a reason would settle whether "
+            f"{_change_back(query, name)} and run again: a change that nobody chose for a reason would settle whether "
             f"{name} causes it"
             for name in (_first(fault) if observational else ())
-            if name not in world.kept
+            if name not in query.kept
         ]
-        found = experiment(world, fault)
+        found = experiment(query, fault)
         if found is not None:
             advice.append(str(found))
     if not advice:
@@ -63,8 +63,8 @@ def tell_more(
     return tuple(dict.fromkeys(advice))
 
 
-def _change_back(world: World, name: str) -> str:
-    return f"change only {name} to {world.variables[name].show(world.reference[name])}"
+def _change_back(query: CounterfactualQuery, name: str) -> str:
+    return f"change only {name} to {query.variables[name].show(query.reference[name])}"
 
 
 def _first(fault: Fault) -> list[str]:
@@ -86,7 +86,7 @@ def _unrecorded(faults: Sequence[Fault], run: Run) -> Iterator[str]:
             yield f"{told}: {value.reason} ({value.hint})"
 
 
-def experiment(world: World, fault: Fault) -> Experiment | None:
+def experiment(query: CounterfactualQuery, fault: Fault) -> Experiment | None:
     """The single change whose outcome differs most between the leading causes, None where none differs enough.
 
     The first pair of causes that any change separates is taken; a cause that stands alone is set against what the run
@@ -94,38 +94,38 @@ def experiment(world: World, fault: Fault) -> Experiment | None:
     """
     leading = [cause.option.name for cause in fault.causes if not cause.is_lead][:HYPOTHESES]
     pairs = list(combinations(leading, 2)) or [(name, MET) for name in leading]
-    found = (_separating(world, fault.objective.variable.name, pair) for pair in pairs)
+    found = (_separating(query, fault.objective.variable.name, pair) for pair in pairs)
     return next((one for one in found if one is not None), None)
 
 
-def _separating(world: World, objective: str, pair: tuple[str, str]) -> Experiment | None:
+def _separating(query: CounterfactualQuery, objective: str, pair: tuple[str, str]) -> Experiment | None:
     changes = [
         (name, value)
         for name in pair
-        if name in world.variables and name not in world.kept
-        for value in candidate_values(world, name)
+        if name in query.variables and name not in query.kept
+        for value in candidate_values(query, name)
     ]
-    if not changes or objective not in world.model.outcomes:
+    if not changes or objective not in query.model.outcomes:
         return None
-    promised = [_probability_if(world, objective, cause, pair, changes) for cause in pair]
+    promised = [_probability_if(query, objective, cause, pair, changes) for cause in pair]
     best = int(np.argmax(np.abs(promised[0] - promised[1])))
     if abs(promised[0][best] - promised[1][best]) < TELLING:
         return None
     name, value = changes[best]
     return Experiment(
-        objective, world.variables[name], value, ((pair[0], promised[0][best]), (pair[1], promised[1][best]))
+        objective, query.variables[name], value, ((pair[0], promised[0][best]), (pair[1], promised[1][best]))
     )
 
 
 def _probability_if(
-    world: World, objective: str, cause: str, pair: tuple[str, str], changes: Sequence[tuple[str, float]]
+    query: CounterfactualQuery, objective: str, cause: str, pair: tuple[str, str], changes: Sequence[tuple[str, float]]
 ) -> FloatArray:
     """Probability of a good outcome after each change, shape (m,), if one of the pair is the cause, the other not.
 
     The other did nothing, so it is taken to have been at its reference all along, and changing it changes nothing. The
     run's noise is abducted anew: what the other cost in the model is put down to the cause and to what the run met.
     """
-    inert = {name: world.reference[name] for name in pair if name != cause and name in world.reference}
-    there = replace(world, config={**world.config, **inert})
+    inert = {name: query.reference[name] for name in pair if name != cause and name in query.reference}
+    there = replace(query, config={**query.config, **inert})
     configs = [{**there.config, **({name: value} if name == cause else {})} for name, value in changes]
     return there.p_ok(objective, configs)

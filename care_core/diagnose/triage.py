@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import EffectRecord
 from care_core.diagnose import provenance
 from care_core.diagnose.advice import believed, by_chance, falls_short, nearest, outweighed, untried
@@ -27,7 +27,7 @@ from care_core.diagnose.fixes import (
     to_fix,
 )
 from care_core.diagnose.hypotheses import explain, speaking, unasked
-from care_core.diagnose.judging import Judged, check_wishes, unread_options, world_of
+from care_core.diagnose.judging import Judged, check_wishes, query_of, unread_options
 from care_core.diagnose.ranking import (
     Suspect,
     describe_path,
@@ -65,7 +65,7 @@ class _Case(Record, eq=False):
     profile: Profile
     choice: ProfileChoice
     run: Run
-    world: World
+    query: CounterfactualQuery
     reference: str
     """Whose the reference is."""
     unranked: Mapping[str, tuple[Suspect, ...]]
@@ -137,26 +137,26 @@ def diagnose(
             hypotheses=explained,
         )
     report("ranking the causes", 0.7)
-    world = world_of(judged, profile, keep)
+    query = query_of(judged, profile, keep)
     weighed = {
-        result.variable.name: suspects(world, result.variable.name, schema.known, run.evidence) for result in broken
+        result.variable.name: suspects(query, result.variable.name, schema.known, run.evidence) for result in broken
     }
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
-    case = _Case(profile, choice, run, world, _reference(judged), unranked)
+    case = _Case(profile, choice, run, query, _reference(judged), unranked)
     refused = _refused_otherwise(case, health)
     unheard = {result.variable.name: refused or _out_of_reach(case, result) for result in broken}
     faults = tuple(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
         for name, result in ((result.variable.name, result) for result in broken)
     )
-    hypotheses = explain(world, broken, weighed, run.refused_by, health.findings, said, choice.fit.verdict)
+    hypotheses = explain(query, broken, weighed, run.refused_by, health.findings, said, choice.fit.verdict)
     report("searching for a fix", 0.85)
     fixes = believed(_fixes(case, {s.option for group in found.values() for s in group}), hypotheses)
     out_of_reach = next(filter(None, unheard.values()), None)
     abstained = out_of_reach or outweighed(hypotheses, health.findings) or _abstains(case, faults, fixes)
     if abstained is None:
-        abstained = falls_short(fixes[0], broken, _odds(world)) or untried(fixes[0], schema.learned_elsewhere)
+        abstained = falls_short(fixes[0], broken, _odds(query)) or untried(fixes[0], schema.learned_elsewhere)
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     if abstained is None:
         faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)
@@ -171,8 +171,8 @@ def diagnose(
         abstained=abstained,
         notes=_notes(case, broken, None if abstained else fixes[0]),
         missions=judged.missions,
-        rivals=circumstances(run, world, schema) if unsure else (),
-        tell_more=tell_more(world, faults, run, unranked, observational=schema.observational)
+        rivals=circumstances(run, query, schema) if unsure else (),
+        tell_more=tell_more(query, faults, run, unranked, observational=schema.observational)
         if unsure and not out_of_reach
         else (),
         health=health,
@@ -219,7 +219,7 @@ def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Di
 def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:
     """Options that cost this run, those that a failed check names first; where none of them convinces, a few leads
     that are not ruled out behind them."""
-    others = not_ruled_out(case.world, result.variable.name, found)
+    others = not_ruled_out(case.query, result.variable.name, found)
     refused = case.run.refused_by if result.variable.kind == "functional" else frozenset()
     first = [suspect for suspect in (*found, *others) if suspect.option in refused]
     named = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION]
@@ -233,14 +233,14 @@ def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], to
 
 
 def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) -> Cause:
-    name, world = suspect.option, case.world
+    name, query = suspect.option, case.query
     option = case.profile.schema.variables[name]
-    is_predictable = result.variable.name in world.model.outcomes and name not in world.kept
-    best = best_alone(world, name) if is_predictable else None
-    path = describe_path(suspect.path, world, case.run)
-    in_support = world.model.supports(name, world.config[name])
+    is_predictable = result.variable.name in query.model.outcomes and name not in query.kept
+    best = best_alone(query, name) if is_predictable else None
+    path = describe_path(suspect.path, query, case.run)
+    in_support = query.model.supports(name, query.config[name])
     support = (suspect.effect.support if suspect.effect is not None else None) or 0.0
-    changed = world.config if best is None else {**world.config, name: best[0]}
+    changed = query.config if best is None else {**query.config, name: best[0]}
     return Cause(
         rank=rank,
         option=option,
@@ -248,14 +248,14 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
         path_ace=suspect.path.ace,
         total_effect=suspect.total_effect,
         contribution=suspect.contribution,
-        current=world.config[name],
+        current=query.config[name],
         suggested=None if best is None else best[0],
-        predicted=None if best is None else prediction(world, result.variable.name, changed),
+        predicted=None if best is None else prediction(query, result.variable.name, changed),
         p_fixed=None if best is None else best[1],
         confidence=_confidence(case, result, suspect, in_support, support),
         in_support=in_support,
         notes=_cause_notes(case, suspect, in_support, support),
-        is_assumed=name in world.assumed,
+        is_assumed=name in query.assumed,
         is_lead=suspect.weight < MIN_CONTRIBUTION and name not in case.run.refused_by,
     )
 
@@ -268,9 +268,9 @@ def _as_in_fix(case: _Case, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
         value = values.get(cause.option.name, cause.suggested)
         if value is None or value == cause.suggested:
             return cause
-        changed = {**case.world.config, cause.option.name: value}
-        promised = prediction(case.world, fault.objective.variable.name, changed)
-        return replace(cause, suggested=value, predicted=promised, p_fixed=float(case.world.probability([changed])[0]))
+        changed = {**case.query.config, cause.option.name: value}
+        promised = prediction(case.query, fault.objective.variable.name, changed)
+        return replace(cause, suggested=value, predicted=promised, p_fixed=float(case.query.probability([changed])[0]))
 
     return tuple(map(as_in_fix, fault.causes))
 
@@ -304,13 +304,13 @@ def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float
     if suspect.symptom is not None and suspect.contribution < MIN_CONTRIBUTION <= suspect.weight:
         notes.append(Note(f"this run's {suspect.symptom} points at it"))
     if not in_support:
-        summary = case.world.model.summaries[suspect.option]
+        summary = case.query.model.summaries[suspect.option]
         notes.append(Note(f"outside the training support ({summary.low:g} to {summary.high:g})", "outside_training"))
     if suspect.effect is not None and support < LOW_SUPPORT:
         notes.append(Note(f"a path to {suspect.path.nodes[-1]} was found in only {support:.0%} of resamples"))
     if case.profile.schema.observational:
         notes.append(Note(_chosen_by_operators(suspect.effect)))
-    if suspect.option in case.world.kept:
+    if suspect.option in case.query.kept:
         notes.append(Note("pinned by --keep: not changed"))
     notes += map(Note, change_notes(case.profile.schema.variables[suspect.option]))
     notes += [Note(str(evidence), "in_the_log") for evidence in case.run.evidence if suspect.option in evidence.options]
@@ -329,19 +329,19 @@ def _chosen_by_operators(effect: EffectRecord | None) -> str:
 def _fixes(case: _Case, options: set[str]) -> list[Fix]:
     """The suggested fix first, then up to three that trade changes for probability or take another way."""
     # Options off their reference that break another objective matter too once this fault is gone.
-    every = options | {name for name in deviating(case.world.config, case.world.reference) if _has_effect(case, name)}
-    free = sorted(every - case.world.kept)
-    found = search(case.world, free)
+    every = options | {name for name in deviating(case.query.config, case.query.reference) if _has_effect(case, name)}
+    free = sorted(every - case.query.kept)
+    found = search(case.query, free)
     if not found:
         return []
     chosen = smallest_good(found)
     others = [found[i] for i in range(len(found)) if i != chosen and abs(i - chosen) == 1]
     without = [name for name in free if name not in found[chosen][0]]
-    detour = search(case.world, without)
+    detour = search(case.query, without)
     others += [detour[smallest_good(detour)]] if detour else []
     useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
     ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
-    fixes = [to_fix(case.world, *settled(case.world, assignment)) for assignment, _probability in ranked]
+    fixes = [to_fix(case.query, *settled(case.query, assignment)) for assignment, _probability in ranked]
     return [fix for i, fix in enumerate(fixes) if fix.changes not in [earlier.changes for earlier in fixes[:i]]]
 
 
@@ -352,29 +352,29 @@ def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]
 
 
 def _has_effect(case: _Case, option: str) -> bool:
-    effects = case.world.model.effects
+    effects = case.query.model.effects
     return any(effects[key].identified and effects[key].effect > 0 for key in effects if key[0] == option)
 
 
 def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> str | None:
     names = [fault.objective.variable.name for fault in faults]
-    unknown = [name for name in names if name not in case.world.model.outcomes]
+    unknown = [name for name in names if name not in case.query.model.outcomes]
     if unknown:
         return f"too few training missions to predict {', '.join(unknown)}: the causes are named, no change is promised"
     for fault in faults:
         rival = next(iter(case.unranked[fault.objective.variable.name]), None)
         if rival is not None and rival.weight > max((cause.contribution for cause in fault.causes), default=0.0):
             return f"'{rival.option}' is as likely a cause, and the training runs cannot tell what it does"
-    now = float(case.world.probability([case.world.config])[0])
+    now = float(case.query.probability([case.query.config])[0])
     enough = max(MIN_PROBABILITY, now + GAIN_FOR_ONE_MORE)
     has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
     if has_cause and fixes and fixes[0].p_fixed >= enough:
         return None
     shown = next((one for one in case.run.evidence if one.kind == "found"), None)
     if shown is not None:
-        back = " or ".join(f"{name} to {case.world.reference[name]:g}" for name in shown.options)
+        back = " or ".join(f"{name} to {case.query.reference[name]:g}" for name in shown.options)
         return f"training says little of it, but this run shows it ({shown.text.partition(':')[0]}): bring {back} first"
-    unsafe = needs_unsafe(case.world, enough)
+    unsafe = needs_unsafe(case.query, enough)
     if unsafe is not None:
         return f"only '{unsafe}' past its default is likely to help, and a safety option is never made looser"
     if not has_cause:
@@ -382,22 +382,22 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
             "no option that this profile models explains the fault: look at what the run met "
             "(wind, battery, positioning, obstacles) or at parameters outside the profile"
         )
-    pinned = f", with {', '.join(sorted(case.world.kept))} kept as it is" if case.world.kept else ""
+    pinned = f", with {', '.join(sorted(case.query.kept))} kept as it is" if case.query.kept else ""
     broken = [fault.objective for fault in faults]
     best = nearest(_resets(case, faults), broken)
-    short = falls_short(best, broken, _odds(case.world)) if best else None
+    short = falls_short(best, broken, _odds(case.query)) if best else None
     return f"{short or 'no change inside the acceptable ranges is likely enough to meet every limit'}{pinned}"
 
 
 def _resets(case: _Case, faults: tuple[Fault, ...]) -> list[Fix]:
     """Each named cause back at its reference, and all of them: where every probability is about zero, what comes
     nearest to the limits is told by its values."""
-    world = case.world
+    query = case.query
     named = dict.fromkeys(cause.option.name for fault in faults for cause in fault.causes if not cause.is_lead)
-    free = [name for name in named if name not in world.kept and world.config[name] != world.reference[name]]
+    free = [name for name in named if name not in query.kept and query.config[name] != query.reference[name]]
     sets = [[name] for name in free] + ([free] if len(free) > 1 else [])
-    resets = [{name: world.reference[name] for name in names} for names in sets]
-    return [to_fix(world, one, float(world.probability([{**world.config, **one}])[0])) for one in resets]
+    resets = [{name: query.reference[name] for name in names} for names in sets]
+    return [to_fix(query, one, float(query.probability([{**query.config, **one}])[0])) for one in resets]
 
 
 def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
@@ -405,7 +405,7 @@ def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
     if result.variable.kind == "functional":
         return _new_way_to_fail(case)
     name, bound = result.variable.name, result.threshold
-    summary = case.world.model.summary_at(name, case.world.reference)
+    summary = case.query.model.summary_at(name, case.query.reference)
     if bound is None or summary is None:
         return None
     best = summary.low if bound.op in ("<=", "<") else summary.high
@@ -438,7 +438,7 @@ def _is_of_one_complaint(metric: Variable) -> bool:
 
 def _new_way_to_fail(case: _Case) -> str | None:
     for variable in case.profile.schema.metrics:
-        summary, value = case.world.model.summaries.get(variable.name), case.run.metrics.get(variable.name)
+        summary, value = case.query.model.summaries.get(variable.name), case.run.metrics.get(variable.name)
         if variable.type != "bool" or summary is None or not is_known(value):
             continue
         if summary.low == summary.high != value:
@@ -448,17 +448,17 @@ def _new_way_to_fail(case: _Case) -> str | None:
 
 
 def _off(case: _Case) -> frozenset[str]:
-    return frozenset(deviating(case.run.config, case.world.reference))
+    return frozenset(deviating(case.run.config, case.query.reference))
 
 
-def _promise(world: World, broken: Sequence[str]) -> str:
+def _promise(query: CounterfactualQuery, broken: Sequence[str]) -> str:
     """Which next run the probabilities are for, and what is known of how it resembles this one."""
-    known = [world.model.training.persistence[name] for name in broken if name in world.model.training.persistence]
-    same, another = (max((persistence.pairs[i] for persistence in known), default=0) for i in (0, 1))
+    known = [query.model.training.carry_over[name] for name in broken if name in query.model.training.carry_over]
+    same, another = (max((carry_over.pairs[i] for carry_over in known), default=0) for i in (0, 1))
     measured = f"measured on {same} pairs of training runs" if same else "not measured, no training run was repeated"
     if another and not same:
         measured = f"not measured, training repeated runs on other days only ({another} pairs)"
-    seen = f", seen in {1 + len(world.repeats)} runs" if world.repeats else ""
+    seen = f", seen in {1 + len(query.repeats)} runs" if query.repeats else ""
     return f"probabilities are for the next run under the same conditions{seen}; how alike such runs are was {measured}"
 
 
@@ -469,16 +469,16 @@ def _reference(judged: Judged) -> str:
     return f"judged against {judged.reference.source}: {count}"
 
 
-def _odds(world: World) -> float:
+def _odds(query: CounterfactualQuery) -> float:
     """Probability that the reference configuration meets every limit in a mission like this, whatever this run met."""
-    return float(replace(world, observed={}, repeats=()).probability([world.reference])[0])
+    return float(replace(query, observed={}, repeats=()).probability([query.reference])[0])
 
 
 def _if_hidden(case: _Case, fix: Fix) -> str:
     """What is left of a fix's promise where something unrecorded moved options and objectives together."""
-    now = float(case.world.probability([case.world.config])[0])
+    now = float(case.query.probability([case.query.config])[0])
     names = {change.option.name for change in fix.changes}
-    effects = [effect for (option, _), effect in case.world.model.effects.items() if option in names]
+    effects = [effect for (option, _), effect in case.query.model.effects.items() if option in names]
     doubt = max((effect.doubtful for effect in effects), default=1.0)
     left = min(fix.p_fixed, now + (1.0 - doubt) * (fix.p_fixed - now))
     return (
@@ -496,12 +496,12 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None) -> t
             notes.append(f"not ranked, as the training runs cannot tell their effect on {name}: {unknown}")
     notes += [
         f"no mechanism predicts {name}: it counts with its base rate, {rate:.0%} of the training missions"
-        for name, rate in case.world.base_rates().items()
+        for name, rate in case.query.base_rates().items()
     ]
-    notes.append(_promise(case.world, [result.variable.name for result in broken]))
+    notes.append(_promise(case.query, [result.variable.name for result in broken]))
     if fix is not None:
-        now = float(case.world.probability([case.world.config])[0])
-        notes += filter(None, [by_chance(fix, now, _odds(case.world))])
+        now = float(case.query.probability([case.query.config])[0])
+        notes += filter(None, [by_chance(fix, now, _odds(case.query))])
     if fix is not None and case.profile.schema.observational:
         notes.append(_if_hidden(case, fix))
     if not case.run.mission.fits and case.run.mission.mismatch not in notes:
@@ -510,8 +510,8 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None) -> t
     if unread:
         named = ", ".join(option.name for option in case.profile.schema.options if option.name in unread)
         notes.append(f"no suspect, as no mode that reads it was entered: {named}")
-    if case.world.assumed:
-        names = sorted(case.world.assumed)
+    if case.query.assumed:
+        names = sorted(case.query.assumed)
         shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
         notes.append(f"not in the log, taken to be at their reference: {shown}")
     return tuple(notes)

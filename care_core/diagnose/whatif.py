@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.configs.driven import option_value
 from care_core.diagnose.fixes import change_notes, prediction
-from care_core.diagnose.judging import Judged, world_of
+from care_core.diagnose.judging import Judged, query_of
 from care_core.diagnose.records import ObjectiveResult, Prediction
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.ecosystems.ranking import lost_by
@@ -51,32 +51,32 @@ class Question(Record, eq=False):
     profile: ProfileChoice
     schema: Schema
     run: Run
-    world: World
+    query: CounterfactualQuery
     objectives: tuple[ObjectiveResult, ...]
     lost_by: tuple[str, ...] = ()
     """What this run was lost by and no prediction knows of."""
 
     def ask(self, changes: Mapping[str, float]) -> Answer:
         """The prediction for this run with these options changed; option names must be the profile's."""
-        world = self.world
-        config = {**world.config, **changes}
-        then, now = world.probability([config, world.config])
+        query = self.query
+        config = {**query.config, **changes}
+        then, now = query.probability([config, query.config])
         return Answer(
             changes=tuple(
                 Change(
                     self.schema.variables[name],
-                    world.config[name],
+                    query.config[name],
                     value,
                     self.warnings(name, value),
-                    world.model.supports(name, value),
-                    name in world.assumed,
+                    query.model.supports(name, value),
+                    name in query.assumed,
                 )
                 for name, value in changes.items()
             ),
             outlooks=tuple(
-                Outlook(result, prediction(world, name, config), prediction(world, name, world.config))
+                Outlook(result, prediction(query, name, config), prediction(query, name, query.config))
                 for result in self.objectives
-                if (name := result.variable.name) in world.model.outcomes
+                if (name := result.variable.name) in query.model.outcomes
             ),
             p_ok=float(then),
             p_ok_now=float(now),
@@ -88,17 +88,17 @@ class Question(Record, eq=False):
         found = []
         if not option.accepts(value):
             found.append(f"outside the acceptable values ({option.acceptable})")
-        if not self.world.model.supports(name, value):
-            summary = self.world.model.summaries[name]
+        if not self.query.model.supports(name, value):
+            summary = self.query.model.summaries[name]
             found.append(f"outside the training runs ({summary.low:g} to {summary.high:g}): a guess")
-        if not any(name in mechanism.inputs for mechanism in self.world.model.mechanisms.values()):
+        if not any(name in mechanism.inputs for mechanism in self.query.model.mechanisms.values()):
             found.append("no effect was seen in training")
-        untold = [pair[1] for pair, one in self.world.model.effects.items() if pair[0] == name and not one.identified]
+        untold = [pair[1] for pair, one in self.query.model.effects.items() if pair[0] == name and not one.identified]
         if untold:
             found.append(f"the training runs cannot tell what it does to {', '.join(untold)}")
         elif self.schema.observational:
             found.append("operators chose it in training: what made them choose may have done what is put down to it")
-        if name in self.world.assumed:
+        if name in self.query.assumed:
             found.append("no source holds its value: it is assumed to be at its reference")
         return (*found, *change_notes(option))
 
@@ -111,7 +111,7 @@ def question(judged: Judged, profile: Profile, choice: ProfileChoice, health: He
         profile=choice,
         schema=profile.schema,
         run=judged.run,
-        world=world_of(judged, profile),
+        query=query_of(judged, profile),
         objectives=judged.results,
         lost_by=lost_by(health.findings, is_judged=bool(judged.broken)),
     )

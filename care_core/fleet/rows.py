@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from care_core.causal.counterfactual import World, known_value
+from care_core.causal.counterfactual import CounterfactualQuery, known_value
 from care_core.causal.model import Model
 from care_core.diagnose.ranking import deviating
 from care_core.diagnose.records import Confidence, Diagnosis, Status, What
@@ -56,10 +56,10 @@ class Asked(Record):
     observed: Mapping[str, float]
     thresholds: Mapping[str, tuple[Op, float]]
 
-    def world(self, model: Model) -> World:
+    def query(self, model: Model) -> CounterfactualQuery:
         """The run, ready to be asked what other values would have done."""
         bounds = {name: Threshold(op, value) for name, (op, value) in self.thresholds.items()}
-        return World(model, self.config, self.observed, bounds)
+        return CounterfactualQuery(model, self.config, self.observed, bounds)
 
 
 class Row(Record):
@@ -120,7 +120,7 @@ class Row(Record):
         return sum(one.probability for one in self.explained if one.what in ("hardware", "world") and one.name)
 
 
-def row_of(log: str, diagnosis: Diagnosis, world: World | None = None) -> Row:
+def row_of(log: str, diagnosis: Diagnosis, query: CounterfactualQuery | None = None) -> Row:
     """The row of a diagnosed run.
 
     Args:
@@ -165,8 +165,8 @@ def row_of(log: str, diagnosis: Diagnosis, world: World | None = None) -> Row:
         ),
         change={} if diagnosis.fix is None else {one.option.name: one.suggested for one in diagnosis.fix.changes},
         p_fixed=None if diagnosis.fix is None else diagnosis.fix.p_fixed,
-        off={} if world is None else {name: world.reference[name] for name in deviating(world.config, world.reference)},
-        asked=None if world is None else _asked(world),
+        off={} if query is None else {name: query.reference[name] for name in deviating(query.config, query.reference)},
+        asked=None if query is None else _asked(query),
     )
 
 
@@ -187,12 +187,12 @@ def by_folder(row: Row) -> Row:
     return row if row.robot or not row.folder else replace(row, robot=row.folder, called=row.folder)
 
 
-def _asked(world: World) -> Asked:
+def _asked(query: CounterfactualQuery) -> Asked:
     """Only what the model reads of the run."""
-    stages = {stage.variable for outcome in world.model.outcomes.values() for stage in outcome.stages}
-    known = {name: known_value(world.observed, name) for name in (*world.model.outcomes, *sorted(stages))}
+    stages = {stage.variable for outcome in query.model.outcomes.values() for stage in outcome.stages}
+    known = {name: known_value(query.observed, name) for name in (*query.model.outcomes, *sorted(stages))}
     return Asked(
-        dict(world.config),
+        dict(query.config),
         {name: value for name, value in known.items() if value is not None},
-        {name: (bound.op, bound.value) for name, bound in world.thresholds.items()},
+        {name: (bound.op, bound.value) for name, bound in query.thresholds.items()},
     )

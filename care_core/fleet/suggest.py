@@ -164,10 +164,10 @@ def _answer(row: Row, model: Model, candidates: Sequence[tuple[Variable, float]]
         name not in row.asked.config for one in model.mechanisms.values() for name in one.inputs
     ):
         return None
-    config, world = row.asked.config, row.asked.world(model)
+    config, query = row.asked.config, row.asked.query(model)
     changed = [{**config, option.name: value} for option, value in candidates]
-    odds = replace(world, observed={}).probability([{**config, **row.off}])[0]
-    return _Answer((1.0 - row.broken) * world.probability([config, *changed]), enough(float(odds)))
+    odds = replace(query, observed={}).probability([{**config, **row.off}])[0]
+    return _Answer((1.0 - row.broken) * query.probability([config, *changed]), enough(float(odds)))
 
 
 class _Run(Record, eq=False):

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from care_core.causal.counterfactual import Config, World
+from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.graph import CausalGraph
 from care_core.causal.model import EdgeRecord, EffectRecord, Model
 from care_core.diagnose.ranking import suspects
@@ -54,8 +54,10 @@ def by_engine(schema: Schema, model: Model, fault: FaultFile) -> list[str]:
     for i, config in enumerate(_configs(schema, fault)):
         seen = {name: float(fault.runs[name].iloc[i]) for name in measured}
         usual = usual_values(schema, fault, config)
-        world = World(model, config, seen, {fault.objective: bound}, reference=usual, variables=schema.variables)
-        for suspect in suspects(world, fault.objective, schema.known):
+        query = CounterfactualQuery(
+            model, config, seen, {fault.objective: bound}, reference=usual, variables=schema.variables
+        )
+        for suspect in suspects(query, fault.objective, schema.known):
             total[suspect.option] = total.get(suspect.option, 0.0) + suspect.weight / FAULTY_RUNS
     return [name for name in sorted(total, key=lambda name: (-total[name], name)) if total[name] > 0]
 

@@ -16,7 +16,7 @@ import pandas as pd
 
 from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import JITTER, LEAST, Mechanism, transformed
-from care_core.causal.model import UNKNOWN_PERSISTENCE, OutcomeRecord, Persistence
+from care_core.causal.model import UNKNOWN_CARRY_OVER, NoiseCarryOver, OutcomeRecord
 from care_core.learn.outcomes import find_stages
 from care_core.learn.relative import configurations_of
 from care_core.profile.schema import Schema
@@ -29,9 +29,9 @@ MOST_RUNS = 800
 Pairs = Sequence[tuple[int, int]]
 
 
-def persistence(
+def carry_over(
     frame: pd.DataFrame, schema: Schema, outcomes: Mapping[str, OutcomeRecord], mechanisms: Mapping[str, Mechanism]
-) -> dict[str, Persistence]:
+) -> dict[str, NoiseCarryOver]:
     """Per objective and metric on the way to one, where the table repeats configurations; empty where it does not."""
     same, another = repeated(frame, schema)
     if not same and not another:
@@ -43,11 +43,11 @@ def persistence(
         targets = [_targets(key, name, frame, schema) for key in keys]
         both = [
             _share(part, [(mechanisms[key], y) for key, y in zip(keys, targets, strict=True)], frame, unknown)
-            for part, unknown in ((same, UNKNOWN_PERSISTENCE.same), (another, UNKNOWN_PERSISTENCE.another))
+            for part, unknown in ((same, UNKNOWN_CARRY_OVER.same), (another, UNKNOWN_CARRY_OVER.another))
         ]
         (of_same, n_same), (of_another, n_another) = both
         # What another day has in common with this one, the same conditions have too.
-        found[name] = Persistence(same=max(of_same, of_another), another=of_another, pairs=(n_same, n_another))
+        found[name] = NoiseCarryOver(same=max(of_same, of_another), another=of_another, pairs=(n_same, n_another))
     return found
 
 

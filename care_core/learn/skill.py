@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from sklearn.metrics import roc_auc_score
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.graph import CausalGraph
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model, SkillRecord, Training
@@ -107,22 +107,22 @@ def _probabilities(
         if v.threshold is None and v.relative is not None and v.name in outcomes
     ]
     if not relative_ones:
-        return _asked(World(model, configs[0], {}, fixed), configs)
+        return _asked(CounterfactualQuery(model, configs[0], {}, fixed), configs)
     reference = {v.name: v.default for v in schema.options if v.default is not None}
     rows = []
     for config in configs:  # each mission has thresholds of its own
-        world = World(model, config, {}, {})
+        query = CounterfactualQuery(model, config, {}, {})
         at_reference = [{**config, **reference}]
         needed = {
-            name: bound.for_need(float(world.predict(name, at_reference).value[0])) for name, bound in relative_ones
+            name: bound.for_need(float(query.predict(name, at_reference).value[0])) for name, bound in relative_ones
         }
-        rows.append(_asked(World(model, config, {}, {**fixed, **needed}), [config]))
+        rows.append(_asked(CounterfactualQuery(model, config, {}, {**fixed, **needed}), [config]))
     return {name: np.concatenate([row[name] for row in rows]) for name in rows[0]}
 
 
-def _asked(world: World, configs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
-    promised = {name: world.p_ok(name, configs) for name in world.thresholds}
-    return {**promised, "all": world.probability(configs)}
+def _asked(query: CounterfactualQuery, configs: Sequence[Mapping[str, float]]) -> dict[str, FloatArray]:
+    promised = {name: query.p_ok(name, configs) for name in query.thresholds}
+    return {**promised, "all": query.probability(configs)}
 
 
 def score(promised: FloatArray, truth: FloatArray) -> SkillRecord | None:

@@ -36,7 +36,7 @@ from care_core.learn.outcomes import (
 )
 from care_core.learn.processes import answers
 from care_core.learn.relative import of_ratios, relative
-from care_core.learn.repeats import persistence
+from care_core.learn.repeats import carry_over
 from care_core.learn.robustness import robustness
 from care_core.learn.skill import cross_validated_skill
 from care_core.learn.structure import Structure, learn_structure
@@ -92,7 +92,7 @@ def _train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, report:
     outcomes, mechanisms = _fit_all(frame, schema, graph, settings, rng)
     outcomes = with_mediation(outcomes, mechanisms, with_known(graph, frame, schema), frame, schema)
     training = _training(frame, schema, structure, settings)
-    training = replace(training, persistence=persistence(frame, schema, outcomes, mechanisms))
+    training = replace(training, carry_over=carry_over(frame, schema, outcomes, mechanisms))
     learned = Learned(with_weak(graph, frame, schema), support, outcomes, mechanisms, training)
     return assemble(frame, schema, learned, settings, rng, report)
 
@@ -132,7 +132,7 @@ def assemble(
         paths=_paths(schema, graph, edges, support),
         outcomes=learned.outcomes,
         summaries=summaries(ratios, schema),
-        witnesses=_witnesses(ratios, schema, learned.mechanisms),
+        correlated_metrics=_correlated_metrics(ratios, schema, learned.mechanisms),
         skill=skill,
         training=learned.training,
         mechanisms=learned.mechanisms,
@@ -389,7 +389,9 @@ def _paths(
     }
 
 
-def _witnesses(frame: pd.DataFrame, schema: Schema, mechanisms: Mapping[str, Mechanism]) -> dict[str, dict[str, float]]:
+def _correlated_metrics(
+    frame: pd.DataFrame, schema: Schema, mechanisms: Mapping[str, Mechanism]
+) -> dict[str, dict[str, float]]:
     """Per objective the metrics that go with missing it: correlation with how bad it was, where it is sure not to be 0.
 
     Each on the scale of its mechanism, so that a metric times its correlation says how much of the miss it shows.

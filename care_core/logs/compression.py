@@ -12,7 +12,7 @@ from typing import IO
 
 from care_core import limits
 from care_core.errors import LogError
-from care_core.logs.mapped import FileBytes
+from care_core.logs.file_windows import FileBytes
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 

@@ -23,7 +23,7 @@ from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters
 from care_core.logs.base import Channel, Kind, LazyColumns, LogFormat, Table, Wanted
 from care_core.logs.clock import Clock, clock_of
 from care_core.logs.damage import summarised
-from care_core.logs.mapped import Bytes, FileArray, Offsets, give_back, stored_in
+from care_core.logs.file_windows import Bytes, FileArray, Offsets, give_back, stored_in
 from care_core.records import Record
 from care_core.run import Damage, Setting
 

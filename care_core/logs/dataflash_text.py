@@ -22,7 +22,7 @@ from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
 from care_core.logs.dataflash import time_field
-from care_core.logs.mapped import FileArray
+from care_core.logs.file_windows import FileArray
 from care_core.run import Damage, Setting
 
 Floats = NDArray[np.float64]

@@ -23,7 +23,7 @@ from care_core.logs.ardupilot import facts_of, history, shortest
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
-from care_core.logs.mapped import FileArray
+from care_core.logs.file_windows import FileArray
 from care_core.logs.mavlink_packets import (
     STAMP_BYTES,
     V1,

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.logs.mapped import Bytes, FileArray
+from care_core.logs.file_windows import Bytes, FileArray
 from care_core.records import Record
 
 Offsets = NDArray[np.int64]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from care_core.logs.base import LogFormat
 from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
-from care_core.logs.mapped import FileBytes, opened
+from care_core.logs.file_windows import FileBytes, opened
 from care_core.logs.mcap_records import MAGIC, McapChunk, McapContents, locate, read_contents
 from care_core.logs.message_index import Places
 from care_core.logs.recording import recording_at

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from care_core.errors import LogError
 from care_core.logs.base import LogFormat
 from care_core.logs.compression import Unpacker
-from care_core.logs.mapped import opened
+from care_core.logs.file_windows import opened
 from care_core.logs.message_index import Places
 from care_core.logs.recording import recording_at
 from care_core.logs.ros1_records import MAGIC, BagChunk, BagContents, locate, read_contents

@@ -15,7 +15,7 @@ import numpy as np
 
 from care_core import limits
 from care_core.logs.compression import CannotUnpackError, Unpacker
-from care_core.logs.mapped import FileBytes
+from care_core.logs.file_windows import FileBytes
 from care_core.logs.message_index import ChunkIndex, MessageIndex
 from care_core.logs.ros_log import BrokenRecordError, Connection, Flaw, Source
 from care_core.records import Record, Struct, field

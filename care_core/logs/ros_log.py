@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from care_core import limits
 from care_core.logs.base import Channel, LogFormat, Table, Wanted
 from care_core.logs.cdr_message import CdrDecoder
+from care_core.logs.file_windows import FileBytes
 from care_core.logs.json_message import json_decoder
-from care_core.logs.mapped import FileBytes
 from care_core.logs.message_index import MessageIndex, Places
 from care_core.logs.ros1_message import message_decoder
 from care_core.logs.ros_message import Buffer, Decoder, MalformedMessageError, short_name

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.logs.mapped import FileBytes
+from care_core.logs.file_windows import FileBytes
 
 MAGIC = b"SQLite format 3\0"
 

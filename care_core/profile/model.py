@@ -81,7 +81,7 @@ class _ModelFile(Record, kw_only=True):
     paths: tuple[PathRecord, ...]
     outcomes: tuple[OutcomeRecord, ...]
     summaries: dict[str, Summary]
-    witnesses: dict[str, dict[str, float]] = field(default_factory=dict)
+    correlated_metrics: dict[str, dict[str, float]] = field(default_factory=dict, name="witnesses")
     skill: dict[str, SkillRecord]
     training: Training
     mechanisms: dict[str, _MechanismRecord]
@@ -107,7 +107,7 @@ def write_model(model: Model, folder: Path) -> None:
         paths=tuple(path for paths in model.paths.values() for path in paths),
         outcomes=tuple(model.outcomes.values()),
         summaries=dict(model.summaries),
-        witnesses={name: dict(found) for name, found in model.witnesses.items()},
+        correlated_metrics={name: dict(found) for name, found in model.correlated_metrics.items()},
         skill=dict(model.skill),
         training=model.training,
         mechanisms={key: _mechanism_record(key, m) for key, m in stored.items()},
@@ -276,7 +276,7 @@ def _to_model(record: _ModelFile, graph: CausalGraph, mechanisms: Mapping[str, M
         paths=paths,
         outcomes={o.objective: o for o in record.outcomes},
         summaries=record.summaries,
-        witnesses=record.witnesses,
+        correlated_metrics=record.correlated_metrics,
         skill=record.skill,
         training=record.training,
         mechanisms=mechanisms,

@@ -26,8 +26,8 @@ from tests.planted import (
     SETTINGS,
     fly,
     fly_many,
+    planted_query,
     planted_run,
-    planted_world,
     with_variable,
 )
 
@@ -112,7 +112,7 @@ def test_where_operators_chose_no_cause_is_sure_and_the_promise_says_what_it_res
     assert (cause.option.name, cause.confidence) == ("speed", confidence)
     assert any(note.text.startswith("operators chose it") for note in cause.notes)
     assert diagnosis.fix is not None
-    now = float(planted_world(planted, speed=1.5).probability([run.config])[0])
+    now = float(planted_query(planted, speed=1.5).probability([run.config])[0])
     left = now + share * (diagnosis.fix.p_fixed - now)
     told = [note for note in diagnosis.notes if note.startswith("operators chose the options")]
     assert len(told) == 1

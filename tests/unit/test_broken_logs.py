@@ -19,7 +19,7 @@ from care_core.ecosystems.examine import examine
 from care_core.ecosystems.registry import run_model
 from care_core.errors import CareError, LogError
 from care_core.extract.read import read_run
-from care_core.logs import mapped
+from care_core.logs import file_windows
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.opening import open_log
 from care_core.profile.reading import read_schema
@@ -101,7 +101,7 @@ def test_a_log_too_large_to_hold_is_the_same_in_windows(
     path = MAKERS[kind](tmp_path / "log")
     held = open_log(path)
     monkeypatch.setattr(limits, "HELD_BYTES", 0)
-    monkeypatch.setattr(mapped, "_WINDOW", 1000)
+    monkeypatch.setattr(file_windows, "_WINDOW", 1000)
     windowed = open_log(path)
     assert (windowed.channels(), windowed.settings(), windowed.damage) == (
         held.channels(), held.settings(), held.damage

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from care_core.causal.model import Summary
 from care_core.diagnose.circumstances import circumstances
-from care_core.diagnose.judging import judge, read_and_judge, world_of
+from care_core.diagnose.judging import judge, query_of, read_and_judge
 from care_core.diagnose.tell_more import experiment
 from care_core.diagnose.triage import diagnose, triage
 from care_core.ecosystems.registry import run_model
@@ -118,8 +118,8 @@ def test_a_message_in_flight_is_a_note_and_no_proof(planted: Profile) -> None:
 
 def circumstances_of(profile: Profile, run: Run, sides: Mapping[str, Side]) -> list[str]:
     schema = replace(profile.schema, circumstances={"battery": sides})
-    world = world_of(judge(run, schema, profile.model), profile)
-    return [one.variable for one in circumstances(run, world, schema)]
+    query = query_of(judge(run, schema, profile.model), profile)
+    return [one.variable for one in circumstances(run, query, schema)]
 
 
 def test_a_metric_beyond_what_the_configuration_explains_is_a_circumstance(planted: Profile) -> None:
@@ -138,8 +138,8 @@ def test_a_context_is_judged_by_where_training_saw_it(planted: Profile) -> None:
     schema = replace(SCHEMA, variables={**SCHEMA.variables, "wind": wind}, circumstances={"wind": {"wind": "high"}})
     for value, expected in ((5.0, []), (9.9, ["wind"]), (12.0, ["wind"]), (0.1, [])):
         run = replace(planted_run(), context={"wind": value})
-        world = replace(world_of(judge(run, SCHEMA, planted.model), planted), model=model)
-        found = circumstances(run, world, schema)
+        query = replace(query_of(judge(run, SCHEMA, planted.model), planted), model=model)
+        found = circumstances(run, query, schema)
         assert [one.name for one in found][: len(expected)] == expected
         assert all(str(one.value)[:2] in one.text for one in found)
 
@@ -150,7 +150,7 @@ def test_a_circumstance_says_how_many_runs_met_more(planted: Profile, side: Side
     model = replace(planted.model, summaries={**planted.model.summaries, "wind": _summary(0.0, 10.0)})
     schema = replace(SCHEMA, variables={**SCHEMA.variables, "wind": wind}, circumstances={"wind": {"wind": side}})
     run = replace(planted_run(), context={"wind": 10.0 * share})
-    (found,) = circumstances(run, replace(world_of(judge(run, SCHEMA, None), planted), model=model), schema)
+    (found,) = circumstances(run, replace(query_of(judge(run, SCHEMA, None), planted), model=model), schema)
     assert found.share == pytest.approx(0.01, abs=1e-6)
 
 
@@ -176,13 +176,13 @@ def test_the_experiment_separates_the_two_leading_causes(planted: Profile) -> No
     judged = judge(run, SCHEMA, planted.model, {"time": 183.0})
     diagnosis = diagnose(judged, planted, CHOICE)
     (fault,) = diagnosis.faults
-    found = experiment(world_of(judged, planted), fault)
+    found = experiment(query_of(judged, planted), fault)
     assert found is not None
     (first, p_first), (second, p_second) = found.if_cause
     assert {first, second} <= {cause.option.name for cause in fault.causes} | {"what this run met"}
     assert abs(p_first - p_second) >= 0.15
     assert found.option.name in (first, second)
-    assert experiment(world_of(judged, planted, (first, second)), fault) is None
+    assert experiment(query_of(judged, planted, (first, second)), fault) is None
 
 
 def test_where_nothing_is_off_its_reference_a_repeat_is_advised(planted: Profile) -> None:

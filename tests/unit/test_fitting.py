@@ -68,7 +68,10 @@ def test_among_few_runs_no_input_is_left_out() -> None:
 def test_knows_less_away_from_the_data() -> None:
     x = RNG(0).uniform(0, 1, (80, 2))
     m = fitted(x, x[:, 0] + 0.1 * RNG(1).normal(size=80))
-    inside, outside = m.at(np.array([[0.5, 0.5]])).ignorance, m.at(np.array([[4.0, 0.5]])).ignorance
+    inside, outside = (
+        m.posterior(np.array([[0.5, 0.5]])).epistemic_ratio,
+        m.posterior(np.array([[4.0, 0.5]])).epistemic_ratio,
+    )
     assert inside[0] < 0.1 < outside[0]
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose.fixes import (
     MAX_CHANGES,
     NEARLY,
@@ -21,7 +21,7 @@ from care_core.diagnose.fixes import (
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.variables import Role, Variable
-from tests.planted import DEFAULTS, OPTIONS, planted_run, planted_world, world_of
+from tests.planted import DEFAULTS, OPTIONS, planted_query, planted_run, query_of
 
 BY_NAME = {option.name: option for option in OPTIONS}
 QUICK = settings(deadline=None, max_examples=40)
@@ -29,7 +29,9 @@ QUICK = settings(deadline=None, max_examples=40)
 
 def candidates(planted: Profile, option: Variable, current: float, reference: float) -> tuple[float, ...]:
     name = option.name
-    here = World(planted.model, {name: current}, {}, {}, reference={name: reference}, variables={name: option})
+    here = CounterfactualQuery(
+        planted.model, {name: current}, {}, {}, reference={name: reference}, variables={name: option}
+    )
     return candidate_values(here, name)
 
 
@@ -72,7 +74,7 @@ def test_a_ratio_is_walked_in_ratios(planted: Profile) -> None:
 
 
 def test_one_planted_cause_needs_one_change(planted: Profile) -> None:
-    here = planted_world(planted, reserve=58)
+    here = planted_query(planted, reserve=58)
     found = search(here, ["reserve", "speed"])
     assignment, probability = found[smallest_good(found)]
     assert set(assignment) == {"reserve"}
@@ -80,7 +82,7 @@ def test_one_planted_cause_needs_one_change(planted: Profile) -> None:
 
 
 def test_two_planted_causes_need_two(planted: Profile) -> None:
-    here = planted_world(planted, speed=1.4, planner=2)
+    here = planted_query(planted, speed=1.4, planner=2)
     found = search(here, ["planner", "radius", "speed"])
     assert set(found[smallest_good(found)][0]) == {"speed", "planner"}
 
@@ -88,7 +90,7 @@ def test_two_planted_causes_need_two(planted: Profile) -> None:
 @QUICK
 @given(driven=st.fixed_dictionaries({o.name: st.floats(*o.range).map(o.snap) for o in OPTIONS if o.range is not None}))
 def test_sets_grow_by_one_and_stay_inside(planted: Profile, driven: dict[str, float]) -> None:
-    here = planted_world(planted, **driven)
+    here = planted_query(planted, **driven)
     free = sorted(name for name in driven if driven[name] != DEFAULTS[name])
     found = search(here, free)
     assert [len(assignment) for assignment, _ in found] == list(range(1, 1 + min(len(found), MAX_CHANGES)))
@@ -100,7 +102,7 @@ def test_sets_grow_by_one_and_stay_inside(planted: Profile, driven: dict[str, fl
 
 
 def test_of_changes_that_do_the_same_the_smallest_is_first_and_what_does_more_is_before_both(planted: Profile) -> None:
-    here = planted_world(planted, inert=0.5, reserve=58)
+    here = planted_query(planted, inert=0.5, reserve=58)
     ranked = _ranked(here, [{"inert": 0.0}, {"inert": 0.4}, {"reserve": 20.0}])
     assert [next(iter(assignment.items())) for assignment, _ in ranked] == [
         ("reserve", 20.0), ("inert", 0.4), ("inert", 0.0),
@@ -108,14 +110,14 @@ def test_of_changes_that_do_the_same_the_smallest_is_first_and_what_does_more_is
 
 
 def test_nothing_free_nothing_found(planted: Profile) -> None:
-    assert search(planted_world(planted, reserve=58), []) == []
-    assert best_alone(planted_world(planted), "reserve") is None
+    assert search(planted_query(planted, reserve=58), []) == []
+    assert best_alone(planted_query(planted), "reserve") is None
 
 
 @QUICK
 @given(speed=st.floats(1.0, 2.0), radius=st.floats(0.75, 1.0))
 def test_a_nearer_value_than_the_reference_has_a_step_of_margin(planted: Profile, speed: float, radius: float) -> None:
-    here = planted_world(planted, speed=speed, radius=radius)
+    here = planted_query(planted, speed=speed, radius=radius)
     back = {"speed": DEFAULTS["speed"], "radius": DEFAULTS["radius"]}
     chosen, probability = settled(here, back)
     floor = here.probability([{**here.config, **back}])[0] - NEARLY
@@ -134,7 +136,7 @@ def test_a_nearer_value_than_the_reference_has_a_step_of_margin(planted: Profile
 
 
 def test_what_is_not_known_between_two_configurations_counts_against_the_second(planted: Profile) -> None:
-    here = planted_world(planted, speed=1.4)
+    here = planted_query(planted, speed=1.4)
     back, between = ({**here.config, "speed": speed} for speed in (5.0, 3.0))
     wary = replace(here, observed={}, wary_from=back)
     plain = replace(here, observed={})
@@ -144,12 +146,12 @@ def test_what_is_not_known_between_two_configurations_counts_against_the_second(
 
 
 def test_an_option_that_the_model_sees_nothing_of_goes_back_to_its_reference(planted: Profile) -> None:
-    chosen, _ = settled(planted_world(planted, inert=0.95, reserve=58), {"inert": DEFAULTS["inert"]})
+    chosen, _ = settled(planted_query(planted, inert=0.95, reserve=58), {"inert": DEFAULTS["inert"]})
     assert chosen == {"inert": DEFAULTS["inert"]}
 
 
 def test_the_best_value_alone(planted: Profile) -> None:
-    here = planted_world(planted, reserve=58)
+    here = planted_query(planted, reserve=58)
     best = best_alone(here, "reserve")
     assert best is not None
     assert best[1] == pytest.approx(here.probability([{**here.config, "reserve": best[0]}])[0])
@@ -172,7 +174,7 @@ def test_one_more_change_must_be_worth_it(probability: list[float], chosen: int)
 
 
 def test_a_fix_tells_every_objective_and_the_change_that_does_most_first(planted: Profile) -> None:
-    here = planted_world(planted, speed=1.4, planner=2)
+    here = planted_query(planted, speed=1.4, planner=2)
     fix = to_fix(here, {"planner": 1.0, "speed": 5.0}, 0.9)
     assert set(fix.predicted) == {"success", "time", "energy"}
     alone = [here.probability([{**here.config, c.option.name: c.suggested}])[0] for c in fix.changes]
@@ -182,7 +184,7 @@ def test_a_fix_tells_every_objective_and_the_change_that_does_most_first(planted
 
 def test_without_a_threshold_a_prediction_has_no_probability(planted: Profile) -> None:
     run = planted_run()
-    p = prediction(world_of(planted, run, {}, {}), "time", run.config)
+    p = prediction(query_of(planted, run, {}, {}), "time", run.config)
     assert p.p_ok is None
     assert p.status() == "not_evaluated"
     assert p.low < p.value < p.high

@@ -59,7 +59,7 @@ def test_the_row_of_a_flight_says_what_its_triage_says(failed: Row, fine: Row) -
     assert failed.asked.config[option_of(failed)] == SLOW
     model = load_profile("arducopter").model
     (value,) = failed.change.values()
-    then = failed.asked.world(model).probability([{**failed.asked.config, option_of(failed): value}])
+    then = failed.asked.query(model).probability([{**failed.asked.config, option_of(failed): value}])
     # The row asks the same model the same question as the triage did, which took failed parts off its promise.
     assert failed.p_fixed == pytest.approx((1 - failed.broken) * then[0])
     assert (fine.status, fine.breaches, fine.main) == ("ok", (), None)
@@ -121,8 +121,8 @@ def test_a_robot_is_helped_where_most_of_its_failures_are(failed: Row) -> None:
 
 def test_what_is_enough_goes_by_the_odds_of_the_reference(failed: Row, monkeypatch: pytest.MonkeyPatch) -> None:
     assert failed.asked is not None
-    world = replace(failed.asked.world(load_profile("arducopter").model), observed={})
-    odds = float(world.probability([{**world.config, **failed.off}])[0])
+    query = replace(failed.asked.query(load_profile("arducopter").model), observed={})
+    odds = float(query.probability([{**query.config, **failed.off}])[0])
     assert falls_short(promising(enough(0.3)), [], 0.3) is None  # as for a single run
     assert falls_short(promising(enough(0.3) - 0.01), [], 0.3)
     for least, helped in ((0.2, ["a", "b"]), (0.99, [])):

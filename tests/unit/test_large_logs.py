@@ -16,7 +16,7 @@ from care_core import limits
 from care_core.application import pace as watched
 from care_core.application.pace import watching
 from care_core.logs.digest import SAMPLED, hashing, log_digest
-from care_core.logs.mapped import FileBytes
+from care_core.logs.file_windows import FileBytes
 from care_core.logs.mcap_records import ENTRY
 from care_core.logs.message_index import MessageIndex
 from care_core.logs.opening import open_log

@@ -74,7 +74,7 @@ def test_a_covariance_is_symmetric_and_never_negative(x: FloatArray) -> None:
 
 def test_a_change_is_known_better_than_the_values_it_lies_between() -> None:
     m, x = mechanism(), np.array([[0.0, 1.0], [3.0, 9.0], [1.0, 2.0]])
-    sd = m.at(x).change_sd(m.at(x[:1]))
+    sd = m.posterior(x).change_sd(m.posterior(x[:1]))
     assert sd[0] < 1e-4
     assert (sd <= 2 * m.latent_sd(x).max() + 1e-6).all()
 
@@ -82,8 +82,8 @@ def test_a_change_is_known_better_than_the_values_it_lies_between() -> None:
 def test_far_away_the_model_falls_back_to_the_mean_and_knows_nothing() -> None:
     m = mechanism()
     near, far = np.array([[1.0, np.exp(0.5)]]), np.array([[1e4, 1e12]])
-    assert m.at(near).ignorance[0] < 0.2
-    assert m.at(far).ignorance[0] == pytest.approx(1.0)
+    assert m.posterior(near).epistemic_ratio[0] < 0.2
+    assert m.posterior(far).epistemic_ratio[0] == pytest.approx(1.0)
     assert m.latent(far)[0] == pytest.approx(m.mean)
 
 

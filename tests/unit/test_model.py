@@ -73,8 +73,8 @@ def test_model_json_is_json_for_everybody(planted: Profile) -> None:
 
 def test_a_model_that_is_not_a_number_is_not_written(planted: Profile, folder: Path) -> None:
     with pytest.raises(ValueError, match="finite"):
-        write_model(replace(planted.model, witnesses={"time": {"mean_speed": float("nan")}}), folder)
-    assert read_model(folder).witnesses == planted.model.witnesses
+        write_model(replace(planted.model, correlated_metrics={"time": {"mean_speed": float("nan")}}), folder)
+    assert read_model(folder).correlated_metrics == planted.model.correlated_metrics
 
 
 @pytest.mark.parametrize("name", ["model.json", "mechanisms.npz"])

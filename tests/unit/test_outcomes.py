@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from care_core.causal.counterfactual import World
+from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.graph import CausalGraph
 from care_core.causal.model import Model
 from care_core.learn.fitting import Effort
@@ -120,8 +120,10 @@ def test_a_run_lost_at_a_stage_that_no_option_moves_is_not_laid_to_a_later_one(p
     rate = frame.located.mean()
     assert mechanisms["stage:located"].probability(np.zeros((1, 0)))[0] == pytest.approx(rate, abs=0.05)
     model: Model = replace(planted.model, outcomes=outcomes, mechanisms=mechanisms)
-    lost = World(model, {"gain": 0.6}, {"armed": 1.0, "located": 0.0, "success": 0.0}, {"success": Threshold(">=", 1)})
-    flown = World(model, {"gain": 0.6}, {"armed": 1.0, "located": 1.0, "success": 1.0}, lost.thresholds)
+    lost = CounterfactualQuery(
+        model, {"gain": 0.6}, {"armed": 1.0, "located": 0.0, "success": 0.0}, {"success": Threshold(">=", 1)}
+    )
+    flown = CounterfactualQuery(model, {"gain": 0.6}, {"armed": 1.0, "located": 1.0, "success": 1.0}, lost.thresholds)
     configs = [{"gain": g} for g in (0.3, 0.5, 0.6, 0.7)]
     # What was met may not be met again, but no other gain brings it back.
     assert lost.probability(configs).max() < lost.probability([lost.config])[0] + 0.02

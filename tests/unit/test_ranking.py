@@ -23,7 +23,7 @@ from care_core.diagnose.reference import profile_config
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.variables import Threshold
-from tests.planted import BOUNDS, DEFAULTS, OPTIONS, SCHEMA, planted_run, planted_world, with_variable, world_of
+from tests.planted import BOUNDS, DEFAULTS, OPTIONS, SCHEMA, planted_query, planted_run, query_of, with_variable
 
 GAMES = st.integers(1, 6).flatmap(
     lambda n: st.tuples(st.just(n), st.lists(st.floats(0, 1), min_size=2**n, max_size=2**n))
@@ -50,7 +50,7 @@ def test_shapley_values_share_an_interaction_and_ignore_a_bystander() -> None:
 
 
 def test_contributions_add_up_to_what_a_full_reset_would_bring(planted: Profile) -> None:
-    here = planted_world(planted, speed=1.4, planner=2, reserve=45, accel=0.6)
+    here = planted_query(planted, speed=1.4, planner=2, reserve=45, accel=0.6)
     found = suspects(here, "time")
     before, after = here.predict("time", [here.config, {**here.config, **DEFAULTS}]).p_ok
     assert sum(s.contribution for s in found) == pytest.approx(after - before)
@@ -60,14 +60,14 @@ def test_contributions_add_up_to_what_a_full_reset_would_bring(planted: Profile)
 def test_of_equal_shares_the_one_goes_first_that_repairs_the_run_alone(planted: Profile) -> None:
     """Either alone brings the time back, yet at its reference the speed costs too much energy."""
     bounds = {**BOUNDS, "time": Threshold("<=", 197), "energy": Threshold("<=", 15)}
-    here = world_of(planted, planted_run(speed=3.2, planner=2), bounds=bounds)
+    here = query_of(planted, planted_run(speed=3.2, planner=2), bounds=bounds)
     found = suspects(here, "time")
     assert found[0].contribution == pytest.approx(found[1].contribution, abs=0.01)
     assert [s.option for s in found[:2]] == ["planner", "speed"]
 
 
 def test_only_options_off_their_reference_with_a_path_are_suspects(planted: Profile) -> None:
-    found = suspects(planted_world(planted, speed=1.4, accel=3.0, inert=0.0), "time")
+    found = suspects(planted_query(planted, speed=1.4, accel=3.0, inert=0.0), "time")
     names = {s.option for s in found}
     assert "speed" in names
     assert "planner" not in names
@@ -82,7 +82,7 @@ def test_only_options_off_their_reference_with_a_path_are_suspects(planted: Prof
 def test_an_effect_that_is_not_identified_is_not_ranked(planted: Profile) -> None:
     effects = dict(planted.model.effects)
     effects["speed", "time"] = replace(effects["speed", "time"], identified=False)
-    here = planted_world(planted, speed=1.4, planner=2)
+    here = planted_query(planted, speed=1.4, planner=2)
     found = suspects(replace(here, model=replace(planted.model, effects=effects)), "time")
     assert [s.option for s in found if not s.is_identified] == ["speed"]
 
@@ -113,7 +113,7 @@ def test_one_path_an_option_the_strongest(planted: Profile) -> None:
 
 
 def test_a_path_tells_what_the_run_met_and_what_it_would_have(planted: Profile) -> None:
-    run, here = planted_run(reserve=58), planted_world(planted, reserve=58)
+    run, here = planted_run(reserve=58), planted_query(planted, reserve=58)
     path = describe_path(best_paths(planted.model, "time", [o.name for o in OPTIONS])["reserve"], here, run)
     option, hold, time = path
     assert (option.value, option.expected) == (58, 20)
@@ -127,14 +127,14 @@ def test_a_path_tells_what_the_run_met_and_what_it_would_have(planted: Profile) 
 
 
 def test_a_decreasing_edge_is_negative(planted: Profile) -> None:
-    run, here = planted_run(speed=1.4), planted_world(planted, speed=1.4)
+    run, here = planted_run(speed=1.4), planted_query(planted, speed=1.4)
     path = describe_path(best_paths(planted.model, "time", [o.name for o in OPTIONS])["speed"], here, run)
     signs = {node.name: node.effect for node in path if node.effect is not None}
     assert signs["mean_speed"] < 0 < signs["speed"]
 
 
 def test_a_refused_mission_has_unknown_values_on_the_path(planted: Profile) -> None:
-    run, here = planted_run(min_sats=14), planted_world(planted, min_sats=14)
+    run, here = planted_run(min_sats=14), planted_query(planted, min_sats=14)
     path = describe_path(best_paths(planted.model, "success", [o.name for o in OPTIONS])["radius"], here, run)
     assert [node.value for node in path] == [0.5, None, 0.0]
 
@@ -163,7 +163,7 @@ def test_a_path_is_not_led_over_an_edge_that_carries_nothing(planted: Profile) -
 
 
 def test_a_check_that_did_not_act_carried_nothing(planted: Profile) -> None:
-    assert "armed" not in _mediators(planted_world(planted, speed=1.4))
-    refused = planted_world(planted, min_sats=13)
+    assert "armed" not in _mediators(planted_query(planted, speed=1.4))
+    refused = planted_query(planted, min_sats=13)
     assert _mediators(refused) == {"armed", "success"}
-    assert "time" in _mediators(planted_world(planted, speed=1.4))  # it may have cost energy
+    assert "time" in _mediators(planted_query(planted, speed=1.4))  # it may have cost energy

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from care_core.causal.model import Persistence
+from care_core.causal.model import NoiseCarryOver
 from care_core.diagnose.judging import Judged, judge, with_repeats
 from care_core.diagnose.triage import triage
 from care_core.errors import UsageError
@@ -54,8 +54,8 @@ def test_a_second_slow_run_takes_chance_out_of_the_promise(planted: Profile) -> 
 def test_a_promise_says_what_is_known_of_how_runs_resemble_each_other(
     planted: Profile, pairs: tuple[int, int], said: str
 ) -> None:
-    seen = {"time": Persistence(same=0.6, another=0.3, pairs=pairs)}
-    training = replace(planted.model.training, persistence=seen)
+    seen = {"time": NoiseCarryOver(same=0.6, another=0.3, pairs=pairs)}
+    training = replace(planted.model.training, carry_over=seen)
     profile = Profile(planted.path, planted.schema)
     vars(profile)["model"] = replace(planted.model, training=training)  # as if it had been read
     run = judged(profile, "a", outcome(260.0), reserve=40.0)

@@ -9,7 +9,7 @@ import pytest
 from care_core.causal.model import OutcomeRecord
 from care_core.learn.fitting import METRIC, fit_mechanism
 from care_core.learn.outcomes import inputs_of
-from care_core.learn.repeats import persistence, repeated
+from care_core.learn.repeats import carry_over, repeated
 from care_core.learn.table import check_table
 from care_core.tables.rows import CONDITIONS
 from tests.planted import DEFAULTS, SCHEMA, fly_many
@@ -37,14 +37,14 @@ def test_the_share_that_was_planted_is_found(share: float) -> None:
     rng = np.random.default_rng(0)
     x, y = frame[["speed"]].to_numpy(), frame["time"].to_numpy()
     mechanism = fit_mechanism(x, y, inputs, binary=False, rng=rng, effort=METRIC, transform="identity")
-    found = persistence(frame, SCHEMA, {"time": OutcomeRecord(objective="time", mechanism="time")}, {"time": mechanism})
+    found = carry_over(frame, SCHEMA, {"time": OutcomeRecord(objective="time", mechanism="time")}, {"time": mechanism})
     assert found["time"].same == pytest.approx(share, abs=0.15)
     assert found["time"].another < 0.2
     assert found["time"].pairs == (80, 80)
 
 
 def test_without_repeats_nothing_is_said() -> None:
-    assert persistence(fly_many(60), SCHEMA, {}, {}) == {}
+    assert carry_over(fly_many(60), SCHEMA, {}, {}) == {}
 
 
 def test_runs_of_one_date_are_the_same_conditions_and_an_unknown_date_is_none() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from care_core.logs.mapped import opened
+from care_core.logs.file_windows import opened
 from care_core.logs.sqlite_pages import MAGIC, Pages, StoredRow
 
 _WIDTHS = (0, 1, 2, 127, 128, 32_767, 32_768, 2**23, 2**31, 2**47, 2**63 - 1)

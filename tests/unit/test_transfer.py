@@ -51,7 +51,7 @@ def test_an_updated_model_survives_the_disk_and_answers_the_same(planted: Profil
         assert mechanism.prior is not None or key not in ("time", "energy")
         x = np.array([[DEFAULTS[name] for name in mechanism.inputs]])
         np.testing.assert_allclose(again.mechanisms[key].expected(x), mechanism.expected(x), rtol=1e-5)
-        there = again.mechanisms[key].at(x)
+        there = again.mechanisms[key].posterior(x)
         np.testing.assert_allclose(there.change_sd(there), 0.0, atol=1e-4)
     assert "carried over with runs.csv" in again.training.origin
     assert again.effects
@@ -129,9 +129,9 @@ def test_what_the_source_does_not_know_a_carried_mechanism_does_not_know_either(
     places = [carried.inputs.index(name) for name in source.inputs]
     for x in (near, far):
         assert carried.latent_sd(x)[0] >= source.latent_sd(x[:, places])[0]
-        there, here = carried.at(x), carried.at(near)
+        there, here = carried.posterior(x), carried.posterior(near)
         assert np.all(np.abs(there.covariance(here)) <= np.sqrt(there.variance * here.variance) * (1 + 1e-6))
-    assert carried.at(near).ignorance[0] < carried.at(far).ignorance[0]
+    assert carried.posterior(near).epistemic_ratio[0] < carried.posterior(far).epistemic_ratio[0]
 
 
 def test_many_runs_of_few_missions_are_no_regression(planted: Profile) -> None:

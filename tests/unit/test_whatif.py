@@ -67,9 +67,9 @@ def test_what_the_training_runs_cannot_tell_is_said_beside_a_value(slow: Questio
     chosen = replace(slow, schema=replace(slow.schema, observational=True))
     assert slow.warnings("speed", 5.0) == ()
     assert any(text.startswith("operators chose it in training") for text in chosen.warnings("speed", 5.0))
-    effects = dict(slow.world.model.effects)
+    effects = dict(slow.query.model.effects)
     effects["speed", "time"] = replace(effects["speed", "time"], identified=False)
-    blind = replace(slow, world=replace(slow.world, model=replace(slow.world.model, effects=effects)))
+    blind = replace(slow, query=replace(slow.query, model=replace(slow.query.model, effects=effects)))
     assert blind.warnings("speed", 5.0) == ("the training runs cannot tell what it does to time",)
 
 
