@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import care_core.extract.read  # noqa: F401  registers every extractor
-from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor, merge_needs
+from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
+from care_core.ecosystems.registry import run_model
+from care_core.logs.base import merge_needs
 from care_core.logs.opening import open_log
 from care_core.profile.reading import read_schema
 from care_core.profile.schema import Schema
@@ -120,16 +122,17 @@ def count_wrong_options(path: Path, row: TruthRow, schema: Schema) -> int:
 def mission_values(path: Path, schema: Schema) -> dict[str, Value]:
     """Metrics and objectives of the last mission of a log, and no value withheld."""
     log = open_log(path)
+    model = run_model(log)
     kind = MISSION_KINDS[str(schema.mission["kind"])]
     extracts = {name: one.extract for name, one in schema.variables.items() if one.extract is not None}
     found = {name: find_extractor(extract.kind) for name, extract in extracts.items()}
     needs = [kind.needs(schema.mission), *(found[name].needs(extracts[name].args) for name in extracts)]
-    missions = kind.missions(log.read(merge_needs(needs)), log.duration_s, schema.mission)
+    missions = kind.missions(model, model.tables(merge_needs(needs)), schema.mission)
     if not missions:
         return {}
     last = missions[-1]
     settings = {name: history[-1].value for name, history in log.settings().items()}
-    mission = Mission(last.tables, last.start_s, last.end_s, last.ended, last.spec, settings)
+    mission = Mission(model, last.tables, last.start_s, last.end_s, last.ended, last.spec, settings)
     return {name: found[name].compute(mission, extract.args) for name, extract in extracts.items()}
 
 

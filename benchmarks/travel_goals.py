@@ -26,6 +26,7 @@ from care_core.causal.mechanisms import Mechanism
 from care_core.causal.model import Model, OutcomeRecord, Training
 from care_core.configs.driven import configuration, in_force
 from care_core.ecosystems.measures import Mission, find_extractor
+from care_core.ecosystems.registry import run_model
 from care_core.extract.read import mission_kind, reading_plan
 from care_core.files import bundled
 from care_core.learn.fitting import OUTCOME
@@ -44,14 +45,15 @@ PARTS = {"goals 1 to 3": (0, 3), "goals 4 and 5": (3, 5)}
 def rows_of(path: Path, schema: Schema) -> dict[str, dict[str, float]]:
     """One row for each part of a drive whose goals were all reached."""
     log = open_log(path)
-    tables = log.read(reading_plan(schema))
+    model = run_model(log)
+    tables = model.tables(reading_plan(schema))
     sent = tables["/move_base/goal"]
     spec = {name: value for name, value in schema.mission.items() if name != "goals"}
     settings = log.settings()
     found = {}
     for part, (first, end) in PARTS.items():
         goals = sent.where(slice(first, end))
-        cut = mission_kind(schema).missions({**tables, "/move_base/goal": goals}, log.duration_s, spec)
+        cut = mission_kind(schema).missions(model, {**tables, "/move_base/goal": goals}, spec)
         if len(goals) < end - first or len(cut) != 1:
             continue
         driven = {name: in_force(history, cut[0].end_s) for name, history in settings.items()}

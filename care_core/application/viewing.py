@@ -49,10 +49,10 @@ def log_of(case: Case) -> Log:
 
 def messages_of(case: Case) -> list[LogMessage]:
     """Everything that the log holds in words, and what was found in its numbers, in time order."""
+    from care_core.ecosystems.registry import run_model
     from care_core.ecosystems.vehicles import vehicle_of
-    from care_core.logs.telemetry import as_dataflash
 
-    log = as_dataflash(log_of(case))
+    log = run_model(log_of(case)).log
     tables = log.read(TEXTS)
     if "/rosout" in tables:
         tables = {name: table for name, table in tables.items() if name != "/rosout_agg"}

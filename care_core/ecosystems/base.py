@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
 from care_core.ecosystems.findings import Finding, Health
-from care_core.ecosystems.measures import merge_needs
-from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted
+from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted, merge_needs
 from care_core.records import Record
 
 
@@ -87,6 +86,8 @@ class Ecosystem(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     formats: ClassVar[tuple[LogFormat, ...]]
+    measures: ClassVar[tuple[str, ...]]
+    """Modules that register its mission kinds and extractors when they are imported."""
 
     @abstractmethod
     def model(self, log: Log) -> RunModel:

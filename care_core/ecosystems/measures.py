@@ -7,9 +7,10 @@ never raises on poor data. New platforms are YAML files that combine these, not 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeGuard, TypeVar
 
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.how_to_record import how_to_record
 from care_core.errors import ProfileError, nearest
 from care_core.logs.base import Table, Wanted
@@ -60,11 +61,13 @@ def _is_number(value: object) -> bool:
 class Mission(Record, eq=False):
     """One mission cut out of a log: what extractors see.
 
-    `tables` hold the decoded channels of the whole log (times in seconds from its start); `start_s` and `end_s`
-    bound the mission in it. `spec` is the profile's `mission` section (its goals or waypoints). `cache` lets
-    extractors share an analysis of the same mission, see `shared`.
+    `model` is the run model of the whole log, of the ecosystem that wrote it. `tables` hold the decoded channels of
+    the whole log (times in seconds from its start); `start_s` and `end_s` bound the mission in it. `spec` is the
+    profile's `mission` section (its goals or waypoints). `cache` lets extractors share an analysis of the same mission,
+    see `shared`.
     """
 
+    model: RunModel
     tables: Mapping[str, Table]
     start_s: float
     end_s: float
@@ -116,8 +119,8 @@ class MissionKind(ABC):
         """The channels and fields that `missions`, `fit` and `evidence` read."""
 
     @abstractmethod
-    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
-        """Every mission of the log, in time order; empty when the log holds none."""
+    def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
+        """Every mission of a log, in time order, out of the tables that its profile reads; empty when it holds none."""
 
     @abstractmethod
     def mismatch(self, mission: Mission) -> str:
@@ -184,15 +187,6 @@ def check_args(given: Args, known: Mapping[str, str], what: str, where: str) -> 
         if isinstance(argument, Argument) and not argument.accepts(value):
             hint = nearest(str(value), argument.choices)
             raise ProfileError(f"{what} takes no '{name}: {value}'.", hint=hint or f"It is: {argument}.", where=where)
-
-
-def merge_needs(parts: Iterable[Wanted]) -> dict[str, tuple[str, ...]]:
-    """One reading plan out of many: per channel the union of the fields, in order of first mention."""
-    plan: dict[str, dict[str, None]] = {}
-    for part in parts:
-        for channel, fields in part.items():
-            plan.setdefault(channel, {}).update(dict.fromkeys(fields))
-    return {channel: tuple(fields) for channel, fields in plan.items()}
 
 
 def has(table: Table | None, *fields: str) -> TypeGuard[Table]:

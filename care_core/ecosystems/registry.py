@@ -13,6 +13,8 @@ _PACKAGES = (
     "care_core.ecosystems.px4",
     "care_core.ecosystems.ros",
 )
+_ANY_ROBOT = ("care_core.ecosystems.parameter", "care_core.ecosystems.whole_log")
+"""Modules with the measures of any recording."""
 
 
 @cache
@@ -24,6 +26,12 @@ def ecosystems() -> tuple[Ecosystem, ...]:
 def ecosystem_of(format: LogFormat) -> Ecosystem:
     """The ecosystem that writes logs of a format."""
     return next(ecosystem for ecosystem in ecosystems() if format in ecosystem.formats)
+
+
+def register_measures() -> None:
+    """Imports every module that registers mission kinds and extractors."""
+    for module in (*(name for ecosystem in ecosystems() for name in ecosystem.measures), *_ANY_ROBOT):
+        import_module(module)
 
 
 def run_model(log: Log) -> RunModel:

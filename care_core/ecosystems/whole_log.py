@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, extractor, missing, numeric, one_of
 from care_core.logs.base import Table, Wanted
 from care_core.records import replace
@@ -35,10 +36,10 @@ class Recordings(MissionKind):
     def needs(self, spec: Args) -> Wanted:
         return {str(spec["channel"]): (str(spec.get("field", "")),)} if "channel" in spec else {}
 
-    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
+    def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
         """One mission a stretch of the value; one that lasts to the end of the recording has not ended."""
         if "channel" not in spec:
-            return (Mission(tables, 0.0, duration_s, True, spec),)
+            return (Mission(model, tables, 0.0, model.log.duration_s, True, spec),)
         table = tables.get(str(spec["channel"]))
         values = None if table is None else _numbers(table, str(spec.get("field", "")))
         if table is None or values is None:
@@ -48,8 +49,8 @@ class Recordings(MissionKind):
         missions = []
         for start in starts.tolist():
             after = np.flatnonzero(~during[start:])
-            end_s = float(table.t[start + after[0]]) if len(after) else duration_s
-            missions.append(Mission(tables, float(table.t[start]), end_s, bool(len(after)), spec))
+            end_s = float(table.t[start + after[0]]) if len(after) else model.log.duration_s
+            missions.append(Mission(model, tables, float(table.t[start]), end_s, bool(len(after)), spec))
         return tuple(missions)
 
     def mismatch(self, mission: Mission) -> str:

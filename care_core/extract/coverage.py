@@ -10,7 +10,6 @@ from care_core.ecosystems.registry import run_model
 from care_core.errors import CareError
 from care_core.extract.read import mission_kind, read_runs, reading_plan
 from care_core.logs.base import Log
-from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.run import MissionInfo, Run, Unavailable
@@ -108,7 +107,7 @@ def try_on(log: Log, schema: Schema) -> Trial:
 
 def _channels(log: Log) -> set[str]:
     """The channels that hold anything."""
-    return {channel.name for channel in as_dataflash(log).channels() if channel.count}
+    return {channel.name for channel in run_model(log).log.channels() if channel.count}
 
 
 def wrong_kind(log: Log, schema: Schema) -> str:

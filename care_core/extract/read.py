@@ -8,31 +8,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import care_core.ecosystems.ardupilot.measures
-import care_core.ecosystems.ardupilot.measures.requested
-import care_core.ecosystems.ardupilot.measures.rover
-import care_core.ecosystems.parameter
-import care_core.ecosystems.px4.missions
-
-# Importing them registers their extractors and mission kinds.
-import care_core.ecosystems.ros.measures.actionlib
-import care_core.ecosystems.ros.measures.battery
-import care_core.ecosystems.ros.measures.laser
-import care_core.ecosystems.ros.measures.nav2
-import care_core.ecosystems.ros.measures.navigation
-import care_core.ecosystems.ros.measures.requested
-import care_core.ecosystems.whole_log  # noqa: F401
 from care_core.configs.driven import changes_between, configuration, in_force
 from care_core.ecosystems.base import RunModel
-from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor, merge_needs
+from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor
+from care_core.ecosystems.registry import register_measures
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
-from care_core.logs.base import Log, LogFormat
+from care_core.logs.base import Log, LogFormat, merge_needs
 from care_core.logs.digest import Sha256, hashing
 from care_core.logs.plausible import clock_doubt, dead_sources
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.run import Check, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable
+
+register_measures()
 
 
 def read_run(
@@ -142,7 +131,7 @@ class _Source(Record, eq=False):
         kind = mission_kind(schema)
         tables = model.tables(reading_plan(schema))
         settings = log.settings()
-        found = kind.missions(tables, log.duration_s, schema.mission)
+        found = kind.missions(model, tables, schema.mission)
         missions = tuple(one for one in found if math.isfinite(one.start_s) and math.isfinite(one.end_s))
         if not missions:
             reader = f"profile '{schema.name}'" if schema.name else "care"

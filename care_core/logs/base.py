@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
@@ -170,3 +170,12 @@ class Log(Protocol):
 
     def read(self, wanted: Wanted) -> Mapping[str, Table]:
         """Decode the wanted fields in one pass. A channel or field that the log lacks is absent from the answer."""
+
+
+def merge_needs(parts: Iterable[Wanted]) -> dict[str, tuple[str, ...]]:
+    """One reading plan out of many: per channel the union of the fields, in order of first mention."""
+    plan: dict[str, dict[str, None]] = {}
+    for part in parts:
+        for channel, fields in part.items():
+            plan.setdefault(channel, {}).update(dict.fromkeys(fields))
+    return {channel: tuple(fields) for channel, fields in plan.items()}

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from care_core.ecosystems.measures import MISSION_KINDS
+from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.ros.measures.drive import GOAL_TIMEOUT_S, TOLERANCE_M, Leg, Status, analyse
 from care_core.ecosystems.vehicles import vehicle_of
-from care_core.logs.telemetry import as_dataflash
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.scaffold.seen import Seen
@@ -62,8 +62,8 @@ def _vehicle_kind(first: Seen, bundled: Sequence[Schema]) -> str:
 
 
 def _found(seen: Seen, spec: Mapping[str, Any]) -> tuple[Any, ...]:
-    kind = MISSION_KINDS[str(spec["kind"])]
-    return kind.missions(as_dataflash(seen.log).read(kind.needs(spec)), seen.log.duration_s, spec)
+    kind, model = MISSION_KINDS[str(spec["kind"])], run_model(seen.log)
+    return kind.missions(model, model.tables(kind.needs(spec)), spec)
 
 
 def _goals(logs: Sequence[Seen]) -> tuple[dict[str, Any], dict[str, str]]:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
+from care_core.ecosystems.registry import run_model
 from care_core.logs.base import Log, LogFormat
 from care_core.logs.opening import open_log
-from care_core.logs.telemetry import as_dataflash
 from care_core.records import Record
 from care_core.run import Setting
 
@@ -38,5 +38,5 @@ class Seen(Record, eq=False):
 def see(path: Path) -> Seen:
     """Open a log. Raises LogError."""
     log = open_log(path)
-    held = {channel.name: channel.type for channel in as_dataflash(log).channels() if channel.count}
+    held = {channel.name: channel.type for channel in run_model(log).log.channels() if channel.count}
     return Seen(path, log, log.settings(), held)

@@ -18,6 +18,7 @@ from care_core.profile.store import load_profile
 from care_core.records import replace
 from care_core.run import Unavailable
 from tests.conftest import Care
+from tests.tables import no_model
 
 PUBLISHED = ("husky", "husky-care", "turtlebot3")
 FAILED = "data/move_base/faults/g55_007.bag"
@@ -28,7 +29,7 @@ def scan(ranges: list[list[float]]) -> Mission:
     column = np.empty(len(ranges), dtype=object)
     column[:] = [np.array(one) for one in ranges]
     limits = {"range_min": np.full(len(ranges), 0.1), "range_max": np.full(len(ranges), 10.0)}
-    return Mission({"/scan": Table(T[: len(ranges)], {"ranges": column, **limits})}, 0.0, 2.0, True, {})
+    return Mission(no_model(), {"/scan": Table(T[: len(ranges)], {"ranges": column, **limits})}, 0.0, 2.0, True, {})
 
 
 def test_the_nearest_obstacle_is_the_shortest_ray_that_the_scanner_can_see() -> None:

@@ -17,13 +17,15 @@ from hypothesis import strategies as st
 from care_core.ecosystems.ardupilot.measures.flight import analyse, distance_to_legs
 from care_core.ecosystems.ardupilot.measures.mission import ArduPilotFlight
 from care_core.ecosystems.ardupilot.measures.series import statistic
-from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission, find_extractor, merge_needs
-from care_core.logs.base import Table
+from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission, find_extractor
+from care_core.ecosystems.registry import run_model
+from care_core.logs.base import Table, merge_needs
 from care_core.logs.opening import open_log
 from care_core.profile.reading import read_schema
 from care_core.profile.schema import Schema
 from care_core.run import Unavailable, Value, is_known
 from care_core.variables import Role
+from tests.tables import read
 
 PROFILE = Path(__file__).parents[2] / "profiles" / "arducopter" / "profile.yaml"
 KIND = MISSION_KINDS["ardupilot_flight"]
@@ -95,8 +97,8 @@ SPEC: Mapping[str, Any] = {"waypoints": [[north(100), HOME[1], 20]], "tolerance_
 
 
 def only(tables: Mapping[str, Table], **settings: float) -> Mission:
-    (mission,) = KIND.missions(tables, 75.0, SPEC)
-    return Mission(mission.tables, mission.start_s, mission.end_s, mission.ended, mission.spec, settings)
+    (mission,) = KIND.missions(*read(tables, 75.0), SPEC)
+    return Mission(mission.model, mission.tables, mission.start_s, mission.end_s, mission.ended, mission.spec, settings)
 
 
 def value(mission: Mission, kind: str, **args: Any) -> Value:
@@ -182,7 +184,7 @@ def test_a_log_that_ends_in_flight_has_no_success() -> None:
 
 def test_arming_by_events_and_more_than_one_flight() -> None:
     events = table([(5.0, 10), (6.0, 15), (8.0, 11), (10.0, 10), (70.0, 11)], "Id")
-    missions = KIND.missions(flight(ARM=None, EV=events), 75.0, SPEC)
+    missions = KIND.missions(*read(flight(ARM=None, EV=events), 75.0), SPEC)
     assert [(one.start_s, one.end_s, one.ended) for one in missions] == [(5.0, 8.0, True), (10.0, 70.0, True)]
 
 
@@ -215,7 +217,7 @@ def test_a_refusal_before_arming_is_no_evidence() -> None:
 
 
 def test_a_log_without_arming_or_refusal_holds_no_mission() -> None:
-    assert KIND.missions({"MSG": table([(1.0, "ArduCopter V4.5.4")], "Message")}, 9.0, SPEC) == ()
+    assert KIND.missions(*read({"MSG": table([(1.0, "ArduCopter V4.5.4")], "Message")}, 9.0), SPEC) == ()
 
 
 def test_statistics_of_a_hundred_and_one_values() -> None:
@@ -237,7 +239,7 @@ def test_another_mission_is_named() -> None:
 @pytest.mark.parametrize("lost", ["POS", "BAT", "ATT", "CMD", "ORGN", "MSG", "ARM"])
 def test_a_missing_channel_never_raises_and_never_gives_a_number_of_it(lost: str) -> None:
     schema = read_schema(PROFILE)
-    for mission in KIND.missions(flight(**{lost: None}), 75.0, SPEC):
+    for mission in KIND.missions(*read(flight(**{lost: None}), 75.0), SPEC):
         for variable in schema.variables.values():
             if variable.extract is not None:
                 found = value(mission, variable.extract.kind, **variable.extract.args)
@@ -285,11 +287,12 @@ needs_data = pytest.mark.skipif(SHARED is None, reason="CARE_SHARED names no fol
 
 def recorded(path: Path, schema: Schema) -> tuple[Mission, dict[str, Value]]:
     log = open_log(path)
+    model = run_model(log)
     extracts = {name: one.extract for name, one in schema.variables.items() if one.extract is not None}
     needs = [KIND.needs(schema.mission), *(find_extractor(e.kind).needs(e.args) for e in extracts.values())]
-    last = KIND.missions(log.read(merge_needs(needs)), log.duration_s, schema.mission)[-1]
+    last = KIND.missions(model, model.tables(merge_needs(needs)), schema.mission)[-1]
     settings = {name: history[-1].value for name, history in log.settings().items()}
-    mission = Mission(last.tables, last.start_s, last.end_s, last.ended, last.spec, settings)
+    mission = Mission(last.model, last.tables, last.start_s, last.end_s, last.ended, last.spec, settings)
     return mission, {name: find_extractor(e.kind).compute(mission, e.args) for name, e in extracts.items()}
 
 

@@ -16,6 +16,7 @@ from care_core.ecosystems.vehicles import is_skid_steered
 from care_core.logs.base import Table
 from care_core.records import replace
 from care_core.run import Unavailable, Value
+from tests.tables import read
 
 KIND = MISSION_KINDS["ardupilot_flight"]
 HOME = (47.0, 8.0)
@@ -71,7 +72,7 @@ def drive(**replaced: Table) -> dict[str, Table]:
 
 
 def only(tables: Mapping[str, Table], **settings: float) -> Mission:
-    (mission,) = KIND.missions(tables, 65.0, {})
+    (mission,) = KIND.missions(*read(tables, 65.0), {})
     return replace(mission, facts=FACTS, settings={**SKID, **settings})
 
 

@@ -18,6 +18,7 @@ from care_core.ecosystems.ardupilot.measures.requested import (
 from care_core.ecosystems.measures import Mission
 from care_core.logs.base import Table
 from care_core.run import Unavailable
+from tests.tables import no_model
 
 HOME = (47.0, 8.0)
 EAST = 111_319.49 * math.cos(math.radians(HOME[0]))
@@ -41,7 +42,7 @@ def mission(*items: tuple[float, ...], bat: Table | None = None) -> Mission:
     }
     if bat is not None:
         tables["BAT"] = bat
-    return Mission(tables, 0.0, 100.0, True, {})
+    return Mission(no_model(), tables, 0.0, 100.0, True, {})
 
 
 def table_of(**columns: list[float]) -> Table:

@@ -10,6 +10,7 @@ from care_core.ecosystems.how_to_record import how_to_record
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission
 from care_core.report.extractors import document
 from care_core.run import Unavailable
+from tests.tables import no_model
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extractors.md"
 
@@ -36,7 +37,9 @@ def test_an_empty_log_never_gives_a_number_out_of_nothing(kind: str) -> None:
     for name, extractor in EXTRACTORS.items():
         if not extractor.parts or name in counts:
             continue
-        value = extractor.compute(Mission({}, 0.0, 10.0, ended=True, spec={"kind": kind}), {"index": 1, "how": "stuck"})
+        value = extractor.compute(
+            Mission(no_model(), {}, 0.0, 10.0, ended=True, spec={"kind": kind}), {"index": 1, "how": "stuck"}
+        )
         assert isinstance(value, Unavailable), name
         assert value.reason
         assert value.hint, f"{name}: {value.reason}"

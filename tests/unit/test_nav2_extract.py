@@ -23,6 +23,7 @@ from care_core.ecosystems.ros.measures.nav2 import (
 )
 from care_core.logs.base import Table
 from care_core.run import Unavailable, Value
+from tests.tables import no_model, read
 
 KIND = MISSION_KINDS["nav2_goals"]
 DURATION_S = 100.0
@@ -85,7 +86,7 @@ def drive(**changed: Table | None) -> dict[str, Table]:
 
 
 def mission(tables: dict[str, Table], spec: dict[str, Any] = SPEC) -> Mission:
-    (one,) = KIND.missions(tables, DURATION_S, spec)
+    (one,) = KIND.missions(*read(tables, DURATION_S), spec)
     return one
 
 
@@ -218,9 +219,11 @@ def test_a_loop_that_kept_its_rate_by_its_own_clock_did_not_miss_it() -> None:
 
 
 def test_a_log_without_goals_holds_no_mission() -> None:
-    assert KIND.missions({}, DURATION_S, SPEC) == ()
-    assert KIND.missions({STATUS: states()}, DURATION_S, SPEC) == ()
-    assert KIND.missions({STATUS: states((0.0, [(1, SUCCEEDED)]), (5.0, [(1, SUCCEEDED)]))}, DURATION_S, SPEC) == ()
+    assert KIND.missions(*read({}, DURATION_S), SPEC) == ()
+    assert KIND.missions(*read({STATUS: states()}, DURATION_S), SPEC) == ()
+    assert (
+        KIND.missions(*read({STATUS: states((0.0, [(1, SUCCEEDED)]), (5.0, [(1, SUCCEEDED)]))}, DURATION_S), SPEC) == ()
+    )
 
 
 @given(
@@ -233,7 +236,7 @@ def test_any_states_make_goals_in_order(told: list[tuple[float, list[tuple[int, 
     legs = find_legs(tables, SPEC, DURATION_S)
     assert [leg.sent_s for leg in legs] == sorted(leg.sent_s for leg in legs)
     assert all(leg.sent_s <= leg.end_s <= DURATION_S for leg in legs)
-    for one in KIND.missions(tables, DURATION_S, SPEC):
+    for one in KIND.missions(*read(tables, DURATION_S), SPEC):
         assert one.start_s <= one.end_s
         KIND.evidence(one)
         KIND.mismatch(one)
@@ -251,6 +254,6 @@ def test_the_kind_reads_the_hidden_topic() -> None:
 def test_what_parameters_say_of_a_robot_is_the_largest_of_them(
     settings: dict[str, float | str], radius: float | None
 ) -> None:
-    mission = Mission({}, 0.0, DURATION_S, ended=True, spec=SPEC, settings=settings)
+    mission = Mission(no_model(), {}, 0.0, DURATION_S, ended=True, spec=SPEC, settings=settings)
     found = find_extractor("parameter").compute(mission, {"names": ["/l.radius", "/g.radius"]})
     assert found == radius if radius is not None else isinstance(found, Unavailable)

@@ -31,6 +31,7 @@ from care_core.logs.opening import open_log
 from care_core.profile.reading import read_schema
 from care_core.records import replace
 from care_core.run import Unavailable, Value, is_known
+from tests.tables import read
 
 KIND = MISSION_KINDS["actionlib_goals"]
 PROFILE = Path(__file__).resolve().parents[2] / "profiles" / "move_base" / "profile.yaml"
@@ -96,7 +97,7 @@ def drive(**changed: Table) -> dict[str, Table]:
 
 
 def mission(tables: Mapping[str, Table], spec: Mapping[str, Any] = SPEC) -> Mission:
-    (one,) = KIND.missions(tables, DURATION_S, spec)
+    (one,) = KIND.missions(*read(tables, DURATION_S), spec)
     return one
 
 
@@ -173,14 +174,14 @@ def test_the_list_starting_again_is_a_new_mission() -> None:
         move_base__goal=goals((10, 2, 0), (21, 4, 0), (40, 2, 0), (51, 4, 0)),
         move_base__result=results((20, 0, 3), (31, 1, 3), (50, 2, 3), (61, 3, 4)),
     )
-    first, second = KIND.missions(twice, DURATION_S, SPEC)
+    first, second = KIND.missions(*read(twice, DURATION_S), SPEC)
     assert (first.start_s, first.end_s, second.start_s, second.end_s) == (10, 31, 40, 61)
     assert [value("goals_success", one) for one in (first, second)] == [1, 0]
     assert [value("goals_sent", one) for one in (first, second)] == [2, 2]
 
 
 def test_no_goals_no_mission() -> None:
-    assert KIND.missions({}, DURATION_S, SPEC) == ()
+    assert KIND.missions(*read({}, DURATION_S), SPEC) == ()
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from care_core.records import replace
 from care_core.report.terminal import to_text
 from care_core.run import Check, MissionInfo, Unavailable, Value, is_known
 from tests.made import made_diagnosis, made_run
+from tests.tables import read
 from tests.unit.test_ardupilot_extract import HOME, KIND, METRES, flight, north, table, value
 
 PROFILE = Path(__file__).parents[2] / "profiles" / "arducopter" / "profile.yaml"
@@ -31,7 +32,7 @@ PLANE = {"firmware": "ArduPlane V4.4.0", "vehicle": "fixed wing"}
 def flown(facts: Mapping[str, str] = COPTER, *, mode: int = 5, **replaced: Any) -> Mission:
     """The flight of `tests/unit/test_ardupilot_extract.py`, in one mode."""
     tables = flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced)
-    (mission,) = KIND.missions(tables, 75.0, {})
+    (mission,) = KIND.missions(*read(tables, 75.0), {})
     return replace(mission, facts=facts)
 
 
@@ -124,7 +125,7 @@ def test_old_logs_tell_heights_otherwise_and_modes_by_name() -> None:
     barometer = replace(flight()["POS"], times=at, columns={"BarAlt": 412.0 + height})
     named = table([(0.0, "STABILIZE")], "Mode")
     tables = flight(MODE=named, POS=None, CTUN=barometer)
-    (mission,) = KIND.missions(tables, 75.0, {})
+    (mission,) = KIND.missions(*read(tables, 75.0), {})
     mission = replace(mission, facts={"firmware": "ArduCopter V3.1"})
     assert mode_names(mission) == ("Stabilize",)
     assert checks(mission)["took_off"] == checks(mission)["landed"] == 1.0
@@ -150,7 +151,7 @@ def test_motors_are_those_of_the_vehicle() -> None:
     at = np.arange(0.0, 75.0, 0.5)
     outputs = {f"C{n}": np.full_like(at, 1500.0) for n in range(1, 9)} | {"C5": np.full_like(at, 1960.0)}
     tables = flight(RCOU=replace(flight()["POS"], times=at, columns=outputs))
-    (mission,) = KIND.missions(tables, 75.0, {})
+    (mission,) = KIND.missions(*read(tables, 75.0), {})
     assert value(mission, "motor_saturation") == 0.0
     hexa = {f"SERVO{n}_FUNCTION": 32.0 + n for n in range(1, 7)}
     assert value(replace(mission, settings=hexa, cache={}), "motor_saturation") == 1.0

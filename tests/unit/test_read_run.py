@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.configs.driven import disagreements, in_force, option_value
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Args, Mission, MissionKind, extractor
 from care_core.ecosystems.registry import run_model
 from care_core.errors import ProfileError, UsageError
@@ -59,10 +60,10 @@ class MadeMissions(MissionKind):
     def needs(self, spec: Args) -> Wanted:
         return {"marks": ("start", "end", "ended")}
 
-    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
+    def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
         marks = tables["marks"]
         rows = zip(marks["start"], marks["end"], marks["ended"], strict=True)
-        return tuple(Mission(tables, start, end, bool(ended), spec) for start, end, ended in rows)
+        return tuple(Mission(model, tables, start, end, bool(ended), spec) for start, end, ended in rows)
 
     def mismatch(self, mission: Mission) -> str:
         return str(mission.spec.get("mismatch", ""))

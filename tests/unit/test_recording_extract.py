@@ -15,13 +15,14 @@ from care_core.logs.base import Table
 from care_core.profile.schema import Schema
 from care_core.run import Unavailable
 from care_core.variables import Extract, Role, Variable
+from tests.tables import no_model, read
 
 T = np.arange(10.0)
 ARMED = {"channel": "status", "field": "armed", "value": 2}
 
 
 def missions(armed: list[float], spec: Args) -> tuple[Mission, ...]:
-    return MISSION_KINDS[KIND].missions({"status": Table(T, {"armed": np.array(armed)})}, 9.5, spec)
+    return MISSION_KINDS[KIND].missions(*read({"status": Table(T, {"armed": np.array(armed)})}, 9.5), spec)
 
 
 def test_the_whole_recording_is_one_mission() -> None:
@@ -36,12 +37,12 @@ def test_each_stretch_of_the_value_is_a_mission_and_the_last_goes_on() -> None:
 
 
 def test_a_log_without_the_channel_has_no_mission() -> None:
-    assert MISSION_KINDS[KIND].missions({}, 9.5, ARMED) == ()
+    assert MISSION_KINDS[KIND].missions(*read({}, 9.5), ARMED) == ()
     assert missions([1.0] * 10, {**ARMED, "field": "absent"}) == ()
 
 
 def value(columns: dict[str, Any], **args: str) -> float | Unavailable | None:
-    mission = Mission({"/speed": Table(T, columns)}, 2.0, 5.0, True, {})
+    mission = Mission(no_model(), {"/speed": Table(T, columns)}, 2.0, 5.0, True, {})
     return find_extractor("signal").compute(mission, {"channel": "/speed", "field": "data", **args})
 
 
@@ -66,9 +67,9 @@ def test_the_outcome_is_the_word_of_the_robot(failsafe: float, expected: float) 
     status = {"arming_state": np.where((T > 0) & (T < 8), 2.0, 1.0), "failsafe": np.where(T == 4, failsafe, 0.0)}
     landed = Table(T, {"landed": np.where((T > 1) & (T < 7), 0.0, 1.0)})
     tables = {"vehicle_status": Table(T, status), "vehicle_land_detected": landed}
-    (mission,) = MISSION_KINDS["px4_flight"].missions(tables, 9.0, {"kind": "px4_flight"})
+    (mission,) = MISSION_KINDS["px4_flight"].missions(*read(tables, 9.0), {"kind": "px4_flight"})
     assert find_extractor("outcome").compute(mission, {}) == expected
-    assert isinstance(find_extractor("outcome").compute(Mission({}, 0, 9, True, {}), {}), Unavailable)
+    assert isinstance(find_extractor("outcome").compute(Mission(no_model(), {}, 0, 9, True, {}), {}), Unavailable)
 
 
 def test_a_profile_reads_what_its_signals_name() -> None:

@@ -27,6 +27,7 @@ from care_core.run import Check, Unavailable, Value, is_known
 from tests.nav2_drive import recorded
 from tests.rewritten import write_text
 from tests.ros_samples import write_bag
+from tests.tables import read
 from tests.unit.test_ardupilot_extract import HOME, KIND, METRES, flight, table
 from tests.unit.test_px4_health import states
 
@@ -43,7 +44,7 @@ def checks(found: tuple[Check, ...]) -> dict[str, Value]:
 
 def judged(facts: Mapping[str, str], mode: int, **replaced: Table | None) -> dict[str, Value]:
     """The checks of the flight of `test_ardupilot_extract`, taken for another vehicle's, in one mode."""
-    (mission,) = KIND.missions(flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced), 75.0, {})
+    (mission,) = KIND.missions(*read(flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced), 75.0), {})
     return checks(KIND.outcome(replace(mission, facts=facts)))
 
 
@@ -66,7 +67,7 @@ def test_a_mission_that_the_vehicle_was_still_at_when_it_was_disarmed_failed() -
 
 def test_a_mission_that_the_pilot_broke_off_is_no_failure_of_the_vehicle() -> None:
     modes = table([(0.0, 10), (40.0, 4)], "ModeNum")
-    (mission,) = KIND.missions(flight(MODE=modes, MSG=said((20.0, "Mission: 2 WP"))), 75.0, {})
+    (mission,) = KIND.missions(*read(flight(MODE=modes, MSG=said((20.0, "Mission: 2 WP"))), 75.0), {})
     value = checks(KIND.outcome(replace(mission, facts=ROVER)))["mission_success"]
     assert isinstance(value, Unavailable)
     assert value.reason == "0 of the mission's 1 waypoints were reached, and the last mode was Hold"
@@ -75,7 +76,7 @@ def test_a_mission_that_the_pilot_broke_off_is_no_failure_of_the_vehicle() -> No
 def test_a_mission_that_a_failsafe_ended_failed() -> None:
     errors = table([(40.0, 17, 1)], "Subsys", "ECode")
     modes = table([(0.0, 10), (40.0, 4)], "ModeNum")
-    (mission,) = KIND.missions(flight(MODE=modes, ERR=errors, MSG=said((20.0, "Mission: 2 WP"))), 75.0, {})
+    (mission,) = KIND.missions(*read(flight(MODE=modes, ERR=errors, MSG=said((20.0, "Mission: 2 WP"))), 75.0), {})
     assert checks(KIND.outcome(replace(mission, facts=ROVER)))["mission_success"] == 0.0
 
 
@@ -120,7 +121,7 @@ def test_a_failsafe_a_crash_and_a_forced_disarm_are_faults_of_any_vehicle() -> N
 
 def test_a_refusal_is_a_fault_only_where_somebody_asked_to_arm() -> None:
     for text, value in (("Arm: Gyros inconsistent", 0.0), ("PreArm: Gyros inconsistent", None)):
-        (mission,) = KIND.missions(flight(ARM=None, MSG=said((2.0, text))), 75.0, {})
+        (mission,) = KIND.missions(*read(flight(ARM=None, MSG=said((2.0, text))), 75.0), {})
         (check,) = KIND.outcome(mission)
         assert check.value == value if value is not None else not is_known(check.value)
 
@@ -135,7 +136,7 @@ def px4(**status: Any) -> dict[str, Value]:
     tables = {"vehicle_status": states(**told), "vehicle_land_detected": states(landed=landed)}
     if result is not None:
         tables["mission_result"] = states(finished=result)
-    (mission,) = PX4.missions(tables, 60.0, {})
+    (mission,) = PX4.missions(*read(tables, 60.0), {})
     return checks(PX4.outcome(mission))
 
 
@@ -159,7 +160,8 @@ def test_px4_says_what_failed() -> None:
 def test_every_arming_of_a_px4_log_is_a_run() -> None:
     status = states(arming_state=[(0.0, 1), (10.0, 2), (20.0, 1), (30.0, 2)])
     spans = [
-        (round(m.start_s, 3), round(m.end_s, 3), m.ended) for m in PX4.missions({"vehicle_status": status}, 60.0, {})
+        (round(m.start_s, 3), round(m.end_s, 3), m.ended)
+        for m in PX4.missions(*read({"vehicle_status": status}, 60.0), {})
     ]
     assert spans == [(10.0, 20.0, True), (30.0, 60.0, False)]
 
@@ -186,7 +188,7 @@ def goals(*statuses: int | None) -> Value:
         "/move_base/goal": Table(np.linspace(0.0, 10.0 * (count - 1), count), sent),
         "/move_base/result": Table(10.0 * np.array(answered, float) + 8.0, results),
     }
-    missions: tuple[Mission, ...] = kind.missions(tables, 100.0, {"goal_timeout_s": 1e9})
+    missions: tuple[Mission, ...] = kind.missions(*read(tables, 100.0), {"goal_timeout_s": 1e9})
     (check,) = kind.outcome(missions[-1])
     return check.value
 

@@ -16,6 +16,16 @@ class ArduPilot(Ecosystem):
     name = "ardupilot"
     title = "ArduPilot"
     formats = (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT, LogFormat.MAVLINK_TLOG)
+    measures = (
+        "care_core.ecosystems.ardupilot.measures.energy",
+        "care_core.ecosystems.ardupilot.measures.events",
+        "care_core.ecosystems.ardupilot.measures.mission",
+        "care_core.ecosystems.ardupilot.measures.outcome",
+        "care_core.ecosystems.ardupilot.measures.requested",
+        "care_core.ecosystems.ardupilot.measures.rover",
+        "care_core.ecosystems.ardupilot.measures.route",
+        "care_core.ecosystems.ardupilot.measures.signals",
+    )
 
     def model(self, log: Log) -> RunModel:
         from care_core.logs.telemetry import as_dataflash

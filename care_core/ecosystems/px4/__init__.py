@@ -16,6 +16,7 @@ class Px4(Ecosystem):
     name = "px4"
     title = "PX4"
     formats = (LogFormat.PX4_ULG,)
+    measures = ("care_core.ecosystems.px4.missions",)
 
     def model(self, log: Log) -> RunModel:
         return RunModel(log)

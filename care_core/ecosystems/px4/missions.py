@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from care_core.ecosystems.ardupilot.measures.flight import AIRBORNE_M
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, has
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.ecosystems.vehicles.arming import KILLED, KILLED_ALOFT_M
@@ -52,17 +53,17 @@ class Px4Flight(MissionKind):
             MESSAGES: ("message",),
         }
 
-    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
+    def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
         status = tables.get(STATUS)
         if not has(status, "arming_state"):
             return ()
         armed = status["arming_state"] == _ARMED
         edges = np.flatnonzero(np.diff(np.concatenate(([False], armed)).astype(np.int8)))
         times = [float(status.t[row]) for row in edges.tolist()]
-        ends = [*times[1::2], duration_s][: len(times[::2])]
+        ends = [*times[1::2], model.log.duration_s][: len(times[::2])]
         closed = len(times) // 2
         return tuple(
-            Mission(tables, start_s, end_s, number < closed, spec)
+            Mission(model, tables, start_s, end_s, number < closed, spec)
             for number, (start_s, end_s) in enumerate(zip(times[::2], ends, strict=True))
         )
 

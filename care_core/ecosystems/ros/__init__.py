@@ -25,6 +25,14 @@ class Ros(Ecosystem):
     name = "ros"
     title = "ROS"
     formats = (LogFormat.ROS1_BAG, LogFormat.ROS2_DB3, LogFormat.MCAP)
+    measures = (
+        "care_core.ecosystems.ros.measures.actionlib",
+        "care_core.ecosystems.ros.measures.battery",
+        "care_core.ecosystems.ros.measures.laser",
+        "care_core.ecosystems.ros.measures.nav2",
+        "care_core.ecosystems.ros.measures.navigation",
+        "care_core.ecosystems.ros.measures.requested",
+    )
 
     def model(self, log: Log) -> RunModel:
         return RunModel(log)

@@ -10,8 +10,8 @@ from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN, is_armed
 from care_core.ecosystems.ardupilot.measures.flight import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, span_of_phase
 from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, instances, series, statistic
-from care_core.ecosystems.measures import Args, Mission, extractor, has, merge_needs, missing
-from care_core.logs.base import Table, Wanted
+from care_core.ecosystems.measures import Args, Mission, extractor, has, missing
+from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.logs.plausible import is_alive
 from care_core.run import Unavailable, Value, is_known
 

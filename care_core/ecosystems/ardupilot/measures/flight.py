@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.measures.modes import MODES, kind_flown, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import ITEMS, Asked, Item, asked, home_of, items_of
-from care_core.ecosystems.measures import Mission, has, merge_needs
-from care_core.logs.base import Table, Wanted
+from care_core.ecosystems.measures import Mission, has
+from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import distinct, known_median, median
 from care_core.records import Record
 from care_core.run import Unavailable

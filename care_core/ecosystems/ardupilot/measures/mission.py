@@ -23,9 +23,10 @@ from care_core.ecosystems.ardupilot.measures.events import (
 from care_core.ecosystems.ardupilot.measures.flight import NEEDS, analyse, waypoint_offsets
 from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, kind_flown, mode_names
 from care_core.ecosystems.ardupilot.measures.outcome import HEIGHTS, WAYPOINT_TOLERANCE_M, plain_checks
-from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, merge_needs, numeric, points
+from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric, points
 from care_core.ecosystems.vehicles import error_kind, error_words
-from care_core.logs.base import Table, Wanted
+from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.logs.plausible import plausible
 from care_core.run import Check, Evidence, Unavailable
 
@@ -42,12 +43,12 @@ class ArduPilotFlight(MissionKind):
     def needs(self, spec: Args) -> Wanted:
         return merge_needs((NEEDS, HEIGHTS))
 
-    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
-        spans = armed_spans(tables, duration_s)
+    def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
+        spans = armed_spans(tables, model.log.duration_s)
         if not spans and not arm_events(tables) and refusals(tables.get("MSG")):
-            spans = [(0.0, duration_s, True)]
+            spans = [(0.0, model.log.duration_s, True)]
         sound = plausible(tables)
-        return tuple(Mission(sound, start_s, end_s, ended, spec) for start_s, end_s, ended in spans)
+        return tuple(Mission(model, sound, start_s, end_s, ended, spec) for start_s, end_s, ended in spans)
 
     def mismatch(self, mission: Mission) -> str:
         expected = mission.spec.get("waypoints", ())

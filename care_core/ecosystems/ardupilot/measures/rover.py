@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from care_core.ecosystems.ardupilot.measures.flight import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flight_of
 from care_core.ecosystems.ardupilot.measures.series import register, series
-from care_core.ecosystems.measures import Args, Mission, extractor, merge_needs, one_of
+from care_core.ecosystems.measures import Args, Mission, extractor, one_of
 from care_core.ecosystems.vehicles import is_skid_steered
-from care_core.logs.base import Table, Wanted
+from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import median, quantile
 from care_core.run import Unavailable, Value
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.measures.flight import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flight_of, span_of_phase
-from care_core.ecosystems.measures import Args, Mission, extractor, merge_needs, missing, one_of
-from care_core.logs.base import Table, Wanted
+from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
+from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import distinct, quantile
 from care_core.run import Unavailable, Value
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from care_core.ecosystems.ardupilot.measures.flight import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS
 from care_core.ecosystems.ardupilot.measures.series import register, series, statistic
-from care_core.ecosystems.measures import Args, Mission, extractor, merge_needs, one_of
+from care_core.ecosystems.measures import Args, Mission, extractor, one_of
 from care_core.ecosystems.vehicles import motor_outputs
-from care_core.logs.base import Table, Wanted
+from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.run import Unavailable, Value
 
 Floats = NDArray[np.float64]

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import Args, Mission, MissionKind, numeric, points
 from care_core.ecosystems.ros.measures.drive import (
     BATTERY_FIELDS,
@@ -102,13 +103,15 @@ class GoalMissions(MissionKind):
             **dict.fromkeys(self.rosout, ROSOUT_FIELDS),
         }
 
-    def missions(self, tables: Mapping[str, Table], duration_s: float, spec: Args) -> tuple[Mission, ...]:
+    def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
         """One mission each time the list of goals starts again, or goals come after a long pause."""
         missions = []
-        groups = _split(goal_server(spec).legs(tables, spec, duration_s), spec)
+        groups = _split(goal_server(spec).legs(tables, spec, model.log.duration_s), spec)
         for number, legs in enumerate(groups):
-            until_s = groups[number + 1][0].sent_s if number + 1 < len(groups) else duration_s
-            missions.append(Mission(tables, legs[0].sent_s, legs[-1].end_s, _has_ended(legs, spec, until_s), spec))
+            until_s = groups[number + 1][0].sent_s if number + 1 < len(groups) else model.log.duration_s
+            missions.append(
+                Mission(model, tables, legs[0].sent_s, legs[-1].end_s, _has_ended(legs, spec, until_s), spec)
+            )
         return tuple(missions)
 
     def mismatch(self, mission: Mission) -> str:
