@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from care_core.errors import UsageError
-from care_core.logs.finding import LOG_SUFFIXES
+from care_core.logs.formats import log_suffixes
 from care_core.logs.opening import is_recording
 
 PROFILE_FILE = "profile.yaml"
@@ -120,7 +120,7 @@ def check_replaceable(path: Path, text: str) -> None:
         return
     with path.open("rb") as stream:
         head = stream.read(_HEAD_BYTES)
-    if path.suffix.lower() in LOG_SUFFIXES or b"\0" in head or _kind(_decoded(head)) != _kind(text):
+    if path.suffix.lower() in log_suffixes() or b"\0" in head or _kind(_decoded(head)) != _kind(text):
         raise UsageError(
             "There is a file of another kind, which is kept.",
             hint="Name another file, or replace it with --force.",

@@ -61,10 +61,10 @@ def read_log(path: Path) -> Answer:
     channels = log.channels()
     tables = log.read({channel.name: ("TimeUS", "Message", "data", "header.stamp", "roll") for channel in channels})
     log.settings()
-    words = [log.format.value, str(len(channels)), str(sum(map(len, tables.values())) > 0), str(log.start is not None)]
+    words = [log.format.name, str(len(channels)), str(sum(map(len, tables.values())) > 0), str(log.start is not None)]
     words += sorted({damage.what for damage in log.damage}) + sorted(log.facts)
     run = read_run(
-        run_model(log), _schema("move_base" if log.format.value.startswith(("ros", "mcap")) else "arducopter")
+        run_model(log), _schema("move_base" if log.format.name.startswith(("ros", "mcap")) else "arducopter")
     )
     return " ".join([*words, *(f"{name} {type(value).__name__}" for name, value in run.objectives.items())])
 

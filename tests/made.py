@@ -20,7 +20,9 @@ from care_core.diagnose.records import (
     Prediction,
 )
 from care_core.ecosystems.findings import Event, Finding, Health
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs import formats
+from care_core.logs.base import Channel, Table, Wanted
+from care_core.logs.formats import LogFormat
 from care_core.records import Struct, field
 from care_core.run import Damage, Evidence, Fit, LogInfo, MissionInfo, ProfileChoice, Run, Setting, Unavailable
 from care_core.variables import Change, Role, Threshold, Variable
@@ -46,7 +48,7 @@ class MadeLog(Struct, eq=False):
     tables: Mapping[str, Mapping[str, Any]]
     types: Mapping[str, str] = field(default_factory=dict)
     path: Path = Path("made.BIN")
-    format: LogFormat = LogFormat.DATAFLASH_BIN
+    format: LogFormat = formats.DATAFLASH_BIN
     start: str | None = None
     duration_s: float = 100.0
     damage: tuple[Damage, ...] = ()

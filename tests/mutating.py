@@ -37,10 +37,10 @@ import zstandard
 import care_core
 from care_core.errors import CareError, ExitCode
 from care_core.files import bundled
-from care_core.logs import mavlink_packets
-from care_core.logs.base import LogFormat
+from care_core.logs import formats, mavlink_packets
 from care_core.logs.dataflash import DataFlashLog, Format
 from care_core.logs.file_windows import FileArray
+from care_core.logs.formats import LogFormat
 from care_core.logs.opening import open_log
 
 MOST_MB, MOST_S = 1000, 20
@@ -536,8 +536,8 @@ def ulog(path: Path, rng: Rng) -> Broken:
 
 
 WAYS: dict[LogFormat, Callable[[Path, Rng], Broken]] = {
-    LogFormat.DATAFLASH_BIN: dataflash, LogFormat.DATAFLASH_TEXT: text, LogFormat.MAVLINK_TLOG: telemetry,
-    LogFormat.ROS1_BAG: ros1, LogFormat.ROS2_DB3: db3, LogFormat.MCAP: mcap, LogFormat.PX4_ULG: ulog,
+    formats.DATAFLASH_BIN: dataflash, formats.DATAFLASH_TEXT: text, formats.MAVLINK_TLOG: telemetry,
+    formats.ROS1_BAG: ros1, formats.ROS2_DB3: db3, formats.MCAP: mcap, formats.PX4_ULG: ulog,
 }  # fmt: skip
 
 
@@ -667,7 +667,7 @@ def main() -> None:
     print(f"{'format':<16}{'files':>6}{'MB':>7}{'s':>6}  exit codes")
     for kind, codes in ends.items():
         said = ", ".join(f"{code}: {count}" for code, count in sorted(codes.items()))
-        print(f"{kind.value:<16}{codes.total():>6}{most[kind][0]:>7.0f}{most[kind][1]:>6.1f}  {said}")
+        print(f"{kind.name:<16}{codes.total():>6}{most[kind][0]:>7.0f}{most[kind][1]:>6.1f}  {said}")
     sys.exit(min(found, 1))
 
 

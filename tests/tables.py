@@ -7,7 +7,9 @@ from pathlib import Path
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.registry import run_model
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs import formats
+from care_core.logs.base import Channel, Table, Wanted
+from care_core.logs.formats import LogFormat
 from care_core.records import Record, field
 from care_core.run import Damage, Setting
 
@@ -17,7 +19,7 @@ class TablesLog(Record, eq=False):
 
     tables: Mapping[str, Table]
     duration_s: float
-    format: LogFormat = LogFormat.DATAFLASH_BIN
+    format: LogFormat = formats.DATAFLASH_BIN
     facts: Mapping[str, str] = field(default_factory=dict)
     known: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
     damage: tuple[Damage, ...] = ()
@@ -39,7 +41,7 @@ class TablesLog(Record, eq=False):
 
 
 def read(
-    tables: Mapping[str, Table], duration_s: float, format: LogFormat = LogFormat.DATAFLASH_BIN
+    tables: Mapping[str, Table], duration_s: float, format: LogFormat = formats.DATAFLASH_BIN
 ) -> tuple[RunModel, Mapping[str, Table]]:
     """The run model of tables, and the tables: what missions are found in."""
     return run_model(TablesLog(tables, duration_s, format)), tables

@@ -14,6 +14,8 @@ from pathlib import Path
 from types import ModuleType
 
 from care_core.ecosystems.px4 import parameter_file as qgc_params
+from care_core.ecosystems.registry import ecosystem_of
+from care_core.logs.formats import format_named
 from care_core.run import Setting
 from care_core.variables import Variable
 
@@ -34,14 +36,6 @@ _MODULES = {
     ConfigFormat.ROS2_YAML: "care_core.ecosystems.ros.ros2_yaml",
 }
 
-_OF_LOG = {
-    "ros1": ConfigFormat.ROS1_YAML,
-    "ros2": ConfigFormat.ROS2_YAML,
-    "mcap": ConfigFormat.ROS2_YAML,
-    "px4": ConfigFormat.QGC_PARAMS,
-}
-"""By how the name of a log's format begins; any other is of an ArduPilot vehicle."""
-
 _YAML_SUFFIXES = (".yaml", ".yml")
 _PARAMETER_LINE = re.compile(r"[A-Z][A-Z0-9_]*(\s*,\s*|\s+)[-+.\w]+(\s|$)")
 _YAML_LINE = re.compile(r"---|[%&!{]|[^\s,#]+\s*:(\s|$)")
@@ -54,14 +48,9 @@ def module_of(format: ConfigFormat) -> ModuleType:
 
 
 def format_for(log_format: str, parameters: Iterable[str] = ()) -> ConfigFormat:
-    """The configuration format of the ecosystem that records such logs.
-
-    An MCAP may be of either ROS: `parameters` are names of it, which only in ROS 2 have a dot after the node.
-    """
-    family = log_format.partition("-")[0]
-    if family == "mcap" and (names := list(parameters)) and not any("." in name for name in names):
-        return ConfigFormat.ROS1_YAML
-    return _OF_LOG.get(family, ConfigFormat.ARDUPILOT_PARAM)
+    """The configuration format of the ecosystem that records such logs; `parameters` are names in the log."""
+    recorded = format_named(log_format)
+    return ConfigFormat(ecosystem_of(recorded).dialect(recorded, parameters))
 
 
 def format_of(text: str, path: Path) -> ConfigFormat:

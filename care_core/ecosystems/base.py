@@ -9,9 +9,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
+from care_core.ecosystems.dictionary import Dictionary
 from care_core.ecosystems.findings import Finding, Health
-from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted, merge_needs
+from care_core.logs import formats
+from care_core.logs.base import Channel, Log, Table, Wanted, merge_needs
+from care_core.logs.formats import LogFormat
 from care_core.records import Record
+from care_core.run import Robot
 
 
 class Limit(Record):
@@ -84,10 +88,15 @@ class Ecosystem(ABC):
     """Everything that the program knows of one ecosystem. What is heavy is imported by the method that needs it."""
 
     name: ClassVar[str]
+    """As the rows of `logs.formats` name it."""
     title: ClassVar[str]
-    formats: ClassVar[tuple[LogFormat, ...]]
     measures: ClassVar[tuple[str, ...]]
     """Modules that register its mission kinds and extractors when they are imported."""
+
+    @property
+    def formats(self) -> tuple[LogFormat, ...]:
+        """The formats of its logs."""
+        return tuple(format for format in formats.FORMATS if format.ecosystem == self.name)
 
     @abstractmethod
     def model(self, log: Log) -> RunModel:
@@ -104,3 +113,23 @@ class Ecosystem(ABC):
     @abstractmethod
     def missions(self, channels: tuple[Channel, ...]) -> Iterator[Mapping[str, Any]]:
         """The mission sections under which a log without a profile may hold runs, the likeliest first."""
+
+    @abstractmethod
+    def messages(self) -> Dictionary:
+        """What its messages mean, by today's names; of ROS, by the type of the message."""
+
+    @abstractmethod
+    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
+        """The format of its configuration files, for the parameters of a log of that format: `qgc-params`."""
+
+    @abstractmethod
+    def robots(self, log: Log) -> Iterator[Robot]:
+        """Names of the robot that the log tells, the surest first."""
+
+    def how_to_record(self, channel: str) -> str:
+        """What to do to have a channel in the next log; "" where it is none of this ecosystem's."""
+        return ""
+
+    def stack(self, facts: Mapping[str, str]) -> str:
+        """The name of its software under which tables of parameters know it: `ros1` and `ros2` differ."""
+        return self.name

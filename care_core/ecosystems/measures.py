@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeGuard, TypeVar
 
 from care_core.ecosystems.base import RunModel
-from care_core.ecosystems.how_to_record import how_to_record
 from care_core.errors import ProfileError, nearest
 from care_core.logs.base import Table, Wanted
 from care_core.records import Record, field
@@ -196,5 +195,7 @@ def has(table: Table | None, *fields: str) -> TypeGuard[Table]:
 
 def missing(channel: str, hint: str = "") -> Unavailable:
     """The answer of an extractor whose channel is not in the log."""
+    from care_core.ecosystems.registry import how_to_record  # the registry's packages import this module
+
     name = channel.partition(" ")[0]  # "ARM with Forced" is a field that an old ARM lacks
     return Unavailable(f"no {channel} in the log", hint or how_to_record(channel), name)

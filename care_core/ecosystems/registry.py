@@ -6,7 +6,8 @@ from functools import cache
 from importlib import import_module
 
 from care_core.ecosystems.base import Ecosystem, RunModel
-from care_core.logs.base import Log, LogFormat
+from care_core.logs.base import Log
+from care_core.logs.formats import LogFormat
 
 _PACKAGES = (
     "care_core.ecosystems.ardupilot",
@@ -25,7 +26,13 @@ def ecosystems() -> tuple[Ecosystem, ...]:
 
 def ecosystem_of(format: LogFormat) -> Ecosystem:
     """The ecosystem that writes logs of a format."""
-    return next(ecosystem for ecosystem in ecosystems() if format in ecosystem.formats)
+    return next(ecosystem for ecosystem in ecosystems() if ecosystem.name == format.ecosystem)
+
+
+def how_to_record(channel: str) -> str:
+    """What to do before the next run to have a channel in the log."""
+    hints = (ecosystem.how_to_record(channel) for ecosystem in ecosystems())
+    return next(filter(None, hints), f"record {channel}")
 
 
 def register_measures() -> None:

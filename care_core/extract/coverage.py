@@ -114,8 +114,8 @@ def wrong_kind(log: Log, schema: Schema) -> str:
     """Why a profile cannot read logs of this kind; '' when it can."""
     if not schema.logs:
         return "it comes from a table of runs and reads no log"
-    if log.format.value not in schema.logs:
-        return f"it reads {' or '.join(schema.logs)}, this is {log.format.value}"
+    if log.format.name not in schema.logs:
+        return f"it reads {' or '.join(schema.logs)}, this is {log.format.name}"
     return ""
 
 

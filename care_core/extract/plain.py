@@ -38,4 +38,4 @@ def _schemas(log: Log) -> list[Schema]:
 
 
 def _bare(log: Log, mission: Mapping[str, Any]) -> Schema:
-    return Schema("", "", "", "", {}, (log.format.value,), False, mission, (), {})
+    return Schema("", "", "", "", {}, (log.format.name,), False, mission, (), {})

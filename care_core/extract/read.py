@@ -13,8 +13,9 @@ from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor
 from care_core.ecosystems.registry import register_measures
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
-from care_core.logs.base import Log, LogFormat, merge_needs
+from care_core.logs.base import Log, merge_needs
 from care_core.logs.digest import Sha256, hashing
+from care_core.logs.formats import format_named
 from care_core.logs.plausible import clock_doubt, dead_sources
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
@@ -100,7 +101,7 @@ def log_info(log: Log, sha256: str) -> LogInfo:
     """The record of where a run came from."""
     return LogInfo(
         path=str(log.path),
-        format=log.format.value,
+        format=log.format.name,
         start=log.start,
         duration_s=log.duration_s,
         sha256=sha256,
@@ -192,18 +193,17 @@ class _Source(Record, eq=False):
         return {name: self._explained(value) for name, value in values.items()}
 
     def _explained(self, value: Value) -> Value:
-        """The value, where it is a number; else why there is none: a dead source, or telemetry, which lacks much."""
+        """The value, where it is a number; else why there is none: a dead source, or a kind of log that lacks much."""
         if not isinstance(value, Unavailable):
             return value if math.isfinite(value) else Unavailable("what the log says of it is no number", _LOOK)
         if value.channel in self.dead:
             return Unavailable(self.dead[value.channel], "check the sensor and its driver")
-        is_telemetry = self.log.format == LogFormat.MAVLINK_TLOG.value
-        return replace(value, hint=_TELEMETRY_ADVICE) if is_telemetry and value.channel else value
+        hint = format_named(self.log.format).missing_hint
+        return replace(value, hint=hint) if hint and value.channel else value
 
 
 _ASKING = ("mission_asked", "goals_asked")
 """Extractors of what a mission asks for."""
-_TELEMETRY_ADVICE = "telemetry does not carry it: use the .BIN of the vehicle's memory card"
 _CLOCK_ADVICE = "judge a log whose messages carry the time at which they were recorded"
 _LOOK = "look at its source with 'care inspect'"
 

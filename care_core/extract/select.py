@@ -102,11 +102,11 @@ def _none_fits(log: Log, covered: Sequence[Coverage], fits: Sequence[Fit], order
     if len(covered) == 1:
         return _choice(covered[0], fits[0])
     reasons = tuple(f"{covered[i].schema.name}: {'; '.join(fits[i].reasons)}" for i in order if covered[i].found)
-    readers = [coverage for coverage in covered if log.format.value in coverage.schema.logs]
+    readers = [coverage for coverage in covered if log.format.name in coverage.schema.logs]
     if not covered:
         reasons = ("no profile is installed",)
     elif not readers:
-        reasons = (f"none of the {len(covered)} installed profiles reads {log.format.value}",)
+        reasons = (f"none of the {len(covered)} installed profiles reads {log.format.name}",)
     elif not reasons:
         names = " and ".join(coverage.schema.name for coverage in readers)
         reasons = (f"nothing that {names} would read is in the log",)

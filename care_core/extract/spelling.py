@@ -16,7 +16,7 @@ def spelled(schema: Schema, log: Log) -> Schema:
 
     A log that holds a parameter under none of its names leaves the option as it is.
     """
-    if log.format.value not in schema.logs:
+    if log.format.name not in schema.logs:
         return schema
     held = log.settings()
     kind = vehicle_of(log.facts, held).kind

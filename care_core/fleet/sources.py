@@ -16,7 +16,8 @@ from urllib.parse import urlsplit
 
 from care_core.errors import LogError, UsageError
 from care_core.limits import MEBIBYTE, megabytes
-from care_core.logs.finding import LOG_SUFFIXES, SHARED_SUFFIX, find_logs, is_log, is_recorder_folder
+from care_core.logs.finding import SHARED_SUFFIX, find_logs, is_log, is_recorder_folder
+from care_core.logs.formats import log_suffixes
 from care_core.records import Record
 
 INSTALL = "Install what it needs with: pip install 'care-tui[fleet]'"
@@ -153,7 +154,7 @@ def shown(url: str) -> str:
 
 def _looks_like_a_log(name: str) -> bool:
     suffix = PurePosixPath(name).suffix.lower()
-    return suffix in LOG_SUFFIXES and suffix != SHARED_SUFFIX
+    return suffix in log_suffixes() and suffix != SHARED_SUFFIX
 
 
 def _is_local(store: Any) -> bool:
@@ -194,4 +195,4 @@ def _nothing(url: str) -> list[Source]:
 
 
 def _endings() -> str:
-    return f"Logs end in {', '.join(LOG_SUFFIXES)}."
+    return f"Logs end in {', '.join(log_suffixes())}."

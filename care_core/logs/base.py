@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
+from care_core.logs.formats import LogFormat
 from care_core.records import Record
 from care_core.run import Damage, Setting
 
@@ -17,18 +17,6 @@ if TYPE_CHECKING:  # a log is told by its first bytes before anything needs numb
 
 Wanted = Mapping[str, Sequence[str]]
 """Channel name to the fields to decode; ROS fields are dotted paths such as `pose.pose.position.x`."""
-
-
-class LogFormat(str, Enum):
-    """The formats that are told apart by content."""
-
-    DATAFLASH_BIN = "dataflash-bin"
-    DATAFLASH_TEXT = "dataflash-text"
-    MAVLINK_TLOG = "mavlink-tlog"
-    PX4_ULG = "px4-ulg"
-    ROS1_BAG = "ros1-bag"
-    ROS2_DB3 = "ros2-db3"
-    MCAP = "mcap"
 
 
 class Channel(Record):

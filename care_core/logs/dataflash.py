@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from care_core import limits
 from care_core.errors import LogError
+from care_core.logs import formats
 from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, shortest, wall_clock
-from care_core.logs.base import Channel, Kind, LazyColumns, LogFormat, Table, Wanted
+from care_core.logs.base import Channel, Kind, LazyColumns, Table, Wanted
 from care_core.logs.clock import Clock, clock_of
 from care_core.logs.damage import summarised
 from care_core.logs.file_windows import Bytes, FileArray, Offsets, give_back, stored_in
@@ -270,7 +271,7 @@ class DataFlashLog:
         LogError: the file cannot be read, or holds no message at all.
     """
 
-    format = LogFormat.DATAFLASH_BIN
+    format = formats.DATAFLASH_BIN
 
     def __init__(self, path: Path) -> None:
         self.path = path

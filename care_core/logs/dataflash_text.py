@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from care_core import limits
 from care_core.errors import LogError
+from care_core.logs import formats
 from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, wall_clock
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
 from care_core.logs.dataflash import time_field
@@ -56,7 +57,7 @@ class DataFlashTextLog:
         LogError: the file cannot be read, or holds no message at all.
     """
 
-    format = LogFormat.DATAFLASH_TEXT
+    format = formats.DATAFLASH_TEXT
 
     def __init__(self, path: Path) -> None:
         self.path = path

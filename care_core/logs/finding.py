@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from care_core.errors import LogError, UsageError
+from care_core.logs.formats import log_suffixes
 from care_core.logs.opening import sniff
 
-LOG_SUFFIXES = (".bin", ".log", ".tlog", ".bag", ".active", ".mcap", ".db3", ".zstd", ".ulg")
 SHARED_SUFFIX = ".log"
 """An ending that many files have: only those that begin like a log are taken out of a folder."""
 
@@ -30,7 +30,7 @@ def find_logs(places: Iterable[Path]) -> tuple[Path, ...]:
         inside = map(whole_recording, logs_below(place)) if place.is_dir() else [place]
         found.update(dict.fromkeys(inside))
     if not found:
-        raise UsageError("There is no log there.", hint=f"Logs end in {', '.join(LOG_SUFFIXES)}.")
+        raise UsageError("There is no log there.", hint=f"Logs end in {', '.join(log_suffixes())}.")
     return tuple(found)
 
 
@@ -55,7 +55,7 @@ def is_recorder_folder(folder: Path) -> bool:
 def is_log(path: Path) -> bool:
     """Whether a file in a folder is a log, by its ending, and by its beginning where others end like that too."""
     suffix = path.suffix.lower()
-    if suffix not in LOG_SUFFIXES or not path.is_file():
+    if suffix not in log_suffixes() or not path.is_file():
         return False
     return suffix != SHARED_SUFFIX or begins_like_a_log(path)
 

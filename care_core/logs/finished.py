@@ -12,7 +12,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
-from care_core.logs.finding import LOG_SUFFIXES, SHARED_SUFFIX, begins_like_a_log
+from care_core.logs.finding import SHARED_SUFFIX, begins_like_a_log
+from care_core.logs.formats import log_suffixes
 from care_core.logs.recording import ROS1_SUFFIXES, ROS2_SUFFIXES, parse_part
 from care_core.logs.ros_metadata import FILE_NAME, parse_metadata
 from care_core.records import Record, Struct, field
@@ -111,7 +112,7 @@ def _in(folder: Path, below: list[Path]) -> Iterator[Sight]:
                     files[entry.name] = _File(entry.name, about.st_size, about.st_mtime_ns)
     except OSError:  # gone, unplugged, or not ours to look into
         return
-    logs = {name: file for name, file in files.items() if Path(name).suffix.lower() in LOG_SUFFIXES}
+    logs = {name: file for name, file in files.items() if Path(name).suffix.lower() in log_suffixes()}
     whole = _one_recording(folder, files, logs)
     if whole is not None:
         yield whole

@@ -19,11 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
+from care_core.logs import formats
 from care_core.logs.ardupilot import facts_of, history, shortest
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
 from care_core.logs.file_windows import FileArray
+from care_core.logs.formats import is_raw_mavlink
 from care_core.logs.mavlink_packets import (
     STAMP_BYTES,
     V1,
@@ -39,7 +41,6 @@ from care_core.logs.mavlink_packets import (
     stamps,
     wanted_extras,
 )
-from care_core.logs.opening import is_raw_mavlink
 from care_core.run import Damage, Setting
 
 _HEARTBEAT, _PARAM_VALUE, _STATUSTEXT, _AUTOPILOT_VERSION = 0, 22, 253, 148
@@ -78,7 +79,7 @@ class MavlinkLog:
         LogError: the file cannot be read, or holds no packet.
     """
 
-    format = LogFormat.MAVLINK_TLOG
+    format = formats.MAVLINK_TLOG
 
     def __init__(self, path: Path) -> None:
         self.path = path

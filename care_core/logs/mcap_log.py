@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.logs.base import LogFormat
+from care_core.logs import formats
 from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
 from care_core.logs.file_windows import FileBytes, opened
 from care_core.logs.mcap_records import MAGIC, McapChunk, McapContents, locate, read_contents
@@ -39,7 +39,7 @@ class McapLog(RosLog):
         recording = recording_at(path)
         parts = [McapPart(file) for file in recording.files]
         super().__init__(
-            path, LogFormat.MCAP, parts,
+            path, formats.MCAP, parts,
             metadata=recording.metadata, missing=recording.missing, notes=recording.notes,
         )  # fmt: skip
 

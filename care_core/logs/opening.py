@@ -2,36 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO
 
 from care_core.errors import LogError
-from care_core.logs.base import Log, LogFormat
-
-READERS = {
-    LogFormat.DATAFLASH_BIN: ("care_core.logs.dataflash", "DataFlashLog"),
-    LogFormat.DATAFLASH_TEXT: ("care_core.logs.dataflash_text", "DataFlashTextLog"),
-    LogFormat.MAVLINK_TLOG: ("care_core.logs.mavlink", "MavlinkLog"),
-    LogFormat.PX4_ULG: ("care_core.logs.px4_ulog", "Px4Log"),
-    LogFormat.ROS1_BAG: ("care_core.logs.ros1_bag", "Ros1Bag"),
-    LogFormat.ROS2_DB3: ("care_core.logs.ros2_db3", "Ros2Db3"),
-    LogFormat.MCAP: ("care_core.logs.mcap_log", "McapLog"),
-}
-"""Module and class per format, imported only when a log of that format is opened."""
-
-READABLE = (
-    "ArduPilot DataFlash (.BIN, .log), MAVLink telemetry (.tlog), PX4 ULog (.ulg), ROS 1 bags (.bag) and ROS 2 bags"
-    " (.db3, .mcap)"
-)
-
-ROS_MAGIC = (
-    (b"#ROSBAG V2.0", LogFormat.ROS1_BAG),
-    (b"SQLite format 3\0", LogFormat.ROS2_DB3),
-    (b"\x89MCAP0\r\n", LogFormat.MCAP),
-)
-"""How the files of a ROS recording begin; each may be packed with zstd."""
+from care_core.logs import formats
+from care_core.logs.base import Log
+from care_core.logs.formats import LogFormat
 
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
@@ -45,12 +23,9 @@ UNREADABLE_MAGIC = (
 """Formats that are recognised but not read: how the file begins, what it is, what to do."""
 
 _CONFIGURATION = (".yaml", ".yml", ".param", ".params", ".parm")
-_SNIFF_BYTES = 4096
 _PIECE_BYTES = 1 << 20
 _ZSTD_BYTES = 1 << 18
 """Enough for the first block of a zstd file, which unpacks as a whole."""
-_TEXT_FORMAT = re.compile(rb"(?m)^FMT, ?\d+, ?\d+, ?\w+")
-_MAVLINK_MARKERS = (0xFD, 0xFE)
 
 
 def open_log(path: str | Path) -> Log:
@@ -65,7 +40,7 @@ def open_log(path: str | Path) -> Log:
 
 def open_as(format: LogFormat, path: Path) -> Log:
     """Open a log whose format was told already. Raises LogError."""
-    module, reader = READERS[format]
+    module, reader = format.reader
     log: Log = getattr(import_module(module), reader)(path)
     return log
 
@@ -73,31 +48,18 @@ def open_as(format: LogFormat, path: Path) -> Log:
 def sniff(path: Path) -> LogFormat:
     """The format of a file, or of the recording in a folder, by its first bytes. Raises LogError as `open_log`."""
     head = _read_head(path)
-    plain = _unpacked(path) if head.startswith(_ZSTD_MAGIC) else head
-    for magic, ros_format in ROS_MAGIC:
-        if plain.startswith(magic):
-            return ros_format
+    is_packed = head.startswith(_ZSTD_MAGIC)
+    plain = _unpacked(path) if is_packed else head
+    for format in formats.FORMATS:
+        if format.magic and plain.startswith(format.magic) and (format.may_be_packed or not is_packed):
+            return format
     for magic, what, hint in UNREADABLE_MAGIC:
         if head.startswith(magic):
             raise _unreadable(path, what, hint)
-    if head.startswith(b"ULog\x01\x12\x35"):
-        return LogFormat.PX4_ULG
-    # A DataFlash log declares its message types first; damage at its very start must not hide them.
-    if b"\xa3\x95\x80" in head:
-        return LogFormat.DATAFLASH_BIN
-    if _TEXT_FORMAT.search(head):
-        return LogFormat.DATAFLASH_TEXT
-    if is_raw_mavlink(head):
-        return LogFormat.MAVLINK_TLOG
-    is_lone_packet = len(head) > 8 and head[0] == 0 and head[8] in _MAVLINK_MARKERS
-    if is_lone_packet or any(_frame_is_followed(head, at + 8) for at in range(len(head) - 8) if head[at] == 0):
-        return LogFormat.MAVLINK_TLOG
+    for format in formats.FORMATS:
+        if format.looks_like is not None and format.looks_like(head):
+            return format
     raise LogError("Not a log of a known format.", hint=_what_then(path), where=str(path))
-
-
-def is_raw_mavlink(head: bytes) -> bool:
-    """Whether a file is a stream of MAVLink packets without the time stamps of a ground station (.rlog, .tlog.raw)."""
-    return _frame_is_followed(head, 0, stamp=0)
 
 
 def _what_then(path: Path) -> str:
@@ -106,7 +68,7 @@ def _what_then(path: Path) -> str:
         return "Name the folder of the bag instead."
     if path.suffix.lower() in _CONFIGURATION:
         return "A configuration file goes with a log: --config FILE."
-    return f"Readable are {READABLE}."
+    return f"Readable are {formats.readable()}."
 
 
 def is_recording(path: Path) -> bool:
@@ -117,19 +79,7 @@ def is_recording(path: Path) -> bool:
         return False
 
 
-def _frame_is_followed(head: bytes, at: int, stamp: int = 8) -> bool:
-    """Whether a MAVLink packet begins here, and after it and a stamp of this many bytes the next, or the file's end."""
-    if at + 3 > len(head) or head[at] not in _MAVLINK_MARKERS:
-        return False
-    is_v2 = head[at] == 0xFD
-    if is_v2 and head[at + 2] & ~1:
-        return False
-    end = at + head[at + 1] + (12 + 13 * head[at + 2] if is_v2 else 8)
-    follows = end + stamp < len(head) and head[end + stamp] in _MAVLINK_MARKERS
-    return follows or (len(head) < _SNIFF_BYTES and len(head) - 8 <= end <= len(head))
-
-
-def _read_head(path: Path, size: int = _SNIFF_BYTES) -> bytes:
+def _read_head(path: Path, size: int = formats.SNIFF_BYTES) -> bytes:
     if path.is_dir():
         from care_core.logs.recording import recording_at
 
@@ -182,5 +132,7 @@ def cannot_open(path: Path, err: OSError) -> LogError:
 
 def _unreadable(path: Path, what: str, hint: str) -> LogError:
     return LogError(
-        f"This is {what}, which cannot be read yet.", hint=hint or f"Readable are {READABLE}.", where=str(path)
+        f"This is {what}, which cannot be read yet.",
+        hint=hint or f"Readable are {formats.readable()}.",
+        where=str(path),
     )

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs import formats
+from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.clock import PAUSE_S, find_clock
 from care_core.logs.damage import summarised
 from care_core.numbers import median
@@ -41,7 +42,7 @@ class Px4Log:
         LogError: pyulog is not installed, or the file cannot be read.
     """
 
-    format = LogFormat.PX4_ULG
+    format = formats.PX4_ULG
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
-from care_core.logs.base import LogFormat
+from care_core.logs import formats
 from care_core.logs.compression import Unpacker
 from care_core.logs.file_windows import opened
 from care_core.logs.message_index import Places
@@ -42,7 +42,7 @@ class Ros1Bag(RosLog):
         parts = [Ros1Part(file) for file in recording.files]
         _check_one_run(path, parts)
         super().__init__(
-            path, LogFormat.ROS1_BAG, parts, missing=recording.missing, notes=recording.notes,
+            path, formats.ROS1_BAG, parts, missing=recording.missing, notes=recording.notes,
         )  # fmt: skip
 
 

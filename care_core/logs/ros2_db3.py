@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
-from care_core.logs.base import LogFormat
+from care_core.logs import formats
 from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
 from care_core.logs.file_windows import opened
 from care_core.logs.message_index import Places
@@ -60,7 +60,7 @@ class Ros2Db3(RosLog):
         recording = recording_at(path)
         parts = [Db3Part(file, is_alone=len(recording.files) == 1) for file in recording.files]
         super().__init__(
-            path, LogFormat.ROS2_DB3, parts,
+            path, formats.ROS2_DB3, parts,
             metadata=recording.metadata, missing=recording.missing, notes=recording.notes,
         )  # fmt: skip
 

@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core import limits
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs import formats
+from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.cdr_message import CdrDecoder
 from care_core.logs.file_windows import FileBytes
+from care_core.logs.formats import LogFormat
 from care_core.logs.json_message import json_decoder
 from care_core.logs.message_index import MessageIndex, Places
 from care_core.logs.ros1_message import message_decoder
@@ -205,7 +207,7 @@ class RosLog:
         types = {short_name(connection.type) for connection in every}
         topics = {connection.topic for connection in every}
         encodings = {connection.encoding for connection in every}
-        facts = {"ros": "1" if self.format is LogFormat.ROS1_BAG or encodings == {"ros1"} else "2"}
+        facts = {"ros": "1" if self.format is formats.ROS1_BAG or encodings == {"ros1"} else "2"}
         stack = next((name for name, own, names in _STACKS if types & set(own) or topics & set(names)), None)
         if stack:
             facts["stack"] = stack

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.logs.base import Channel, Log, LogFormat, Table, Wanted
+from care_core.logs import formats
+from care_core.logs.base import Channel, Log, Table, Wanted
 from care_core.records import Record
 
 Floats = NDArray[np.float64]
@@ -63,9 +64,9 @@ _TEXTS = frozenset(("Message", "Name"))
 def as_dataflash(log: Log) -> Log:
     """The log as whoever reads DataFlash messages expects it: of telemetry the log that it can stand for, of a
     DataFlash log the fields that its declarations give the kind that the firmware does."""
-    if log.format is LogFormat.MAVLINK_TLOG:
+    if log.format is formats.MAVLINK_TLOG:
         return _Telemetry(log)
-    return _Declared(log) if log.format in (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT) else log
+    return _Declared(log) if log.format in (formats.DATAFLASH_BIN, formats.DATAFLASH_TEXT) else log
 
 
 class _Declared(Record, eq=False):

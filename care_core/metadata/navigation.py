@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeGuard, get_args
 
 from care_core.metadata.fact import Fact, FactType, number
 from care_core.metadata.words import word_of
@@ -29,6 +29,11 @@ _LOADING = frozenset({"plugin", "class"})
 """What names the class of a part that is loaded."""
 _WORD = re.compile(r"[a-z]+")
 _COMMON = frozenset({"server", "plugin", "parameters", "layer", "ros", "base"})
+
+
+def is_ros(stack: str) -> TypeGuard[Ros]:
+    """Whether the parameters of a stack of software are those of ROS."""
+    return stack in get_args(Ros)
 
 
 def owners(ros: Ros) -> Collection[str]:

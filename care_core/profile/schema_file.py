@@ -17,7 +17,7 @@ from care_core import plain_yaml
 from care_core.causal.nominal import nominal
 from care_core.ecosystems.vehicles import Kind as VehicleKind
 from care_core.errors import ProfileError, nearest
-from care_core.logs.base import LogFormat
+from care_core.logs.formats import FORMATS
 from care_core.profile.schema import EvidenceRule, Schema, Side
 from care_core.variables import (
     About,
@@ -190,7 +190,7 @@ class _Profile(Strict):
     @field_validator("logs")
     @classmethod
     def _are_formats(cls, formats: list[str]) -> list[str]:
-        known = [format.value for format in LogFormat]
+        known = [format.name for format in FORMATS]
         for format in formats:
             if format not in known:
                 raise ValueError(f"there is no log format '{format}'. {nearest(format, known)}".strip())

@@ -175,7 +175,7 @@ def _log(log: Log) -> LogEntry:
     size = sum(path.stat().st_size for path in files)
     return LogEntry(
         path=clean(str(log.path)),
-        format=log.format.value,
+        format=log.format.name,
         start=log.start,
         duration_s=log.duration_s,
         bytes=size,

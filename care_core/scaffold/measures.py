@@ -83,7 +83,7 @@ def find_measures(logs: Sequence[Seen], spec: Mapping[str, Any], bundled: Sequen
     types = {name: kind for log in logs for name, kind in log.channels.items()}
     named = set(MISSION_KINDS[str(spec["kind"])].needs(spec)) if spec["kind"] != "recording" else set()
     candidates += _signals(types, named, {one.name for one in candidates})
-    formats = tuple(dict.fromkeys(log.log.format.value for log in logs))
+    formats = tuple(dict.fromkeys(log.log.format.name for log in logs))
     variables = {variable.name: variable for variable in candidates}
     trial = Schema("trial", "", "", "", {}, formats, False, {**spec}, (), variables)
     found = Measures()

@@ -10,6 +10,7 @@ from care_core.ecosystems.measures import MISSION_KINDS
 from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.ros.measures.drive import GOAL_TIMEOUT_S, TOLERANCE_M, Leg, Status, analyse
 from care_core.ecosystems.vehicles import vehicle_of
+from care_core.metadata.navigation import is_ros
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.scaffold.seen import Seen
@@ -36,8 +37,8 @@ def find_missions(logs: Sequence[Seen], bundled: Sequence[Schema]) -> Missions:
         bundled: profiles that read such logs; one for the same kind of vehicle says how its missions are found.
     """
     first = logs[0]
-    if first.ecosystem in ("ardupilot", "px4"):
-        kind = "px4_flight" if first.ecosystem == "px4" else _vehicle_kind(first, bundled)
+    if not is_ros(first.stack):
+        kind = "px4_flight" if first.stack == "px4" else _vehicle_kind(first, bundled)
         if kind and any(_found(log, {"kind": kind}) for log in logs):
             return Missions({"kind": kind}, {"kind": "arming to disarming"}, False)
         return _whole("no log holds a mission from arming to disarming that is known how to judge")

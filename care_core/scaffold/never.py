@@ -10,14 +10,13 @@ from collections.abc import Mapping
 from fnmatch import translate
 
 from care_core.ecosystems.vehicles.self_written import SELF_WRITTEN, SIMULATOR_PREFIX
-from care_core.scaffold.seen import Ecosystem
 
 _WIRING = "wiring, radio, logging and what is fitted"
 _CODES = "codes and bit masks whose meaning is not known here"
 _SIMULATOR = {"the simulated world": (f"{SIMULATOR_PREFIX}*", "SIH_*")}
 _ROBOT = "what the robot and its map are"
 
-NEVER: Mapping[Ecosystem, Mapping[str, tuple[str, ...]]] = {
+NEVER: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "ardupilot": {
         **_SIMULATOR,
         **SELF_WRITTEN,
@@ -65,16 +64,16 @@ SAFETY = re.compile(
 """Failsafes and fences: no fix may loosen them."""
 
 
-def reason_against(ecosystem: Ecosystem, parameter: str) -> str:
+def reason_against(stack: str, parameter: str) -> str:
     """Why a parameter is no option; '' where nothing speaks against it."""
     name = parameter
-    if ecosystem == "ros1":
+    if stack == "ros1":
         name = parameter.rpartition("/")[2]
-    elif ecosystem == "ros2":
+    elif stack == "ros2":
         node, dot, own = parameter.partition(".")
         name = own if dot else node
     spellings = {name, name.rpartition(".")[2]}
-    for reason, patterns in NEVER[ecosystem].items():
+    for reason, patterns in NEVER.get(stack, {}).items():
         if any(re.fullmatch(translate(pattern), one) for pattern in patterns for one in spellings):
             return reason
     return ""

@@ -9,11 +9,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from care_core.configs.driven import same_value
 from care_core.metadata.fact import Fact
-from care_core.metadata.navigation import fact_of
+from care_core.metadata.navigation import fact_of, is_ros
 from care_core.records import Record, Struct, field
 from care_core.run import Setting
 from care_core.scaffold.never import SAFETY, reason_against
-from care_core.scaffold.seen import Ecosystem, Seen
+from care_core.scaffold.seen import Seen
 from care_core.variables import Role, ValueType, Variable
 
 _SPREAD = 2.0
@@ -84,19 +84,19 @@ def find_options(logs: Sequence[Seen], known: Mapping[str, Variable], taken: Ite
         known: options of the profiles that came with the program, by parameter.
         taken: names that other variables of the profile have.
     """
-    ecosystem = logs[0].ecosystem
+    stack = logs[0].stack
     found = Options()
     chosen: list[tuple[_Driven, Fact | None]] = []
     for driven in _all_driven(logs):
-        fact = fact_of(ecosystem, driven.name) if ecosystem in ("ros1", "ros2") else None
-        reason = _against(ecosystem, driven, len(logs), fact, known)
+        fact = fact_of(stack, driven.name) if is_ros(stack) else None
+        reason = _against(stack, driven, len(logs), fact, known)
         if reason:
             found.leave(driven.name, reason)
         else:
             chosen.append((driven, fact))
     names = _short_names([driven.name for driven, _ in chosen], known, set(taken))
     for driven, fact in chosen:
-        option = _option(names[driven.name], driven, ecosystem, fact, known.get(driven.name))
+        option = _option(names[driven.name], driven, stack, fact, known.get(driven.name))
         if option is None:
             found.leave(driven.name, "they are 0 and nothing says how large they may be")
         else:
@@ -115,9 +115,9 @@ def _all_driven(logs: Sequence[Seen]) -> list[_Driven]:
     ]
 
 
-def _against(ecosystem: Ecosystem, driven: _Driven, logs: int, fact: Fact | None, known: Mapping[str, Variable]) -> str:
+def _against(stack: str, driven: _Driven, logs: int, fact: Fact | None, known: Mapping[str, Variable]) -> str:
     """Why a parameter is no option; '' for one that is."""
-    reason = reason_against(ecosystem, driven.name)
+    reason = reason_against(stack, driven.name)
     if reason:
         return reason
     if any(number(value) is None for value in driven.last):
@@ -126,7 +126,7 @@ def _against(ecosystem: Ecosystem, driven: _Driven, logs: int, fact: Fact | None
         return f"not every log holds them (an option needs a value in all {logs})"
     default = driven.default if fact is None or driven.default is not None else fact.default_number
     is_new = len(driven.values) == 1 and driven.name not in known
-    if is_new and default is None and ecosystem in ("ardupilot", "px4"):
+    if is_new and default is None and not is_ros(stack):
         return "they never changed, and no log says their default"
     is_set = len(driven.values) > 1 or default is None or not same_value(driven.usual[0], default)
     return "" if is_set or driven.name in known else "at their default in every log"
@@ -158,11 +158,9 @@ def _ends_alike(other: str, parts: Sequence[str]) -> bool:
     return own[-len(parts) :] == list(parts)
 
 
-def _option(
-    name: str, driven: _Driven, ecosystem: Ecosystem, fact: Fact | None, known: Variable | None
-) -> Option | None:
-    kind, labels, type_from = _type(driven, ecosystem, fact, known)
-    reference, reference_from = _reference(driven, ecosystem, known)
+def _option(name: str, driven: _Driven, stack: str, fact: Fact | None, known: Variable | None) -> Option | None:
+    kind, labels, type_from = _type(driven, stack, fact, known)
+    reference, reference_from = _reference(driven, stack, known)
     bounds = (0.0, 1.0), "yes or no"
     if kind == "enum":
         bounds = (min(code for code, _ in labels), max(code for code, _ in labels)), type_from
@@ -198,7 +196,7 @@ def _driven_as(driven: _Driven) -> str:
 
 
 def _type(
-    driven: _Driven, ecosystem: Ecosystem, fact: Fact | None, known: Variable | None
+    driven: _Driven, stack: str, fact: Fact | None, known: Variable | None
 ) -> tuple[ValueType, tuple[tuple[float, str], ...], str]:
     if known is not None and (not known.labels or set(driven.values) <= {code for code, _ in known.labels}):
         return known.type, known.labels, "bundled profile"
@@ -206,17 +204,17 @@ def _type(
         return "enum", fact.values, "bundled table"
     if any(isinstance(value, str) for value in driven.last):
         return "bool", (), "log"
-    if ecosystem in ("ros1", "ros2"):
+    if is_ros(stack):
         return ("int" if all(isinstance(value, int) for value in driven.last) else "float"), (), "log"
     everything = (*driven.values, *([] if driven.default is None else [driven.default]))
     is_whole = all(value.is_integer() for value in everything) and max(map(abs, everything)) >= _WHOLE
     return ("int" if is_whole else "float"), (), "its values"
 
 
-def _reference(driven: _Driven, ecosystem: Ecosystem, known: Variable | None) -> tuple[float, str]:
+def _reference(driven: _Driven, stack: str, known: Variable | None) -> tuple[float, str]:
     """The configuration to judge against: the firmware's; for ROS, whose defaults drive no robot, the usual one."""
     default = driven.default
-    if ecosystem in ("ardupilot", "px4") and default is not None:
+    if not is_ros(stack) and default is not None:
         return default, "firmware default (log)"
     usual, times = driven.usual
     if times == 1 and len(driven.last) > 1 and known is not None and known.default is not None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from care_core.ecosystems.vehicles import vehicle_of
 from care_core.errors import LogError, UsageError
 from care_core.extract.read import reading_plan
+from care_core.metadata.navigation import is_ros
 from care_core.profile.reading import parse_schema
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
@@ -49,7 +50,7 @@ def scaffold(logs: Sequence[Seen], name: str, bundled: Sequence[Schema]) -> Scaf
         LogError: the logs hold neither parameters nor anything that can be measured.
     """
     _refuse_mixed(logs)
-    readers = [one for one in bundled if logs[0].log.format.value in one.logs and not one.carried_over]
+    readers = [one for one in bundled if logs[0].log.format.name in one.logs and not one.carried_over]
     missions = find_missions(logs, readers)
     measures = find_measures(logs, missions.spec, readers)
     taken = {one.variable.name for one in measures.kept}
@@ -67,11 +68,11 @@ def scaffold(logs: Sequence[Seen], name: str, bundled: Sequence[Schema]) -> Scaf
 
 
 def _refuse_mixed(logs: Sequence[Seen]) -> None:
-    others = [seen for seen in logs if seen.ecosystem != logs[0].ecosystem]
+    others = [seen for seen in logs if seen.stack != logs[0].stack]
     if others:
         raise UsageError(
-            f"The logs are of different robots: {logs[0].path.name} is of {logs[0].ecosystem}, "
-            f"{others[0].path.name} of {others[0].ecosystem}.",
+            f"The logs are of different robots: {logs[0].path.name} is of {logs[0].stack}, "
+            f"{others[0].path.name} of {others[0].stack}.",
             hint="Name logs of one robot.",
         )
 
@@ -123,7 +124,7 @@ def _head(name: str, logs: Sequence[Seen], measures: Measures, good: Sequence[in
     if match:
         yield "# What a log must say to be of this platform."
         yield f"match: {scalar(match)}"
-    formats = list(dict.fromkeys(seen.log.format.value for seen in logs))
+    formats = list(dict.fromkeys(seen.log.format.name for seen in logs))
     yield f"logs: {scalar(formats)}"
     yield ""
 
@@ -132,7 +133,7 @@ def _platform(seen: Seen) -> str:
     facts = seen.log.facts
     named = [facts[key] for key in ("firmware", "stack", "vehicle", "frame") if facts.get(key)]
     ros = f"ROS {facts['ros']}" if "ros" in facts else ""
-    return " ".join(part for part in (ros, *dict.fromkeys(named)) if part) or seen.log.format.value
+    return " ".join(part for part in (ros, *dict.fromkeys(named)) if part) or seen.log.format.name
 
 
 def _match(logs: Sequence[Seen]) -> dict[str, str]:
@@ -143,7 +144,7 @@ def _match(logs: Sequence[Seen]) -> dict[str, str]:
         if len(words) == 1 and (word := words.pop()):
             match[key] = word
     kinds = {vehicle_of(seen.log.facts, seen.settings).kind for seen in logs}
-    if len(kinds) == 1 and logs[0].ecosystem in ("ardupilot", "px4") and (kind := kinds.pop()) != "unknown":
+    if len(kinds) == 1 and not is_ros(logs[0].stack) and (kind := kinds.pop()) != "unknown":
         match["vehicle"] = kind
     return match
 

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
 
-from care_core.ecosystems.registry import run_model
-from care_core.logs.base import Log, LogFormat
+from care_core.ecosystems.registry import ecosystem_of, run_model
+from care_core.logs.base import Log
 from care_core.logs.opening import open_log
 from care_core.records import Record
 from care_core.run import Setting
-
-Ecosystem = Literal["ardupilot", "px4", "ros1", "ros2"]
-
-_ARDUPILOT = (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT, LogFormat.MAVLINK_TLOG)
 
 
 class Seen(Record, eq=False):
@@ -27,12 +22,9 @@ class Seen(Record, eq=False):
     """Those that hold a message, with their types."""
 
     @property
-    def ecosystem(self) -> Ecosystem:
-        if self.log.format in _ARDUPILOT:
-            return "ardupilot"
-        if self.log.format is LogFormat.PX4_ULG:
-            return "px4"
-        return "ros1" if self.log.facts.get("ros") == "1" else "ros2"
+    def stack(self) -> str:
+        """Whose parameters it holds: `ardupilot`, `px4`, `ros1`, `ros2`."""
+        return ecosystem_of(self.log.format).stack(self.log.facts)
 
 
 def see(path: Path) -> Seen:

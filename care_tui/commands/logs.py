@@ -64,7 +64,7 @@ def params(
         histories = chosen
     remarks = {name: remark(history, source=sources) for name, history in histories.items() if changed or sources}
     settings = {name: history[-1] for name, history in histories.items()}
-    emit(write_params(settings, format_for(opened.format.value, settings), remarks), out, force=force)
+    emit(write_params(settings, format_for(opened.format.name, settings), remarks), out, force=force)
 
 
 @app.command()

@@ -19,8 +19,9 @@ from care_core.ecosystems.examine import examine
 from care_core.ecosystems.registry import run_model
 from care_core.errors import CareError, LogError
 from care_core.extract.read import read_run
-from care_core.logs import file_windows
-from care_core.logs.base import Log, LogFormat
+from care_core.logs import file_windows, formats
+from care_core.logs.base import Log
+from care_core.logs.formats import LogFormat
 from care_core.logs.opening import open_log
 from care_core.profile.reading import read_schema
 from care_core.profile.store import load_profile
@@ -53,10 +54,10 @@ def short_tlog(path: Path) -> Path:
 
 
 MAKERS: dict[LogFormat, Callable[[Path], Path]] = {
-    LogFormat.DATAFLASH_BIN: short_bin,
-    LogFormat.DATAFLASH_TEXT: short_text,
-    LogFormat.MAVLINK_TLOG: short_tlog,
-    LogFormat.PX4_ULG: write_ulog,
+    formats.DATAFLASH_BIN: short_bin,
+    formats.DATAFLASH_TEXT: short_text,
+    formats.MAVLINK_TLOG: short_tlog,
+    formats.PX4_ULG: write_ulog,
 }
 FIELDS = ("roll", "text", "Roll", "TimeUS", "Message", "Value", "voltage_v", "message", "Lat")
 
@@ -91,7 +92,7 @@ def test_a_log_cut_anywhere(kind: LogFormat, tmp_path: Path) -> None:
     assert counts[-1] > 0
 
 
-HELD = (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT, LogFormat.MAVLINK_TLOG)
+HELD = (formats.DATAFLASH_BIN, formats.DATAFLASH_TEXT, formats.MAVLINK_TLOG)
 
 
 @pytest.mark.parametrize("kind", HELD)

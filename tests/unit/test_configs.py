@@ -346,7 +346,7 @@ def test_commands_of_each_ecosystem() -> None:
 def test_commands_of_ros_2() -> None:
     speed = Variable("speed", Role.OPTION, parameters=(MAX_VEL,))
     plugin = Variable("rate", Role.OPTION, reboot_required=True, parameters=("/a.rate",))
-    assert apply_commands([Change(speed, 0.5, 1.0), Change(plugin, 20.0, 10.0)], format_for("ros2-mcap")) == [
+    assert apply_commands([Change(speed, 0.5, 1.0), Change(plugin, 20.0, 10.0)], format_for("mcap")) == [
         "ros2 param set /controller_server FollowPath.max_vel_x 1.0",
         "# in the parameter file of /a: rate: 10.0, then start it again",
     ]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from care_core.ecosystems.how_to_record import how_to_record
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission
+from care_core.ecosystems.registry import how_to_record
 from care_core.report.extractors import document
 from care_core.run import Unavailable
 from tests.tables import no_model

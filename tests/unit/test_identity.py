@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from care_core.extract.identity import identify, named, robot_of
-from care_core.logs.base import LogFormat
+from care_core.logs import formats
 from care_core.logs.opening import open_log
 from care_core.records import field
 from care_core.run import Setting
@@ -114,14 +114,14 @@ def test_the_board_comes_before_what_people_set(
 def test_a_ros_log_names_its_robot_where_somebody_wrote_it(
     types: dict[str, str], facts: dict[str, str], told: dict[str, str], id: str | None
 ) -> None:
-    log = Told({topic: {} for topic in types}, types=types, facts=facts, told=told, format=LogFormat.MCAP)
+    log = Told({topic: {} for topic in types}, types=types, facts=facts, told=told, format=formats.MCAP)
     robot = identify(log)
     assert (robot and robot.id) == id
 
 
 def test_the_model_is_told_and_told_to_be_no_more() -> None:
     text = np.array(["<?xml version='1.0'?><!-- <robot> --><robot xmlns:x='y' name=\"husky\x1b\">"] * 201, dtype=object)
-    robot = identify(Told({"/robot_description": {"data": text}}, format=LogFormat.ROS2_DB3))
+    robot = identify(Told({"/robot_description": {"data": text}}, format=formats.ROS2_DB3))
     assert robot is not None
     assert (robot.name, robot.is_sure) == ("husky\\x1b", False)
 

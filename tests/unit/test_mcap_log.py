@@ -13,7 +13,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 from care_core.ecosystems.examine import examine
 from care_core.ecosystems.registry import run_model
-from care_core.logs.base import LogFormat
+from care_core.logs import formats
 from care_core.logs.mcap_log import McapLog
 from care_core.logs.opening import open_log
 from tests.ros_samples import (
@@ -46,7 +46,7 @@ def check(path: Path) -> McapLog:
     """Every value is the one that was written; answers the log."""
     log = open_log(path)
     assert isinstance(log, McapLog)
-    assert log.format is LogFormat.MCAP
+    assert log.format is formats.MCAP
     tables = log.read(WANTED)
     assert set(tables) == {"/imu", "/note"}
     table = tables["/imu"]

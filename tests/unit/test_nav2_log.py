@@ -45,6 +45,6 @@ def test_a_recorded_nav2_drive(tmp_path: Path, plugin: StoragePlugin) -> None:
         "recovery behavior Spin",
         "controller_server: Failed to make progress",
     ]
-    assert write_params(run.settings, format_for(log.format.value, run.settings)) == (
+    assert write_params(run.settings, format_for(log.format.name, run.settings)) == (
         "/controller_server:\n  ros__parameters:\n    FollowPath:\n      max_vel_x: 0.26\n"
     )

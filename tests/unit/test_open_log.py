@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from care_core.errors import ExitCode, LogError
-from care_core.logs.base import LogFormat
+from care_core.logs import formats
 from care_core.logs.digest import log_digest
 from care_core.logs.opening import open_log, sniff
 
@@ -47,14 +47,14 @@ def test_the_name_of_a_file_does_not_matter(tmp_path: Path) -> None:
     bag, log = tmp_path / "a.BIN", tmp_path / "b.bag"
     bag.write_bytes(b"#ROSBAG V2.0\n" + b"\0" * 80)
     log.write_bytes(b"\xa3\x95\x80" + b"\0" * 86)
-    assert sniff(bag) is LogFormat.ROS1_BAG
-    assert sniff(log) is LogFormat.DATAFLASH_BIN
+    assert sniff(bag) is formats.ROS1_BAG
+    assert sniff(log) is formats.DATAFLASH_BIN
 
 
 def test_a_damaged_first_byte_does_not_hide_a_dataflash_log(tmp_path: Path) -> None:
     path = tmp_path / "a.BIN"
     path.write_bytes((b"\0" + b"\x95\x80" + b"\0" * 86) + b"\xa3\x95\x80" + b"\0" * 86)
-    assert sniff(path) is LogFormat.DATAFLASH_BIN
+    assert sniff(path) is formats.DATAFLASH_BIN
 
 
 def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:

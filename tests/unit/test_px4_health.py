@@ -11,7 +11,9 @@ import numpy as np
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Health
 from care_core.ecosystems.px4.examining import examine
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs import formats
+from care_core.logs.base import Channel, Table, Wanted
+from care_core.logs.formats import LogFormat
 from care_core.records import Struct, field
 from care_core.run import Damage, Setting
 
@@ -24,7 +26,7 @@ class MadeLog(Struct, eq=False):
     parameters: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
     damage: tuple[Damage, ...] = ()
     path: Path = Path("made.ulg")
-    format: LogFormat = LogFormat.PX4_ULG
+    format: LogFormat = formats.PX4_ULG
     start: str | None = None
     facts: Mapping[str, str] = field(
         default_factory=lambda: {"stack": "PX4", "firmware": "PX4 v1.15.0 (cb09dde6)", "vehicle": "multicopter"}

@@ -18,7 +18,9 @@ from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Args, Missi
 from care_core.ecosystems.registry import run_model
 from care_core.errors import ProfileError, UsageError
 from care_core.extract.read import read_run, read_runs, reading_plan
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs import formats
+from care_core.logs.base import Channel, Table, Wanted
+from care_core.logs.formats import LogFormat
 from care_core.profile.schema import EvidenceRule, Schema
 from care_core.records import Struct, field
 from care_core.run import Damage, Evidence, Setting, Unavailable, Value
@@ -32,7 +34,7 @@ class MadeLog(Struct, eq=False):
     known: Mapping[str, tuple[Setting, ...]] = field(default_factory=dict)
     spans: tuple[tuple[float, float, bool], ...] = ((0.0, 10.0, True),)
     facts: Mapping[str, str] = field(default_factory=dict)
-    format: LogFormat = LogFormat.DATAFLASH_BIN
+    format: LogFormat = formats.DATAFLASH_BIN
     start: str | None = None
     duration_s: float = 20.0
     damage: tuple[Damage, ...] = ()

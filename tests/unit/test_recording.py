@@ -41,7 +41,7 @@ def test_the_parts_of_a_split_bag_are_one_run(tmp_path: Path, names: tuple[str, 
     tables = log.read(WANTED)
     assert tables["/note"]["data"].tolist() == [f"message {row} é" for row in range(MESSAGES)]
     np.testing.assert_allclose(tables["/imu"]["header.stamp"], tables["/imu"].t, atol=1e-9)
-    assert (log.damage, log.format.value) == ((), "ros1-bag")
+    assert (log.damage, log.format.name) == ((), "ros1-bag")
     one = open_log(folder / names[1])
     assert one.facts["part"] == "2 of 3; name the folder to read all as one run"
     assert len(one.read(WANTED)["/note"]) == MESSAGES // 3

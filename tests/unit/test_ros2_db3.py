@@ -18,7 +18,8 @@ from care_core.configs.compare import Side, compare
 from care_core.configs.formats import ConfigFormat, write_params
 from care_core.configs.loading import read_config
 from care_core.errors import LogError
-from care_core.logs.base import Log, LogFormat
+from care_core.logs import formats
+from care_core.logs.base import Log
 from care_core.logs.digest import log_digest
 from care_core.logs.opening import open_log
 from care_core.logs.ros2_db3 import _Database
@@ -26,7 +27,7 @@ from tests.ros_samples import IMU, MESSAGES, ROS2, SECOND_NS, START_NS, TEXT, WA
 
 
 def check(log: Log) -> None:
-    assert log.format is LogFormat.ROS2_DB3
+    assert log.format is formats.ROS2_DB3
     tables = log.read(WANTED)
     np.testing.assert_allclose(tables["/imu"].t, np.arange(MESSAGES) / 10, atol=1e-9)
     np.testing.assert_allclose(tables["/imu"]["header.stamp"], tables["/imu"].t, atol=1e-9)

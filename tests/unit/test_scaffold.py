@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from care_core import plain_yaml
 from care_core.errors import UsageError
-from care_core.logs.base import LogFormat
+from care_core.logs import formats
 from care_core.metadata.navigation import fact_of
 from care_core.records import field
 from care_core.run import Setting
@@ -45,7 +45,7 @@ def seen(parameters: Mapping[str, Any], *, ros: str = "", defaults: Mapping[str,
     log = SetLog(
         tables={},
         path=Path("a.mcap" if ros else "a.BIN"),
-        format=LogFormat.MCAP if ros else LogFormat.DATAFLASH_BIN,
+        format=formats.MCAP if ros else formats.DATAFLASH_BIN,
         facts={"ros": ros} if ros else {"firmware": "ArduPlane V4.5.0"},
         parameters=parameters,
         defaults=defaults or {},

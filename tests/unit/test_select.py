@@ -11,7 +11,9 @@ from care_core.errors import ProfileError
 from care_core.extract.coverage import cover
 from care_core.extract.read import reading_plan
 from care_core.extract.select import choose_profile, fitting_profile
-from care_core.logs.base import Channel, LogFormat, Table, Wanted
+from care_core.logs import formats
+from care_core.logs.base import Channel, Table, Wanted
+from care_core.logs.formats import LogFormat
 from care_core.profile.schema import Schema
 from care_core.records import Record, Struct, field, replace
 from care_core.run import FITS, Damage, Fit, Setting
@@ -29,7 +31,7 @@ class NamedLog(Struct, eq=False):
     sources: tuple[str, ...] = ()
     facts: Mapping[str, str] = field(default_factory=dict)
     path: Path = Path("a.BIN")
-    format: LogFormat = LogFormat.DATAFLASH_BIN
+    format: LogFormat = formats.DATAFLASH_BIN
     start: str | None = None
     duration_s: float = 1.0
     damage: tuple[Damage, ...] = ()

@@ -11,7 +11,7 @@ from care_core.application.case import Case
 from care_core.application.signals import Signal, signals_of, trace_of, whole_of
 from care_core.application.viewing import messages_of
 from care_core.errors import CareError
-from care_core.logs.base import LogFormat
+from care_core.logs import formats
 from care_core.records import replace
 from care_tui.render.plot import plot
 from tests.made import MadeLog, T
@@ -68,7 +68,7 @@ def test_what_the_robot_said_is_in_the_words_of_its_vehicle() -> None:
     said = {(one.kind, one.text) for one in messages_of(case_of(flight))}
     assert {("message", "1"), ("ERR", "radio failsafe"), ("over", "radio failsafe over"), ("event", "disarmed")} <= said
     words, levels = np.full(len(T), "gyro 0 failed", dtype=object), np.full(len(T), "ERROR", dtype=object)
-    px4 = MadeLog({"logged_messages": {"message": words, "level": levels}}, format=LogFormat.PX4_ULG)
+    px4 = MadeLog({"logged_messages": {"message": words, "level": levels}}, format=formats.PX4_ULG)
     assert ("ERROR", "gyro 0 failed") in {(one.kind, one.text) for one in messages_of(case_of(px4))}
 
 

@@ -11,7 +11,9 @@ from care_core.configs.changes import apply_commands
 from care_core.configs.driven import configuration
 from care_core.configs.formats import ConfigFormat
 from care_core.extract.spelling import spelled
-from care_core.logs.base import Log, LogFormat
+from care_core.logs import formats
+from care_core.logs.base import Log
+from care_core.logs.formats import LogFormat
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
 from care_core.records import Struct, field
@@ -27,7 +29,7 @@ class Flown(Struct, eq=False):
 
     held: Mapping[str, float]
     facts: Mapping[str, str] = field(default_factory=lambda: {"firmware": "ArduCopter V4.7.0"})
-    format: LogFormat = LogFormat.DATAFLASH_BIN
+    format: LogFormat = formats.DATAFLASH_BIN
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
         return {name: (Setting(name, value, "PARM"),) for name, value in self.held.items()}

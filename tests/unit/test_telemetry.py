@@ -76,7 +76,7 @@ def test_the_profile_finds_its_sources_in_telemetry(schema: Schema, tmp_path: Pa
     assert fit.options == len(schema.options)
     assert fit.sources >= 14
     assert {"ATT", "POS", "MSG", "ATTITUDE"} <= {channel.name for channel in as_dataflash(log).channels()}
-    assert as_dataflash(open_log(SAMPLE)).format.value == "dataflash-bin"
+    assert as_dataflash(open_log(SAMPLE)).format.name == "dataflash-bin"
 
 
 def test_a_text_log_gives_the_same_run(recorded: Run, schema: Schema, tmp_path: Path) -> None:

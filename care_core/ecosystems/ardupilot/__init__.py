@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.dictionary import Dictionary
 from care_core.ecosystems.findings import Health
-from care_core.logs.base import Channel, Log, LogFormat
+from care_core.logs.base import Channel, Log
+from care_core.logs.formats import LogFormat
+from care_core.run import Robot
 
 
 class ArduPilot(Ecosystem):
@@ -15,7 +18,6 @@ class ArduPilot(Ecosystem):
 
     name = "ardupilot"
     title = "ArduPilot"
-    formats = (LogFormat.DATAFLASH_BIN, LogFormat.DATAFLASH_TEXT, LogFormat.MAVLINK_TLOG)
     measures = (
         "care_core.ecosystems.ardupilot.measures.energy",
         "care_core.ecosystems.ardupilot.measures.events",
@@ -42,6 +44,22 @@ class ArduPilot(Ecosystem):
 
     def missions(self, channels: tuple[Channel, ...]) -> Iterator[Mapping[str, Any]]:
         yield {"kind": "ardupilot_flight"}
+
+    def messages(self) -> Dictionary:
+        return {}
+
+    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
+        return "ardupilot-param"
+
+    def robots(self, log: Log) -> Iterator[Robot]:
+        from care_core.ecosystems.vehicles.identity import robots
+
+        return robots(log)
+
+    def how_to_record(self, channel: str) -> str:
+        from care_core.ecosystems.ardupilot.recording import how_to_record
+
+        return how_to_record(channel)
 
 
 ECOSYSTEM = ArduPilot()

@@ -13,7 +13,8 @@ from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, Health
 from care_core.ecosystems.ranking import rank_findings
-from care_core.logs.base import LogFormat, Wanted
+from care_core.logs import formats
+from care_core.logs.base import Wanted
 from care_core.logs.plausible import clock_doubt, plausible
 
 _TOO_SHORT_S = 2.0
@@ -37,7 +38,7 @@ READS: Wanted = _plan()
 def flight_of(model: RunModel) -> Flight:
     """The flight that a DataFlash or telemetry log holds."""
     log, tables = model.log, plausible(model.tables(READS))
-    end_s, is_telemetry = log.duration_s, log.format is LogFormat.MAVLINK_TLOG
+    end_s, is_telemetry = log.duration_s, log.format is formats.MAVLINK_TLOG
     breaks_off = any(damage.time_s is None or damage.time_s >= end_s - _LAST_S for damage in log.damage)
     clock_jumps = any(damage.is_jump for damage in log.damage)
     return Flight(tables, log.settings(), log.facts, end_s, is_telemetry, breaks_off, clock_jumps)

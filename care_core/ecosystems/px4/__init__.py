@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.dictionary import Dictionary
 from care_core.ecosystems.findings import Health
-from care_core.logs.base import Channel, Log, LogFormat
+from care_core.logs.base import Channel, Log
+from care_core.logs.formats import LogFormat
+from care_core.run import Robot
 
 
 class Px4(Ecosystem):
@@ -15,7 +18,6 @@ class Px4(Ecosystem):
 
     name = "px4"
     title = "PX4"
-    formats = (LogFormat.PX4_ULG,)
     measures = ("care_core.ecosystems.px4.missions",)
 
     def model(self, log: Log) -> RunModel:
@@ -31,6 +33,17 @@ class Px4(Ecosystem):
 
     def missions(self, channels: tuple[Channel, ...]) -> Iterator[Mapping[str, Any]]:
         yield {"kind": "px4_flight"}
+
+    def messages(self) -> Dictionary:
+        return {}
+
+    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
+        return "qgc-params"
+
+    def robots(self, log: Log) -> Iterator[Robot]:
+        from care_core.ecosystems.vehicles.identity import robots
+
+        return robots(log)
 
 
 ECOSYSTEM = Px4()

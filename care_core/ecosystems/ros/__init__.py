@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.dictionary import Dictionary
 from care_core.ecosystems.findings import Health
-from care_core.logs.base import Channel, Log, LogFormat
+from care_core.logs.base import Channel, Log
+from care_core.logs.formats import MCAP, ROS1_BAG, LogFormat
+from care_core.run import Robot
 
 _PATIENCE_S = 1e9
 """How long a goal may take where nobody gave it a time."""
@@ -24,7 +27,6 @@ class Ros(Ecosystem):
 
     name = "ros"
     title = "ROS"
-    formats = (LogFormat.ROS1_BAG, LogFormat.ROS2_DB3, LogFormat.MCAP)
     measures = (
         "care_core.ecosystems.ros.measures.actionlib",
         "care_core.ecosystems.ros.measures.battery",
@@ -50,6 +52,28 @@ class Ros(Ecosystem):
             yield {"kind": "actionlib_goals", "action": action, "goal_timeout_s": _PATIENCE_S}
         if any(channel.count and channel.name.endswith(_STATUS) for channel in channels):
             yield {"kind": "nav2_goals", "goal_timeout_s": _PATIENCE_S}
+
+    def messages(self) -> Dictionary:
+        return {}
+
+    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
+        """An MCAP may be of either ROS: only in ROS 2 have names of parameters a dot, after the node."""
+        names = list(parameters) if format is MCAP else []
+        is_ros1 = format is ROS1_BAG or (names and not any("." in name for name in names))
+        return "ros1-yaml" if is_ros1 else "ros2-yaml"
+
+    def robots(self, log: Log) -> Iterator[Robot]:
+        from care_core.ecosystems.ros.identity import robots
+
+        return robots(log)
+
+    def how_to_record(self, channel: str) -> str:
+        if "/_" in channel:
+            return f"ros2 bag record --include-hidden-topics {channel}"
+        return f"record it: rosbag record {channel}, or ros2 bag record {channel}" if channel.startswith("/") else ""
+
+    def stack(self, facts: Mapping[str, str]) -> str:
+        return "ros1" if facts.get("ros") == "1" else "ros2"
 
 
 def _actions(channels: tuple[Channel, ...]) -> list[str]:

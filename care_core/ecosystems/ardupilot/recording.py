@@ -1,4 +1,4 @@
-"""How to record a channel that a log lacks: what to say beside "no BAT in the log"."""
+"""Which bits of LOG_BITMASK have a DataFlash message written."""
 
 from __future__ import annotations
 
@@ -28,13 +28,9 @@ _BITS: dict[str, tuple[str, int]] = {
 
 
 def how_to_record(channel: str) -> str:
-    """What to do before the next run to have a topic (it begins with a slash) or a DataFlash message in the log."""
-    if "/_" in channel:
-        return f"ros2 bag record --include-hidden-topics {channel}"
-    if channel.startswith("/"):
-        return f"record it: rosbag record {channel}, or ros2 bag record {channel}"
+    """What to set so that the vehicle writes a message, "" where no bit is known for it."""
     message = channel.partition(" ")[0]
-    if message in _BITS:
-        name, value = _BITS[message]
-        return f"set '{name}' ({value}) in LOG_BITMASK, so that the vehicle writes {channel}"
-    return f"record {channel}"
+    if message not in _BITS:
+        return ""
+    name, value = _BITS[message]
+    return f"set '{name}' ({value}) in LOG_BITMASK, so that the vehicle writes {channel}"
