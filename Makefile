@@ -30,27 +30,27 @@ bench: $(DEV)
 
 docs: $(BASE)
 	$(BIN)/python -m care_core.report.extractors docs/extractors.md
-	$(BIN)/python -m benchmarks.documents
+	$(BIN)/python -m benchmarks.tools.documents
 
 profiles: $(DEV)
-	$(BIN)/python -m benchmarks.train_profiles
+	$(BIN)/python -m benchmarks.tools.train_profiles
 
 screenshots: $(BASE)
-	$(BIN)/python -m benchmarks.screenshots
+	$(BIN)/python -m benchmarks.tools.screenshots
 
 # The manual page, from the help of the commands.
 man: $(BASE)
 	$(BIN)/python -m care_tui.manual docs/care.1
 
 walk: $(BASE)
-	$(BIN)/python -m benchmarks.walk
+	$(BIN)/python -m benchmarks.tools.walk
 
 fuzz: $(DEV)
-	$(BIN)/python -m tests.fuzzing --seconds 60
+	$(BIN)/python -m benchmarks.tools.fuzzing --seconds 60
 
 # Logs of yours taken apart by their format and put together wrong: make mutate LOGS="a.BIN b.bag".
 mutate: $(DEV)
-	$(BIN)/python -m tests.mutating $(LOGS)
+	$(BIN)/python -m benchmarks.tools.mutating $(LOGS)
 
 # Each format cut at 200 places and with 200 flipped bits; the tests do with 50.
 damage: $(DEV)
@@ -60,7 +60,7 @@ kills: $(DEV)
 	CARE_KILLS=200 $(BIN)/pytest -q tests/integration/test_kills.py
 
 matrix:
-	$(PYTHON) -m benchmarks.matrix
+	$(PYTHON) -m benchmarks.tools.matrix
 
 # What a base installation holds, by name, version and license: build/sbom.json (CycloneDX).
 sbom:

@@ -108,10 +108,10 @@ BENCHMARKS = (
     Benchmark("growth", "benchmarks.growth --picture docs/growth.svg", "2 GB", "none"),
     Benchmark("slow_link", "benchmarks.slow_link", "no key lost, still 1 s after the release", "none"),
     Benchmark("tui", "benchmarks.tui", "0.5 s to the first frame, 50 ms a key, 2 kB", "none"),
-    Benchmark("fuzz", "tests.fuzzing --seconds 60", "no finding in any target", "none"),
+    Benchmark("fuzz", "benchmarks.tools.fuzzing --seconds 60", "no finding in any target", "none"),
     Benchmark(
         "mutate",
-        "tests.mutating --count 3000 samples/arducopter_failed.BIN samples/ardurover_failed.BIN"
+        "benchmarks.tools.mutating --count 3000 samples/arducopter_failed.BIN samples/ardurover_failed.BIN"
         " samples/move_base_drive.bag samples/nav2_failed.mcap",
         "no traceback, no death, 1 GB and 20 s",
         "none",
@@ -123,7 +123,7 @@ BENCHMARKS = (
         "none",
         settings=(("CARE_KILLS", "200"),),
     ),
-    Benchmark("matrix", "benchmarks.matrix", "Python 3.10 to 3.13, 420 MB, wheels for aarch64", "none"),
+    Benchmark("matrix", "benchmarks.tools.matrix", "Python 3.10 to 3.13, 420 MB, wheels for aarch64", "none"),
 )
 
 
@@ -132,7 +132,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     shared = os.environ.get("CARE_SHARED")
     parser.add_argument("--shared", type=Path, default=Path(shared) if shared else None, help="folder with `data`")
-    parser.add_argument("--tables", type=Path, help="tables of runs (benchmarks.train_profiles --tables)")
+    parser.add_argument("--tables", type=Path, help="tables of runs (benchmarks.tools.train_profiles --tables)")
     parser.add_argument("--only", action="append", choices=[one.name for one in BENCHMARKS])
     parser.add_argument("--list", action="store_true")
     asked = parser.parse_args()

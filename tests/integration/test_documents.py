@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.documents import DOCUMENTS, ROOT, played, prepare, sessions
+from benchmarks.tools.documents import DOCUMENTS, ROOT, played, prepare, sessions
 
 _LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
 

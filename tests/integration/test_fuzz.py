@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests import fuzzing
+from benchmarks.tools import fuzzing
 
 SECONDS = 1.0
 

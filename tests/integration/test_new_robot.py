@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.documents import ROOT, prepare, printed, sessions
+from benchmarks.tools.documents import ROOT, prepare, printed, sessions
 from care_core import plain_yaml
 from care_core.collect.campaign import Campaign, read_campaign
 from care_core.collect.sampling import points

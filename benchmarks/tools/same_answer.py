@@ -1,6 +1,6 @@
 """Whether two checkouts give the same answer for the same bytes.
 
-    python -m benchmarks.same_answer BEFORE AFTER LOG_OR_FOLDER... [--save FILE]
+    python -m benchmarks.tools.same_answer BEFORE AFTER LOG_OR_FOLDER... [--save FILE]
 
 BEFORE and AFTER are checkouts of the project, or answers that an earlier run saved. Each triages every log, in a
 process of its own checkout; the JSON report and the text must be the same to the byte, and a refusal the same sentence.

@@ -1,4 +1,4 @@
-"""Real logs broken where it hurts: `python -m tests.mutating LOG... [--count 3000] [--seed 0] [--kept DIR]`.
+"""Real logs broken where it hurts: `python -m benchmarks.tools.mutating LOG... [--count 3000] [--seed 0] [--kept DIR]`.
 
 The fuzzer breaks small files byte by byte; here whole recordings are taken apart by their own format and put together
 again with one to three things wrong that a sound file never has: declared lengths, counts, types and texts, stamps,

@@ -1,6 +1,6 @@
 """Retrains the bundled profiles from their data.
 
-    python -m benchmarks.train_profiles [--shared DIR] [--only NAME]... [--tables DIR]
+    python -m benchmarks.tools.train_profiles [--shared DIR] [--only NAME]... [--tables DIR]
 
 The platforms with recorded missions are ingested from the logs themselves, the others from published tables; the
 lander's arm is simulated anew by its campaign.

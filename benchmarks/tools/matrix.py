@@ -1,4 +1,4 @@
-"""The package on every Python it is for: `python -m benchmarks.matrix [--only 3.12]`.
+"""The package on every Python it is for: `python -m benchmarks.tools.matrix [--only 3.12]`.
 
 Builds the wheel and the source archive once. Each is installed, base dependencies alone, into a bare environment of
 each Python that is found (`python3.10` to `python3.13` on the path), where `care --version` must work and `care demo`
@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 PYTHONS = ("3.10", "3.11", "3.12", "3.13")
 PLATFORMS = ("manylinux2014_aarch64", "manylinux_2_28_aarch64")
 MOST_MB = 420

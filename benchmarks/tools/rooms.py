@@ -1,4 +1,4 @@
-"""Which rooms the path of a log and a threshold pass through in `care triage`: `python -m benchmarks.rooms`.
+"""Which rooms the path of a log and a threshold pass through in `care triage`: `python -m benchmarks.tools.rooms`.
 
 Every function of the project that is called with the value (alone, in a list or a mapping, or as the bound of a
 `Threshold`) is noted. Prints, per value, how many functions of each room are given it, and how often the log is opened.
@@ -46,7 +46,7 @@ def walked(value: Path | float, *words: str) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
 
     def note(frame: FrameType, event: str, _: object) -> None:
-        if event == "call" and (room := _room(frame)) is not None and room != "benchmarks":
+        if event == "call" and (room := _room(frame)) is not None and room != "benchmarks/tools":
             code = frame.f_code
             given = [frame.f_locals.get(name) for name in code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]]
             if any(_holds(argument, value) for argument in given):

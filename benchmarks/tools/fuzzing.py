@@ -1,4 +1,6 @@
-"""Every reader fed with files that were broken at random: `python -m tests.fuzzing [--seconds 60] [--only NAMES]`.
+"""Every reader fed with files that were broken at random.
+
+    python -m benchmarks.tools.fuzzing [--seconds 60] [--only NAMES]
 
 A target reads what a good file became after a few changes: bytes set, copied, cut out or in, numbers made extreme,
 parts of another good file. Whatever it raises but a `CareError`, and whatever takes longer than 20 s or more than 2 GB,
@@ -34,7 +36,7 @@ from care_core.files import bundled
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 KEPT = ROOT / ".fuzz"
 MOST_BYTES, MOST_MEMORY, LONGEST_S = 1 << 17, 2 << 30, 20
 EXTREMES = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 2**63 - 1, 2**63, 2**64 - 1)
@@ -411,7 +413,7 @@ def main() -> None:
     print(f"seed {given.seed}, {given.seconds:.0f} s each\n{'target':<20}{'executions':>12}{'findings':>10}")
     total = 0
     for name in names:
-        command = [sys.executable, "-m", "tests.fuzzing", "--inside", "--only", name]
+        command = [sys.executable, "-m", "benchmarks.tools.fuzzing", "--inside", "--only", name]
         command += ["--seconds", str(given.seconds), "--seed", str(given.seed)]
         environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
         ran = subprocess.run(command, stdout=subprocess.PIPE, text=True, cwd=ROOT, env=environment, check=False)

@@ -1,4 +1,4 @@
-"""Which small faults the tests let pass: `python -m benchmarks.mutants --mutants 60 --seed 0`.
+"""Which small faults the tests let pass: `python -m benchmarks.tools.mutants --mutants 60 --seed 0`.
 
 Each mutant is one change in one place of `care_core`: a comparison, an operator, a number, a negation. It is put into a
 copy of the tree and tried by the unit tests that import the module, or where none does those that import its room. A
@@ -22,7 +22,7 @@ from pathlib import Path
 
 from care_core.records import Record
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 ROOMS = ("diagnose", "causal", "extract", "configs")
 LIMIT_S = 300.0
 _COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {

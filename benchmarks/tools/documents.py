@@ -1,6 +1,6 @@
 """The commands in README.md and docs/, run as they stand: `make docs` puts in what they print.
 
-python -m benchmarks.documents [FILE...]
+python -m benchmarks.tools.documents [FILE...]
 
 A fenced block whose first line begins with `$ ` is a session: its commands run in order, all of one document in one
 empty folder that holds `samples/`, and what each prints follows it, data before talk. A block after the line
@@ -21,7 +21,7 @@ from pathlib import Path
 from care_core.files import bundled, write_atomically
 from care_core.records import Record
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 WRITTEN_ELSEWHERE = {"extractors.md", "walk.md"}
 DOCUMENTS = (
     ROOT / "README.md",

@@ -1,6 +1,6 @@
 """Pictures of the six steps and of the HTML report for the documentation, from the real engine on the bundled sample.
 
-python -m benchmarks.screenshots [FOLDER]
+python -m benchmarks.tools.screenshots [FOLDER]
 
 The report is drawn by a Chromium without a screen; where there is none, its picture is left as it is, which is said.
 """

@@ -1,6 +1,6 @@
 """The walk of a new user, key by key, as a terminal shows it: writes docs/walk.md. Needs tmux.
 
-python -m benchmarks.walk [FILE]
+python -m benchmarks.tools.walk [FILE]
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PATIENCE_S = 30.0
 INTRODUCTION = f"""# A walk through the app
 
 A new user has a failed flight, `{SAMPLE}`, and the one command `care`. Every screen below is what a terminal of
-{WIDTH} x {HEIGHT} showed (blank lines at its end are left out); `python -m benchmarks.walk` takes them again.
+{WIDTH} x {HEIGHT} showed (blank lines at its end are left out); `python -m benchmarks.tools.walk` takes them again.
 """
 
 
@@ -72,7 +72,7 @@ class Terminal(Struct, eq=False):
 
     def start(self) -> None:
         care = f"{shlex.quote(sys.executable)} -m care_tui"
-        root = Path(__file__).parent.parent
+        root = Path(__file__).parents[2]
         (self.folder / "rc").write_text(f"PS1='$ '\ncare() {{ PYTHONPATH={shlex.quote(str(root))} {care} \"$@\"; }}\n")
         shell = f"env XDG_CONFIG_HOME=. XDG_STATE_HOME=. CARE_HISTORY=off bash --rcfile {self.folder / 'rc'} -i"
         flights = self.folder / "flights"
