@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from msgspec import Struct, ValidationError, convert, field, to_builtins
+from msgspec import DecodeError, Struct, ValidationError, convert, field, json, to_builtins
 from msgspec.structs import asdict, force_setattr, replace
 
 if TYPE_CHECKING:
@@ -22,7 +22,18 @@ else:  # a type checker alone needs it
         return lambda cls: cls
 
 
-__all__ = ["Record", "Struct", "UnfitError", "asdict", "field", "force_setattr", "plain", "read", "replace"]
+__all__ = [
+    "Record",
+    "Struct",
+    "UnfitError",
+    "asdict",
+    "field",
+    "force_setattr",
+    "plain",
+    "read",
+    "read_json",
+    "replace",
+]
 
 R = TypeVar("R")
 
@@ -58,9 +69,27 @@ def read(kind: type[R], value: Any) -> R:
     try:
         return convert(value, kind)
     except ValidationError as err:
-        found = _PLACE.match(str(err))
-        message, where = (found[1], found[2] or "") if found else (str(err), "")
-        raise UnfitError(message, where.lstrip(".")) from None
+        raise _unfit(err) from None
+
+
+def read_json(kind: type[R], text: bytes) -> R:
+    """The record that a JSON text of this program holds; JSON has no number that is not finite.
+
+    Raises:
+        UnfitError: as `read`, or the text is no JSON.
+    """
+    try:
+        return json.decode(text, type=kind)
+    except ValidationError as err:
+        raise _unfit(err) from None
+    except DecodeError as err:
+        raise UnfitError(str(err)) from None
+
+
+def _unfit(err: ValidationError) -> UnfitError:
+    match = _PLACE.match(str(err))
+    message, where = (match[1], match[2] or "") if match else (str(err), "")
+    return UnfitError(message, where.lstrip("."))
 
 
 def _not_finite(value: Any, where: str) -> Iterator[str]:

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 
 from care_core.profile.schema import Schema
-from care_core.records import UnfitError, plain, read
+from care_core.records import UnfitError, plain, read_json
 
 _MOST = 64
 """Entries that are kept; the ones that were written first go first."""
@@ -26,7 +26,7 @@ def cached(text: str) -> Schema | None:
         digest, _, stored = _entry(text).read_text(encoding="utf-8").partition("\n")
         if hashlib.sha256(stored.encode()).hexdigest() != digest:
             return None
-        return read(Schema, json.loads(stored))
+        return read_json(Schema, stored.encode())
     except (OSError, ValueError, UnfitError):
         return None
 

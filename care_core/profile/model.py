@@ -33,7 +33,7 @@ from care_core.causal.nominal import FORMULAS, Nominal
 from care_core.errors import ProfileError
 from care_core.files import replace_file, sync_folder
 from care_core.numbers import six_digits
-from care_core.records import Record, UnfitError, asdict, field, plain, read, replace
+from care_core.records import Record, UnfitError, asdict, field, plain, read_json, replace
 
 ARCHIVE = b"PK\x03\x04"
 _DAMAGED = (ValueError, TypeError, KeyError, EOFError, OverflowError, RuntimeError)
@@ -186,7 +186,7 @@ def read_model(folder: Path) -> Model:
     """
     path = folder / "model.json"
     try:
-        record = read(_ModelFile, json.loads(_content(path)))
+        record = read_json(_ModelFile, _content(path))
         mechanisms = _mechanisms(record.mechanisms, _read_arrays(folder, record.arrays_sha256))
         graph = CausalGraph(
             record.nodes,
