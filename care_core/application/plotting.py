@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from care_core.application.case import Case
 from care_core.application.sharing import EVERYTHING, Sharing
-from care_core.application.signal_words import is_position, words_of
+from care_core.application.signal_words import meanings_of
 from care_core.application.signals import Line as Values
-from care_core.application.signals import Signal, Source, lines_of, signals_of, type_name, whole_of
+from care_core.application.signals import Signal, Source, lines_of, signals_of, whole_of
 from care_core.application.viewing import log_of
 from care_core.numbers import median
 from care_core.records import replace
@@ -125,11 +125,10 @@ def ranked(case: Case, sharing: Sharing = EVERYTHING) -> tuple[list[list[Signal]
             return 1.0, -len(used & matters) / len(used)
         return (2.0, 0.0) if group[0].wanted else (3.0, 0.0)
 
-    groups = [
-        group
-        for group in _groups(signals_of(case))
-        if sharing.positions or not any(is_position(one.channel, one.field) for one in group)
-    ]
+    groups = list(_groups(signals_of(case)))
+    if not sharing.positions:
+        meaning = meanings_of(log_of(case))
+        groups = [group for group in groups if not any(meaning(one.channel, one.field).is_position for one in group)]
     ordered = sorted(groups, key=rank)
     return ordered, sum(rank(group)[0] < 2 for group in ordered)
 
@@ -149,8 +148,8 @@ def _plot(
 ) -> Plot | None:
     """The plot of a group, None where the log has no number for it in the span."""
     channel = group[0].channel
-    types = {one.name: type_name(one.type) for one in log_of(case).channels()}
-    unit, words = words_of(channel, types.get(channel, ""), group[0].field)
+    meaning = meanings_of(log_of(case))(channel, group[0].field)
+    unit, words = meaning.unit, meaning.label
     lines, drawn = [], []
     for one in group:
         found = values.get((one.channel, one.field))

@@ -1,12 +1,18 @@
 """Units of the signals that logs hold, and what they are in words, where that is documented.
 
-ArduPilot: docs "Log messages" and the FMTU records of its logs; MAVLink: common.xml; PX4: msg/; ROS: REP 103 and the
-comments of the message definitions.
+ArduPilot: docs "Log messages" and the FMTU records of its logs; MAVLink: common.xml; ROS: REP 103 and the comments of
+the message definitions. Those of PX4 are in its ecosystem's dictionary.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+
+from care_core.application.signals import type_name
+from care_core.ecosystems.dictionary import Field
+from care_core.ecosystems.registry import ecosystem_of
+from care_core.logs.base import Log
+from care_core.records import replace
 
 Words = tuple[str, str]
 """Unit and words."""
@@ -95,21 +101,6 @@ _WORDS: Mapping[str, Mapping[str, Words]] = {
     "GPS_RAW_INT": {"satellites_visible": ("", "satellites"), "eph": ("", "horizontal dilution, times 100")},
     "VIBRATION": {f"vibration_{axis}": ("m/s2", "vibration") for axis in "xyz"},
     "SERVO_OUTPUT_RAW": _SERVOS,
-    "vehicle_local_position": {
-        "x": ("m", "position north"),
-        "y": ("m", "position east"),
-        "z": ("m", "position down"),
-        "vx": ("m/s", "speed north"),
-        "vy": ("m/s", "speed east"),
-        "vz": ("m/s", "speed down"),
-    },
-    "battery_status": {
-        "voltage_v": ("V", "battery voltage"),
-        "current_a": ("A", "battery current"),
-        "remaining": ("", "charge left, 0 to 1"),
-    },
-    "cpuload": {"load": ("", "processor load, 0 to 1")},
-    "sensor_gps": {"satellites_used": ("", "satellites"), "eph": ("m", "horizontal accuracy")},
 }
 _WORDS_OF_TYPES: Mapping[str, Mapping[str, Words]] = {
     "Odometry": {
@@ -146,21 +137,29 @@ _POSITIONS = {
     "GPS_RAW_INT": {"lat", "lon", "alt"},
     "LOCAL_POSITION_NED": {"x", "y"},
     "VFR_HUD": {"alt"},
-    "vehicle_local_position": {"x", "y"},
-    "vehicle_local_position_setpoint": {"x", "y"},
-    "vehicle_global_position": {"lat", "lon", "alt"},
-    "sensor_gps": {"lat", "lon", "alt", "latitude_deg", "longitude_deg", "altitude_msl_m"},
 }
 
 
-def words_of(channel: str, type: str, field: str) -> Words:
-    """Unit and words of a signal, both empty where they are not known; `type` is that of a ROS message, bare."""
+def meanings_of(log: Log) -> Callable[[str, str], Field]:
+    """What a signal of a log means, by channel and field: its unit, its words, and whether it says where it was."""
+    ecosystem, channels = ecosystem_of(log.format), {channel.name: channel for channel in log.channels()}
+
+    def meaning(name: str, field: str) -> Field:
+        channel = channels.get(name)
+        known = ecosystem.field(channel, field) if channel is not None else None
+        known = known or _worded(name, type_name(channel.type) if channel is not None else "", field)
+        return replace(known, is_position=known.is_position or _is_position(name, field))
+
+    return meaning
+
+
+def _worded(channel: str, type: str, field: str) -> Field:
     known = _WORDS.get(channel) or _WORDS_OF_TYPES.get(type.removesuffix("Stamped")) or _WORDS_OF_TYPES.get(type) or {}
-    return known.get(field, ("", ""))
+    return Field(*known.get(field, ("", "")))
 
 
-def is_position(channel: str, field: str) -> bool:
-    """Whether a signal says where the robot was: on the earth, or on the map of its site."""
+def _is_position(channel: str, field: str) -> bool:
+    """On the earth, or on the map of its site."""
     if channel.startswith("/"):
         return "position." in field or field.rsplit(".", maxsplit=1)[-1] in ("latitude", "longitude", "altitude")
     return field in _POSITIONS.get(channel, ())

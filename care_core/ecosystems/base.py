@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
-from care_core.ecosystems.dictionary import Dictionary
+from care_core.ecosystems.dictionary import Dictionary, Field, find_field
 from care_core.ecosystems.findings import Finding, Health
 from care_core.logs import formats
 from care_core.logs.base import Channel, Log, Table, Wanted, merge_needs
@@ -117,6 +117,10 @@ class Ecosystem(ABC):
     @abstractmethod
     def messages(self) -> Dictionary:
         """What its messages mean, by today's names; of ROS, by the type of the message."""
+
+    def field(self, channel: Channel, name: str) -> Field | None:
+        """What a field of a channel means, None where that is not known."""
+        return find_field(self.messages(), channel.name, name)
 
     @abstractmethod
     def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:

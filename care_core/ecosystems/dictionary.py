@@ -32,3 +32,11 @@ class Message(Record):
 
 
 Dictionary = Mapping[str, Message]
+
+
+def find_field(dictionary: Dictionary, message: str, name: str) -> Field | None:
+    """What a field means, by today's names or former ones; None where that is not known."""
+    known = dictionary.get(message) or next((one for one in dictionary.values() if message in one.former), None)
+    if known is None:
+        return None
+    return known.fields.get(name) or next((one for one in known.fields.values() if name in one.former), None)

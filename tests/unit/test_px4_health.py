@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Health
 from care_core.ecosystems.px4.examining import examine
+from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.formats import LogFormat
@@ -70,7 +70,7 @@ FLOWN = states(arming_state=[(0, 1), (10, 2), (50, 1)], nav_state=[(0, 4), (10, 
 
 
 def test_a_flight_is_told_by_its_status_and_its_words() -> None:
-    health = examine(RunModel(MadeLog({
+    health = examine(Px4Flight(MadeLog({
         "vehicle_status": FLOWN,
         "vehicle_land_detected": states(landed=[(0, 1), (12, 0), (48, 1)]),
         "logged_messages": words((0.0, "INFO", "[logger] Start file log"), (10.0, "INFO", "[commander] Armed by RC"),
@@ -84,7 +84,7 @@ def test_a_flight_is_told_by_its_status_and_its_words() -> None:
 
 
 def test_flags_raised_in_flight_are_findings_and_those_before_arming_are_not() -> None:
-    health = examine(RunModel(MadeLog({
+    health = examine(Px4Flight(MadeLog({
         "vehicle_status": FLOWN,
         "failsafe_flags": states(manual_control_signal_lost=[(0, 1), (5, 0), (30, 1), (33, 0)],
                                  gcs_connection_lost=[(0, 1)], fd_motor_failure=[(0, 0), (35, 1)]),
@@ -99,20 +99,20 @@ def test_flags_raised_in_flight_are_findings_and_those_before_arming_are_not() -
 def test_a_flight_that_never_had_a_radio_has_lost_none() -> None:
     flown = states(arming_state=[(0, 2), (40, 1)], nav_state=[(0, 17)])
     health = examine(
-        RunModel(MadeLog({"vehicle_status": flown, "failsafe_flags": states(manual_control_signal_lost=[(0.3, 1)])}))
+        Px4Flight(MadeLog({"vehicle_status": flown, "failsafe_flags": states(manual_control_signal_lost=[(0.3, 1)])}))
     )
     assert "radio" not in [one.kind for one in health.findings]
 
 
 def test_a_sensor_that_the_estimator_rejects_is_found_after_a_second_of_it() -> None:
     ratios = states(vel_test_ratio=[(0, 0.1), (30, 1.4), (30.3, 0.2)], mag_test_ratio=[(0, 0.1), (30, 1.4), (36, 0.2)])
-    health = examine(RunModel(MadeLog({"vehicle_status": FLOWN, "estimator_status": ratios})))
+    health = examine(Px4Flight(MadeLog({"vehicle_status": FLOWN, "estimator_status": ratios})))
     assert [(one.kind, one.title) for one in health.findings] == [("compass", "estimator rejects compass")]
 
 
 def test_a_vehicle_that_is_not_ready_says_why() -> None:
     text = "[commander_tests] Not ready to fly: Sensors not set up correctly"
-    health = examine(RunModel(MadeLog({
+    health = examine(Px4Flight(MadeLog({
         "vehicle_status": states(arming_state=[(0, 1)], nav_state=[(0, 0)]),
         "logged_messages": words((3.0, "WARNING", text)),
     })))  # fmt: skip
@@ -124,13 +124,13 @@ def test_a_vehicle_that_is_not_ready_says_why() -> None:
 
 def test_a_complaint_before_an_arming_is_no_finding() -> None:
     said = words((3.0, "WARNING", "[health_and_arming_checks] Preflight: GPS fix too low"))
-    health = examine(RunModel(MadeLog({"vehicle_status": FLOWN, "logged_messages": said})))
+    health = examine(Px4Flight(MadeLog({"vehicle_status": FLOWN, "logged_messages": said})))
     assert texts(health, "arming")[0] == "Preflight: GPS fix too low"
     assert health.findings == ()
 
 
 def test_battery_and_satellites_in_brief() -> None:
-    health = examine(RunModel(MadeLog({
+    health = examine(Px4Flight(MadeLog({
         "vehicle_status": FLOWN,
         "battery_status": states(voltage_v=[(0, 16.4), (30, 13.1), (32, 15.0)], current_a=[(0, 2.0), (30, 50.0)],
                                  cell_count=[(0, 4)], warning=[(0, 0), (30, 1)], connected=[(0, 1)]),
@@ -143,24 +143,24 @@ def test_battery_and_satellites_in_brief() -> None:
 
 
 def test_a_wrong_stamp_makes_no_long_flight() -> None:
-    health = examine(RunModel(MadeLog({"vehicle_status": FLOWN}, duration_s=1200.0)))
+    health = examine(Px4Flight(MadeLog({"vehicle_status": FLOWN}, duration_s=1200.0)))
     assert "the recording ends, but for a message stamped 1140 s later" in texts(health, "log")
 
 
 def test_a_log_that_ends_armed_says_so() -> None:
     armed = states(arming_state=[(0, 1), (10, 2)], nav_state=[(0, 3)])
-    assert texts(examine(RunModel(MadeLog({"vehicle_status": armed}))))[-1].startswith(
+    assert texts(examine(Px4Flight(MadeLog({"vehicle_status": armed}))))[-1].startswith(
         "the log ends with the vehicle armed"
     )
 
 
 def test_nothing_is_said_of_a_log_without_status() -> None:
-    assert examine(RunModel(MadeLog({}))).too_little
+    assert examine(Px4Flight(MadeLog({}))).too_little
 
 
 def test_what_falls_after_the_kill_switch_is_the_kill_switchs_doing() -> None:
     def killed(up_m: float) -> Health:
-        return examine(RunModel(MadeLog({
+        return examine(Px4Flight(MadeLog({
             "vehicle_status": FLOWN,
             "failsafe_flags": states(fd_critical_failure=[(0, 0), (42, 1), (43, 0)]),
             "vehicle_local_position": states(z=[(0, 0.0), (12, -up_m)]),

@@ -16,6 +16,7 @@ from care_core.diagnose.records import overall
 from care_core.ecosystems.measures import MISSION_KINDS, Mission
 from care_core.ecosystems.registry import run_model
 from care_core.errors import ExitCode
+from care_core.logs import formats
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
 from care_core.records import replace
@@ -136,7 +137,7 @@ def px4(**status: Any) -> dict[str, Value]:
     tables = {"vehicle_status": states(**told), "vehicle_land_detected": states(landed=landed)}
     if result is not None:
         tables["mission_result"] = states(finished=result)
-    (mission,) = PX4.missions(*read(tables, 60.0), {})
+    (mission,) = PX4.missions(*read(tables, 60.0, formats.PX4_ULG), {})
     return checks(PX4.outcome(mission))
 
 
@@ -161,7 +162,7 @@ def test_every_arming_of_a_px4_log_is_a_run() -> None:
     status = states(arming_state=[(0.0, 1), (10.0, 2), (20.0, 1), (30.0, 2)])
     spans = [
         (round(m.start_s, 3), round(m.end_s, 3), m.ended)
-        for m in PX4.missions(*read({"vehicle_status": status}, 60.0), {})
+        for m in PX4.missions(*read({"vehicle_status": status}, 60.0, formats.PX4_ULG), {})
     ]
     assert spans == [(10.0, 20.0, True), (30.0, 60.0, False)]
 

@@ -21,21 +21,29 @@ class Px4(Ecosystem):
     measures = ("care_core.ecosystems.px4.missions",)
 
     def model(self, log: Log) -> RunModel:
-        return RunModel(log)
+        from care_core.ecosystems.px4.flight import Px4Flight
+
+        return Px4Flight(log)
 
     def examine(self, model: RunModel) -> Health:
         from care_core.ecosystems.px4.examining import examine
+        from care_core.ecosystems.px4.flight import Px4Flight
 
+        assert isinstance(model, Px4Flight)
         return examine(model)
 
     def checks(self) -> tuple[Check[Any], ...]:
-        return ()
+        from care_core.ecosystems.px4.checks import CHECKS
+
+        return CHECKS
 
     def missions(self, channels: tuple[Channel, ...]) -> Iterator[Mapping[str, Any]]:
         yield {"kind": "px4_flight"}
 
     def messages(self) -> Dictionary:
-        return {}
+        from care_core.ecosystems.px4.messages import MESSAGES
+
+        return MESSAGES
 
     def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
         return "qgc-params"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from bisect import bisect
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -46,9 +45,3 @@ def with_said(
 
     said = [(t, _SAID[text]) for t, text in messages if text in _SAID]
     return sorted((*recorded, *(one for one in said if is_untold(*one))))
-
-
-KILLED = re.compile(r"\bKill(?:[- ]?switch)? engaged", re.IGNORECASE)
-"""What the commander of PX4 says of the kill switch, then and now (Commander.cpp)."""
-KILLED_ALOFT_M = 0.5
-"""Metres: what drifts by less is on the ground."""

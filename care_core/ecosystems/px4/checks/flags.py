@@ -1,0 +1,65 @@
+"""Flags by which the vehicle itself says what is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.px4.episodes import Episode, State, episode
+from care_core.ecosystems.px4.flight import FLAGS, STATUS, Px4Flight
+from care_core.logs.base import Wanted, merge_needs
+
+_OLD_FLAGS, _ESTIMATOR = "vehicle_status_flags", "estimator_status_flags"
+
+STATES = (
+    State(STATUS, "failsafe", "failsafe"),
+    State(STATUS, "rc_signal_lost", "radio lost", "radio"),
+    State(STATUS, "data_link_lost", "ground station lost", "radio", "info"),
+    State(STATUS, "engine_failure", "engine failure", "motor", "critical"),
+    State(STATUS, "mission_failure", "mission cannot be flown", "planner", "warning", "operation"),
+    State(FLAGS, "manual_control_signal_lost", "radio lost", "radio"),
+    State(FLAGS, "gcs_connection_lost", "ground station lost", "radio", "info"),
+    State(FLAGS, "battery_unhealthy", "battery unhealthy", "battery", "critical"),
+    State(FLAGS, "battery_low_remaining_time", "battery will not last to reach home", "battery"),
+    State(FLAGS, "geofence_breached", "geofence breached"),
+    State(FLAGS, "local_position_invalid", "no valid local position", "estimator"),
+    State(FLAGS, "global_position_invalid", "no valid global position", "gps"),
+    State(FLAGS, "attitude_invalid", "no valid attitude", "estimator", "critical"),
+    State(FLAGS, "angular_velocity_invalid", "no valid rotation rate", "imu", "critical"),
+    State(FLAGS, "wind_limit_exceeded", "wind above its limit"),
+    State(FLAGS, "fd_critical_failure", "attitude beyond the failure detector's limits", "attitude", "critical"),
+    State(FLAGS, "fd_motor_failure", "motor failure", "motor", "critical"),
+    State(FLAGS, "fd_esc_arming_failure", "an ESC did not arm", "motor", "critical"),
+    State(FLAGS, "fd_imbalanced_prop", "imbalanced propeller", "vibration"),
+    State(_OLD_FLAGS, "condition_battery_healthy", "battery unhealthy", "battery", "critical"),
+    State(_OLD_FLAGS, "vtol_transition_failure", "transition failed", "attitude"),
+    State(_ESTIMATOR, "cs_mag_field_disturbed", "magnetic field disturbed", "compass"),
+    State(_ESTIMATOR, "cs_mag_fault", "compass given up by the estimator", "compass"),
+    State(_ESTIMATOR, "cs_inertial_dead_reckoning", "estimator without position aid", "estimator"),
+    State(_ESTIMATOR, "fs_bad_acc_vertical", "vertical accelerations make no sense", "vibration"),
+    State(_ESTIMATOR, "fs_bad_acc_clipping", "accelerometers clip", "vibration"),
+)
+"""msg/VehicleStatus.msg, FailsafeFlags.msg, VehicleStatusFlags.msg (to 1.13) and EstimatorStatusFlags.msg."""
+_GOOD_WHEN_SET = frozenset(("condition_battery_healthy",))
+
+READS: Wanted = merge_needs({state.topic: (state.field,)} for state in STATES)
+LIMITS = Limits()  # the vehicle applies its own
+
+
+def episodes(flight: Px4Flight) -> Iterator[Episode]:
+    """What was flagged while it was armed."""
+    for state in STATES:
+        table = flight.table(state.topic, state.field)
+        if table is not None:
+            bad = table[state.field] == (0 if state.field in _GOOD_WHEN_SET else 1)
+            found = episode(flight, table, bad, state, f"{state.topic}.{state.field}")
+            if found is not None:
+                yield found
+
+
+def find(flight: Px4Flight) -> Iterator[Finding]:
+    yield from filter(None, (found.finding() for found in episodes(flight)))
+
+
+CHECK = Check("flags", "what the vehicle itself reports as failed, lost or beyond its limits", READS, LIMITS, find)

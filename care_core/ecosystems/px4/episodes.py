@@ -1,0 +1,76 @@
+"""States that the vehicle itself holds for wrong, from when they set in while it was armed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.findings import Finding, FindingKind, Severity, Suspect
+from care_core.ecosystems.px4.flight import Px4Flight, Span
+from care_core.logs.base import Table
+from care_core.records import Record
+
+
+class State(Record):
+    """Something that can be wrong: the field that says so, and what a finding of it is (no kind: only an event)."""
+
+    topic: str
+    field: str
+    means: str
+    kind: FindingKind | None = None
+    severity: Severity = "warning"
+    suspect: Suspect = "hardware"
+
+
+class Episode(NamedTuple):
+    """A state that set in while the vehicle was armed."""
+
+    state: State
+    start_s: float
+    end_s: float
+    """Of the last time."""
+    text: str
+    """What it was and for how long, or how often."""
+    source: str
+
+    def finding(self) -> Finding | None:
+        """The finding that it is, None where its state is only an event."""
+        if self.state.kind is None:
+            return None
+        return Finding(
+            kind=self.state.kind,
+            title=self.state.means,
+            onset_s=self.start_s,
+            end_s=self.end_s,
+            severity=self.state.severity,
+            evidence=f"{self.text}, by the vehicle's own check",
+            source=self.source,
+            suspect=self.state.suspect,
+        )
+
+
+def episode(
+    flight: Px4Flight, table: Table, bad: NDArray[np.bool_], state: State, source: str, at_least_s: float = 0.0
+) -> Episode | None:
+    """A state that set in while armed and lasted long enough. One that holds from its first record on was there before:
+    a vehicle flown by a ground station alone never had a radio to lose."""
+    first_s = table.t[0]
+    spans = [
+        (start, end)
+        for start, end in _spans(table.t, bad)
+        if end - start >= at_least_s and start > first_s and flight.began_armed(start)
+    ]
+    if not spans:
+        return None
+    start, end = spans[0]
+    lasting = f" ({len(spans)} times until {spans[-1][0]:.0f} s)" if len(spans) > 1 else f" for {end - start:.1f} s"
+    return Episode(state, start, spans[-1][1], state.means + lasting, source)
+
+
+def _spans(t: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[Span]:
+    """Spans in which a mask holds, each until the next row in which it does not."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    ends = np.minimum(edges[1::2], len(t) - 1)
+    return list(zip(t[edges[::2]].tolist(), t[ends].tolist(), strict=True))

@@ -1,0 +1,217 @@
+"""The model of a PX4 log: when it was armed, in which modes, how high, and what its firmware said.
+
+Topics and fields are those of PX4's message definitions (msg/*.msg). Times are seconds from the start of the log.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from functools import cached_property
+
+import numpy as np
+
+from care_core.ecosystems.base import RunModel
+from care_core.logs.base import Log, Table, Wanted
+
+Span = tuple[float, float]
+
+STATUS, MESSAGES, LANDED = "vehicle_status", "logged_messages", "vehicle_land_detected"
+POSITION, RESULT, FLAGS = "vehicle_local_position", "mission_result", "failsafe_flags"
+
+READS: Wanted = {
+    STATUS: ("arming_state", "nav_state", "failsafe", "failure_detector_status", "vehicle_type"),
+    MESSAGES: ("level", "message"),
+    LANDED: ("landed",),
+    POSITION: ("z",),
+    RESULT: ("finished", "failure"),
+    FLAGS: ("fd_critical_failure", "fd_motor_failure"),
+    "sensor_combined": ("gyro_rad[0]",),
+}
+
+ROVER = 3
+"""vehicle_type of a rover (vehicle_status.msg: VEHICLE_TYPE_ROVER)."""
+TERMINATION = 13
+"""nav_state in which the failure detector has ended the flight (vehicle_status.msg)."""
+AIRBORNE_M = 2.0
+"""Height above where it was armed from which it flew."""
+SAID_WITHIN_S = 1.0
+"""Topics are published at their own times: what belongs to an event may come so much after it."""
+
+_ARMED = 2
+"""arming_state: 2 has meant armed in every version (vehicle_status.msg)."""
+_GAVE_UP = 0b10001111
+"""failure_detector_status: roll, pitch, height, external and motor (failure_detector_status.msg)."""
+_IDLE_S = 60.0
+_MARKS = re.compile(r"\x1b?\[\d+m")
+_SPEAKER = re.compile(r"^\[\w+\]\s*")
+_ARMED_BY = re.compile(r"\[commander\] (?:Armed|Disarmed) (by .+)")
+_PREFLIGHT = re.compile(r"Preflight|Not ready|arming denied", re.IGNORECASE)
+_NOT_READY = re.compile(r"^(?:Not ready to fly|Preflight(?: Fail)?): ?", re.IGNORECASE)
+_KILLED = re.compile(r"\bKill(?:[- ]?switch)? engaged", re.IGNORECASE)
+"""What the commander says of the kill switch, then and now (Commander.cpp)."""
+
+
+class Px4Flight(RunModel):
+    """A PX4 log as a flight: everything that checks, mission kind and timeline know of it."""
+
+    def __init__(self, log: Log) -> None:
+        super().__init__(log)
+        self.expect(READS)
+
+    def table(self, topic: str, *fields: str) -> Table | None:
+        """A topic with rows and all of these fields, None where the log lacks one."""
+        table = self.tables({topic: fields}).get(topic)
+        return table if table is not None and len(table) and set(fields) <= table.columns.keys() else None
+
+    @cached_property
+    def end_s(self) -> float:
+        """When the recording really ended: a last message long after everything else has a wrong stamp."""
+        duration_s = self.log.duration_s
+        t = np.unique(np.concatenate([*(table.t for table in self.tables(READS).values()), [duration_s]]))
+        late = np.flatnonzero(np.diff(t) > _IDLE_S)
+        return float(t[late[0]]) if len(late) and len(t) - late[0] < len(t) / 10 else duration_s
+
+    @cached_property
+    def arming(self) -> tuple[tuple[float, bool], ...]:
+        """Whether it was armed at first, and when that changed."""
+        return tuple((t, state == _ARMED) for t, state in self.changes(STATUS, "arming_state"))
+
+    @cached_property
+    def armed(self) -> tuple[Span, ...]:
+        """From each arming to its disarming, or to the end of the recording."""
+        spans: list[Span] = []
+        start: float | None = None
+        for t, is_armed in self.arming:
+            if is_armed:
+                start = t if start is None else start
+            elif start is not None:
+                spans.append((start, t))
+                start = None
+        return (*spans, (start, self.end_s)) if start is not None else tuple(spans)
+
+    @property
+    def ends_armed(self) -> bool:
+        """Whether the log breaks off before the vehicle disarmed."""
+        return bool(self.arming) and self.arming[-1][1]
+
+    def began_armed(self, t: float) -> bool:
+        """Whether what begins at a time began while it was armed. What is there as it arms was there before."""
+        return any(start < t <= end for start, end in self.armed)
+
+    @cached_property
+    def messages(self) -> tuple[tuple[float, str, str], ...]:
+        """Time, level and text of what the firmware said."""
+        table = self.table(MESSAGES, "message")
+        if table is None:
+            return ()
+        levels = table["level"].tolist() if "level" in table.columns else [""] * len(table)
+        rows = zip(table.t.tolist(), levels, table["message"].tolist(), strict=True)
+        return tuple((t, str(level), _MARKS.sub("", str(text)).strip()) for t, level, text in rows)
+
+    def armed_by(self, t: float) -> str:
+        """What the commander says of an arming or disarming at a time: "by landing"; "" where it says nothing."""
+        matches = (_ARMED_BY.match(text) for at, _, text in self.messages if abs(at - t) < SAID_WITHIN_S)
+        return next((match[1] for match in matches if match), "")
+
+    @cached_property
+    def complaints(self) -> tuple[tuple[float, str], ...]:
+        """What keeps it from arming, by its own words."""
+        return tuple((t, without_speaker(text)) for t, _, text in self.messages if is_complaint(text))
+
+    @cached_property
+    def kills(self) -> tuple[float, ...]:
+        """When the kill switch cut its motors while it was armed, as the commander says."""
+        said = (t for t, _, text in self.messages if _KILLED.search(text))
+        return tuple(t for t in said if any(start <= t <= end for start, end in self.armed))
+
+    def killed_s(self, span: Span = (-math.inf, math.inf)) -> float | None:
+        """When the kill switch first cut its motors in a span, None where it did not."""
+        return next((t for t in self.kills if span[0] <= t <= span[1]), None)
+
+    def heights(self, span: Span) -> Table | None:
+        """`height` in metres above where a span begins, None where the log tells no height in it."""
+        position = self.table(POSITION, "z")
+        part = None if position is None else position.between(*span)
+        known = None if part is None else part.where(np.isfinite(part["z"]))
+        if known is None or not len(known):
+            return None
+        return Table(known.t, {"height": known["z"][0] - known["z"]})
+
+    def height_m(self, t: float) -> float | None:
+        """How high it was above where it was armed last. The land detector is no witness: many a pilot kills what it
+        does not let disarm."""
+        armed_s = max((start for start, _ in self.armed if start <= t), default=0.0)
+        heights = self.heights((armed_s, math.inf))
+        return None if heights is None else float(np.interp(t, heights.t, heights["height"]))
+
+    @cached_property
+    def modes(self) -> tuple[tuple[float, int], ...]:
+        """`nav_state` at first, and when it changed."""
+        return tuple((t, int(mode)) for t, mode in self.changes(STATUS, "nav_state"))
+
+    def modes_during(self, span: Span) -> list[int]:
+        """The modes in force during a span, in order."""
+        before = [mode for t, mode in self.modes if t <= span[0]][-1:]
+        return [*before, *(mode for t, mode in self.modes if span[0] < t <= span[1])]
+
+    def gave_up(self, span: Span) -> bool:
+        """Whether the failure detector acted in a span."""
+        status = self.during(STATUS, "failure_detector_status", span)
+        bits = np.nan_to_num(status["failure_detector_status"]).astype(np.int64) if status is not None else 0
+        return (
+            self.ever(FLAGS, "fd_critical_failure", 1, span)
+            or self.ever(FLAGS, "fd_motor_failure", 1, span)
+            or TERMINATION in self.modes_during(span)
+            or bool(np.any(bits & _GAVE_UP))
+        )
+
+    def changes(self, topic: str, field: str) -> Iterator[tuple[float, float]]:
+        """The first value of a field and every change of it; nothing where the log lacks it."""
+        table = self.table(topic, field)
+        return iter(()) if table is None else changes(table, field)
+
+    def during(self, topic: str, field: str, span: Span) -> Table | None:
+        """A topic's rows in a span, None where the log lacks the field."""
+        table = self.table(topic, field)
+        return None if table is None else table.between(*span)
+
+    def ever(self, topic: str, field: str, value: float, span: Span) -> bool:
+        """Whether a field had a value in a span."""
+        table = self.during(topic, field, span)
+        return table is not None and bool(np.any(table[field] == value))
+
+    def last(self, topic: str, field: str, t: float) -> float | None:
+        """The value in force at a time, which may have been published before or just after it."""
+        table = self.during(topic, field, (-math.inf, t + SAID_WITHIN_S))
+        return float(table[field][-1]) if table is not None and len(table) else None
+
+
+def changes(table: Table, field: str) -> Iterator[tuple[float, float]]:
+    """The first value of a field and every change of it."""
+    values = table[field]
+    known = np.flatnonzero(np.isfinite(values))
+    if len(known):
+        for row in known[np.append(True, np.diff(values[known]) != 0)].tolist():
+            yield float(table.t[row]), float(values[row])
+
+
+def is_complaint(text: str) -> bool:
+    """Whether the firmware says that it does not let itself be armed."""
+    return _PREFLIGHT.search(text) is not None
+
+
+def is_arming(text: str) -> bool:
+    """Whether the commander says that it armed or disarmed."""
+    return _ARMED_BY.match(text) is not None
+
+
+def without_speaker(text: str) -> str:
+    """A message without the name of the module that says it."""
+    return _SPEAKER.sub("", text)
+
+
+def reason_of(complaint: str) -> str:
+    """What a complaint says is wrong."""
+    return _NOT_READY.sub("", complaint)
