@@ -19,10 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
-from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.examining import examine
-from care_core.ecosystems.ros.recording import Recording
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 from care_core.records import Record
@@ -59,6 +58,13 @@ class Driven(Record):
         return bool(self.failure) and self.cause in ("hardware", "both")
 
 
+def driven_in(path: Path) -> Drive:
+    """The drive that a bag holds."""
+    log = open_log(path)
+    assert isinstance(log, RosLog)
+    return Drive(log)
+
+
 def driven(folder: Path) -> Iterator[Driven]:
     """The missions of a folder with its truth."""
     for line in (folder / "truth.jsonl").read_text().splitlines():
@@ -68,12 +74,11 @@ def driven(folder: Path) -> Iterator[Driven]:
         if path is None or row.get("dropped"):
             continue
         failed = row["hardware"] or {}
-        log = open_log(path)
-        commands = Recording.read(log).commands if isinstance(log, RosLog) else None
-        began_s = (float(commands.t[0]) if commands else 0.0) + failed.get("fail_at", 0.0)
         start = time.perf_counter()
-        findings = examine(RunModel(log)).findings
+        drive = driven_in(path)
+        findings = examine(drive).findings
         took = time.perf_counter() - start
+        began_s = (float(drive.commands.t[0]) if drive.commands else 0.0) + failed.get("fail_at", 0.0)
         yield Driven(row["tag"], failed.get("fail_kind", ""), began_s, row["ok"], row.get("cause", ""), findings, took)
 
 
@@ -141,7 +146,7 @@ def main() -> None:
     print(false_alarms(((one.tag, one.findings) for one in missions if not one.failure), "nothing failed"))
     if args.healthy:
         bags = sorted(args.healthy.rglob("*.bag"))
-        looks = ((bag.name, examine(RunModel(open_log(bag))).findings) for bag in bags)
+        looks = ((bag.name, examine(driven_in(bag)).findings) for bag in bags)
         print(false_alarms(looks, "healthy hardware, any parameters"))
     took = [one.seconds for one in missions]
     print(f"reading, account and checks: {1000 * np.median(took):.0f} ms a mission, at most {1000 * max(took):.0f}")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 _PIECE = 1 << 16
 """Rows that are worked on together: what is made of them on the way stays in the processor's cache."""

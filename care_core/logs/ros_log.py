@@ -260,6 +260,16 @@ class RosLog:
             }
         return {topic: _table(kinds[topic], pieces.get(topic, []), self._low_ns) for topic in wanted if topic in kinds}
 
+    def sampled_times(self, topic: str, at_most: int) -> NDArray[np.float64]:
+        """Record times, s, of the messages of a topic that `read` decodes where it may decode so many of it."""
+        times = [
+            part.times_ns[number][self._wanted(part, number, {topic: at_most})]
+            for part in self._parts
+            for number, connection in part.connections.items()
+            if connection.topic == topic and number in part.times_ns
+        ]
+        return (np.concatenate([np.empty(0, np.int64), *times]) - self._low_ns) / 1e9
+
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
         """Every value of every parameter that the log tells.
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Health
+from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.ros import ECOSYSTEM
 from care_core.ecosystems.ros.checks import odometry
 from care_core.ecosystems.ros.checks.messages import gist
-from care_core.ecosystems.ros.examining import examine
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
 from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SUCCEEDED, Drive
@@ -36,7 +36,7 @@ WARN, ERROR, FATAL = 30, 40, 50
 
 
 def looked_at(drive: Drive, tmp_path: Path) -> Health:
-    return examine(RunModel(open_log(drive.write(tmp_path / "drive.mcap"))))
+    return ECOSYSTEM.examine(run_model(open_log(drive.write(tmp_path / "drive.mcap"))))
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_an_error_that_a_fatal_one_follows_leads_it(tmp_path: Path) -> None:
 
 def test_recordings_that_tell_of_no_robot_say_so(tmp_path: Path) -> None:
     write_mcap(tmp_path / "imu.mcap")
-    health = examine(RunModel(open_log(tmp_path / "imu.mcap")))
+    health = ECOSYSTEM.examine(run_model(open_log(tmp_path / "imu.mcap")))
     assert health.too_little
     assert health.findings == ()
     assert health.too_little.startswith("it holds inertial data, and nothing that tells how a robot did: no odometry")
@@ -192,7 +192,7 @@ def test_a_battery_that_says_nothing_plausible_is_not_said_to_be_missing(tmp_pat
         if kind == BATTERY
     ]
     dead = [(topic, kind, at, dataclasses.replace(message, voltage=0.9)) for topic, kind, at, message in messages]
-    health = examine(RunModel(open_log(write_db3(tmp_path / "bag", messages=dead))))
+    health = ECOSYSTEM.examine(run_model(open_log(write_db3(tmp_path / "bag", messages=dead))))
     assert health.too_little.endswith(
         "goals, commands, laser or messages, and too little or nothing plausible of battery"
     )
@@ -201,7 +201,7 @@ def test_a_battery_that_says_nothing_plausible_is_not_said_to_be_missing(tmp_pat
 def test_an_empty_recording_is_said_to_be_empty(tmp_path: Path) -> None:
     with McapFile(tmp_path / "empty.mcap"):
         pass
-    health = examine(RunModel(open_log(tmp_path / "empty.mcap")))
+    health = ECOSYSTEM.examine(run_model(open_log(tmp_path / "empty.mcap")))
     assert health.too_little
     assert any("nothing was recorded" in one.text for one in health.timeline)
 
@@ -212,7 +212,7 @@ def test_other_containers_are_looked_at_alike(tmp_path: Path) -> None:
         for topic, kind, t, message in Drive("stall", ABORTED).messages()
     ]
     log = open_log(write_db3(tmp_path / "bag", messages=sorted(messages, key=lambda one: one[2])))
-    assert [one.kind for one in examine(RunModel(log)).findings][:1] == ["drive"]
+    assert [one.kind for one in ECOSYSTEM.examine(run_model(log)).findings][:1] == ["drive"]
 
 
 def test_times_and_samples_of_a_recording(tmp_path: Path) -> None:
@@ -232,7 +232,7 @@ def test_a_simulation_that_lags_behind_real_time_is_noted(pace: float, found: li
             own_ns = int(row * 100_000_000 * pace)
             reading = imu(ROS2, row, own_ns)
             log.add("/imu", "sensor_msgs/msg/Imu", START_NS + row * 100_000_000, cdr(reading))
-    health = examine(RunModel(open_log(tmp_path / "slow.mcap")))
+    health = ECOSYSTEM.examine(run_model(open_log(tmp_path / "slow.mcap")))
     assert [one.kind for one in health.findings if one.kind != "log"] == found
     assert all(one.severity == "info" for one in health.findings)
 
@@ -241,7 +241,7 @@ def test_renamed_files_of_a_bag_are_noted(tmp_path: Path) -> None:
     write_db3(tmp_path / "bag")
     (data,) = (tmp_path / "bag").glob("*.db3")
     data.rename(data.with_name("other.db3"))
-    (note,) = (one for one in examine(RunModel(open_log(tmp_path / "bag"))).findings if one.kind == "log")
+    (note,) = (one for one in ECOSYSTEM.examine(run_model(open_log(tmp_path / "bag"))).findings if one.kind == "log")
     assert note.title == "metadata.yaml names other files than those beside it"
     assert "other.db3" in note.evidence
 
@@ -270,7 +270,7 @@ def test_whatever_messages_hold_a_look_at_them_succeeds(seed: int, tmp_path: Pat
                     )
                     when = START_NS + row * 50_000_000 + int(rng.integers(0, 20_000_000))
                     log.add(topic, kind, when, cdr(random_message(ROS2, kind, rng)))
-    health = examine(RunModel(open_log(tmp_path / "random.mcap")))
+    health = ECOSYSTEM.examine(run_model(open_log(tmp_path / "random.mcap")))
     assert all(one.title and one.evidence for one in health.findings)
     assert len(health.timeline) <= 60
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
 from care_core.ecosystems.dictionary import Dictionary
@@ -11,6 +11,10 @@ from care_core.ecosystems.findings import Health
 from care_core.logs.base import Channel, Log
 from care_core.logs.formats import MCAP, ROS1_BAG, LogFormat
 from care_core.run import Robot
+
+if TYPE_CHECKING:
+    from care_core.ecosystems.ros.drive import Drive
+    from care_core.logs.ros_log import RosLog
 
 _PATIENCE_S = 1e9
 """How long a goal may take where nobody gave it a time."""
@@ -37,15 +41,19 @@ class Ros(Ecosystem):
     )
 
     def model(self, log: Log) -> RunModel:
-        return RunModel(log)
+        from care_core.ecosystems.ros.drive import Drive
+
+        return Drive(cast("RosLog", log))
 
     def examine(self, model: RunModel) -> Health:
         from care_core.ecosystems.ros.examining import examine
 
-        return examine(model)
+        return examine(cast("Drive", model))
 
     def checks(self) -> tuple[Check[Any], ...]:
-        return ()
+        from care_core.ecosystems.ros.checks import CHECKS
+
+        return CHECKS
 
     def missions(self, channels: tuple[Channel, ...]) -> Iterator[Mapping[str, Any]]:
         for action in _actions(channels):
@@ -54,7 +62,9 @@ class Ros(Ecosystem):
             yield {"kind": "nav2_goals", "goal_timeout_s": _PATIENCE_S}
 
     def messages(self) -> Dictionary:
-        return {}
+        from care_core.ecosystems.ros.messages import MESSAGES
+
+        return MESSAGES
 
     def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
         """An MCAP may be of either ROS: only in ROS 2 have names of parameters a dot, after the node."""

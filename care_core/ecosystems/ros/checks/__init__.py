@@ -1,4 +1,4 @@
-"""The health checks of ROS recordings, one module each: `check(recording)` yields findings.
+"""The health checks of ROS recordings, one module each.
 
 Probabilities: in `benchmarks.ros_health` all 29 findings of failed hardware were right, on few missions of one
 simulated robot; 0.9 is the 95 % lower bound of that. What it does not show (tf, imu, topics, messages) is judged.
@@ -6,9 +6,7 @@ simulated robot; 0.9 is the 95 % lower bound of that. What it does not show (tf,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.base import Check
 from care_core.ecosystems.ros.checks import (
     battery,
     blocked,
@@ -21,17 +19,17 @@ from care_core.ecosystems.ros.checks import (
     timing,
     topics,
 )
-from care_core.ecosystems.ros.recording import Recording
+from care_core.ecosystems.ros.drive import Drive
 
-CHECKS: tuple[Callable[[Recording], Iterator[Finding]], ...] = (
-    battery.check,
-    laser.check,
-    odometry.check,
-    drive.check,
-    blocked.check,
-    imu.check,
-    topics.check,
-    planner.check,
-    timing.check,
-    messages.check,
+CHECKS: tuple[Check[Drive], ...] = (
+    battery.CHECK,
+    laser.CHECK,
+    odometry.CHECK,
+    drive.CHECK,
+    blocked.CHECK,
+    imu.CHECK,
+    topics.CHECK,
+    planner.CHECK,
+    timing.CHECK,
+    messages.CHECK,
 )

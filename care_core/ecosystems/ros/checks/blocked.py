@@ -6,46 +6,60 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.checks import laser
-from care_core.ecosystems.ros.recording import Floats, Odometry, Recording, Scans
-from care_core.numbers import median
+from care_core.ecosystems.ros.drive import Drive
+from care_core.ecosystems.ros.messages import ODOMETRY, SCAN, reading
+from care_core.ecosystems.ros.motion import Odometry
+from care_core.ecosystems.ros.sensors import Scans
+from care_core.numbers import Floats, median
 
-BEFORE_S, AT_MOST_S = 0.8, 3.0
-"""Scans are compared with one so much earlier."""
-FREE_M = 0.5
-"""A return so much nearer than what every ray beside it measured before is new."""
-AHEAD_M, ASIDE_M, WIDE_M = 5.0, 0.8, 0.4
-"""How far ahead and aside of the robot something must appear, and how wide it must be, to be in its way."""
-RAYS = 8
-TURN_RAD = 0.1
-"""Between the scans the robot must not have turned further: where its laser sits on it is not known."""
-STUCK_S, STUCK_M = 10.0, 0.5
-"""A robot that gets no further in this time, within a minute of it, was stopped by it."""
+LIMITS = Limits()
+_WAY = "what a robot's width and a few seconds of driving take up"
+BEFORE_S = LIMITS.add("age of the scan that is compared", 0.8, "s", "long enough for somebody to step in the way")
+AT_MOST_S = LIMITS.add("oldest scan that is compared", 3.0, "s", "an older one saw another place")
+FREE_M = LIMITS.add("how much nearer a new return is", 0.5, "m", "ten times the noise of scanners (0.03 to 0.05 m)")
+AHEAD_M = LIMITS.add("how far ahead it appears at most", 5.0, "m", _WAY)
+ASIDE_M = LIMITS.add("how far aside it appears at most", 0.8, "m", _WAY)
+WIDE_M = LIMITS.add("how wide it is at least", 0.4, "m", "a leg or a box; less is noise or a pole")
+RAYS = LIMITS.add("rays that see it", 8, "", "fewer are stray returns")
+FEWEST_RAYS = LIMITS.add("rays of a scan", 30, "", "fewer do not show a thing's width")
+TURN_RAD = LIMITS.add("turn between the scans", 0.1, "rad", "where the laser sits on the robot is not known")
+STUCK_S = LIMITS.add("time without getting further", 10.0, "s", "move_base's oscillation_timeout")
+STUCK_M = LIMITS.add("way in that time", 0.5, "m", "Nav2's progress checker: required_movement_radius")
+SOON_S = LIMITS.add("how soon the robot is stuck", 60.0, "s", "later something else has stopped it")
 
 
-def check(recording: Recording) -> Iterator[Finding]:
-    odometry = recording.odometry
-    if odometry is None or not any(goal.failed for goal in recording.goals):
-        return  # without a goal that failed nobody knows that the robot wanted to go on
-    for scans in recording.scans:
-        doubted_s = min((one.onset_s for one in laser.faults(recording, scans)), default=np.inf)
-        if scans.ranges.shape[1] < 30 or scans.angles[0] == scans.angles[1]:
+def find(drive: Drive) -> Iterator[Finding]:
+    """Something that appeared ahead and stopped the robot. Without a failed goal nobody knows that it wanted on."""
+    odometry = drive.odometry
+    if odometry is None or not any(goal.failed for goal in drive.goals):
+        return
+    for scans in drive.scans:
+        doubted_s = min((finding.onset_s for finding in laser.faults(drive, scans)), default=np.inf)
+        if scans.ranges.shape[1] < FEWEST_RAYS or scans.angles[0] == scans.angles[1]:
             continue
         for row, points in _appeared(scans, _poses(odometry, scans.t)):
             at = float(scans.t[row])
             if at >= doubted_s - 2 * BEFORE_S:
                 return
             stuck_s = _stuck(odometry, at)
-            if stuck_s is None or not any(goal.failed and goal.end_s >= at for goal in recording.goals):
+            if stuck_s is None or not any(goal.failed and goal.end_s >= at for goal in drive.goals):
                 continue
             far, wide = float(median(points[:, 0])), float(np.ptp(points[:, 1]))
             yield Finding(
-                "blocked", "something appeared in the robot's way", at, float(odometry.t[-1]),
-                recording.severity(at), f"{wide:.1f} m wide, {far:.1f} m ahead, where the laser saw free space before;"
-                f" the robot gets no further from {stuck_s:.0f} s on", f"{scans.topic} against {odometry.topic}",
-                "world", 0.85,
-            )  # fmt: skip
+                kind="blocked",
+                title="something appeared in the robot's way",
+                onset_s=at,
+                end_s=float(odometry.t[-1]),
+                severity=drive.severity(at),
+                evidence=f"{wide:.1f} m wide, {far:.1f} m ahead, where the laser saw free space before; the robot gets"
+                f" no further from {stuck_s:.0f} s on",
+                source=f"{scans.topic} against {odometry.topic}",
+                suspect="world",
+                probability=0.85,
+            )
             return
 
 
@@ -93,12 +107,15 @@ def _poses(odometry: Odometry, t: Floats) -> Floats:
 
 
 def _stuck(odometry: Odometry, at: float) -> float | None:
-    """When the robot began to get no further, within a minute; None where it went on."""
+    """When the robot began to get no further, soon after; None where it went on."""
     t = odometry.t
-    for row in np.flatnonzero((t >= at) & (t <= at + 60.0)).tolist():
+    for row in np.flatnonzero((t >= at) & (t <= at + SOON_S)).tolist():
         last = int(np.searchsorted(t, t[row] + STUCK_S))
         if last >= len(t):
             return None
         if np.hypot(odometry.x[row:last] - odometry.x[row], odometry.y[row:last] - odometry.y[row]).max() < STUCK_M:
             return float(t[row])
     return None
+
+
+CHECK = Check("blocked", "something that appears ahead and stops the robot", reading(SCAN, ODOMETRY), LIMITS, find)

@@ -1,4 +1,4 @@
-"""The drive: does it do what is asked? It stands, it stops and goes, it is too slow, it pulls to one side."""
+"""The drive: does it do what is commanded? It stands, it stops and goes, it is too slow, it pulls to one side."""
 
 from __future__ import annotations
 
@@ -9,106 +9,145 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.ros.following import Following, following
-from care_core.ecosystems.ros.recording import Battery, Bools, Floats, Recording
-from care_core.numbers import known_median, median
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding, FindingKind, Severity, Suspect
+from care_core.ecosystems.ros.drive import Drive
+from care_core.ecosystems.ros.messages import BATTERY, ODOMETRY, TWIST, TWIST_STAMPED, reading
+from care_core.ecosystems.ros.motion import BREAKS_LOOSE_MPS, Following
+from care_core.ecosystems.ros.sensors import Battery
+from care_core.numbers import Bools, Floats, known_median, median
 
-STANDS_S = 5.0
-"""A drive that stands so long against its commands has failed or is held. In 301 healthy missions: 1.5 s at most."""
-SLOW_S, SLOW = 5.0, 0.7
-"""So long below this share of the speed asked for. The longest of 301 healthy missions: 1.9 s."""
-STOPS, STOPS_IN_S, STOPPED_S = 4, 20.0, 4.0
-"""So many standstills within this time, together so long. 97.5 % of healthy missions: at most 4, and 1.6 s in all."""
-PULL_RADPM, PULL_SAMPLES, PULL_AGREE = 0.12, 25, 0.8
-"""Turn per metre beyond what was asked, over so many samples with steady commands, of which this share agree. So none
-of 301 healthy missions pulls; with 20 samples one does, with 15 five."""
-PULL_BEFORE = 10
-"""So many samples before it in which the drive did not pull."""
-SPACED_S = 0.2
-SLOWER = 0.97
-"""A side that turns too slowly makes the robot slower too."""
-LOST_S = 3.0
-"""Over a longer pause between samples nobody knows whether the robot stood."""
-_STANDING = 0.2
-"""A drive that does less than this share of what is asked stands."""
-_STEADY_MPS, _STEADY_RADPS = 0.15, 0.3
-_LOAD = 0.5
-"""Current that stays above idle by this share of what driving draws: the wheels turn or push."""
+LIMITS = Limits()
+_HEALTHY = "301 healthy move_base missions"
+STANDS_S = LIMITS.add("standstill against commands", 5.0, "s", f"{_HEALTHY}: 1.5 s at most")
+STANDING = LIMITS.add("share of the command that counts as standing", 0.2, "", "noise of odometry at rest, slip")
+STILL = LIMITS.add("speed and turn of a standstill", 0.02, "m/s, rad/s", "noise of odometry at rest")
+SLOW_S = LIMITS.add("time below the commanded speed", 5.0, "s", f"{_HEALTHY}: 1.9 s at most")
+SLOW = LIMITS.add("share of the commanded speed", 0.7, "", f"{_HEALTHY}: below it for 1.9 s at most")
+STOPS = LIMITS.add("standstills close together", 4, "", f"97.5 % of {_HEALTHY}: at most 4")
+STOPS_IN_S = LIMITS.add("time in which they lie", 20.0, "s", f"97.5 % of {_HEALTHY}: at most 4 standstills")
+STOPPED_S = LIMITS.add("time that they take together", 4.0, "s", f"97.5 % of {_HEALTHY}: 1.6 s")
+PULL_RADPM = LIMITS.add("turn beyond the commands", 0.12, "rad/m", f"no one of {_HEALTHY} pulls so")
+PULL_SAMPLES = int(LIMITS.add("samples that pull", 25, "", f"with 20 one of {_HEALTHY} pulls, with 15 five"))
+PULL_AGREE = LIMITS.add("share of them that agree", 0.8, "", f"no one of {_HEALTHY} pulls so")
+PULL_BEFORE = int(LIMITS.add("samples before that do not pull", 10, "", "a robot that always pulled is built so"))
+SLOWER = LIMITS.add("share of the commanded speed while it pulls", 0.97, "", "a slow side makes the robot slower, too")
+SPACED_S = LIMITS.add("time between samples of a pull", 0.2, "s", "what comes faster says the same again")
+STEADY_MPS = LIMITS.add("change of a steady command", 0.15, "m/s", "a drive answers larger steps with a lag")
+STEADY_RADPS = LIMITS.add("change of a steady turn", 0.3, "rad/s", "a drive answers larger steps with a lag")
+PULL_MPS = LIMITS.add("commanded speed while it pulls", 0.1, "m/s", "slower, noise of the turn is more than the pull")
+PULL_DRIVEN_MPS = LIMITS.add("speed while it pulls", 0.05, "m/s", "slower, noise of the turn is more than the pull")
+LOST_S = LIMITS.add("pause between samples", 3.0, "s", "over a longer one nobody knows whether the robot stood")
+SLOW_LOST_S = LIMITS.add("pause between slow samples", 2.0, "s", "over a longer one nobody knows how fast it was")
+FASTER = LIMITS.add("ratio of speeds that shows a drive was not weak", 1.3, "", "clearly more than noise of odometry")
+LOAD = LIMITS.add("share of the driving current beyond idle", 0.5, "", "wheels that turn or push draw it")
+IDLE = LIMITS.add("ratio of driving to idle current", 1.2, "", "a smaller one does not tell them apart")
+DRIVES_MPS = LIMITS.add("speed at which current is that of driving", 0.1, "m/s", "slower, little is drawn")
+RESTS = LIMITS.add("speed and turn at which current is idle", 0.01, "m/s, rad/s", "noise of odometry at rest")
+LATER = LIMITS.add("samples that show a drive obeys", 10, "", "fewer are too few")
+OBEYS = LIMITS.add("share of them that stand", 0.1, "", "standing still for an instant, as at each turn")
 
-_SOURCE = "{odometry} against {commands}; limits: 97.5 % of healthy move_base missions stay far below them"
 
-
-def check(recording: Recording) -> Iterator[Finding]:
-    asked = following(recording)
-    if asked is None or recording.commands is None:
+def find(drive: Drive) -> Iterator[Finding]:
+    """Standstills against commands, short and long, weakness, and a pull to one side."""
+    motion = drive.following
+    if motion is None:
         return
-    source = _SOURCE.format(odometry=asked.odometry.topic, commands=recording.commands.topic)
-    stood = _stood(asked)
-    still = _unbroken(asked.odometry.t[asked.to_move], stood[asked.to_move])
+    stood = _stood(motion)
+    still = _unbroken(motion.odometry.t[motion.to_move], stood[motion.to_move])
     long = [(start, end) for start, end in still if end - start >= STANDS_S]
     if long:
-        yield _standing(recording, asked, long, source)
-    yield from _stopping(recording, [one for one in still if one not in long], source)
-    slow = list(_slow(recording, asked, stood, source))
+        yield _standing(drive, motion, long)
+    yield from _stopping(drive, motion, [stop for stop in still if stop not in long])
+    slow = list(_slow(drive, motion, stood))
     yield from slow
-    if not slow:  # a drive that does less than asked turns otherwise than asked too
-        yield from _pulling(recording, asked, source)
+    if not slow:  # a drive that does less than commanded turns otherwise than commanded, too
+        yield from _pulling(drive, motion)
 
 
-def obeys(recording: Recording, since_s: float) -> bool:
+def obeys(drive: Drive, since_s: float) -> bool:
     """Whether the drive has followed its commands since then, as far as that can be seen."""
-    asked = following(recording)
-    if asked is None:
+    motion = drive.following
+    if motion is None:
         return False
-    later = (asked.odometry.t > since_s) & asked.to_move
-    return bool(np.count_nonzero(later) >= 10) and float(_stood(asked)[later].mean()) < 0.1
+    later = (motion.odometry.t > since_s) & motion.to_move
+    return bool(np.count_nonzero(later) >= LATER) and float(_stood(motion)[later].mean()) < OBEYS
 
 
-def _stood(asked: Following) -> Bools:
+def _finding(
+    drive: Drive,
+    title: str,
+    span: tuple[float, float],
+    evidence: str,
+    *,
+    kind: FindingKind = "drive",
+    otherwise: Severity = "warning",
+    suspect: Suspect = "hardware",
+    probability: float = 0.9,
+) -> Finding:
+    """What is wrong with a drive, as seen by its odometry against its commands."""
+    assert drive.odometry is not None
+    assert drive.commands is not None
+    return Finding(
+        kind=kind,
+        title=title,
+        onset_s=span[0],
+        end_s=span[1],
+        severity=drive.severity(span[0], otherwise),
+        evidence=evidence,
+        source=f"{drive.odometry.topic} against {drive.commands.topic}; limits: 97.5 % of healthy move_base missions"
+        " stay far below them",
+        suspect=suspect,
+        probability=probability,
+    )
+
+
+def _stood(motion: Following) -> Bools:
     """Samples in which the robot stands though every command of the last second asked for motion."""
-    odometry = asked.odometry
+    odometry = motion.odometry
     speed, turn = np.hypot(odometry.speed, odometry.sideways), np.abs(odometry.turn)
-    wanted, wanted_turn = np.abs(asked.wanted_speed), np.abs(asked.wanted_turn)
-    stands = (speed < np.maximum(_STANDING * wanted, 0.02)) & (turn < np.maximum(_STANDING * wanted_turn, 0.02))
+    wanted, wanted_turn = np.abs(motion.wanted_speed), np.abs(motion.wanted_turn)
+    stands = speed < np.maximum(STANDING * wanted, STILL)
+    stands &= turn < np.maximum(STANDING * wanted_turn, STILL)
     # A robot asked to drive a curve that only turns does not drive either.
-    return asked.to_move & (stands | ((wanted >= 0.08) & (speed < _STANDING * wanted)))
+    return motion.to_move & (stands | ((wanted >= BREAKS_LOOSE_MPS) & (speed < STANDING * wanted)))
 
 
-def _standing(recording: Recording, asked: Following, long: list[tuple[float, float]], source: str) -> Finding:
-    start, end = long[0][0], long[-1][1]
-    total_s = sum(stop - begin for begin, stop in long)
-    inside = (asked.odometry.t >= start) & (asked.odometry.t <= long[0][1])
-    wanted = float(median(np.abs(asked.wanted_speed[inside])))
-    told = f"commanded {wanted:.2f} m/s" if wanted > 0 else "commanded to turn"
-    evidence = f"{told} for {total_s:.0f} s, odometry stands"
-    pushing = next((one for battery in recording.batteries if (one := _pushes(battery, asked, long)) is not None), None)
-    severity = recording.severity(start, "critical")
-    if pushing is None:
-        return Finding("drive", "the robot does not move though commanded", start, end, severity, evidence, source,
-                       probability=0.9)  # fmt: skip
-    drawn, idle, driving = pushing
-    load = f"; current {drawn:.1f} A, idle {idle:.1f} A, driving {driving:.1f} A"
-    if drawn - idle > _LOAD * (driving - idle):
-        return Finding("blocked", "something holds the robot: its motors push, it does not move", start, end, severity,
-                       evidence + load, source, "world", 0.85)  # fmt: skip
-    return Finding("drive", "the drive does not answer its commands", start, end, severity, evidence + load, source,
-                   probability=0.9)  # fmt: skip
+def _standing(drive: Drive, motion: Following, long: list[tuple[float, float]]) -> Finding:
+    """Against its commands the drive stands: it failed, or something holds it, which its current tells."""
+    span, total_s = (long[0][0], long[-1][1]), sum(stop - begin for begin, stop in long)
+    inside = (motion.odometry.t >= span[0]) & (motion.odometry.t <= long[0][1])
+    wanted = float(median(np.abs(motion.wanted_speed[inside])))
+    order = f"commanded {wanted:.2f} m/s" if wanted > 0 else "commanded to turn"
+    evidence = f"{order} for {total_s:.0f} s, odometry stands"
+    currents = (currents for battery in drive.batteries if (currents := _currents(battery, motion, long)) is not None)
+    drawn, idle, driving = next(currents, (np.nan, np.nan, np.nan))
+    if np.isnan(drawn):
+        return _finding(drive, "the robot does not move though commanded", span, evidence, otherwise="critical")
+    evidence += f"; current {drawn:.1f} A, idle {idle:.1f} A, driving {driving:.1f} A"
+    if drawn - idle > LOAD * (driving - idle):
+        return _finding(
+            drive, "something holds the robot: its motors push, it does not move", span, evidence,
+            kind="blocked", otherwise="critical", suspect="world", probability=0.85,
+        )  # fmt: skip
+    return _finding(drive, "the drive does not answer its commands", span, evidence, otherwise="critical")
 
 
-def _pushes(battery: Battery, asked: Following, long: list[tuple[float, float]]) -> tuple[float, float, float] | None:
-    """Current while held, while idle and while driving, A; None where the recording does not tell them apart."""
-    odometry = asked.odometry
-    held = np.zeros(len(battery.t), bool)
+def _currents(
+    battery: Battery, motion: Following, long: list[tuple[float, float]]
+) -> tuple[float, float, float] | None:
+    """Current while standing, while idle and while driving, A; None where the recording does not tell them apart."""
+    odometry = motion.odometry
+    stood = np.zeros(len(battery.t), bool)
     for start, end in long:
-        held |= (battery.t >= start + 1.0) & (battery.t <= end)
+        stood |= (battery.t >= start + 1.0) & (battery.t <= end)
     speed = np.interp(battery.t, odometry.t, np.abs(odometry.speed))
     turn = np.interp(battery.t, odometry.t, np.abs(odometry.turn))
-    drives, idles = (speed > 0.1) & ~held, (speed < 0.01) & (turn < 0.01) & ~held
-    if min(np.count_nonzero(one) for one in (held, drives, idles)) < 3:
+    drives, idles = (speed > DRIVES_MPS) & ~stood, (speed < RESTS) & (turn < RESTS) & ~stood
+    if min(np.count_nonzero(rows) for rows in (stood, drives, idles)) < 3:
         return None
-    drawn, idle, driving = (known_median(battery.current[one]) for one in (held, idles, drives))
-    return (drawn, idle, driving) if driving > 1.2 * idle > 0 else None
+    drawn, idle, driving = (known_median(battery.drawn[rows]) for rows in (stood, idles, drives))
+    return (drawn, idle, driving) if driving > IDLE * idle > 0 else None
 
 
 def _unbroken(t: Floats, stood: Bools) -> list[tuple[float, float]]:
@@ -119,7 +158,7 @@ def _unbroken(t: Floats, stood: Bools) -> list[tuple[float, float]]:
     return [(float(t[first]), float(t[last])) for first, last in spans]
 
 
-def _stopping(recording: Recording, still: list[tuple[float, float]], source: str) -> Iterator[Finding]:
+def _stopping(drive: Drive, motion: Following, still: list[tuple[float, float]]) -> Iterator[Finding]:
     """Many short standstills close together."""
     starts = np.array([start for start, _ in still])
     stood_s = np.array([end - start for start, end in still])
@@ -127,54 +166,61 @@ def _stopping(recording: Recording, still: list[tuple[float, float]], source: st
         near = (starts >= start) & (starts < start + STOPS_IN_S)
         if np.count_nonzero(near) >= STOPS and float(stood_s[near].sum()) >= STOPPED_S:
             later = starts >= start
-            evidence = (f"{np.count_nonzero(later)} standstills of {median(stood_s[later]):.1f} s"
-                        " while commands to move go on")  # fmt: skip
-            yield Finding("commands", "commands reach the drive only now and then", start, still[-1][1],
-                          recording.severity(start), evidence, source, probability=0.9)  # fmt: skip
+            yield _finding(
+                drive, "commands reach the drive only now and then", (start, still[-1][1]),
+                f"{np.count_nonzero(later)} standstills of {median(stood_s[later]):.1f} s while commands to move go on",
+                kind="commands",
+            )  # fmt: skip
             return
 
 
-def _slow(recording: Recording, asked: Following, stood: Bools, source: str) -> Iterator[Finding]:
+def _slow(drive: Drive, motion: Following, stood: Bools) -> Iterator[Finding]:
     """Moves, but slower than every command of the last second."""
-    odometry, wanted = asked.odometry, asked.wanted_speed
-    asks = np.abs(wanted) >= 0.08
+    odometry, wanted = motion.odometry, motion.wanted_speed
+    asks = np.abs(wanted) >= BREAKS_LOOSE_MPS
     share = np.divide(odometry.speed, wanted, out=np.ones(len(wanted)), where=asks)
     slow = (share < SLOW)[asks]
     t = odometry.t[asks]
-    begin = 0
-    found: list[tuple[int, int]] = []
-    for row in range(len(t) + 1):
-        if row == len(t) or not slow[row] or (row and t[row] - t[row - 1] > 2.0):
-            if row > begin and t[row - 1] - t[begin] >= SLOW_S and not stood[asks][begin:row].mean() > 0.5:
-                found.append((begin, row))
-            begin = row + 1 if row < len(t) and not slow[row] else row
+    found = _slow_spans(t, slow, stood[asks])
     if not found:
         return
     rows = np.concatenate([np.arange(first, last) for first, last in found])
     speeds, demands = np.abs(odometry.speed[asks]), np.abs(wanted[asks])
     reached, demanded = float(median(speeds[rows])), float(median(demands[rows]))
     # It was weak since it last was clearly faster, though before a higher speed was asked for nobody could see.
-    faster = np.flatnonzero(speeds[: found[0][0]] > 1.3 * reached)
-    lasting = slow & np.append(slow[1:], False) & (demands > 1.3 * reached)
+    faster = np.flatnonzero(speeds[: found[0][0]] > FASTER * reached)
+    lasting = slow & np.append(slow[1:], False) & (demands > FASTER * reached)
     since = np.flatnonzero(lasting & (np.arange(len(t)) > (faster[-1] if len(faster) else -1)))
-    start, end = float(t[min(*since[:1], found[0][0])]), float(t[found[-1][1] - 1])
+    span = float(t[min(*since[:1], found[0][0])]), float(t[found[-1][1] - 1])
     evidence = f"reaches {reached:.2f} m/s of {demanded:.2f} m/s commanded, for {len(rows)} samples"
-    yield Finding("drive", "the drive is weak: slower than commanded", start, end, recording.severity(start), evidence,
-                  source, probability=0.9)  # fmt: skip
+    yield _finding(drive, "the drive is weak: slower than commanded", span, evidence)
 
 
-def _pulling(recording: Recording, asked: Following, source: str) -> Iterator[Finding]:
-    """Turns to one side more than asked, in proportion to its speed, and is slower than asked."""
-    odometry = asked.odometry
-    steady = asked.asked & (np.abs(asked.wanted_speed) > 0.1) & (np.abs(odometry.speed) > 0.05)
-    steady &= (asked.speed_high - asked.speed_low < _STEADY_MPS) & (asked.turn_high - asked.turn_low < _STEADY_RADPS)
+def _slow_spans(t: Floats, slow: Bools, stood: Bools) -> list[tuple[int, int]]:
+    """First row and the one after the last of each stretch in which the robot is slow for long, and does not stand."""
+    begin = 0
+    found: list[tuple[int, int]] = []
+    for row in range(len(t) + 1):
+        if row == len(t) or not slow[row] or (row and t[row] - t[row - 1] > SLOW_LOST_S):
+            if row > begin and t[row - 1] - t[begin] >= SLOW_S and not stood[begin:row].mean() > 0.5:
+                found.append((begin, row))
+            begin = row + 1 if row < len(t) and not slow[row] else row
+    return found
+
+
+def _pulling(drive: Drive, motion: Following) -> Iterator[Finding]:
+    """Turns to one side more than commanded, in proportion to its speed, and is slower than commanded."""
+    odometry = motion.odometry
+    steady = motion.commanded & (np.abs(motion.wanted_speed) > PULL_MPS) & (np.abs(odometry.speed) > PULL_DRIVEN_MPS)
+    steady &= motion.speed_high - motion.speed_low < STEADY_MPS
+    steady &= motion.turn_high - motion.turn_low < STEADY_RADPS
     rows = _spaced(odometry.t, np.flatnonzero(steady))
     if len(rows) < PULL_BEFORE + PULL_SAMPLES:
         return
     t, speed = odometry.t[rows], odometry.speed[rows]
-    pull: Floats = (odometry.turn[rows] - (asked.turn_high + asked.turn_low)[rows] / 2) / speed
+    pull: Floats = (odometry.turn[rows] - (motion.turn_high + motion.turn_low)[rows] / 2) / speed
     windows = sliding_window_view(pull, PULL_SAMPLES)[PULL_BEFORE:]
-    shares = sliding_window_view(speed / asked.wanted_speed[rows], PULL_SAMPLES)[PULL_BEFORE:]
+    shares = sliding_window_view(speed / motion.wanted_speed[rows], PULL_SAMPLES)[PULL_BEFORE:]
     middles = median(windows, axis=1)
     agrees = np.mean(np.sign(windows) == np.sign(middles)[:, None], axis=1)
     fits = (np.abs(middles) >= PULL_RADPM) & (agrees >= PULL_AGREE) & (median(shares, axis=1) < SLOWER)
@@ -183,18 +229,23 @@ def _pulling(recording: Recording, asked: Following, source: str) -> Iterator[Fi
         if float(median(pull[:first])) * np.sign(middle) < PULL_RADPM / 2:
             # It began where the sum of what is beyond half of it turns upwards.
             above = np.cumsum(pull[: first + PULL_SAMPLES] * np.sign(middle) - abs(middle) / 2)
-            start = float(t[int(np.argmin(above))])
-            side = "left" if middle > 0 else "right"
+            span = float(t[int(np.argmin(above))]), float(t[-1])
             evidence = (
                 f"turns {abs(middle):.2f} rad per metre beyond its commands, {agrees[number]:.0%} of samples agree"
             )
-            yield Finding("drive", f"the drive pulls to the {side}", start, float(t[-1]), recording.severity(start),
-                          evidence, source, probability=0.8)  # fmt: skip
+            side = "left" if middle > 0 else "right"
+            yield _finding(drive, f"the drive pulls to the {side}", span, evidence, probability=0.8)
             return
 
 
 def _spaced(t: Floats, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The first row of every fifth of a second: what comes faster says the same again."""
+    """The first row of every fifth of a second."""
     _, first = np.unique(np.floor(t[rows] / SPACED_S), return_index=True)
     spaced: NDArray[np.intp] = rows[first]
     return spaced
+
+
+READS = reading(ODOMETRY, TWIST, TWIST_STAMPED, BATTERY)
+CHECK = Check(
+    "drive", "a robot that stands, stops and goes, is slow or pulls against its commands", READS, LIMITS, find
+)

@@ -6,33 +6,41 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.ros import plan
-from care_core.ecosystems.ros.recording import Floats, Recording, believable
+from care_core.ecosystems.ros.drive import Drive
+from care_core.ecosystems.ros.messages import IMU, ODOMETRY, TWIST, TWIST_STAMPED, believable, holds, reading
 from care_core.logs.base import Table
-from care_core.numbers import median
+from care_core.numbers import Floats, median
 
-SHOCK_MPS2 = 25.0
-"""Beyond gravity. Kerbs and rough ground give a wheeled robot 5 to 15 m/s^2; a collision gives tens."""
-HARDEST_MPS2 = 1e4
-TIP_DEG = 30.0
-"""Slope that wheeled robots are built to climb at most (Husky A200: 45 deg at most, 30 deg across)."""
-_GRAVITY = (7.8, 11.8)
+LIMITS = Limits()
+SHOCK_MPS2 = LIMITS.add(
+    "shock beyond gravity", 25.0, "m/s2",
+    "kerbs and rough ground give a wheeled robot 5 to 15 m/s2; a collision gives tens",
+)  # fmt: skip
+TIP_DEG = LIMITS.add(
+    "tilt", 30.0, "deg", "slope that wheeled robots are built to climb at most (Husky A200: 45 deg, 30 deg across)"
+)
+LEAST_MPS2 = LIMITS.add("least usual acceleration", 7.8, "m/s2", "gravity, 9.8, less a badly scaled sensor's error")
+MOST_MPS2 = LIMITS.add("greatest usual acceleration", 11.8, "m/s2", "gravity and a badly scaled sensor's error")
+MESSAGES_FELT = LIMITS.add("messages of an IMU", 50, "", "fewer do not tell what is usual")
+UNIT_ERROR = LIMITS.add("error of a unit quaternion", 0.1, "", "a driver without an orientation sends zeros")
 
 
-def check(recording: Recording) -> Iterator[Finding]:
-    if recording.odometry is None or recording.commands is None:
+def find(drive: Drive) -> Iterator[Finding]:
+    """Shocks and tilt, of a robot that drives."""
+    if drive.odometry is None or drive.commands is None:
         return
-    for topic, table in recording.of(plan.IMU):
-        if set(plan.FIELDS[plan.IMU]) <= set(table.columns) and len(table) >= 50:
-            yield from _felt(recording, topic, table)
+    for topic, table in drive.of(IMU):
+        if holds(table, IMU) and len(table) >= MESSAGES_FELT:
+            yield from _felt(drive, topic, table)
             return
 
 
-def _felt(recording: Recording, topic: str, table: Table) -> Iterator[Finding]:
-    felt = np.sqrt(sum(believable(table[f"linear_acceleration.{axis}"], HARDEST_MPS2) ** 2 for axis in "xyz"))
+def _felt(drive: Drive, topic: str, table: Table) -> Iterator[Finding]:
+    felt = np.sqrt(sum(believable(table, IMU, f"linear_acceleration.{axis}") ** 2 for axis in "xyz"))
     good = np.isfinite(felt)
-    if not good.any() or not _GRAVITY[0] <= float(median(felt[good])) <= _GRAVITY[1]:
+    if not good.any() or not LEAST_MPS2 <= float(median(felt[good])) <= MOST_MPS2:
         return
     t, tilt = table.t, _tilt(table)
     hits = np.flatnonzero(good & (np.abs(felt - median(felt[good])) > SHOCK_MPS2))
@@ -42,21 +50,29 @@ def _felt(recording: Recording, topic: str, table: Table) -> Iterator[Finding]:
     at = float(t[min(hits[:1].tolist() + tips[:1].tolist())])
     words = [f"{len(hits)} shocks up to {felt[hits].max():.0f} m/s^2"] if len(hits) else []
     words += [f"tilted by up to {tilt[tips].max():.0f} deg from {t[tips[0]]:.1f} s on"] if len(tips) else []
-    title = "the robot tips over" if not len(hits) else "the robot hits something" + (" and tips" if len(tips) else "")
-    end = float(max(t[hits[-1]] if len(hits) else 0.0, t[tips[-1]] if len(tips) else 0.0))
     yield Finding(
-        "crash", title, at, end, recording.severity(at, "critical" if len(tips) else "warning"), ", ".join(words),
-        topic, "operation", 0.7,
-    )  # fmt: skip
+        kind="crash",
+        title="the robot tips over" if not len(hits) else "the robot hits something" + " and tips" * bool(len(tips)),
+        onset_s=at,
+        end_s=float(max(t[rows[-1]] for rows in (hits, tips) if len(rows))),
+        severity=drive.severity(at, "critical" if len(tips) else "warning"),
+        evidence=", ".join(words),
+        source=topic,
+        suspect="operation",
+        probability=0.7,
+    )
 
 
 def _tilt(table: Table) -> Floats:
     """Angle of the robot's upward axis to what it was at first, deg, shape (n,); zero without an orientation."""
-    x, y, z, w = (believable(table[f"orientation.{axis}"], 2.0) for axis in "xyzw")
+    x, y, z, w = (believable(table, IMU, f"orientation.{axis}") for axis in "xyzw")
     length = x * x + y * y + z * z + w * w
-    if not np.all(np.abs(length[np.isfinite(length)] - 1) < 0.1) or not np.isfinite(length).all():
+    if not np.all(np.abs(length[np.isfinite(length)] - 1) < UNIT_ERROR) or not np.isfinite(length).all():
         return np.zeros(len(table))
     up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=1)
     first = median(up[: max(5, len(up) // 50)], axis=0)
     angle: Floats = np.degrees(np.arccos(np.clip(up @ (first / np.linalg.norm(first)), -1, 1)))
     return angle
+
+
+CHECK = Check("imu", "shocks, and a robot that tips", reading(IMU, ODOMETRY, TWIST, TWIST_STAMPED), LIMITS, find)

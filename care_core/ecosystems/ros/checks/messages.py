@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
 from care_core.ecosystems.ros.checks import planner, timing
-from care_core.ecosystems.ros.diagnostics import Report, reports
-from care_core.ecosystems.ros.recording import ERROR, FATAL, Recording, Said
+from care_core.ecosystems.ros.drive import Drive
+from care_core.ecosystems.ros.messages import DIAGNOSTICS, ROSOUT, reading
+from care_core.ecosystems.ros.node_messages import Level, LogMessage, Report
 
-MOST = 3
-"""So many kinds of error are told, the first of them first."""
+LIMITS = Limits()
+MOST = int(LIMITS.add("kinds of error that are told", 3, "", "the first of them; more are noise of what failed first"))
+BAD = LIMITS.add("level of diagnostics", 2, "", "diagnostic_msgs/DiagnosticStatus: 2 is ERROR, 3 is STALE")
 _HARMLESS = re.compile(
     r"transition callback on a goal handle that we're not tracking|rotate recovery can't rotate", re.IGNORECASE
 )
@@ -28,12 +31,13 @@ _ABOUT: tuple[tuple[re.Pattern[str], FindingKind], ...] = (
 )
 _TRACEBACK = "Traceback (most recent call last)"
 _RAISED = re.compile(r'File "(?:.*/)?([^/"]+)", line (\d+), in (\w+)')
-NUMBERS = re.compile(r"-?\d+(\.\d+)?")
+_NUMBER = re.compile(r"-?\d+(\.\d+)?")
 
 
-def check(recording: Recording) -> Iterator[Finding]:
-    yield from _diagnostics(recording)
-    yield from _errors(recording)
+def find(drive: Drive) -> Iterator[Finding]:
+    """Errors of diagnostics and of nodes."""
+    yield from _diagnostics(drive)
+    yield from _errors(drive)
 
 
 def about(text: str) -> FindingKind:
@@ -41,47 +45,57 @@ def about(text: str) -> FindingKind:
     return next((kind for pattern, kind in _ABOUT if pattern.search(text)), "software")
 
 
-def _diagnostics(recording: Recording) -> Iterator[Finding]:
+def _diagnostics(drive: Drive) -> Iterator[Finding]:
     worst: dict[str, list[Report]] = {}
     last: dict[str, Report] = {}
-    for one in reports(recording):
-        last[one.name] = one
-        if one.level >= 2:  # ERROR or STALE
-            worst.setdefault(one.name, []).append(one)
-    for name, own in sorted(worst.items(), key=lambda one: one[1][0].time_s)[:MOST]:
-        first = own[0]
-        stays = last[name].level >= 2
-        until_s = recording.duration_s if stays else last[name].time_s
-        again = (f", {len(own)} times" if len(own) > 1 else "") + (", and so to the end" if stays else "")
-        severity: Severity = recording.severity(first.time_s, "critical" if first.level == 2 else "warning")
+    for report in drive.reports:
+        last[report.name] = report
+        if report.level >= BAD:
+            worst.setdefault(report.name, []).append(report)
+    for name, bad in sorted(worst.items(), key=lambda item: item[1][0].time_s)[:MOST]:
+        first, stays = bad[0], last[name].level >= BAD
+        again = (f", {len(bad)} times" if len(bad) > 1 else "") + (", and so to the end" if stays else "")
         yield Finding(
-            about(f"{name} {first.message}"), f"diagnostics: {name}: {first.message or 'error'}", first.time_s,
-            until_s, severity, f'{first.word} "{first.message}"{again}', first.topic,
+            kind=about(f"{name} {first.message}"),
+            title=f"diagnostics: {name}: {first.message or 'error'}",
+            onset_s=first.time_s,
+            end_s=drive.duration_s if stays else last[name].time_s,
+            severity=drive.severity(first.time_s, "critical" if first.level == BAD else "warning"),
+            evidence=f'{first.word} "{first.message}"{again}',
+            source=first.topic,
             probability=0.7,
-        )  # fmt: skip
+        )
 
 
-def _errors(recording: Recording) -> Iterator[Finding]:
-    kinds: dict[tuple[str, str], list[Said]] = {}
-    for one in recording.said:
-        known = planner.FAILS.search(one.text) or timing.known(one.text) or _HARMLESS.search(one.text)
-        if one.level >= ERROR and not known:
-            kinds.setdefault((one.node, NUMBERS.sub("#", one.text)), []).append(one)
-    fatal_s = max((one.time_s for one in recording.said if one.level >= FATAL), default=None)
-    ranked = sorted(kinds.values(), key=lambda own: (-own[0].level, own[0].time_s))
-    for own in ranked[:MOST]:
-        first = own[0]
-        is_fatal = first.level >= FATAL
-        # An error that a fatal one follows led to it, as far as anybody can say.
-        downed = is_fatal or (fatal_s is not None and first.time_s <= fatal_s)
-        otherwise: Severity = "critical" if downed else "warning"
-        times = f", {len(own)} times" if len(own) > 1 else ""
+def _errors(drive: Drive) -> Iterator[Finding]:
+    kinds: dict[tuple[str, str], list[LogMessage]] = {}
+    for message in drive.log_messages:
+        text = message.text
+        is_known = planner.FAILS.search(text) or timing.is_known(text) or _HARMLESS.search(text)
+        if message.level >= Level.ERROR and not is_known:
+            kinds.setdefault((message.node, _NUMBER.sub("#", text)), []).append(message)
+    fatal_s = max((message.time_s for message in drive.log_messages if message.level >= Level.FATAL), default=None)
+    ranked = sorted(kinds.values(), key=lambda alike: (-alike[0].level, alike[0].time_s))
+    for alike in ranked[:MOST]:
+        first = alike[0]
+        times = f", {len(alike)} times" if len(alike) > 1 else ""
         yield Finding(
-            about(f"{first.node} {first.text}"), ": ".join(filter(None, (first.node, gist(first.text)))), first.time_s,
-            own[-1].time_s,
-            recording.severity(first.time_s, otherwise) if downed else "warning" if not recording.goals else "info",
-            f'{"FATAL" if is_fatal else "ERROR"} "{gist(first.text, 160)}"{times}', "/rosout", "hardware", 0.5,
-        )  # fmt: skip
+            kind=about(f"{first.node} {first.text}"),
+            title=": ".join(filter(None, (first.node, gist(first.text)))),
+            onset_s=first.time_s,
+            end_s=alike[-1].time_s,
+            severity=_severity(drive, first, fatal_s),
+            evidence=f'{"FATAL" if first.level >= Level.FATAL else "ERROR"} "{gist(first.text, 160)}"{times}',
+            source="/rosout",
+            probability=0.5,
+        )
+
+
+def _severity(drive: Drive, first: LogMessage, fatal_s: float | None) -> Severity:
+    """An error that a fatal one follows led to it, as far as anybody can say."""
+    if first.level >= Level.FATAL or (fatal_s is not None and first.time_s <= fatal_s):
+        return drive.severity(first.time_s, "critical")
+    return "info" if drive.goals else "warning"
 
 
 def gist(text: str, most: int = 80) -> str:
@@ -92,3 +106,6 @@ def gist(text: str, most: int = 80) -> str:
     raised = [match for line in lines if (match := _RAISED.match(line))]
     place = f" ({raised[-1][1]} line {raised[-1][2]}, {raised[-1][3]})" if raised else ""
     return f"{lines[-1][:most]}{place}"
+
+
+CHECK = Check("messages", "errors of nodes and of diagnostics", reading(DIAGNOSTICS, *ROSOUT), LIMITS, find)

@@ -2,147 +2,156 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sized
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.ros import plan
-from care_core.ecosystems.ros.recording import STREAM_MESSAGES, Floats, Odometry, Recording
+from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive, way_through
+from care_core.ecosystems.ros.messages import (
+    ACTION_GOAL,
+    ACTION_RESULT,
+    MESSAGES,
+    ODOMETRY,
+    STATUS,
+    TF,
+    TWIST,
+    TWIST_STAMPED,
+    holds,
+    reading,
+)
+from care_core.ecosystems.ros.motion import STALE_S, Odometry
 from care_core.logs.base import Table
 from care_core.logs.plausible import STAMP, never_moved
-from care_core.numbers import median, quantile
+from care_core.numbers import Floats, median, quantile
 
-JUMP_M = 0.3
-"""A position that steps further than speed and time allow. The largest such step of 301 healthy missions: 0.07 m."""
-DRIFTS = ((1.5, 0.08), (4.0, 0.04))
-"""Over so many metres the share by which the position advances further than the speed says. Of 301 healthy missions
-97.5 % stay below 0.043 and 0.018, all below 0.075 and 0.03."""
-SHRINK = 0.35
-"""The share by which it advances less far: thin sampling alone gives up to 0.33."""
-AGREED_M = 0.7
-"""For so many metres position and speed must have agreed before they are said to disagree."""
-CORRECTION_M = 0.5
-"""A step of map -> odom: amcl's corrections are below update_min_d (0.2 m) times its error, far less than this."""
-_PAUSE_S = 0.6
-"""Over a longer pause the speed in between is not known."""
+LIMITS = Limits()
+_HEALTHY = "301 healthy move_base missions"
+_DRIFT = f"{_HEALTHY}: 97.5 % below half of it"
+JUMP_M = LIMITS.add("step beyond what speed and time allow", 0.3, "m", f"{_HEALTHY}: at most 0.07 m")
+DRIFTS = (
+    (LIMITS.add("short way of a drift", 1.5, "m", _DRIFT), LIMITS.add("drift over it", 0.08, "", _DRIFT)),
+    (LIMITS.add("long way of a drift", 4.0, "m", _DRIFT), LIMITS.add("drift over it", 0.04, "", _DRIFT)),
+)
+"""Over so many metres the share by which the position advances further than the speed says."""
+SHRINK = LIMITS.add("share by which it advances less far", 0.35, "", "thin sampling alone gives up to 0.33")
+COVERED = LIMITS.add("share of the way that is compared", 0.8, "", "over less, noise is more than drift")
+AGREED_M = LIMITS.add("way on which position and speed agreed", 0.7, "m", "else that odometry is made so")
+CORRECTION_M = LIMITS.add("step of map -> odom", 0.5, "m", "amcl corrects below update_min_d (0.2 m) times its error")
+FOUND_S = LIMITS.add("time to find the robot on the map", 5.0, "s", "the first corrections are large")
+PAUSE_S = LIMITS.add("pause between samples", STALE_S, "s", "over a longer one the speed is not known")
 
 
-def check(recording: Recording) -> Iterator[Finding]:
-    odometry = recording.odometry
-    yield from _dead(recording)
+def find(drive: Drive) -> Iterator[Finding]:
+    """Odometry that cannot be, that jumps or drifts, and a localisation that jumps."""
+    odometry = drive.odometry
+    yield from _unusable(drive)
     if odometry is not None and odometry.tells_speed and not odometry.stands_still:
-        yield from _jumps(recording, odometry)
-        yield from _drift(recording, odometry)
-    yield from _corrections(recording)
+        yield from _jumps(drive, odometry)
+        yield from _drift(drive, odometry)
+    yield from _corrections(drive)
 
 
-def _dead(recording: Recording) -> Iterator[Finding]:
+def _unusable(drive: Drive) -> Iterator[Finding]:
     """Odometry that cannot be: no numbers, no movement while goals were reached, no time."""
-    tables = dict(recording.of(plan.ODOMETRY))
-    if recording.odometry is None:
+    for topic, title, evidence in _doubts(drive):
+        yield Finding(
+            kind="localisation",
+            title=title,
+            onset_s=0.0,
+            end_s=drive.duration_s,
+            severity="warning",
+            evidence=evidence,
+            source=topic,
+            probability=0.9,
+        )
+
+
+def _doubts(drive: Drive) -> Iterator[tuple[str, str, str]]:
+    """Topic, title and evidence of each."""
+    tables = dict(drive.of(ODOMETRY))
+    odometry = drive.odometry
+    if odometry is None:
         rows = {topic: len(table) for topic, table in tables.items() if len(table) >= STREAM_MESSAGES}
         if rows and all(_is_nothing(tables[topic]) for topic in rows):
             topic = min(rows)
-            yield _unusable(recording, topic, "odometry says no numbers", f"{rows[topic]} messages without a position")
+            yield topic, "odometry says no numbers", f"{rows[topic]} messages without a position"
         return
-    odometry = recording.odometry
-    path_m = float(np.sum(np.hypot(np.diff(odometry.x), np.diff(odometry.y))))
-    way_m = _way_of_goals(recording)
+    topic, count, path_m = odometry.topic, len(odometry.t), odometry.path_m()
+    way_m = way_through(drive.goals, drive.commands)
     if odometry.stands_still:
-        yield _unusable(
-            recording, odometry.topic, "odometry tells no position",
-            f"the same in all {len(odometry.t)} messages, while its own speed makes {odometry.way_m:.1f} m",
-        )  # fmt: skip
-    elif never_moved(path_m, len(odometry.t), way_m):
-        yield _unusable(
-            recording, odometry.topic, "odometry never moved, but goals were reached",
-            f"{path_m:.2g} m in {len(odometry.t)} messages, goals and commands over {way_m:.1f} m",
-        )  # fmt: skip
-    stamp = np.asarray(tables[odometry.topic][STAMP], np.float64)
+        evidence = f"the same in all {count} messages, while its own speed makes {odometry.way_by_speed_m:.1f} m"
+        yield topic, "odometry tells no position", evidence
+    elif never_moved(path_m, count, way_m):
+        evidence = f"{path_m:.2g} m in {count} messages, goals and commands over {way_m:.1f} m"
+        yield topic, "odometry never moved, but goals were reached", evidence
+    stamp = np.asarray(tables[topic].columns.get(STAMP, ()), np.float64)
     known = stamp[np.isfinite(stamp)]
     if len(stamp) >= STREAM_MESSAGES and (not len(known) or (len(known) == len(stamp) and np.ptp(known) == 0)):
-        yield _unusable(
-            recording, odometry.topic, "odometry carries no time",
-            f"its {len(stamp)} stamps {'are the same' if len(known) else 'were never set'}; transforms need them",
-        )  # fmt: skip
+        stamps = "are the same" if len(known) else "were never set"
+        yield topic, "odometry carries no time", f"its {len(stamp)} stamps {stamps}; transforms need them"
 
 
 def _is_nothing(table: Table) -> bool:
-    columns = [table[name] for name in plan.FIELDS[plan.ODOMETRY][1:3] if name in table.columns]
-    return len(columns) == 2 and not np.isfinite(np.hypot(*columns)).any()
-
-
-def _unusable(recording: Recording, topic: str, title: str, evidence: str) -> Finding:
-    return Finding(
-        "localisation", title, 0.0, recording.duration_s, "warning", evidence, topic, probability=0.9
-    )  # fmt: skip
-
-
-def _way_of_goals(recording: Recording) -> float:
-    """How far the robot must have gone, m: from reached goal to reached goal, or as it was commanded on the way to
-    them."""
-    reached = [goal for goal in recording.goals if goal.outcome == "reached"]
-    apart = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(reached)]
-    way_m = sum(one for one in apart if math.isfinite(one))
-    if recording.commands is None:
-        return way_m
-    t = recording.commands.t
-    ordered = np.hypot(recording.commands.speed, recording.commands.sideways)
-    ordered = ordered * np.minimum(np.diff(t, append=t[-1:]), _PAUSE_S)
-    return max(way_m, sum(float(ordered[(t >= one.sent_s) & (t <= one.end_s)].sum()) for one in reached))
+    names = ("pose.pose.position.x", "pose.pose.position.y")
+    return set(names) <= set(table.columns) and not np.isfinite(np.hypot(*(table[name] for name in names))).any()
 
 
 def _steps(odometry: Odometry) -> tuple[Floats, Floats, Floats]:
     """Per sample how far the position went since the one before, and the least and most that the speeds allow, m."""
     went = np.hypot(np.diff(odometry.x, prepend=odometry.x[:1]), np.diff(odometry.y, prepend=odometry.y[:1]))
-    speed = np.hypot(odometry.speed, odometry.sideways)
+    speed, dt = np.hypot(odometry.speed, odometry.sideways), odometry.dt
     before = np.concatenate([speed[:1], speed[:-1]])
-    return went, np.minimum(speed, before) * odometry.dt, np.maximum(speed, before) * odometry.dt
+    return went, np.minimum(speed, before) * dt, np.maximum(speed, before) * dt
 
 
-def _jumps(recording: Recording, odometry: Odometry) -> Iterator[Finding]:
+def _jumps(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
     went, _, most = _steps(odometry)
+    dt = odometry.dt
     top = quantile(np.hypot(odometry.speed, odometry.sideways), 0.99)
-    excess = went - np.maximum(most, np.where(odometry.dt > _PAUSE_S, top * odometry.dt, 0.0))
+    excess = went - np.maximum(most, np.where(dt > PAUSE_S, top * dt, 0.0))
     rows = np.flatnonzero(excess > JUMP_M)
     if not len(rows):
         return
     at, far = float(odometry.t[rows[0]]), float(went[rows[0]])
     more = f"; {len(rows)} such jumps" if len(rows) > 1 else ""
     yield Finding(
-        "localisation", f"odometry jumps by {far:.1f} m", at, float(odometry.t[rows[-1]]), recording.severity(at),
-        f"{far:.2f} m within {odometry.dt[rows[0]]:.2f} s, its speed explains {most[rows[0]]:.2f} m{more}",
-        f"{odometry.topic}: position against its own speed", probability=0.9,
-    )  # fmt: skip
+        kind="localisation",
+        title=f"odometry jumps by {far:.1f} m",
+        onset_s=at,
+        end_s=float(odometry.t[rows[-1]]),
+        severity=drive.severity(at),
+        evidence=f"{far:.2f} m within {dt[rows[0]]:.2f} s, its speed explains {most[rows[0]]:.2f} m{more}",
+        source=f"{odometry.topic}: position against its own speed",
+        probability=0.9,
+    )
 
 
-def _drift(recording: Recording, odometry: Odometry) -> Iterator[Finding]:
+def _drift(drive: Drive, odometry: Odometry) -> Iterator[Finding]:
     """The position agreed with the speed, and from some moment on it does not.
 
     One that never did is how that odometry is made: wheels of another size, a twist that is filtered.
     """
     went, least, most = _steps(odometry)
     beyond = np.where(went > most, went - most, np.where(went < least, went - least, 0.0))
-    usable = (odometry.dt < _PAUSE_S) & (np.abs(beyond) < JUMP_M)
+    usable = (odometry.dt < PAUSE_S) & (np.abs(beyond) < JUMP_M)
     extra = np.cumsum(np.where(usable, beyond, 0.0))
     way = np.cumsum(np.where(usable, (least + most) / 2, 0.0))
     for over_m, most_share in DRIFTS:
         first = np.searchsorted(way, way - over_m)
         length = way - way[first]
-        share = np.divide(extra - extra[first], length, out=np.zeros(len(way)), where=length > 0.8 * over_m)
+        share = np.divide(extra - extra[first], length, out=np.zeros(len(way)), where=length > COVERED * over_m)
         rows = np.flatnonzero((share > most_share) | (share < -SHRINK))
         if len(rows):
-            yield from _drifting(recording, odometry, extra, way, share, rows, most_share)
+            yield from _drifting(drive, odometry, extra, way, share, rows, most_share)
             return
 
 
 def _drifting(
-    recording: Recording,
+    drive: Drive,
     odometry: Odometry,
     extra: Floats,
     way: Floats,
@@ -160,11 +169,15 @@ def _drifting(
     start = float(odometry.t[bend])
     word = "further" if typical > 0 else "less far"
     yield Finding(
-        "localisation", "odometry drifts: its position and its speed disagree", start, float(odometry.t[rows[-1]]),
-        recording.severity(start),
-        f"the position advances {abs(typical):.0%} {word} than the speed says, and agreed before",
-        f"{odometry.topic}: position against its own speed; healthy move_base missions stay below 4 %", probability=0.9,
-    )  # fmt: skip
+        kind="localisation",
+        title="odometry drifts: its position and its speed disagree",
+        onset_s=start,
+        end_s=float(odometry.t[rows[-1]]),
+        severity=drive.severity(start),
+        evidence=f"the position advances {abs(typical):.0%} {word} than the speed says, and agreed before",
+        source=f"{odometry.topic}: position against its own speed; healthy move_base missions stay below 4 %",
+        probability=0.9,
+    )
 
 
 def _bend(extra: Floats, way: Floats, slope: float, before: int) -> int:
@@ -173,27 +186,31 @@ def _bend(extra: Floats, way: Floats, slope: float, before: int) -> int:
     return int(np.flatnonzero(under <= under.min() + 1e-3)[0])
 
 
-def _corrections(recording: Recording) -> Iterator[Finding]:
+def _corrections(drive: Drive) -> Iterator[Finding]:
     """Steps of map -> odom in tf: the localisation found itself elsewhere."""
-    for topic, table in recording.of(*plan.TF):
-        if not set(plan.FIELDS[plan.TF[0]]) <= set(table.columns):
+    for topic, table in drive.of(*TF):
+        if not holds(table, TF[0]):
             continue
-        places = _map_to_odom(table.t, *(table[name] for name in plan.FIELDS[plan.TF[0]]))
+        places = _map_to_odom(table.t, *(table[name] for name in MESSAGES[TF[0]].reads))
         if len(places) < 3:
             continue
         t, x, y = places.T
         steps = np.hypot(np.diff(x), np.diff(y))
         rows = np.flatnonzero(steps > CORRECTION_M)
-        # The first corrections find the robot on the map, from wherever it was said to be.
-        rows = rows[t[rows + 1] > t[0] + 5.0]
+        rows = rows[t[rows + 1] > t[0] + FOUND_S]
         if len(rows):
             at, far, most = float(t[rows[0] + 1]), float(steps[rows[0]]), float(steps[rows].max())
             more = f", {len(rows)} such steps of up to {most:.2f} m" if len(rows) > 1 else ""
             yield Finding(
-                "localisation", f"localisation jumps by {'up to ' * (most > far)}{most:.1f} m", at,
-                float(t[rows[-1] + 1]), recording.severity(at), f"map -> odom steps by {far:.2f} m{more}", topic,
+                kind="localisation",
+                title=f"localisation jumps by {'up to ' * (most > far)}{most:.1f} m",
+                onset_s=at,
+                end_s=float(t[rows[-1] + 1]),
+                severity=drive.severity(at),
+                evidence=f"map -> odom steps by {far:.2f} m{more}",
+                source=topic,
                 probability=0.7,
-            )  # fmt: skip
+            )
             return
 
 
@@ -212,3 +229,9 @@ def _map_to_odom(t: Floats, *columns: NDArray[Any]) -> Floats:
 
 def _is_number(*values: object) -> bool:
     return all(isinstance(value, (int, float, np.number)) for value in values)
+
+
+READS = reading(ODOMETRY, *TF, TWIST, TWIST_STAMPED, ACTION_GOAL, ACTION_RESULT, STATUS)
+CHECK = Check(
+    "odometry", "odometry without numbers, that jumps or drifts, a localisation that jumps", READS, LIMITS, find
+)

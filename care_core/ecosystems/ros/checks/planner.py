@@ -1,4 +1,4 @@
-"""The planner: no path, no command, or only turning to and fro with a goal ahead."""
+"""Planner and controller: no path, no command, or only turning to and fro with a goal ahead."""
 
 from __future__ import annotations
 
@@ -8,9 +8,28 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.ros.action_goals import Goal
-from care_core.ecosystems.ros.recording import ERROR, WARN, Recording, Said, stretches
+from care_core.ecosystems.ros.drive import Drive
+from care_core.ecosystems.ros.goals import Goal
+from care_core.ecosystems.ros.messages import (
+    ACTION_GOAL,
+    ACTION_RESULT,
+    ODOMETRY,
+    ROSOUT,
+    STATUS,
+    TWIST,
+    TWIST_STAMPED,
+    reading,
+)
+from care_core.ecosystems.ros.motion import (
+    BREAKS_LOOSE_MPS,
+    STANDS_RADPS,
+    Commands,
+    Odometry,
+    stretches,
+)
+from care_core.ecosystems.ros.node_messages import Level, LogMessage
 
 FAILS = re.compile(
     r"failed to (produce|find|get|make|create|generate) .*(path|plan|control)|failed to make progress"
@@ -21,70 +40,107 @@ FAILS = re.compile(
     re.IGNORECASE,
 )
 """What move_base, its planners, move_base_flex and Nav2's servers say when they find no way."""
-OFTEN = 10
-"""A planner that complains less often, and whose goals were reached, found its way."""
-STANDS_S = 15.0
-"""So long without way, with a goal ahead, while the commands themselves ask for none: move_base's oscillation_timeout
-and Nav2's progress checker (movement_time_allowance) wait 10 s."""
-WAY_M = 0.3
+
+LIMITS = Limits()
+OFTEN = LIMITS.add("complaints", 10, "", "with fewer, and its goals reached, a planner found a way")
+STUCK_S = LIMITS.add(
+    "time without way while commands ask for none", 15.0, "s",
+    "move_base's oscillation_timeout and Nav2's movement_time_allowance are 10 s",
+)  # fmt: skip
+STUCK_M = LIMITS.add("way in that time", 0.3, "m", "less than Nav2's required_movement_radius, 0.5 m")
+COVERED = LIMITS.add("share of that time that samples cover", 0.8, "", "over less nobody knows where the robot was")
+BREAK_S = LIMITS.add("break in which the robot moves a little", 2.0, "s", "a shorter one is no way made")
+FORWARD = LIMITS.add("share of commands to move forward", 0.3, "", "with more of them the robot does not obey")
+TURNING = LIMITS.add("share of commands to turn", 0.5, "", "most of what the controller asks for")
+COMMANDS = LIMITS.add("commands in that time", 5, "", "fewer tell nothing of a controller")
+SAMPLES = LIMITS.add("samples of odometry on a goal", 5, "", "fewer tell of no way")
 
 
-def check(recording: Recording) -> Iterator[Finding]:
-    yield from _fails(recording)
-    yield from _dithers(recording)
+def find(drive: Drive) -> Iterator[Finding]:
+    """Messages that no path is found, and goals on which the controller is stuck."""
+    yield from _fails(drive)
+    yield from _stuck(drive)
 
 
-def _fails(recording: Recording) -> Iterator[Finding]:
-    words = [one for one in recording.said if one.level >= WARN and FAILS.search(one.text)]
-    failed = any(goal.failed for goal in recording.goals)
-    if not words or (recording.goals and not failed and len(words) < OFTEN):
+def _fails(drive: Drive) -> Iterator[Finding]:
+    complaints = [one for one in drive.log_messages if one.level >= Level.WARN and FAILS.search(one.text)]
+    failed = any(goal.failed for goal in drive.goals)
+    if not complaints or (drive.goals and not failed and len(complaints) < OFTEN):
         return
-    if not recording.goals and len(words) < OFTEN and words[0].level < ERROR:
+    if not drive.goals and len(complaints) < OFTEN and complaints[0].level < Level.ERROR:
         return
-    at = _beginning(words, recording.goals)
-    told = Counter(one.text for one in words).most_common(1)[0][0]
-    often = "message" if len(words) == 1 else "messages, most often"
+    at = _beginning(complaints, drive.goals)
+    text = Counter(message.text for message in complaints).most_common(1)[0][0]
+    often = "message" if len(complaints) == 1 else "messages, most often"
     yield Finding(
-        "planner", "the planner finds no way", at, words[-1].time_s, recording.severity(at),
-        f'{len(words)} {often} "{told[:90]}"', f"{words[0].node} in /rosout", "parameter", 0.4,
-    )  # fmt: skip
+        kind="planner",
+        title="the planner finds no path",
+        onset_s=at,
+        end_s=complaints[-1].time_s,
+        severity=drive.severity(at),
+        evidence=f'{len(complaints)} {often} "{text[:90]}"',
+        source=f"{complaints[0].node} in /rosout",
+        suspect="parameter",
+        probability=0.4,
+    )
 
 
-def _beginning(words: list[Said], goals: tuple[Goal, ...]) -> float:
+def _beginning(complaints: list[LogMessage], goals: tuple[Goal, ...]) -> float:
     """The first message on the first goal that failed: a planner may complain on the way to a goal that it reaches."""
     for goal in goals:
-        own = [one.time_s for one in words if goal.sent_s <= one.time_s <= goal.end_s]
-        if goal.failed and own:
-            return own[0]
-    return words[0].time_s
+        times = [message.time_s for message in complaints if goal.sent_s <= message.time_s <= goal.end_s]
+        if goal.failed and times:
+            return times[0]
+    return complaints[0].time_s
 
 
-def _dithers(recording: Recording) -> Iterator[Finding]:
-    """Goals on which the robot makes no way because its commands ask for none."""
-    odometry, commands = recording.odometry, recording.commands
+def _stuck(drive: Drive) -> Iterator[Finding]:
+    """The first goal on which the robot gets nowhere because its commands ask for no forward motion."""
+    odometry, commands = drive.odometry, drive.commands
     if odometry is None or commands is None:
         return
-    for goal in recording.goals:
-        if not goal.failed:
+    for goal in drive.goals:
+        span = _nowhere(odometry, goal) if goal.failed else None
+        shares = None if span is None else _commanded(commands, *span)
+        if span is None or shares is None or shares[0] >= FORWARD:
             continue
-        inside = (odometry.t >= goal.sent_s) & (odometry.t <= goal.end_s)
-        t, x, y = odometry.t[inside], odometry.x[inside], odometry.y[inside]
-        if len(t) < 5:
-            continue
-        later = np.minimum(np.searchsorted(t, t + STANDS_S), len(t) - 1)
-        stays = (np.hypot(x[later] - x, y[later] - y) < WAY_M) & (t[later] - t > 0.8 * STANDS_S)
-        still = [one for one in stretches(t, stays, 2.0) if one[1] > one[0]]
-        if not still:
-            continue
-        start, end = still[0][0], min(still[-1][1] + STANDS_S, goal.end_s)
-        asked = (commands.t >= start) & (commands.t <= end)
-        forward = np.abs(commands.speed[asked]) >= 0.08
-        if np.count_nonzero(asked) >= 5 and float(forward.mean()) < 0.3:
-            turns = np.abs(commands.turn[asked]) >= 0.05
-            doing = "to turn to and fro" if float((turns & ~forward).mean()) > 0.5 else "to stand"
-            yield Finding(
-                "planner", f"the planner makes no way: it asks {doing}", start, end, recording.severity(start),
-                f"under {WAY_M} m of way in {end - start:.0f} s, {1 - forward.mean():.0%} of the commands ask for none",
-                f"{commands.topic}, {odometry.topic}", "parameter", 0.6,
-            )  # fmt: skip
-            return
+        forward, turns = shares
+        yield Finding(
+            kind="planner",
+            title=f"the controller is stuck: it commands to {'turn to and fro' if turns > TURNING else 'stand'}",
+            onset_s=span[0],
+            end_s=span[1],
+            severity=drive.severity(span[0]),
+            evidence=f"less than {STUCK_M} m in {span[1] - span[0]:.0f} s, {1 - forward:.0%} of its commands ask for no"
+            " forward motion",
+            source=f"{commands.topic}, {odometry.topic}",
+            suspect="parameter",
+            probability=0.6,
+        )
+        return
+
+
+def _nowhere(odometry: Odometry, goal: Goal) -> tuple[float, float] | None:
+    """From when to when the robot got nowhere on a goal; None where it made way."""
+    inside = (odometry.t >= goal.sent_s) & (odometry.t <= goal.end_s)
+    t, x, y = odometry.t[inside], odometry.x[inside], odometry.y[inside]
+    if len(t) < SAMPLES:
+        return None
+    later = np.minimum(np.searchsorted(t, t + STUCK_S), len(t) - 1)
+    stays = (np.hypot(x[later] - x, y[later] - y) < STUCK_M) & (t[later] - t > COVERED * STUCK_S)
+    still = [(first, last) for first, last in stretches(t, stays, BREAK_S) if last > first]
+    return (still[0][0], min(still[-1][1] + STUCK_S, goal.end_s)) if still else None
+
+
+def _commanded(commands: Commands, start_s: float, end_s: float) -> tuple[float, float] | None:
+    """Shares of the commands of a time that ask to move forward, and to turn on the spot; None: hardly any came."""
+    asked = (commands.t >= start_s) & (commands.t <= end_s)
+    if np.count_nonzero(asked) < COMMANDS:
+        return None
+    forward = np.abs(commands.speed[asked]) >= BREAKS_LOOSE_MPS
+    turns = np.abs(commands.turn[asked]) >= STANDS_RADPS
+    return float(forward.mean()), float((turns & ~forward).mean())
+
+
+READS = reading(*ROSOUT, ODOMETRY, TWIST, TWIST_STAMPED, ACTION_GOAL, ACTION_RESULT, STATUS)
+CHECK = Check("planner", "a planner that finds no path, a controller that is stuck", READS, LIMITS, find)

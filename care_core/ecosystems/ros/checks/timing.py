@@ -7,15 +7,19 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
-from care_core.ecosystems.ros import plan
-from care_core.ecosystems.ros.recording import WARN, Recording, Said
+from care_core.ecosystems.ros.drive import Drive
+from care_core.ecosystems.ros.messages import ROSOUT, STAMPED, reading
+from care_core.ecosystems.ros.node_messages import Level, LogMessage
 from care_core.ecosystems.timeline import counted
 from care_core.logs.plausible import APART, STAMP, is_simulated, kept_its_rate, stamps_pace
 from care_core.numbers import median
 
-SHARE = 0.1
-"""Of the time, with a message a second counted as all of it: loops that miss now and then are no fault."""
+LIMITS = Limits()
+SHARE = LIMITS.add("messages a second", 0.1, "1/s", "loops that miss now and then are no fault")
+FEWEST = LIMITS.add("messages", 3.0, "", "loops that miss now and then are no fault")
+FASTEST = LIMITS.add("ratio of two clocks", APART, "", "a real clock is right to 0.01 %")
 _LOOPS = re.compile(
     r"(control|map update|planner) loop missed|missed its desired rate|behavior tree.*(tick|loop) rate", re.IGNORECASE
 )
@@ -37,48 +41,57 @@ _FAMILIES: tuple[tuple[re.Pattern[str], FindingKind, str], ...] = (
 )
 
 
-def known(text: str) -> bool:
+def is_known(text: str) -> bool:
     """Whether a message is one of those that this check reads."""
     return any(pattern.search(text) for pattern, *_ in _FAMILIES)
 
 
-def check(recording: Recording) -> Iterator[Finding]:
-    yield from _lags(recording)
+def find(drive: Drive) -> Iterator[Finding]:
+    """Clocks that run apart, and messages that loops, transforms or sensors are late."""
+    yield from _lags(drive)
     for pattern, kind, title in _FAMILIES:
-        words = [one for one in recording.said if _counts(one, pattern)]
-        if not words or len(words) < max(3.0, SHARE * recording.duration_s):
+        complaints = [message for message in drive.log_messages if _counts(message, pattern)]
+        if not complaints or len(complaints) < max(FEWEST, SHARE * drive.duration_s):
             continue
-        at = words[0].time_s
+        first = complaints[0]
         yield Finding(
-            kind, title, at, words[-1].time_s, "info" if kind == "control" else _at_most_warning(recording, at),
-            f'{len(words)} messages from {words[0].node}, first "{words[0].text[:90]}"', "/rosout", "parameter", 0.3,
-        )  # fmt: skip
+            kind=kind,
+            title=title,
+            onset_s=first.time_s,
+            end_s=complaints[-1].time_s,
+            severity="info" if kind == "control" else _at_most_warning(drive, first.time_s),
+            evidence=f'{len(complaints)} messages from {first.node}, first "{first.text[:90]}"',
+            source="/rosout",
+            suspect="parameter",
+            probability=0.3,
+        )
 
 
-def _counts(one: Said, pattern: re.Pattern[str]) -> bool:
-    return one.level >= WARN and pattern.search(one.text) is not None and not kept_its_rate(one.text)
+def _counts(message: LogMessage, pattern: re.Pattern[str]) -> bool:
+    is_late = message.level >= Level.WARN and pattern.search(message.text) is not None
+    return is_late and not kept_its_rate(message.text)
 
 
-def _at_most_warning(recording: Recording, at: float) -> Severity:
-    return "warning" if recording.severity(at) == "critical" else "info"
+def _at_most_warning(drive: Drive, at: float) -> Severity:
+    return "warning" if drive.severity(at) == "critical" else "info"
 
 
-def _lags(recording: Recording) -> Iterator[Finding]:
+def _lags(drive: Drive) -> Iterator[Finding]:
     """A clock of the robot that runs otherwise than the recorder's: a simulation that its computer cannot keep up with,
     or where both are said to be clocks of the day, one that is wrong."""
     paces, simulated = {}, []
-    for topic, table in recording.of(*plan.STAMPED):
+    for topic, table in drive.of(*STAMPED):
         stamp = np.asarray(table.columns.get(STAMP, ()), np.float64)
         if len(stamp) and (pace := stamps_pace(table.t, stamp)) is not None:
             paces[topic] = pace
             simulated += [topic] if is_simulated(table.t, stamp) else []
-    off = {topic: pace for topic, pace in paces.items() if not 1 / APART <= pace <= APART}
+    off = {topic: pace for topic, pace in paces.items() if not 1 / FASTEST <= pace <= FASTEST}
     if not off:
         return
     pace = float(median(list(off.values())))
     evidence = (
         f"{counted(len(off), 'topic')} with stamps at {min(off.values()):.2f} to {max(off.values()):.2f} s a second"
-        f" (limits {1 / APART:.2f} and {APART})"
+        f" (limits {1 / FASTEST:.2f} and {FASTEST})"
     )
     if simulated:
         title = f"the robot's clock runs at {pace:.0%} of real time: a {'slow' if pace < 1 else 'fast'} simulation"
@@ -86,6 +99,17 @@ def _lags(recording: Recording) -> Iterator[Finding]:
     else:
         title = f"stamps of {' and '.join(sorted(off))} run at {pace:.2g} of the recording's clock: one is wrong"
     yield Finding(
-        "cpu", title, 0.0, recording.duration_s, "info" if simulated else "warning", evidence,
-        "header.stamp against times of recording", "world" if simulated else "operation", 0.8,
-    )  # fmt: skip
+        kind="cpu",
+        title=title,
+        onset_s=0.0,
+        end_s=drive.duration_s,
+        severity="info" if simulated else "warning",
+        evidence=evidence,
+        source="header.stamp against times of recording",
+        suspect="world" if simulated else "operation",
+        probability=0.8,
+    )
+
+
+CHECK = Check("timing", "clocks that run apart, loops and transforms that are late", reading(*ROSOUT, *STAMPED), LIMITS,
+              find)  # fmt: skip

@@ -7,111 +7,161 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind
-from care_core.ecosystems.ros import plan
-from care_core.ecosystems.ros.recording import WARN, Floats, Recording
-from care_core.ecosystems.ros.silence import ends_early
+from care_core.ecosystems.ros.drive import SILENT_PERIODS, SILENT_S, Drive
+from care_core.ecosystems.ros.messages import (
+    BATTERY,
+    CLOUD,
+    IMU,
+    ODOMETRY,
+    ROSOUT,
+    SCAN,
+    STATUS,
+    TWIST,
+    TWIST_STAMPED,
+    reading,
+    type_of,
+)
+from care_core.ecosystems.ros.node_messages import Level
 from care_core.logs.recording import RENAMED
-from care_core.numbers import median
+from care_core.numbers import Floats, median
 
-OUTAGE_S, OUTAGE_PERIODS = 5.0, 10.0
-"""A pause this long, and so many periods long, in several streams at once is an outage. Of 301 healthy missions, some
-recorded by a computer at its limit, the longest pause of odometry was 4.5 s."""
-TOGETHER_S = 4.0
+LIMITS = Limits()
+_LOADED = "of 301 healthy missions, some recorded by a computer at its limit, the longest pause of odometry was 4.5 s"
+OUTAGE_S = LIMITS.add("pause of a stream", 5.0, "s", _LOADED)
+OUTAGE_PERIODS = LIMITS.add("pause of a stream in its periods", 10.0, "", _LOADED)
+TOGETHER_S = LIMITS.add("how far apart pauses begin that are one", 4.0, "s", "a link fails for all within its time-out")
+TOPICS = LIMITS.add("streams that pause together", 2, "", "one alone is its sensor")
+BURST = LIMITS.add("share of the usual period in a burst", 0.2, "", "what a link held back comes at once")
+BURST_MESSAGES = LIMITS.add("messages in a burst", 5, "", "fewer are chance")
+DROVE_M = LIMITS.add("way during an outage", 0.5, "m", "less is noise of odometry")
+ENDED = LIMITS.add("share of the recording without a stream", 0.1, "", "recorders do not stop all topics at once")
+LIMITS.add("silence of a stream that has ended", SILENT_S, "s", _LOADED)
+LIMITS.add("silence of a stream in its periods", SILENT_PERIODS, "", _LOADED)
 _QOS = re.compile(r"incompatible qos", re.IGNORECASE)
 _TOPIC = re.compile(r"topic '?\"?([\w/~]+)")
-_KINDS: dict[str, FindingKind] = {plan.ODOMETRY: "localisation", plan.IMU: "imu", plan.BATTERY: "battery"}
+_KINDS: dict[str, FindingKind] = {ODOMETRY: "localisation", IMU: "imu", BATTERY: "battery"}
 _CONTACT = re.compile(r"contact|collision|bumper", re.IGNORECASE)
 """Topics that speak only while something touches (gazebo_ros bumpers and their like)."""
-_LASERS = (plan.SCAN, plan.CLOUD)
+_JUDGED_ELSEWHERE = (SCAN, CLOUD, TWIST, TWIST_STAMPED, STATUS)
 
 
-def check(recording: Recording) -> Iterator[Finding]:
-    yield from _qos(recording)
-    outages = list(_outage(recording))
-    yield from outages
-    yield from _ended(recording)
-    yield from _renamed(recording)
+def find(drive: Drive) -> Iterator[Finding]:
+    """Incompatible QoS, outages, streams that end early, and files that were renamed."""
+    yield from _qos(drive)
+    yield from _outage(drive)
+    yield from _ended(drive)
+    yield from _renamed(drive)
 
 
-def _qos(recording: Recording) -> Iterator[Finding]:
-    counts = {one.name: one.count for one in recording.channels}
+def _qos(drive: Drive) -> Iterator[Finding]:
+    counts = {channel.name: channel.count for channel in drive.channels}
     told: dict[str, tuple[float, str, str]] = {}
-    for one in recording.said:
-        if one.level >= WARN and _QOS.search(one.text):
-            found = _TOPIC.search(one.text)
-            told.setdefault(found.group(1) if found else "a topic", (one.time_s, one.node, one.text))
-    for topic, (at, node, text) in told.items():
-        empty = counts.get(topic) == 0
-        what = "nothing of it was recorded" if empty else f"{counts.get(topic, 0)} messages were recorded"
+    for message in drive.log_messages:
+        if message.level >= Level.WARN and _QOS.search(message.text):
+            topic = _TOPIC.search(message.text)
+            told.setdefault(topic.group(1) if topic else "a topic", (message.time_s, message.node, message.text))
+    for name, (at, node, text) in told.items():
+        empty = counts.get(name) == 0
+        what = "nothing of it was recorded" if empty else f"{counts.get(name, 0)} messages were recorded"
         yield Finding(
-            "topics", f"{topic}: quality of service of its publisher and a reader do not fit", at, at,
-            "warning" if empty else "info", f'{what}; {node}: "{text[:160]}"',
-            "/rosout; a reader that asks for reliable gets nothing from a best-effort publisher (ROS 2, About QoS)",
-            "operation", 0.95,
-        )  # fmt: skip
+            kind="topics",
+            title=f"{name}: incompatible QoS between publisher and subscriber",
+            onset_s=at,
+            end_s=at,
+            severity="warning" if empty else "info",
+            evidence=f'{what}; {node}: "{text[:160]}"',
+            source="/rosout; a subscriber that asks for reliable gets nothing from a best-effort publisher (ROS 2,"
+            " About QoS)",
+            suspect="operation",
+            probability=0.95,
+        )
 
 
-def _outage(recording: Recording) -> Iterator[Finding]:
+def _outage(drive: Drive) -> Iterator[Finding]:
     """Streams that pause together, as when the link or the recorder fails while the robot goes on."""
     gaps: list[tuple[float, float, str]] = []
-    for topic, times in recording.times.items():
-        if topic in recording.streams:
+    for topic, times in drive.times.items():
+        if topic in drive.streams:
             pauses = np.diff(times)
             row = int(np.argmax(pauses))
-            if pauses[row] >= max(OUTAGE_S, OUTAGE_PERIODS * recording.streams[topic]):
+            if pauses[row] >= max(OUTAGE_S, OUTAGE_PERIODS * drive.streams[topic]):
                 gaps.append((float(times[row]), float(times[row + 1]), topic))
     for start, _, topic in sorted(gaps):
-        together = [one for one in gaps if abs(one[0] - start) <= TOGETHER_S and one[1] > start + OUTAGE_S]
+        together = [gap for gap in gaps if abs(gap[0] - start) <= TOGETHER_S and gap[1] > start + OUTAGE_S]
         silent = [
-            one
-            for one in recording.times
-            if (over := ends_early(recording, one)) and abs(over[0] - start) <= TOGETHER_S
+            name for name in drive.times if (over := drive.ends_early(name)) and abs(over[0] - start) <= TOGETHER_S
         ]
-        if len(together) + len(silent) < 2 or topic in silent:
+        if len(together) + len(silent) < TOPICS or topic in silent:
             continue
-        names = sorted({one[2] for one in together} | set(silent))
-        last = max(one[1] for one in together)
-        burst = [one for one in names if _comes_in_a_burst(recording.times[one], last)]
-        drove = recording.moved_between(start, last)
-        words = "; what was sent meanwhile came in a burst" if burst else ""
-        words += f"; the robot drove {drove:.1f} m meanwhile" if np.isfinite(drove) and drove > 0.5 else ""
-        words += f"; {', '.join(silent)} never came back" if silent else ""
+        names = sorted({gap[2] for gap in together} | set(silent))
+        lasted_s = [end - begin for begin, end, _ in together]
+        last = max(gap[1] for gap in together)
+        words = _meanwhile(drive, names, silent, start, last)
         yield Finding(
-            "radio", "outage of link or recorder: several topics stall at once", start, last, recording.severity(start),
-            f"{', '.join(names)} pause for {min(one[1] - one[0] for one in together):.0f} to"
-            f" {max(one[1] - one[0] for one in together):.0f} s{words}", "times of recording", "operation", 0.8,
-        )  # fmt: skip
+            kind="radio",
+            title="outage of link or recorder: several topics stall at once",
+            onset_s=start,
+            end_s=last,
+            severity=drive.severity(start),
+            evidence=f"{', '.join(names)} pause for {min(lasted_s):.0f} to {max(lasted_s):.0f} s{words}",
+            source="times of recording",
+            suspect="operation",
+            probability=0.8,
+        )
         return
+
+
+def _meanwhile(drive: Drive, names: list[str], silent: list[str], start: float, last: float) -> str:
+    """What else is known of an outage, in words."""
+    burst = any(_comes_in_a_burst(drive.times[name], last) for name in names)
+    drove = drive.moved_between(start, last)
+    words = "; what was sent meanwhile came in a burst" if burst else ""
+    words += f"; the robot drove {drove:.1f} m meanwhile" if np.isfinite(drove) and drove > DROVE_M else ""
+    return words + (f"; {', '.join(silent)} never came back" if silent else "")
 
 
 def _comes_in_a_burst(times: Floats, after_s: float) -> bool:
     """Whether messages come much faster than usual when a topic returns."""
     back = times[(times >= after_s - OUTAGE_S) & (times <= after_s + OUTAGE_S)]
     usual = float(median(np.diff(times)))
-    return int(np.count_nonzero(np.diff(back) < 0.2 * usual)) >= 5
+    return int(np.count_nonzero(np.diff(back) < BURST * usual)) >= BURST_MESSAGES
 
 
-def _ended(recording: Recording) -> Iterator[Finding]:
-    for channel in recording.channels:
-        kind = plan.kind_of(channel)
-        if kind in (*_LASERS, plan.TWIST, plan.TWIST_STAMPED, plan.STATUS) or _CONTACT.search(channel.name):
+def _ended(drive: Drive) -> Iterator[Finding]:
+    for channel in drive.channels:
+        type = type_of(channel)
+        if type in _JUDGED_ELSEWHERE or _CONTACT.search(channel.name):
             continue
-        over = ends_early(recording, channel.name)
-        if over is None or recording.duration_s - over[0] < 0.1 * recording.duration_s:
+        over = drive.ends_early(channel.name)
+        if over is None or drive.duration_s - over[0] < ENDED * drive.duration_s:
             continue
         at, period_s = over
         yield Finding(
-            _KINDS.get(kind, "topics"), f"{channel.name} ends early", at, recording.duration_s,
-            recording.severity(at) if kind in _KINDS else "info",
-            f"nothing for the last {recording.duration_s - at:.0f} s, one every {period_s:.2g} s before",
-            "times of recording", probability=0.6,
-        )  # fmt: skip
+            kind=_KINDS.get(type, "topics"),
+            title=f"{channel.name} ends early",
+            onset_s=at,
+            end_s=drive.duration_s,
+            severity=drive.severity(at) if type in _KINDS else "info",
+            evidence=f"nothing for the last {drive.duration_s - at:.0f} s, one every {period_s:.2g} s before",
+            source="times of recording",
+            probability=0.6,
+        )
 
 
-def _renamed(recording: Recording) -> Iterator[Finding]:
-    if RENAMED in recording.facts:
+def _renamed(drive: Drive) -> Iterator[Finding]:
+    if RENAMED in drive.facts:
         yield Finding(
-            "log", "metadata.yaml names other files than those beside it", 0.0, 0.0, "info",
-            f"{RENAMED}: {recording.facts[RENAMED]}; 'ros2 bag' does not open it so", "metadata.yaml", "operation",
-        )  # fmt: skip
+            kind="log",
+            title="metadata.yaml names other files than those beside it",
+            onset_s=0.0,
+            end_s=0.0,
+            severity="info",
+            evidence=f"{RENAMED}: {drive.facts[RENAMED]}; 'ros2 bag' does not open it so",
+            source="metadata.yaml",
+            suspect="operation",
+        )
+
+
+CHECK = Check("topics", "incompatible QoS, outages, streams that end early", reading(*ROSOUT, ODOMETRY), LIMITS, find)

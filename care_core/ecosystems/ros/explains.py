@@ -1,11 +1,8 @@
-"""All findings of a ROS recording, the first cause before its consequences."""
+"""Which finding on a robot that drives by its sensors can bring about which."""
 
 from __future__ import annotations
 
-from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.ranking import Explains, rank_findings
-from care_core.ecosystems.ros.checks import CHECKS
-from care_core.ecosystems.ros.recording import Recording
+from care_core.ecosystems.ranking import Explains
 
 EXPLAINS: Explains = {
     "battery": frozenset({"battery", "drive", "commands", "topics", "laser", "cpu"}),
@@ -23,10 +20,4 @@ EXPLAINS: Explains = {
     "planner": frozenset({"planner", "control", "tf"}),
     "software": frozenset({"software", "topics"}),
 }
-"""What each kind of finding can bring about, in a robot that drives by its sensors. A planner that finds no way keeps
-the computer busy, so that loops and transforms come late."""
-
-
-def find(recording: Recording) -> tuple[Finding, ...]:
-    """What was not as it should be, in the order told."""
-    return rank_findings((finding for check in CHECKS for finding in check(recording)), EXPLAINS)
+"""A planner that finds no path keeps the computer busy, so that loops and transforms come late."""

@@ -1,0 +1,270 @@
+"""The model of a drive: what a ROS recording tells of its robot, each part prepared once, when first asked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, TypeVar
+
+import numpy as np
+
+from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.findings import Severity
+from care_core.ecosystems.ros import messages
+from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, actionlib_goals, nav2_goals
+from care_core.ecosystems.ros.messages import FRAME, MESSAGES, topics, type_of
+from care_core.ecosystems.ros.motion import Commands, Following, Odometry, commands_of, following, odometry_of
+from care_core.ecosystems.ros.node_messages import LogMessage, Report, log_messages, reports
+from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
+from care_core.logs.base import Channel, Table, Wanted, merge_needs
+from care_core.logs.plausible import STAMP
+from care_core.logs.ros_log import RosLog
+from care_core.numbers import Floats, median, quantile
+from care_core.run import Damage, Setting
+
+OPEN_S = 30.0
+"""A goal without an answer for longer than this at the end of a recording was not being reached."""
+STREAM_MESSAGES, STEADY = 10, 3.0
+"""A stream has so many messages, and nine in ten of its pauses are below so many times the usual one."""
+SILENT_S, SILENT_PERIODS = 5.0, 10.0
+"""A stream has ended when it is silent for so long and for so many of its periods."""
+COMMANDS = 3
+"""Fewer commands tell of no drive."""
+
+ODOMETRY_FIELDS = (*MESSAGES[messages.ODOMETRY].reads, FRAME)
+COMMAND_FIELDS = (*MESSAGES[messages.TWIST].reads, *MESSAGES[messages.TWIST_STAMPED].reads)
+BATTERY_FIELDS = (*MESSAGES[messages.BATTERY].reads, STAMP)
+LOG_FIELDS = MESSAGES[messages.ROSOUT[0]].reads
+"""What is read of a topic that a profile names."""
+
+T = TypeVar("T")
+Prepare = Callable[[str, Table], "T | None"]
+
+
+class Drive(RunModel):
+    """A recording as a robot's drive.
+
+    Health looks at samples of what sends often (`of`, and all that has no topic in its name), measures at every message
+    of the topics that a profile names (`odometry_on`, `commands_on`, `battery_on`, `messages_on`).
+    """
+
+    log: RosLog
+
+    def __init__(self, log: RosLog) -> None:
+        super().__init__(log)
+        self.damage: tuple[Damage, ...] = ()
+        """What is broken in what health looked at."""
+        self._looked_at: Wanted = {}
+        self._samples: dict[str, Table] = {}
+        self._prepared: dict[tuple[Prepare[Any], str], Any] = {}
+
+    # The recording
+
+    @cached_property
+    def channels(self) -> tuple[Channel, ...]:
+        return self.log.channels()
+
+    @cached_property
+    def times(self) -> Mapping[str, Floats]:
+        """Record times of every topic, s; nothing is decoded for them."""
+        return self.log.times()
+
+    @property
+    def duration_s(self) -> float:
+        return self.log.duration_s
+
+    @property
+    def facts(self) -> Mapping[str, str]:
+        return self.log.facts
+
+    @property
+    def settings(self) -> Mapping[str, tuple[Setting, ...]]:
+        return self.log.settings()
+
+    def look_at(self, types: Iterable[str]) -> None:
+        """Read samples of messages of these types, in one pass with whatever else is expected to be read."""
+        self._looked_at = topics(self.channels, types)
+        lacking = {name: fields for name, fields in self._expected.items() if self._lacks({name: fields})}
+        self._tables |= self.decode(lacking)
+        self._read = self._expected
+        self.damage = self.log.damage
+
+    def decode(self, wanted: Wanted) -> Mapping[str, Table]:
+        """One pass over the log for the samples, where health asked for them, and for what is wanted whole."""
+        sampled, self._looked_at = self._looked_at, {}
+        if not sampled:
+            return super().decode(wanted)
+        most = {one.name: MESSAGES[type_of(one)].at_most for one in self.channels if one.name in sampled}
+        thinned = {name: count for name, count in most.items() if count and name not in wanted}
+        tables = self.log.read(merge_needs((wanted, sampled)), thinned)
+        for name in sampled.keys() & tables.keys():
+            self._samples[name] = self._thinned(name, tables[name], most[name]) if name in wanted else tables[name]
+        return {name: tables[name] for name in wanted if name in tables}
+
+    def _thinned(self, topic: str, table: Table, most: int) -> Table:
+        """The messages that the reader answers where it may decode so many of a topic."""
+        if not most or len(table) <= most:
+            return table
+        return table.where(np.isin(table.t, self.log.sampled_times(topic, most)))
+
+    def of(self, *types: str) -> Iterator[tuple[str, Table]]:
+        """Topic and samples of every channel of these types that has messages."""
+        for channel in self.channels:
+            if type_of(channel) in types and len(self._samples.get(channel.name, ())):
+                yield channel.name, self._samples[channel.name]
+
+    def _of_topic(self, prepare: Prepare[T], topic: str, *fields: str) -> T | None:
+        """What every message of a topic tells that a profile names, prepared once; None where it tells nothing."""
+        if (prepare, topic) not in self._prepared:
+            table = self.tables({topic: fields}).get(topic)
+            self._prepared[prepare, topic] = None if table is None else prepare(topic, table)
+        prepared: T | None = self._prepared[prepare, topic]
+        return prepared
+
+    # Streams
+
+    @cached_property
+    def streams(self) -> Mapping[str, float]:
+        """Topics that come steadily, so that silence means something, with their usual period, s."""
+        found = {}
+        for topic, times in self.times.items():
+            if len(times) < STREAM_MESSAGES:
+                continue
+            pauses = np.diff(times)
+            usual = float(median(pauses))
+            if usual > 0 and quantile(pauses, 0.9) <= STEADY * usual:
+                found[topic] = usual
+        return found
+
+    def ends_early(self, topic: str) -> tuple[float, float] | None:
+        """When a stream was heard last and its period, s; None where it goes on to the end, or nothing goes on after
+        it."""
+        period_s = self.streams.get(topic)
+        if period_s is None:
+            return None
+        last_s = float(self.times[topic][-1])
+        silent_s = self.duration_s - last_s
+        if silent_s < max(SILENT_S, SILENT_PERIODS * period_s):
+            return None
+        others = (self.times[name][-1] for name in self.streams if name != topic)
+        return (last_s, period_s) if any(self.duration_s - end < silent_s / 2 for end in others) else None
+
+    # Motion
+
+    @cached_property
+    def odometry(self) -> Odometry | None:
+        """The odometry of the base: of several the one named so, which others are made from."""
+        read = (odometry_of(topic, table) for topic, table in self.of(messages.ODOMETRY))
+        found = [steady for one in read if one is not None and (steady := one.advancing()) is not None]
+        return min(found, key=lambda one: (not one.tells_speed, *_plainness(one.topic, "odom")), default=None)
+
+    @cached_property
+    def commands(self) -> Commands | None:
+        """The commands to the base: the topic named `cmd_vel`, else the only one; None where it cannot be told."""
+        found = (commands_of(topic, table) for topic, table in self.of(messages.TWIST, messages.TWIST_STAMPED))
+        known = [one for one in found if one is not None]
+        named = [one for one in known if one.topic.rpartition("/")[2] == "cmd_vel"] or known
+        ranked = sorted((_plainness(one.topic, "cmd_vel"), number) for number, one in enumerate(named))
+        is_told = len(ranked) == 1 or (len(ranked) > 1 and ranked[0][0][:2] != ranked[1][0][:2])
+        return named[ranked[0][1]] if is_told else None
+
+    def odometry_on(self, topic: str) -> Odometry | None:
+        """The odometry of a topic, every message of it."""
+        return self._of_topic(odometry_of, topic, *ODOMETRY_FIELDS)
+
+    def commands_on(self, topic: str) -> Commands | None:
+        """The commands of a topic, every one of them."""
+        return self._of_topic(commands_of, topic, *COMMAND_FIELDS)
+
+    @cached_property
+    def following(self) -> Following | None:
+        """Odometry beside commands, None where either is missing or odometry tells no speed."""
+        odometry, commands = self.odometry, self.commands
+        if odometry is None or commands is None or len(commands.t) < COMMANDS or not odometry.tells_speed:
+            return None
+        return following(odometry, commands)
+
+    def moved_between(self, start_s: float, end_s: float) -> float:
+        """Distance that odometry went in a time, m; nan where there is none."""
+        return math.nan if self.odometry is None else self.odometry.path_m(start_s, end_s)
+
+    # Sensors
+
+    @cached_property
+    def scans(self) -> tuple[Scans, ...]:
+        return tuple(one for topic, table in self.of(messages.SCAN) if (one := scans_of(topic, table)) is not None)
+
+    @cached_property
+    def batteries(self) -> tuple[Battery, ...]:
+        """Those whose voltage is one."""
+        found = (battery_of(topic, table) for topic, table in self.of(messages.BATTERY))
+        return tuple(one for one in found if one is not None and one.is_alive)
+
+    def battery_on(self, topic: str) -> Battery | None:
+        """The battery of a topic, every message of it."""
+        return self._of_topic(battery_of, topic, *BATTERY_FIELDS)
+
+    # Goals
+
+    @cached_property
+    def goals(self) -> tuple[Goal, ...]:
+        """Every goal of the recording's driving actions, in the order sent; of all its actions where none drives."""
+        results = {topic.rpartition("/")[0]: table for topic, table in self.of(messages.ACTION_RESULT)}
+        sent = {topic.rpartition("/")[0]: table for topic, table in self.of(messages.ACTION_GOAL)}
+        tables = {topic: table for topic, table in self.of(messages.STATUS) if topic.endswith(STATUS_TOPIC)}
+        found = [
+            goal
+            for action, table in sent.items()
+            for goal in actionlib_goals(action, table, results.get(action), self.duration_s)
+        ]
+        for topic, table in tables.items():
+            found += nav2_goals({topic.removesuffix(STATUS_TOPIC): table}, self.duration_s)
+        driving = [goal for goal in found if goal.drives]
+        return tuple(sorted(driving or found, key=lambda goal: goal.sent_s))
+
+    def severity(self, onset_s: float, otherwise: Severity = "warning") -> Severity:
+        """How much something that began then matters: critical where a goal failed afterwards, or is left open at the
+        end; a warning where every later goal was reached; `otherwise` where the robot was given no goal."""
+        if not self.goals:
+            return otherwise
+        after = [goal for goal in self.goals if goal.end_s >= onset_s]
+        stopped = any(goal.failed or (not goal.outcome and goal.time_s > OPEN_S) for goal in after)
+        return "critical" if stopped else "warning"
+
+    # Messages
+
+    @cached_property
+    def log_messages(self) -> tuple[LogMessage, ...]:
+        """What nodes said, in order of time; where it was recorded twice (`/rosout_agg`), once."""
+        spoken = [log_messages(table, type) for type in messages.ROSOUT for _, table in self.of(type)]
+        return max(spoken, key=len, default=())
+
+    def log_messages_on(self, topics: Iterable[str]) -> tuple[LogMessage, ...] | None:
+        """What nodes said on the first of these topics that the recording has; None where it has none of them."""
+        read = (self._of_topic(_spoken, topic, *LOG_FIELDS) for topic in topics)
+        return next((spoken for spoken in read if spoken is not None), None)
+
+    @cached_property
+    def reports(self) -> tuple[Report, ...]:
+        """What diagnostics said, changes of level only."""
+        return tuple(reports(self.of(messages.DIAGNOSTICS)))
+
+
+def way_through(goals: Iterable[Goal], commands: Commands | None) -> float:
+    """How far the robot must have gone to reach the goals that it reached, m: from one to the next, or as it was
+    commanded on the way to them."""
+    reached = [goal for goal in goals if goal.outcome == "reached"]
+    apart = [math.dist((a.x, a.y), (b.x, b.y)) for a, b in pairwise(reached)]
+    way_m = sum(one for one in apart if math.isfinite(one))
+    return way_m if commands is None else max(way_m, sum(commands.way_m(one.sent_s, one.end_s) for one in reached))
+
+
+def _spoken(topic: str, table: Table) -> tuple[LogMessage, ...] | None:
+    return log_messages(table) if {"level", "name", "msg"} <= set(table.columns) else None
+
+
+def _plainness(topic: str, name: str) -> tuple[bool, int, str]:
+    """Ranks topics: `/odom` before `/robot/odom` before `/odometry/filtered`."""
+    return topic.rpartition("/")[2] != name, topic.count("/"), topic

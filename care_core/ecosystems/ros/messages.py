@@ -1,0 +1,190 @@
+"""The dictionary of ROS messages: by type what is read of it, how much of it, in which units, and what is possible.
+
+Topics of a stranger's recording are named anyhow, so a channel is known by its type. No camera and no point cloud is
+read, and of sensors that send often as many messages as a look at them needs: an hour takes no longer than minutes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.dictionary import Field, Message
+from care_core.logs.base import Channel, Table, Wanted
+from care_core.logs.plausible import STAMP
+from care_core.logs.ros_message import short_name
+from care_core.numbers import Floats
+
+ODOMETRY = "nav_msgs/Odometry"
+TWIST, TWIST_STAMPED = "geometry_msgs/Twist", "geometry_msgs/TwistStamped"
+SCAN = "sensor_msgs/LaserScan"
+CLOUD = "sensor_msgs/PointCloud2"
+BATTERY = "sensor_msgs/BatteryState"
+IMU = "sensor_msgs/Imu"
+VIEWER_LOG = ("foxglove.Log", "foxglove_msgs/Log")
+"""Messages of nodes as viewers have them, with names and levels of their own."""
+ROSOUT = ("rosgraph_msgs/Log", "rcl_interfaces/Log", *VIEWER_LOG)
+DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
+STATUS = "action_msgs/GoalStatusArray"
+TREE = "nav2_msgs/BehaviorTreeLog"
+RECOVERY = "move_base_msgs/RecoveryStatus"
+TRANSITION = "lifecycle_msgs/TransitionEvent"
+TF = ("tf2_msgs/TFMessage", "tf/tfMessage")
+LOCALISED = "geometry_msgs/PoseWithCovarianceStamped"
+ACTION_GOAL, ACTION_RESULT = "ActionGoal", "ActionResult"
+"""How the types of a ROS 1 action's goals and results end."""
+
+ROBOT = (ODOMETRY, TWIST, TWIST_STAMPED, SCAN, BATTERY)
+"""What a robot that drives publishes."""
+STAMPED = (ODOMETRY, SCAN, IMU)
+"""What carries the time at which the robot made it, by its own clock."""
+WITHOUT_STREAM = (
+    "rcl_interfaces/ParameterEvent", "rosbag2_interfaces/ReadSplitEvent", "rosbag2_interfaces/WriteSplitEvent",
+    "bond/Status", *ROSOUT,
+)  # fmt: skip
+"""Types whose channels are empty, or stop, without anything being wrong."""
+
+FRAME = "header.frame_id"
+"""The frame in which a message gives places: text, so read only where places are compared."""
+
+_FAR_M, _FAST, _ELECTRIC, _HARDEST_MPS2, _UNIT = 1e7, 1e3, 1e4, 1e4, 2.0
+"""Beyond these nothing is: positions (UTM northings reach 1e7 m), speeds in m/s and rad/s, volts, amperes and ampere
+hours, accelerations. Parts of a unit quaternion lie within 1; one beyond 2 is damaged, not rounded."""
+
+
+class RosMessage(Message):
+    """A type of message: what the model of a drive reads of it, and how much."""
+
+    reads: tuple[str, ...] = ()
+    at_most: int = 0
+    """Messages of a topic that health decodes; what comes seldom is read whole, 0."""
+    label: str = ""
+    """What a recording of it alone holds, in words."""
+
+
+def _number(unit: str, label: str = "", most: float = math.inf) -> Field:
+    return Field(unit, label, plausible=(-most, most))
+
+
+def _position(axis: str) -> Field:
+    return Field("m", f"position {axis}", plausible=(-_FAR_M, _FAR_M), is_position=True)
+
+
+_PARTS = tuple(f"orientation.{axis}" for axis in "xyzw")
+_ORIENTATION = {part: _number("", most=_UNIT) for part in _PARTS}
+_POSE = {
+    "pose.pose.position.x": _position("x"),
+    "pose.pose.position.y": _position("y"),
+    **{f"pose.pose.{part}": field for part, field in _ORIENTATION.items()},
+}
+_COMMAND = {
+    "linear.x": _number("m/s", "commanded speed", _FAST),
+    "linear.y": _number("m/s", "commanded speed to the left", _FAST),
+    "angular.z": _number("rad/s", "commanded turn rate", _FAST),
+}
+_STAMPED_COMMAND = {f"twist.{name}": field for name, field in _COMMAND.items()}
+_VELOCITY = {
+    "twist.twist.linear.x": _number("m/s", "speed forward", _FAST),
+    "twist.twist.linear.y": _number("m/s", "speed to the left", _FAST),
+    "twist.twist.angular.z": _number("rad/s", "turn rate", _FAST),
+}
+_ACCELERATION = {
+    "linear_acceleration.x": _number("m/s2", "forward acceleration", _HARDEST_MPS2),
+    "linear_acceleration.y": _number("m/s2", "sideways acceleration", _HARDEST_MPS2),
+    "linear_acceleration.z": _number("m/s2", "vertical acceleration", _HARDEST_MPS2),
+}
+_BATTERY = {
+    "voltage": _number("V", "battery voltage", _ELECTRIC),
+    "current": _number("A", "battery current", _ELECTRIC),
+    "percentage": Field("", "charge left, 0 to 1"),
+    "charge": _number("Ah", "charge left", _ELECTRIC),
+}
+_ANGLES = {"angle_min": _number("rad", most=_FAST), "angle_increment": _number("rad", most=_FAST)}
+_TARGET = "goal.target_pose"
+_TRANSFORM = "transforms.transform.translation"
+
+
+def _reads(*fields: str, at_most: int = 0, label: str = "") -> RosMessage:
+    return RosMessage({}, reads=fields, at_most=at_most, label=label)
+
+
+MESSAGES: Mapping[str, RosMessage] = {
+    ODOMETRY: RosMessage({**_VELOCITY, **_POSE}, reads=(STAMP, *_POSE, *_VELOCITY), at_most=20_000),
+    TWIST: RosMessage(_COMMAND, reads=tuple(_COMMAND), at_most=20_000),
+    TWIST_STAMPED: RosMessage(_STAMPED_COMMAND, reads=tuple(_STAMPED_COMMAND), at_most=20_000),
+    SCAN: RosMessage(_ANGLES, reads=(STAMP, *_ANGLES, "range_min", "range_max", "ranges"), at_most=2_500),
+    BATTERY: RosMessage(_BATTERY, reads=tuple(_BATTERY), at_most=5_000),
+    IMU: RosMessage(
+        {**_ACCELERATION, **_ORIENTATION, "angular_velocity.z": Field("rad/s", "turn rate of the gyro")},
+        reads=(STAMP, *_ACCELERATION, *_ORIENTATION), at_most=30_000, label="inertial data",
+    ),
+    **dict.fromkeys(ROSOUT, _reads("level", "name", "msg", "message")),
+    DIAGNOSTICS: _reads("status.level", "status.name", "status.message"),
+    STATUS: _reads("status_list.goal_info.goal_id.uuid", "status_list.status"),
+    TREE: _reads("event_log.node_name", "event_log.previous_status", "event_log.current_status"),
+    RECOVERY: _reads("recovery_behavior_name"),
+    TRANSITION: _reads("start_state.label", "goal_state.label"),
+    **dict.fromkeys(TF, _reads(
+        "transforms.header.frame_id", "transforms.child_frame_id", f"{_TRANSFORM}.x", f"{_TRANSFORM}.y",
+        at_most=10_000, label="transforms",
+    )),
+    ACTION_GOAL: _reads(
+        "goal_id.id", f"{_TARGET}.header.frame_id", *(f"{_TARGET}.pose.position.{axis}" for axis in "xy"),
+        *(f"{_TARGET}.pose.{part}" for part in _PARTS),
+    ),
+    ACTION_RESULT: _reads("status.goal_id.id", "status.status", "status.text"),
+    LOCALISED: RosMessage(_POSE, label="poses"),
+    **dict.fromkeys(("geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped"), _reads(label="poses")),
+    "sensor_msgs/NavSatFix": _reads(label="satellite positions"),
+    **dict.fromkeys(("sensor_msgs/Image", "sensor_msgs/CompressedImage"), _reads(label="images")),
+    CLOUD: _reads(label="point clouds"),
+    "sensor_msgs/JointState": _reads(label="joint states"),
+    "sensor_msgs/Range": _reads(label="ranges"),
+}  # fmt: skip
+"""By short type; of the goals and results of ROS 1 actions, by how the type ends."""
+
+
+def reading(*types: str) -> Wanted:
+    """What is read of these types."""
+    return {type: MESSAGES[type].reads for type in types}
+
+
+def type_of(channel: Channel) -> str:
+    """The key of `MESSAGES` for a channel, its short type where there is none."""
+    name = short_name(channel.type.partition(",")[0])
+    return next((ending for ending in (ACTION_GOAL, ACTION_RESULT) if name.endswith(ending)), name)
+
+
+def holds(table: Table, type: str) -> bool:
+    """Whether a table has every field that is read of messages of a type."""
+    return all(field in table.columns for field in MESSAGES[type].reads)
+
+
+def believable(table: Table, type: str, field: str) -> Floats:
+    """A column of numbers with nan for what nothing of its kind can be: a damaged one."""
+    low, high = MESSAGES[type].fields[field].plausible or (-math.inf, math.inf)
+    return _within(table[field], low, high)
+
+
+def yaw_of(table: Table, prefix: str) -> Floats:
+    """Heading of a unit quaternion, rad."""
+    columns = (_within(table[f"{prefix}.{axis}"], -_UNIT, _UNIT) for axis in "xyzw")
+    x, y, z, w = (np.clip(column, -1.0, 1.0) for column in columns)
+    yaw: Floats = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    return yaw
+
+
+def _within(column: NDArray[Any], low: float, high: float) -> Floats:
+    values = np.asarray(column, np.float64)
+    with np.errstate(invalid="ignore"):
+        return np.where((values >= low) & (values <= high), values, np.nan)
+
+
+def topics(channels: Iterable[Channel], types: Iterable[str]) -> Wanted:
+    """The fields to read of the channels of these types that have messages."""
+    wanted = frozenset(types)
+    return {one.name: MESSAGES[type_of(one)].reads for one in channels if one.count and type_of(one) in wanted}

@@ -1,0 +1,229 @@
+"""How the robot moved, by its odometry, and what it was commanded to do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from care_core.ecosystems.ros.messages import FRAME, ODOMETRY, TWIST, TWIST_STAMPED, believable, yaw_of
+from care_core.logs.base import Table
+from care_core.logs.plausible import STAMP
+from care_core.numbers import Bools, Floats, median, quantile
+from care_core.records import Record, replace
+
+STANDS_MPS, STANDS_RADPS = 0.02, 0.05
+"""Below these a robot stands still, and a command asks it to: a wheeled robot's odometry at rest is quieter."""
+BREAKS_LOOSE_MPS, BREAKS_LOOSE_RADPS = 0.08, 0.15
+"""A command for less may be too little to break loose, so a robot that stands still then does not disobey."""
+TWIST_MPS, TWIST_RADPS = 0.01, 0.01
+"""An odometry that ever tells more than these has its twist filled in: some drivers leave it zero."""
+STILL_M = 2.0
+"""Way by its speed that no noise of a speed makes while a position stays the same to the last digit."""
+
+STALE_S = 0.6
+"""Base drivers stop without commands for about this long (diff_drive_controller: cmd_vel_timeout 0.5 s)."""
+ANSWER_S = 1.0
+"""Within this time a drive follows: a step of 1 m/s at 1 m/s^2."""
+_THIN = 2.5
+"""Commands may come this many times later than usual before they count as ceased: recordings are thinned."""
+
+PUNCTUAL_S, MOSTLY = 0.25, 0.6
+"""Where this share of messages is recorded so soon after it was made, both clocks run alike."""
+_FEWEST = 3
+"""Samples without which there is no movement to speak of."""
+
+
+class Odometry(Record, eq=False):
+    """What odometry says, where it says numbers: s, m, rad, m/s, rad/s, each of shape (n,)."""
+
+    topic: str
+    frame: str
+    """Empty where it was not read."""
+    recorded_s: Floats
+    t: Floats
+    """When each sample was made, in the recorder's time, see `when_made`."""
+    clock: Floats
+    """The same by the robot's own clock, which a slow simulation slows."""
+    x: Floats
+    y: Floats
+    yaw: Floats
+    speed: Floats
+    """Forward, negative backwards."""
+    sideways: Floats
+    turn: Floats
+    numberless_s: Floats
+    """When messages without numbers were recorded, shape (m,)."""
+
+    @property
+    def dt(self) -> Floats:
+        """Time since the sample before by the robot's own clock; 0 for the first."""
+        step = np.diff(self.clock, prepend=np.nan)
+        return np.where(step > 0, step, 0.0)
+
+    @property
+    def tells_speed(self) -> bool:
+        """Whether its twist is filled in."""
+        return bool(np.any(np.abs(self.speed) > TWIST_MPS) or np.any(np.abs(self.turn) > TWIST_RADPS))
+
+    @property
+    def way_by_speed_m(self) -> float:
+        """How far it went by its speed."""
+        return float(np.sum(np.hypot(self.speed, self.sideways) * self.dt))
+
+    @property
+    def stands_still(self) -> bool:
+        """Whether its position is not filled in: the same to the last digit while its speed makes metres of way."""
+        return not np.ptp(self.x) and not np.ptp(self.y) and self.way_by_speed_m > STILL_M
+
+    def path_m(self, start_s: float = -np.inf, end_s: float = np.inf) -> float:
+        """Length of the path of its positions in a time, m."""
+        inside = (self.t >= start_s) & (self.t <= end_s)
+        return float(np.sum(np.hypot(np.diff(self.x[inside]), np.diff(self.y[inside]))))
+
+    def advancing(self) -> Odometry | None:
+        """The samples with a heading that were made one after the other; None where hardly any were."""
+        good = np.isfinite(self.yaw + self.t)
+        good[1:] &= np.diff(self.t) > 0
+        if np.count_nonzero(good) < _FEWEST:
+            return None
+        if good.all():
+            return self
+        columns = ("recorded_s", "t", "clock", "x", "y", "yaw", "speed", "sideways", "turn")
+        return replace(self, **{name: getattr(self, name)[good] for name in columns})
+
+
+class Commands(Record, eq=False):
+    """Velocity commands: s, m/s, rad/s, each of shape (n,), in order of time."""
+
+    topic: str
+    t: Floats
+    speed: Floats
+    sideways: Floats
+    turn: Floats
+
+    def way_m(self, start_s: float, end_s: float) -> float:
+        """How far a robot goes that follows the commands of a time, m."""
+        inside = (self.t >= start_s) & (self.t <= end_s)
+        ordered = np.hypot(self.speed, self.sideways) * np.minimum(np.diff(self.t, append=self.t[-1:]), STALE_S)
+        return float(ordered[inside].sum())
+
+
+def odometry_of(topic: str, table: Table) -> Odometry | None:
+    """The odometry of a topic; None where its messages are not of that kind, or none tells numbers."""
+    places, speeds = ("pose.pose.position.x", "pose.pose.position.y"), ("linear.x", "linear.y", "angular.z")
+    fields = (*places, *(f"twist.twist.{name}" for name in speeds))
+    headings = [f"pose.pose.orientation.{axis}" for axis in "xyzw"]
+    if len(table) < _FEWEST or not {*fields, *headings} <= set(table.columns):
+        return None
+    x, y, speed, sideways, turn = (believable(table, ODOMETRY, name) for name in fields)
+    good = np.isfinite(x + y + speed + sideways + turn)
+    if np.count_nonzero(good) < 2:
+        return None
+    t, clock = when_made(table), _clock(table)
+    return Odometry(
+        topic=topic,
+        frame=str(table[FRAME][good][0]) if FRAME in table.columns else "",
+        recorded_s=table.t[good],
+        t=t[good],
+        clock=(t if clock is None else clock)[good],
+        x=x[good],
+        y=y[good],
+        yaw=yaw_of(table, "pose.pose.orientation")[good],
+        speed=speed[good],
+        sideways=sideways[good],
+        turn=turn[good],
+        numberless_s=table.t[~good],
+    )
+
+
+def _clock(table: Table) -> Floats | None:
+    """The stamps of messages, where they are set and run forward."""
+    if STAMP not in table.columns:
+        return None
+    stamp = np.asarray(table[STAMP], np.float64)
+    return stamp if np.isfinite(stamp).all() and stamp[-1] > stamp[0] and np.all(np.diff(stamp) >= 0) else None
+
+
+def when_made(table: Table) -> Floats:
+    """When messages were made, in the recorder's time: by their stamps where that clock runs as the recorder's does.
+
+    What a link held back was recorded later than it was made, and comes in a burst.
+    """
+    stamp = _clock(table)
+    if stamp is None:
+        return table.t
+    late: Floats = table.t - stamp
+    usual = quantile(late, 0.1)
+    return stamp + usual if float(np.mean(late - usual < PUNCTUAL_S)) >= MOSTLY else table.t
+
+
+def commands_of(topic: str, table: Table) -> Commands | None:
+    """The commands of a topic of geometry_msgs/Twist or TwistStamped; None where none is."""
+    type, prefix = (TWIST_STAMPED, "twist.") if "twist.linear.x" in table.columns else (TWIST, "")
+    names = [f"{prefix}{name}" for name in ("linear.x", "linear.y", "angular.z")]
+    if not set(names) <= set(table.columns):
+        return None
+    speed, sideways, turn = (believable(table, type, name) for name in names)
+    good = np.isfinite(speed + turn + sideways)
+    return Commands(topic, table.t[good], speed[good], sideways[good], turn[good]) if good.any() else None
+
+
+class Following(Record, eq=False):
+    """Per odometry sample the commands of the last second: the least and the most that was asked for.
+
+    `commanded` is False where no command was in force, `to_move` True where every command of that second asked for
+    motion. All of shape (n,).
+    """
+
+    odometry: Odometry
+    commanded: Bools
+    to_move: Bools
+    speed_low: Floats
+    speed_high: Floats
+    turn_low: Floats
+    turn_high: Floats
+
+    @property
+    def wanted_speed(self) -> Floats:
+        """The speed that every command of the last second asked for at least, m/s, 0 where they differ in sign."""
+        return _least(self.speed_low, self.speed_high, self.commanded)
+
+    @property
+    def wanted_turn(self) -> Floats:
+        """The same of the turn, rad/s."""
+        return _least(self.turn_low, self.turn_high, self.commanded)
+
+
+def _least(low: Floats, high: Floats, commanded: Bools) -> Floats:
+    same: Floats = np.where(low > 0, low, np.where(high < 0, high, 0.0))
+    return np.where(commanded, same, 0.0)
+
+
+def following(odometry: Odometry, commands: Commands) -> Following:
+    """Odometry beside the commands that were in force."""
+    first = np.searchsorted(commands.t, odometry.t - ANSWER_S, "right") - 1
+    last = np.searchsorted(commands.t, odometry.t, "right")
+    stale_s = max(STALE_S, _THIN * float(median(np.diff(commands.t))))
+    commanded = (first >= 0) & (last > 0)
+    commanded &= odometry.t - commands.t[np.maximum(last - 1, 0)] <= stale_s
+    moving = np.hypot(commands.speed, commands.sideways) >= BREAKS_LOOSE_MPS
+    moving |= np.abs(commands.turn) >= BREAKS_LOOSE_RADPS
+    to_move = np.zeros(len(odometry.t), bool)
+    bounds = [np.zeros(len(odometry.t)) for _ in range(4)]
+    for row in np.flatnonzero(commanded).tolist():
+        second = slice(int(first[row]), int(last[row]))
+        speed, turn = commands.speed[second], commands.turn[second]
+        for bound, value in zip(bounds, (speed.min(), speed.max(), turn.min(), turn.max()), strict=True):
+            bound[row] = value
+        to_move[row] = moving[second].all()
+    return Following(odometry, commanded, to_move, *bounds)
+
+
+def stretches(t: Floats, condition: Bools, gap_s: float) -> list[tuple[float, float]]:
+    """First and last time of each stretch in which a condition holds, breaks shorter than `gap_s` bridged."""
+    found: list[tuple[float, float]] = []
+    for time_s in t[condition].tolist():
+        if found and time_s - found[-1][1] < gap_s:
+            found[-1] = (found[-1][0], time_s)
+        else:
+            found.append((time_s, time_s))
+    return found

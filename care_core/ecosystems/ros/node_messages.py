@@ -1,0 +1,98 @@
+"""What nodes said on /rosout, and what diagnostics said of the robot's parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from enum import IntEnum
+
+from care_core.ecosystems.ros.messages import DIAGNOSTICS, MESSAGES, VIEWER_LOG, holds
+from care_core.logs.base import Table
+from care_core.records import Record
+
+
+class Level(IntEnum):
+    """How much a message of a node matters, in the codes of rosgraph_msgs/Log."""
+
+    DEBUG = 1
+    INFO = 2
+    WARN = 4
+    ERROR = 8
+    FATAL = 16
+
+    @property
+    def word(self) -> str:
+        """As a list of messages shows it."""
+        return self.name if self >= Level.WARN else self.name.lower()
+
+
+_ROS2 = {10: Level.DEBUG, 20: Level.INFO, 30: Level.WARN, 40: Level.ERROR, 50: Level.FATAL}
+"""Levels of rcl_interfaces/Log; none of them is one of ROS 1."""
+_VIEWER = {0: Level.INFO, 1: Level.DEBUG, 2: Level.INFO, 3: Level.WARN, 4: Level.ERROR, 5: Level.FATAL}
+"""Levels of foxglove.Log (its schema: unknown, debug, info, warning, error, fatal)."""
+ROSOUT_TOPICS = ("/rosout", "/rosout_agg")
+PARTS = {0: "OK", 1: "WARN", 2: "ERROR", 3: "STALE"}
+"""Levels of diagnostic_msgs/DiagnosticStatus."""
+
+
+class LogMessage(Record):
+    """A message of a node; `level` as ROS 1 has them, `Level` where it is one of those."""
+
+    time_s: float
+    level: int
+    node: str
+    text: str
+
+
+class Report(Record):
+    """What diagnostics said of a part when its level changed."""
+
+    time_s: float
+    topic: str
+    name: str
+    level: int
+    message: str
+
+    @property
+    def word(self) -> str:
+        return PARTS.get(self.level, str(self.level))
+
+
+def level_of(code: float, type: str = "") -> int:
+    """The level of ROS 1 that a code of a message of that type stands for."""
+    if type in VIEWER_LOG:
+        return _VIEWER.get(int(code), int(code))
+    return _ROS2.get(int(code), int(code))
+
+
+def level_word(level: int) -> str:
+    """A level as a list of messages shows it."""
+    return Level(level).word if level in Level.__members__.values() else str(level)
+
+
+def log_messages(table: Table, type: str = "") -> tuple[LogMessage, ...]:
+    """The messages of one topic, in order of time. What a damaged definition reads as no text, or no level, was said by
+    nobody."""
+    text = next((name for name in ("msg", "message") if name in table.columns), None)
+    if text is None or "level" not in table.columns:
+        return ()
+    nodes = table["name"].tolist() if "name" in table.columns else [""] * len(table)
+    rows = zip(table.t.tolist(), table["level"].tolist(), nodes, table[text].tolist(), strict=True)
+    return tuple(LogMessage(t, level_of(code, type), node, words) for t, code, node, words in rows
+                 if isinstance(code, (int, float)) and math.isfinite(code)
+                 and isinstance(node, str) and isinstance(words, str))  # fmt: skip
+
+
+def reports(tables: Iterable[tuple[str, Table]]) -> Iterator[Report]:
+    """Every change of level, the first report included, in order of time within each topic of diagnostics."""
+    for topic, table in tables:
+        if not holds(table, DIAGNOSTICS):
+            continue
+        now: dict[str, int] = {}
+        columns = (table[name] for name in MESSAGES[DIAGNOSTICS].reads)
+        for time_s, levels, names, messages in zip(table.t.tolist(), *columns, strict=True):
+            for level, name, message in zip(levels, names, messages, strict=True):
+                code = level[0] if isinstance(level, bytes) else int(level)
+                if now.get(str(name)) != code:
+                    now[str(name)] = code
+                    yield Report(time_s, topic, str(name), code, str(message))
