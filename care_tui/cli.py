@@ -41,6 +41,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
     "doctor": ("doctor",),
     "shell": ("completion", "man"),
     "profiles": ("profiles",),
+    "checks": ("checks",),
     "formats": ("schema",),
 }
 """Modules of `care_tui.commands` with the commands that each holds, in the order of the help."""

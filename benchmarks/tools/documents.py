@@ -22,7 +22,7 @@ from care_core.files import bundled, write_atomically
 from care_core.records import Record
 
 ROOT = Path(__file__).parents[2]
-WRITTEN_ELSEWHERE = {"extractors.md", "walk.md"}
+WRITTEN_ELSEWHERE = {"checks.md", "extractors.md", "walk.md"}
 DOCUMENTS = (
     ROOT / "README.md",
     *(path for path in sorted((ROOT / "docs").glob("*.md")) if path.name not in WRITTEN_ELSEWHERE),
