@@ -15,7 +15,6 @@ from care_core.records import replace
 if TYPE_CHECKING:
     from care_core.diagnose.baseline import Baseline, Proposal, Refused
     from care_core.diagnose.judging import Judged
-    from care_core.ecosystems.registry import run_model
     from care_core.logs.base import Log
     from care_core.profile.store import Profile
     from care_core.run import ProfileChoice
@@ -71,12 +70,14 @@ def _runs_of(log: Log, profile: Profile) -> tuple[list[Judged], list[Refused]]:
     from care_core.diagnose.baseline import Refused, for_any_mission, refusal
     from care_core.diagnose.judging import judge
     from care_core.ecosystems.examine import examine
-    from care_core.extract.read import read_runs
+    from care_core.ecosystems.registry import run_model
+    from care_core.extract.read import read_runs, reading_plan
 
-    schema = for_any_mission(profile.schema)
-    health = examine(run_model(log))
+    schema, model = for_any_mission(profile.schema), run_model(log)
+    model.expect(reading_plan(schema))
+    health = examine(model)
     good, bad = [], []
-    for run in read_runs(run_model(log), schema):
+    for run in read_runs(model, schema):
         judged = judge(run, schema, profile.model)
         reason = refusal(judged, health)
         if reason:
