@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from datetime import datetime
-from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, Literal
 
@@ -22,6 +20,7 @@ from care_core.records import field
 from care_core.report.document import estimate, plain_number
 from care_core.report.published import Document
 from care_core.run import FitVerdict
+from care_core.tables import parquet
 from care_core.text import clean, listed, wrapped
 
 SCHEMA_ID: Final = "care.fleet/1"
@@ -302,31 +301,18 @@ def check_parquet_path(path: Path) -> None:
     from care_core.files import refuse_recording
 
     refuse_recording(path)
-    if path.suffix.lower() != ".parquet":
+    if path.suffix.lower() != parquet.SUFFIX:
         raise UsageError("The table's name ends in .parquet.", hint="Rename it.", where=str(path))
     if not path.parent.is_dir():
         raise UsageError("The folder does not exist.", hint="Make it first.", where=str(path.parent))
-    if find_spec("pyarrow") is None:
-        raise UsageError("Parquet cannot be written here.", hint=f"{INSTALL}.")
+    parquet.check_parquet(f"{INSTALL}.")
 
 
 def write_parquet(path: Path, fleet: Fleet) -> None:
     """The rows as a table, whole or not at all: the columns of the document's rows, lists as lists of texts, a column
     `objective.NAME` and `option.NAME` for each. Raises UsageError."""
-    import pandas as pd
-
-    from care_core.files import replace_file
-
-    content = io.BytesIO()
-    pd.DataFrame(
-        [_flat(entry, row) for entry, row in zip(_row_entries(fleet.rows), fleet.rows, strict=True)]
-    ).to_parquet(content, index=False)
-    try:
-        replace_file(path, content.getvalue())
-    except OSError as err:
-        raise UsageError(
-            f"Cannot write the table: {err.strerror}.", hint="Choose another place.", where=str(path)
-        ) from err
+    rows = [_flat(entry, row) for entry, row in zip(_row_entries(fleet.rows), fleet.rows, strict=True)]
+    parquet.write_parquet(path, rows, dict.fromkeys(name for row in rows for name in row))
 
 
 _NESTED = {"objectives", "explained", "causes", "findings", "change", "off"}

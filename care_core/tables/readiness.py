@@ -10,6 +10,7 @@ from pathlib import Path
 from care_core.errors import UsageError
 from care_core.profile.schema import Schema
 from care_core.records import Record
+from care_core.tables.parquet import SUFFIX, read_parquet
 from care_core.tables.rows import INSTALL_LEARN
 from care_core.variables import Role, Variable
 
@@ -91,7 +92,7 @@ def read_columns(path: Path, schema: Schema) -> tuple[dict[str, list[float | Non
         UsageError: the table cannot be read.
     """
     try:
-        rows = _parquet_rows(path) if path.suffix.lower() == ".parquet" else _csv_rows(path)
+        rows = _parquet_rows(path) if path.suffix.lower() == SUFFIX else _csv_rows(path)
     except (OSError, ValueError, csv.Error) as err:
         reason = (err.strerror if isinstance(err, OSError) else "") or "it is no table of runs"
         raise UsageError(
@@ -108,14 +109,11 @@ def _csv_rows(path: Path) -> list[dict[str, object]]:
 
 def _parquet_rows(path: Path) -> list[dict[str, object]]:
     try:
-        import pandas as pd
-
-        records = pd.read_parquet(path).to_dict("records")
+        return read_parquet(path)
     except ImportError as err:
         raise UsageError(
             "Parquet cannot be read here.", hint=f"{INSTALL_LEARN}, or use .csv.", where=str(path)
         ) from err
-    return [{str(key): value for key, value in record.items()} for record in records]
 
 
 def _number(value: object) -> float | None:

@@ -14,6 +14,7 @@ from care_core.extract.read import read_runs
 from care_core.logs.opening import open_log
 from care_core.profile.schema import Schema
 from care_core.run import Run, Setting, is_known
+from care_core.tables import parquet
 
 ABOUT = ("log", "mission", "log_format", "log_start", "log_sha256")
 """The columns before the variables."""
@@ -54,8 +55,8 @@ def write_table(path: Path, rows: Sequence[TableRow], schema: Schema) -> None:
 
 def write_rows(path: Path, rows: Sequence[TableRow], columns: list[str]) -> None:
     """Write rows as CSV or Parquet, by suffix; whole or not at all. A row may lack columns."""
-    if path.suffix.lower() == ".parquet":
-        _write_parquet(path, rows, columns)
+    if path.suffix.lower() == parquet.SUFFIX:
+        parquet.write_parquet(path, rows, columns)
         return
     from care_core.files import write_atomically
 
@@ -68,30 +69,12 @@ def write_rows(path: Path, rows: Sequence[TableRow], columns: list[str]) -> None
 
 def check_table_path(path: Path) -> None:
     """Refuse, before any log is read, a table that could not be written. Raises UsageError."""
-    if path.suffix.lower() not in (".csv", ".parquet"):
+    if path.suffix.lower() not in (".csv", parquet.SUFFIX):
         raise UsageError("A table of runs ends in .csv or .parquet.", hint="Rename it.", where=str(path))
     from care_core.files import refuse_recording
 
     refuse_recording(path)
     if not path.parent.is_dir():
         raise UsageError("The folder does not exist.", hint="Make it first.", where=str(path.parent))
-    if path.suffix.lower() == ".parquet":
-        from importlib.util import find_spec
-
-        if find_spec("pyarrow") is None:
-            raise UsageError("Parquet cannot be written here.", hint=f"{INSTALL_LEARN}, or write .csv.")
-
-
-def _write_parquet(path: Path, rows: Sequence[TableRow], columns: list[str]) -> None:
-    import pandas as pd
-
-    from care_core.files import replace_file
-
-    content = io.BytesIO()
-    pd.DataFrame(rows, columns=columns).to_parquet(content, index=False)
-    try:
-        replace_file(path, content.getvalue())
-    except OSError as err:
-        raise UsageError(
-            f"Cannot write the table: {err.strerror}.", hint="Choose another place.", where=str(path)
-        ) from err
+    if path.suffix.lower() == parquet.SUFFIX:
+        parquet.check_parquet(f"{INSTALL_LEARN}, or write .csv.")
