@@ -55,11 +55,7 @@ ROWS = arrays(np.float64, st.tuples(st.integers(1, 9), st.integers(1, 4)), eleme
 @given(ROWS, st.sampled_from([None, 0, 1]))
 def test_a_median_is_the_one_that_numpy_answers(values: Floats, axis: int | None) -> None:
     with np.errstate(all="ignore"):
-        expected = np.median(values, axis=axis)
-        np.testing.assert_array_equal(median(values, axis=axis), expected)
-        np.testing.assert_array_equal(
-            median(values.copy(), axis=axis or 0, in_place=True), np.median(values, axis or 0)
-        )
+        np.testing.assert_array_equal(median(values, axis=axis), np.median(values, axis=axis))
 
 
 @given(arrays(np.float64, st.integers(1, 30), elements=st.floats(allow_infinity=False)), st.floats(0, 1))

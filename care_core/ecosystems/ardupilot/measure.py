@@ -27,7 +27,7 @@ def lasting(t: Floats, mask: Mask, for_s: float, gap_s: float = 1.0, records: in
     record."""
     if not mask.any():
         return []
-    step = float(median(np.diff(t), in_place=True)) if len(t) > 1 else 0.0
+    step = float(median(np.diff(t))) if len(t) > 1 else 0.0
     held = runs(t, mask, max(gap_s, 1.5 * step))
     counts = np.searchsorted(t[mask], [edge for span in held for edge in span], side="right").tolist()
     starts = np.searchsorted(t[mask], [span[0] for span in held], side="left").tolist()
@@ -94,7 +94,7 @@ def steady(t: Floats, x: Floats, width_s: float) -> Floats:
 
 def records(t: Floats, width_s: float) -> int:
     """How many of at least three records, an odd number, lie in a window of `width_s`."""
-    step = max(float(median(np.diff(t), in_place=True)), 1e-6)
+    step = max(float(median(np.diff(t))), 1e-6)
     return min(max(round(width_s / step) | 1, 3), len(t) if len(t) % 2 else len(t) - 1)
 
 
