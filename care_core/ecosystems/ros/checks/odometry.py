@@ -33,8 +33,8 @@ _HEALTHY = "301 healthy move_base missions"
 _DRIFT = f"{_HEALTHY}: 97.5 % below half of it"
 JUMP_M = LIMITS.add("step beyond what speed and time allow", 0.3, "m", f"{_HEALTHY}: at most 0.07 m")
 DRIFTS = (
-    (LIMITS.add("short way of a drift", 1.5, "m", _DRIFT), LIMITS.add("drift over it", 0.08, "", _DRIFT)),
-    (LIMITS.add("long way of a drift", 4.0, "m", _DRIFT), LIMITS.add("drift over it", 0.04, "", _DRIFT)),
+    (LIMITS.add("short way of a drift", 1.5, "m", _DRIFT), LIMITS.add("drift over a short way", 0.08, "", _DRIFT)),
+    (LIMITS.add("long way of a drift", 4.0, "m", _DRIFT), LIMITS.add("drift over a long way", 0.04, "", _DRIFT)),
 )
 """Over so many metres the share by which the position advances further than the speed says."""
 SHRINK = LIMITS.add("share by which it advances less far", 0.35, "", "thin sampling alone gives up to 0.33")
