@@ -2,7 +2,7 @@
 
     python -m benchmarks.travel --shared DIR --table arducopter.parquet [--platform NAME] [--profiles DIR] [--folds N]
 
-Two parts. *Missions left out whole*: the table (by `benchmarks.tools.train_profiles --tables`) is split by mission; each
+Two parts. *Missions left out whole*: the table (`benchmarks.tools.train_profiles --tables`) is split by mission; each
 part is predicted by a model of the others: time and energy with their intervals, what the reference configuration needs
 for the mission (against the flight that flew it), and the probability that all objectives are met. *Faults*: failed
 flights of other settings, whose resets were flown: causes, fixes, and the probabilities promised for each reset.
