@@ -13,7 +13,7 @@ from typer.main import get_command
 from care_tui import __version__
 from care_tui.cli import OPEN, command_line
 
-_EXIT_STATUS = (
+EXIT_STATUS = (
     ("0", "all objectives are within their thresholds; the command did what it was asked"),
     ("1", "a fault was found"),
     ("2", "the command line, a configuration or a profile is wrong"),
@@ -44,7 +44,7 @@ def manual_page() -> str:
 def _page(context: Any) -> Iterator[str]:
     group = context.command
     yield f'.TH CARE 1 "" "care {__version__}" "User Commands"'
-    yield from (".SH NAME", f"care \\- {_roff(_first(group.help).rstrip('.').lower())}")
+    yield from (".SH NAME", f"care \\- {_roff(first_sentence(group.help).rstrip('.').lower())}")
     yield from (".SH SYNOPSIS", ".B care", "[\\fILOG\\fR] [\\fIOPTION\\fR]...", ".br", ".B care")
     yield "\\fICOMMAND\\fR [\\fIOPTION\\fR]... [\\fIARGUMENT\\fR]..."
     yield from (".SH DESCRIPTION", _roff(group.help))
@@ -53,7 +53,7 @@ def _page(context: Any) -> Iterator[str]:
     yield from _options(context, group)
     yield ".SH COMMANDS"
     yield from _commands(context, group, "care")
-    for title, rows in (("EXIT STATUS", _EXIT_STATUS), ("ENVIRONMENT", _ENVIRONMENT), ("FILES", _FILES)):
+    for title, rows in (("EXIT STATUS", EXIT_STATUS), ("ENVIRONMENT", _ENVIRONMENT), ("FILES", _FILES)):
         yield f".SH {title}"
         for name, text in rows:
             yield from (".TP", f".B {_roff(name)}", _roff(text))
@@ -82,7 +82,8 @@ def _options(context: Any, command: Any) -> Iterator[str]:
             yield from (".TP", f".B {_roff(record[0])}", _roff(" ".join(record[1].split())))
 
 
-def _first(text: str) -> str:
+def first_sentence(text: str) -> str:
+    """What a help says in its first sentence."""
     return re.split(r"(?<=\.)\s", text.strip(), maxsplit=1)[0]
 
 

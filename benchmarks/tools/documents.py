@@ -18,6 +18,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks.tools.tables import with_tables
 from care_core.files import bundled, write_atomically
 from care_core.records import Record
 
@@ -25,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 WRITTEN_ELSEWHERE = {"checks.md", "extractors.md", "walk.md"}
 DOCUMENTS = (
     ROOT / "README.md",
-    *(path for path in sorted((ROOT / "docs").glob("*.md")) if path.name not in WRITTEN_ELSEWHERE),
+    *(path for path in sorted((ROOT / "docs").rglob("*.md")) if path.name not in WRITTEN_ELSEWHERE),
 )
 
 _BLOCK = re.compile(r"(?P<before>[^\n]*)\n```[a-z]*\n(?P<session>\$ .*?)^```$", re.DOTALL | re.MULTILINE)
@@ -88,7 +89,8 @@ def prepare(folder: Path) -> None:
 
 
 def renewed(text: str) -> str:
-    """A document with what its commands print now."""
+    """A document with what its commands print now, and its tables."""
+    text = with_tables(text)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         prepare(folder)

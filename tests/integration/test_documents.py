@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.tools.documents import DOCUMENTS, ROOT, played, prepare, sessions
+from benchmarks.tools.tables import with_tables
 
 _LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
 
@@ -24,6 +25,12 @@ def test_the_commands_print_what_the_document_says(document: Path, tmp_path: Pat
         found = played(session, tmp_path)
         assert "Traceback" not in found
         assert without_digits(found) == without_digits(session.written), "make docs renews it"
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_tables_are_what_the_code_knows(document: Path) -> None:
+    page = document.read_text(encoding="utf-8")
+    assert with_tables(page) == page, "make docs renews it"
 
 
 @pytest.mark.parametrize("document", [*DOCUMENTS, ROOT / "ARCHITECTURE.md"], ids=lambda path: path.name)

@@ -1,4 +1,4 @@
-"""The public names of the core: the README's notebook runs as it stands, and importing costs nothing until then."""
+"""The public names of the core: the code of docs/notebook.md runs, and importing costs nothing until then."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def case() -> care_core.Case:
     return care_core.triage(SAMPLE)
 
 
-def test_the_notebook_of_the_readme_runs(
+def test_the_notebook_of_the_documents_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "notebook.md").read_text(encoding="utf-8"), re.DOTALL)
     (tmp_path / "samples").symlink_to(SAMPLE.parent)
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
-    exec(compile(code, "README.md", "exec"), names)
+    exec(compile(code, "notebook.md", "exec"), names)
     fix = names["case"].diagnosis.fix
     assert names["fault"].causes[0].option.name in {change.option.name for change in fix.changes}
     assert names["edited"].before == "LAND_SPEED,16\n" != names["edited"].after

@@ -1,0 +1,71 @@
+"""The words of the field are used, in the code and on the screen; those that they replaced do not come back."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+REPLACED_NAMES = {
+    "Told": "FindingRow",
+    "World": "CounterfactualQuery",
+    "At": "Prediction",
+    "Levels": "unique_values",
+    "kin": "a covariance of errors",
+    "Kinship": "a covariance of errors",
+    "Moment": "Event",
+    "LEADS": "EXPLAINS",
+    "persistence": "carry_over",
+    "witnesses": "correlated_metrics",
+    "ignorance": "epistemic_ratio",
+    "frozen": "records",
+}
+"""Names of classes, functions, variables and modules that may not be defined, with what to write."""
+
+REPLACED_PHRASES = {
+    "something this log does not show: control was lost": "control was lost; the log does not show why",
+    "of this run are off it": "parameters differ",
+    "No parameter as far as this explains it": "if this is the cause, changing parameters will not help",
+    "Possible are numbers": "allowed: 0.02 to 0.6",
+}
+"""Phrases that may not be printed, with what to write."""
+
+
+def test_no_replaced_name_is_defined() -> None:
+    found = {name: where for where, name in _defined() if name in REPLACED_NAMES}
+    assert not found, {name: f"{where}: write {REPLACED_NAMES[name]}" for name, where in found.items()}
+
+
+def test_no_replaced_phrase_is_printed() -> None:
+    texts = {path: " ".join(_joined(path).split()) for path in (*_sources(), *_pages())}
+    found = {old: path for path, text in texts.items() for old in REPLACED_PHRASES if old in text}
+    assert not found, {old: f"{path}: write {REPLACED_PHRASES[old]}" for old, path in found.items()}
+
+
+def _sources() -> Iterator[Path]:
+    return (path for room in ("care_core", "care_tui") for path in (ROOT / room).rglob("*.py"))
+
+
+def _pages() -> Iterator[Path]:
+    yield ROOT / "README.md"
+    yield from (ROOT / "docs").glob("*.md")
+
+
+def _joined(path: Path) -> str:
+    """A text with the strings that the code writes in several parts in one."""
+    return re.sub(r'"\s*(?:rf|f|r)?"', "", path.read_text(encoding="utf-8"))
+
+
+def _defined() -> Iterator[tuple[Path, str]]:
+    for path in _sources():
+        yield path, path.stem
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, (ast.ClassDef, ast.FunctionDef)):
+                yield path, node.name
+            elif isinstance(node, ast.arg):
+                yield path, node.arg
+            elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                yield path, node.id
