@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case
-from care_core.application.viewing import TEXTS, log_of
+from care_core.application.viewing import log_of
 from care_core.errors import CareError
 from care_core.records import Record, replace
 
@@ -25,7 +25,20 @@ SELECTORS = ("I", "Inst", "Instance", "C")
 CLOCKS = ("GMS", "GWk", "TimeUS", "time_usec", "time_boot_ms", "timestamp", "stamp", "secs", "sec", "nsecs", "nanosec")
 """Last parts of fields that say when a message was made: no signals, and they tell the day."""
 
-NO_SIGNALS = {"ARM", "CMD", "ERR", "EV", "MODE", "MSG", "ORGN", "PARM", "VER", *TEXTS}
+NO_SIGNALS = {
+    "ARM",
+    "CMD",
+    "ERR",
+    "EV",
+    "MODE",
+    "MSG",
+    "ORGN",
+    "PARM",
+    "VER",
+    "logged_messages",
+    "/rosout",
+    "/rosout_agg",
+}
 """Records of what was done and said: there is nothing to draw."""
 
 KNOWN: Mapping[str, Mapping[str, tuple[str, ...]]] = {

@@ -11,33 +11,10 @@ from care_core.errors import CareError
 from care_core.records import Record
 
 if TYPE_CHECKING:
-    from care_core.ecosystems.vehicles import Kind
+    from care_core.ecosystems.findings import Event
     from care_core.history.store import Triaged
     from care_core.logs.base import Log
     from care_core.run import FitVerdict
-
-TEXTS = {
-    "MSG": ("Message",),
-    "ERR": ("Subsys", "ECode"),
-    "EV": ("Id",),
-    "logged_messages": ("message", "level"),
-    "/rosout": ("level", "name", "msg"),
-    "/rosout_agg": ("level", "name", "msg"),
-}
-"""Channels that hold what the robot's software said, and their fields."""
-
-LEVELS = {1: "debug", 2: "info", 4: "WARN", 8: "ERROR", 16: "FATAL", 10: "debug", 20: "info", 30: "WARN", 40: "ERROR"}
-"""Levels of ROS 1 and ROS 2 log messages."""
-PX4_LEVELS = {"emergency": "FATAL", "alert": "FATAL", "critical": "FATAL", "error": "ERROR", "warning": "WARN"}
-"""Levels of PX4's logged messages that ask for attention."""
-
-
-class LogMessage(Record):
-    """Something the robot's software said, `time_s` after the start of the log."""
-
-    time_s: float
-    kind: str
-    text: str
 
 
 def log_of(case: Case) -> Log:
@@ -47,43 +24,18 @@ def log_of(case: Case) -> Log:
     return case.log
 
 
-def messages_of(case: Case) -> list[LogMessage]:
+def messages_of(case: Case) -> list[Event]:
     """Everything that the log holds in words, and what was found in its numbers, in time order."""
-    from care_core.ecosystems.registry import run_model
-    from care_core.ecosystems.vehicles import vehicle_of
+    from care_core.ecosystems.findings import Event
+    from care_core.ecosystems.registry import ecosystem_of
 
-    log = run_model(log_of(case)).log
-    tables = log.read(TEXTS)
-    if "/rosout" in tables:
-        tables = {name: table for name, table in tables.items() if name != "/rosout_agg"}
-    kind = vehicle_of(log.facts, case.diagnosis.run.settings).kind
-    found = []
-    for name, table in tables.items():
-        fields = [table.columns[field] for field in TEXTS[name] if field in table.columns]
-        for time_s, *values in zip(table.t, *fields, strict=True):
-            found.append(LogMessage(float(time_s), *_worded(name, values, kind)))
-    said = {message.text for message in found}
-    evidence = case.diagnosis.run.evidence
-    found += [LogMessage(part.time_s, part.kind, part.text) for part in evidence if part.text not in said]
-    return sorted(found, key=lambda message: message.time_s)
-
-
-def _worded(channel: str, values: list[object], kind: Kind) -> tuple[str, str]:
-    """Kind and words of a message of this channel."""
-    from care_core.ecosystems.vehicles import error_words, event_words, is_over
-
-    if channel.startswith("/rosout"):
-        level, name, text = (*values, "", "")[:3]
-        return LEVELS.get(int(float(str(level))), "?"), f"{name}: {text}"
-    if channel == "logged_messages":
-        text, level = (*values, "", "")[:2]
-        return PX4_LEVELS.get(str(level).casefold(), "message"), str(text)
-    if channel == "ERR":
-        subsystem, code = (int(float(str(value))) for value in (*values, 0, 0)[:2])
-        return ("over" if is_over(subsystem, code) else "ERR"), error_words(subsystem, code, kind)
-    if channel == "EV":
-        return "event", event_words(int(float(str(values[0])))) if values else ""
-    return "message", str(values[0]) if values else ""
+    log = log_of(case)
+    ecosystem = ecosystem_of(log.format)
+    messages = list(ecosystem.log_messages(ecosystem.model(log)))
+    texts = {message.text for message in messages}
+    evidence = (part for part in case.diagnosis.run.evidence if part.text not in texts)
+    found = [Event(part.time_s, part.kind, part.text, "the run") for part in evidence]
+    return sorted([*messages, *found], key=lambda message: message.time_s)
 
 
 def what_would_fit(case: Case) -> list[str]:

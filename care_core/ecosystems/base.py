@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
 from care_core.ecosystems.dictionary import Dictionary, Field, find_field
-from care_core.ecosystems.findings import Finding, Health
+from care_core.ecosystems.findings import Event, Finding, Health
 from care_core.logs import formats
 from care_core.logs.base import Channel, Log, Table, Wanted, merge_needs
 from care_core.logs.formats import LogFormat
@@ -105,6 +105,10 @@ class Ecosystem(ABC):
     @abstractmethod
     def examine(self, model: RunModel) -> Health:
         """What happened, and what is wrong."""
+
+    @abstractmethod
+    def log_messages(self, model: RunModel) -> Iterator[Event]:
+        """Everything that its software said, in words, with how much it matters; in no order."""
 
     @abstractmethod
     def checks(self) -> tuple[Check[Any], ...]:

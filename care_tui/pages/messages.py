@@ -7,7 +7,8 @@ from typing import ClassVar
 from textual.content import Content
 
 from care_core.application.case import Case
-from care_core.application.viewing import LogMessage, messages_of
+from care_core.application.viewing import messages_of
+from care_core.ecosystems.findings import Event
 from care_tui.pages.page import Fetch, Page, View, sentence
 from care_tui.render.objectives import meaning
 from care_tui.render.rows import Row, Rows, labelled, text
@@ -33,7 +34,7 @@ class MessagesPage(Page):
     def __init__(self, screen: PanesScreen, case: Case) -> None:
         super().__init__(screen)
         self._case = case
-        self._found: Fetch[list[LogMessage]] = Fetch(self, "messages")
+        self._found: Fetch[list[Event]] = Fetch(self, "messages")
         self._wanted: float | None = None
         self._placed = False
 
@@ -43,7 +44,7 @@ class MessagesPage(Page):
     def view(self) -> View:
         return self._found.view("Messages of the log", self._show)
 
-    def _show(self, messages: list[LogMessage]) -> View:
+    def _show(self, messages: list[Event]) -> View:
         title = Content.assemble("Messages of the log", (f"  {len(messages)}{self._span()}", "dim"))
         if not messages:
             return View(Content("Messages of the log"), lambda _: sentence("The log holds no message in words."))
@@ -74,23 +75,23 @@ class MessagesPage(Page):
         fits = self._case.diagnosis.profile.fit.verdict != "no"
         return f"; mission {mission.start_s:.1f} to {mission.end_s:.1f} s" if fits else ""
 
-    def _moment(self, messages: list[LogMessage]) -> int:
+    def _moment(self, messages: list[Event]) -> int:
         """The first message that the diagnosis rests on, else the last of the mission."""
         marked = [i for i, message in enumerate(messages) if self._is_evidence(message)]
         end = self._case.diagnosis.run.mission.end_s
         before = [i for i, message in enumerate(messages) if message.time_s <= end]
         return marked[0] if marked else before[-1] if before else 0
 
-    def _is_evidence(self, message: LogMessage) -> bool:
+    def _is_evidence(self, message: Event) -> bool:
         evidence = self._case.diagnosis.run.evidence
         return any(abs(part.time_s - message.time_s) < NEAR_S and part.text in message.text for part in evidence)
 
-    def _item(self, message: LogMessage) -> Content:
+    def _item(self, message: Event) -> Content:
         mark = self.glyphs.here if self._is_evidence(message) else "!" if message.kind in LOUD else " "
         style = "bold" if mark != " " else ""
         return Content.assemble(f"{mark} {message.time_s:8.1f} s  {message.kind:<8} ") + text(message.text, style)
 
-    def _detail(self, message: LogMessage | None) -> Rows:
+    def _detail(self, message: Event | None) -> Rows:
         if message is None:
             return Rows([])
         rows = [labelled(f"{message.time_s:.2f} s", message.text)]

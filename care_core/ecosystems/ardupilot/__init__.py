@@ -7,7 +7,7 @@ from typing import Any
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
 from care_core.ecosystems.dictionary import Dictionary
-from care_core.ecosystems.findings import Health
+from care_core.ecosystems.findings import Event, Health
 from care_core.logs.base import Channel, Log
 from care_core.logs.formats import LogFormat
 from care_core.run import Robot
@@ -38,6 +38,11 @@ class ArduPilot(Ecosystem):
         from care_core.ecosystems.ardupilot.examining import examine
 
         return examine(model)
+
+    def log_messages(self, model: RunModel) -> Iterator[Event]:
+        from care_core.ecosystems.ardupilot.log_messages import log_messages
+
+        return log_messages(model)
 
     def checks(self) -> tuple[Check[Any], ...]:
         return ()

@@ -7,7 +7,7 @@ from typing import Any
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
 from care_core.ecosystems.dictionary import Dictionary
-from care_core.ecosystems.findings import Health
+from care_core.ecosystems.findings import Event, Health
 from care_core.logs.base import Channel, Log
 from care_core.logs.formats import LogFormat
 from care_core.run import Robot
@@ -31,6 +31,11 @@ class Px4(Ecosystem):
 
         assert isinstance(model, Px4Flight)
         return examine(model)
+
+    def log_messages(self, model: RunModel) -> Iterator[Event]:
+        from care_core.ecosystems.px4.flight import log_messages
+
+        return log_messages(model)
 
     def checks(self) -> tuple[Check[Any], ...]:
         from care_core.ecosystems.px4.checks import CHECKS

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.findings import Event
 from care_core.logs.base import Log, Table, Wanted
 
 Span = tuple[float, float]
@@ -215,3 +216,14 @@ def without_speaker(text: str) -> str:
 def reason_of(complaint: str) -> str:
     """What a complaint says is wrong."""
     return _NOT_READY.sub("", complaint)
+
+
+_LEVELS = {"emergency": "FATAL", "alert": "FATAL", "critical": "FATAL", "error": "ERROR", "warning": "WARN"}
+"""Levels of logged messages that ask for attention."""
+
+
+def log_messages(flight: RunModel) -> Iterator[Event]:
+    """What the firmware said, with its level where that asks for attention."""
+    assert isinstance(flight, Px4Flight)
+    for t, level, text in flight.messages:
+        yield Event(t, _LEVELS.get(level.casefold(), "message"), text, MESSAGES)

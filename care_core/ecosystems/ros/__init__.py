@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
 from care_core.ecosystems.dictionary import Dictionary
-from care_core.ecosystems.findings import Health
+from care_core.ecosystems.findings import Event, Health
 from care_core.logs.base import Channel, Log
 from care_core.logs.formats import MCAP, ROS1_BAG, LogFormat
 from care_core.run import Robot
@@ -49,6 +49,11 @@ class Ros(Ecosystem):
         from care_core.ecosystems.ros.examining import examine
 
         return examine(cast("Drive", model))
+
+    def log_messages(self, model: RunModel) -> Iterator[Event]:
+        from care_core.ecosystems.ros.node_messages import spoken
+
+        return spoken(model)
 
     def checks(self) -> tuple[Check[Any], ...]:
         from care_core.ecosystems.ros.checks import CHECKS

@@ -6,7 +6,9 @@ import math
 from collections.abc import Iterable, Iterator
 from enum import IntEnum
 
-from care_core.ecosystems.ros.messages import DIAGNOSTICS, MESSAGES, VIEWER_LOG, holds
+from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.findings import Event
+from care_core.ecosystems.ros.messages import DIAGNOSTICS, MESSAGES, ROSOUT, VIEWER_LOG, holds, type_of
 from care_core.logs.base import Table
 from care_core.records import Record
 
@@ -96,3 +98,13 @@ def reports(tables: Iterable[tuple[str, Table]]) -> Iterator[Report]:
                 if now.get(str(name)) != code:
                     now[str(name)] = code
                     yield Report(time_s, topic, str(name), code, str(message))
+
+
+def spoken(model: RunModel) -> Iterator[Event]:
+    """What nodes said, with its level; of both topics of ROS 1 the one that its nodes write to."""
+    present = {channel.name: type_of(channel) for channel in model.log.channels() if channel.name in ROSOUT_TOPICS}
+    for topic in sorted(present)[:1]:
+        fields = MESSAGES[present[topic]].reads if present[topic] in ROSOUT else ()
+        table = model.tables({topic: fields}).get(topic)
+        for said in log_messages(table, present[topic]) if table is not None else ():
+            yield Event(said.time_s, level_word(said.level), f"{said.node}: {said.text}", topic)
