@@ -29,8 +29,8 @@ def new_profile(logs: Sequence[Path], out: Path, *, force: bool, progress: Progr
         LogError: none of the logs can be read, or they hold nothing that a profile could be made of.
     """
     from care_core.files import write_atomically
+    from care_core.scaffold.inputs import open_input
     from care_core.scaffold.scaffold import scaffold
-    from care_core.scaffold.seen import see
     from care_core.tables.rows import rows_of, write_table
 
     check_new(out, force=force)
@@ -38,7 +38,7 @@ def new_profile(logs: Sequence[Path], out: Path, *, force: bool, progress: Progr
     for number, path in enumerate(logs):
         progress(f"reading {path.name}", 0.5 * number / len(logs))
         try:
-            seen.append(see(path))
+            seen.append(open_input(path))
         except CareError as err:
             failed[str(path)] = err.message
     if not seen:

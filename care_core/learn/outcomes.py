@@ -173,11 +173,11 @@ def fit_outcomes(
     frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, effort: Effort
 ) -> Outcomes:
     """Mechanisms of every objective that the graph gives a cause and the table gives values."""
-    sought = sought_of_objectives(frame, schema, graph, rng, effort=effort)
-    return put_together(sought, [question.answer() for one in sought for question in one.questions])
+    of_objectives = questions_of_objectives(frame, schema, graph, rng, effort=effort)
+    return put_together(of_objectives, [question.answer() for one in of_objectives for question in one.questions])
 
 
-class Sought(Record, eq=False):
+class ObjectiveQuestions(Record, eq=False):
     """An objective, its stages if it has any, and the questions whose answers are its mechanisms: one each."""
 
     objective: str
@@ -185,9 +185,9 @@ class Sought(Record, eq=False):
     questions: tuple[Question, ...]
 
 
-def sought_of_objectives(
+def questions_of_objectives(
     frame: pd.DataFrame, schema: Schema, graph: CausalGraph, rng: np.random.Generator, *, effort: Effort
-) -> list[Sought]:
+) -> list[ObjectiveQuestions]:
     """What has to be fitted for every objective that the graph gives a cause and the table gives values."""
     found = []
     for objective in schema.objectives:
@@ -195,16 +195,16 @@ def sought_of_objectives(
             found.append(_by_stages(objective, frame, schema, graph, rng, effort))
         else:
             question = ask_total(objective.name, frame, schema, graph, rng, effort=effort)
-            found.append(Sought(objective.name, (), () if question is None else (question,)))
+            found.append(ObjectiveQuestions(objective.name, (), () if question is None else (question,)))
     return found
 
 
-def put_together(sought: Sequence[Sought], answers: Sequence[Mechanism]) -> Outcomes:
+def put_together(of_objectives: Sequence[ObjectiveQuestions], answers: Sequence[Mechanism]) -> Outcomes:
     """The outcomes from the answers to all their questions, in order."""
     outcomes: dict[str, OutcomeRecord] = {}
     mechanisms: dict[str, Mechanism] = {}
     left = iter(answers)
-    for one in sought:
+    for one in of_objectives:
         found = {question.target: next(left) for question in one.questions}
         if one.stages and any(mechanism.inputs for mechanism in found.values()):
             outcomes[one.objective] = OutcomeRecord(objective=one.objective, stages=one.stages)
@@ -222,7 +222,7 @@ def _by_stages(
     graph: CausalGraph,
     rng: np.random.Generator,
     effort: Effort,
-) -> Sought:
+) -> ObjectiveQuestions:
     records, questions = [], []
     for stage in find_stages(objective, schema, frame):
         # A stage that no option moves stays in, with its base rate: else its failures would be laid to a later one.
@@ -233,7 +233,7 @@ def _by_stages(
         if question is not None:
             questions.append(question)
             records.append(StageRecord(variable=stage.variable, passes=stage.passes, mechanism=key))
-    return Sought(objective.name, tuple(records), tuple(questions))
+    return ObjectiveQuestions(objective.name, tuple(records), tuple(questions))
 
 
 def fit_total(

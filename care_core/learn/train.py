@@ -31,7 +31,7 @@ from care_core.learn.outcomes import (
     badness,
     groups_that_move_together,
     put_together,
-    sought_of_objectives,
+    questions_of_objectives,
     varying_options,
 )
 from care_core.learn.processes import answers
@@ -237,15 +237,15 @@ def _fit_all(
     frame: pd.DataFrame, schema: Schema, graph: CausalGraph, settings: TrainSettings, rng: np.random.Generator
 ) -> Outcomes:
     """Every objective, and every metric as a function of the options that cause it."""
-    sought = sought_of_objectives(frame, schema, graph, rng, effort=OUTCOME)
+    of_objectives = questions_of_objectives(frame, schema, graph, rng, effort=OUTCOME)
     asked = (
         ask_total(metric.name, frame, schema, graph, np.random.default_rng([settings.seed, i]), effort=METRIC)
         for i, metric in enumerate(schema.metrics)
     )
-    questions = [*(question for one in sought for question in one.questions), *filter(None, asked)]
+    questions = [*(question for one in of_objectives for question in one.questions), *filter(None, asked)]
     fitted = answers([question.answer for question in questions], settings.n_jobs)
-    of_metrics = sum(len(one.questions) for one in sought)
-    outcomes, mechanisms = put_together(sought, fitted[:of_metrics])
+    of_metrics = sum(len(one.questions) for one in of_objectives)
+    outcomes, mechanisms = put_together(of_objectives, fitted[:of_metrics])
     named = zip(questions[of_metrics:], fitted[of_metrics:], strict=True)
     return outcomes, mechanisms | {question.target: mechanism for question, mechanism in named}
 

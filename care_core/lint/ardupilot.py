@@ -10,8 +10,8 @@ from difflib import get_close_matches
 from care_core.ecosystems.vehicles.parameters import spellings
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Kind
-from care_core.lint.generic import found
-from care_core.lint.records import Document, Entry, Finding, Severity
+from care_core.lint.generic import problem_at
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import ardupilot
 from care_core.metadata.ardupilot import Release
 from care_core.metadata.fact import Fact
@@ -39,16 +39,16 @@ _FAR = 10.0
 """Documented ranges are what is usual: what lies beyond the bound by less than this factor is worth a note alone."""
 
 
-def releases_of(document: Document, target: str) -> tuple[tuple[Release, ...], bool]:
+def releases_of(file: ConfigFile, target: str) -> tuple[tuple[Release, ...], bool]:
     """The releases that a file may be for, and whether anybody says so.
 
     Args:
         target: what the operator says: `copter-4.5`, `rover`; empty where nothing is said.
     """
-    asked = _asked(*_words(target)) if target else _asked(*_header(document.text))
+    asked = _asked(*_words(target)) if target else _asked(*_header(file.text))
     if asked:
         return asked, True
-    names = {entry.name for entry in document.entries}
+    names = {entry.name for entry in file.entries}
     counts: Counter[Release] = Counter(release for name in names for release in ardupilot.known_in(name))
     most = max(counts.values(), default=0)
     return tuple(release for release in ardupilot.ALL if counts[release] == most and most), False
@@ -73,23 +73,23 @@ def _asked(letter: str, version: str) -> tuple[Release, ...]:
     return tuple(one for one in own if one.version == version) or own
 
 
-def check(document: Document, target: str) -> Iterator[Finding]:
+def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of an ArduPilot vehicle's parameters."""
-    releases, is_told = releases_of(document, target)
-    for entry in document.entries:
+    releases, is_told = releases_of(file, target)
+    for entry in file.entries:
         if entry.name.startswith(SIMULATOR_PREFIX):
             continue
         known = ardupilot.known_in(entry.name)
         if not known:
-            yield _unknown(document, entry)
+            yield _unknown(file, entry)
         elif not known & set(releases):
-            yield _elsewhere(document, entry, releases, is_told)
+            yield _elsewhere(file, entry, releases, is_told)
         elif not is_self_written(entry.name):
-            yield from _value(document, entry, ardupilot.facts_of(entry.name, releases))
+            yield from _value(file, entry, ardupilot.facts_of(entry.name, releases))
 
 
-def _unknown(document: Document, entry: Entry) -> Finding:
-    held = {one.name for one in document.entries}
+def _unknown(file: ConfigFile, entry: Entry) -> Problem:
+    held = {one.name for one in file.entries}
     close = [
         name
         for name in get_close_matches(entry.name, _alike(entry.name), n=3, cutoff=_ALIKE)
@@ -97,9 +97,9 @@ def _unknown(document: Document, entry: Entry) -> Finding:
     ]
     if close:
         text = f"No release of ArduPilot has a parameter {entry.name}."
-        return found("unknown-key", Severity.WARNING, document, entry, text, f"Did you mean {close[0]}?", _LISTS)
+        return problem_at("unknown-key", Severity.WARNING, file, entry, text, f"Did you mean {close[0]}?", _LISTS)
     text = f"ArduPilot's lists have no parameter {entry.name}: a script's, a custom build's, or one before 3.4."
-    return found("unknown-key", Severity.NOTE, document, entry, text, "Check its spelling.", _LISTS)
+    return problem_at("unknown-key", Severity.NOTE, file, entry, text, "Check its spelling.", _LISTS)
 
 
 def _alike(name: str) -> list[str]:
@@ -110,7 +110,7 @@ def _digits(name: str) -> list[str]:
     return re.findall(r"\d+", name)
 
 
-def _elsewhere(document: Document, entry: Entry, releases: Sequence[Release], is_told: bool) -> Finding:
+def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[Release], is_told: bool) -> Problem:
     """A name of other releases than those the file is for."""
     new = _renamed(entry.name, releases)
     is_sure = is_told and (new is not None or all(_parts(one) >= _COMPLETE for one in releases))
@@ -118,9 +118,9 @@ def _elsewhere(document: Document, entry: Entry, releases: Sequence[Release], is
     told = _told(releases) if is_told else f"the releases that know most of this file ({_told(releases)})"
     known = _told([one for one in ardupilot.ALL if one in ardupilot.known_in(entry.name)])
     if new:
-        return found("renamed", severity, document, entry, f"{entry.name} is {new[0]} in {told}.", new[1], _LISTS)
+        return problem_at("renamed", severity, file, entry, f"{entry.name} is {new[0]} in {told}.", new[1], _LISTS)
     text = f"{entry.name} is not in {told}, but in {known}."
-    return found("unknown-key", severity, document, entry, text, "Is the file for this firmware?", _LISTS)
+    return problem_at("unknown-key", severity, file, entry, text, "Is the file for this firmware?", _LISTS)
 
 
 def _renamed(name: str, releases: Sequence[Release]) -> tuple[str, str] | None:
@@ -141,7 +141,7 @@ def _told(releases: Sequence[Release]) -> str:
     return f"{releases[0]} to {releases[-1].version}"
 
 
-def _value(document: Document, entry: Entry, facts: Sequence[Fact]) -> Iterator[Finding]:
+def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact]) -> Iterator[Problem]:
     """A value that no release that the file may be for allows."""
     value = entry.number
     if value is None or not facts:
@@ -150,17 +150,17 @@ def _value(document: Document, entry: Entry, facts: Sequence[Fact]) -> Iterator[
     bounded = [one for one in facts if one.low is not None and one.high is not None]
     if len(bounded) == len(facts):
         if not any(_within(value, one) for one in bounded):
-            yield from _outside(document, entry, value, bounded)
+            yield from _outside(file, entry, value, bounded)
     elif all(_is_enumeration(one) for one in facts):
         ever = {code for one in ardupilot.facts_of(entry.name) for code, _ in one.values}
         if value not in {*ever, 0.0, -1.0} and not (value in _SIMULATED and entry.name.endswith("_TYPE")):
             text = f"{entry.name} is {value:g}, which is none of the values of {fact.source}."
-            yield found("not-in-values", Severity.WARNING, document, entry, text, _listed(fact), fact.source)
+            yield problem_at("not-in-values", Severity.WARNING, file, entry, text, _listed(fact), fact.source)
     elif all(one.bits for one in facts) and value > 0 and value.is_integer():
         unknown = [bit for bit in range(32) if int(value) >> bit & 1 and not any(bit in one.bits for one in facts)]
         if unknown:
             text = f"{entry.name} is {value:g}: bit {', '.join(map(str, unknown))} means nothing to {fact.source}."
-            yield found("not-in-values", Severity.NOTE, document, entry, text, "", fact.source)
+            yield problem_at("not-in-values", Severity.NOTE, file, entry, text, "", fact.source)
 
 
 def _is_enumeration(fact: Fact) -> bool:
@@ -182,7 +182,7 @@ def _within(value: float, fact: Fact) -> bool:
     return fact.low - near <= value <= fact.high + near or any(value == code for code, _ in fact.values)
 
 
-def _outside(document: Document, entry: Entry, value: float, facts: Sequence[Fact]) -> Iterator[Finding]:
+def _outside(file: ConfigFile, entry: Entry, value: float, facts: Sequence[Fact]) -> Iterator[Problem]:
     """A number outside the documented ranges. 0 and -1 mean "off" or "not set" for many parameters and are let be."""
     fact = facts[-1]
     low, high = fact.low or 0.0, fact.high or 0.0
@@ -194,9 +194,9 @@ def _outside(document: Document, entry: Entry, value: float, facts: Sequence[Fac
         fits = [scaled for scaled in (value / ratio, value * ratio) if low < scaled < high]
         if low >= 0 and value > 0 and fits and not low / _FAR <= value <= high * _FAR:
             hint = f"Is it in {words}? {fits[0]:g} would be within the range."
-            yield found("wrong-unit", Severity.WARNING, document, entry, text, hint, fact.source)
+            yield problem_at("wrong-unit", Severity.WARNING, file, entry, text, hint, fact.source)
             return
-    yield found("out-of-range", Severity.NOTE, document, entry, text, "The range is what is usual.", fact.source)
+    yield problem_at("out-of-range", Severity.NOTE, file, entry, text, "The range is what is usual.", fact.source)
 
 
 def _listed(fact: Fact) -> str:

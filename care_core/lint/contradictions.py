@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from care_core.lint.generic import found
-from care_core.lint.records import Document, Entry, Finding, Severity
+from care_core.lint.generic import problem_at
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 
 
 class Pair(NamedTuple):
@@ -72,7 +72,7 @@ _INFLATION = (
 )
 
 
-def pairs(document: Document, values: Mapping[str, Entry], known: Sequence[Pair]) -> Iterator[Finding]:
+def pairs(file: ConfigFile, values: Mapping[str, Entry], known: Sequence[Pair]) -> Iterator[Problem]:
     """Pairs of one scope that contradict each other."""
     for pair in known:
         low, high = values.get(pair.low), values.get(pair.high)
@@ -84,7 +84,7 @@ def pairs(document: Document, values: Mapping[str, Entry], known: Sequence[Pair]
             why = f": {pair.why}" if pair.why else ""
             text = f"{low.keys[-1]} ({low.number:g}) is above {high.keys[-1]} ({high.number:g}){why}."
             hint = f"The other is in line {high.line}."
-            yield found("contradiction", Severity.WARNING, document, low, text, hint, pair.source)
+            yield problem_at("contradiction", Severity.WARNING, file, low, text, hint, pair.source)
 
 
 def inscribed_radius(footprint: Entry | None, radius: Entry | None) -> float | None:
@@ -114,10 +114,10 @@ def _distance_to(x: float, y: float, to_x: float, to_y: float) -> float:
     return math.hypot(x + share * along_x, y + share * along_y)
 
 
-def inflation(document: Document, radius: float | None, inflations: Sequence[Entry]) -> Iterator[Finding]:
+def inflation(file: ConfigFile, radius: float | None, inflations: Sequence[Entry]) -> Iterator[Problem]:
     """Inflation that is smaller than the robot."""
     for entry in inflations:
         if radius is not None and entry.number is not None and 0 < entry.number < radius * (1 - 1e-6):
             text = f"inflation_radius ({entry.number:g} m) is smaller than the robot ({radius:.3g} m from its centre)."
             hint = "Plans may touch obstacles: give it at least the robot's inscribed radius."
-            yield found("contradiction", Severity.WARNING, document, entry, text, hint, _INFLATION)
+            yield problem_at("contradiction", Severity.WARNING, file, entry, text, hint, _INFLATION)

@@ -1,4 +1,4 @@
-"""Files in, findings out: which family of rules a file belongs to."""
+"""Files in, problems out: which family of rules a file belongs to."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from care_core.configs.formats import ConfigFormat, module_of
 from care_core.configs.loading import split_name
 from care_core.errors import UsageError, nearest
 from care_core.lint import ardupilot, contradictions, generic, navigation
-from care_core.lint.reading import read_document
-from care_core.lint.records import Document, Entry, Finding, Severity
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.reading import read_file
 from care_core.metadata.navigation import DISTRIBUTIONS
 from care_core.records import Record
 from care_core.run import Setting
@@ -26,8 +26,8 @@ _MAY_BE_ELSEWHERE = frozenset({"unknown-key", "misplaced-key", "not-loaded"})
 class Linted(Record):
     """One file and what was found in it, in the order of its lines."""
 
-    document: Document
-    findings: tuple[Finding, ...]
+    file: ConfigFile
+    problems: tuple[Problem, ...]
 
 
 def lint(names: Sequence[str], target: str = "", schema: Schema | None = None) -> tuple[Linted, ...]:
@@ -56,33 +56,33 @@ def _check_target(target: str) -> None:
 
 def _lint(name: str, target: str, schema: Schema | None) -> Linted:
     path, namespace = split_name(name)
-    document, refused = read_document(path, namespace)
-    findings = [*refused, *generic.check(document), *_of_ecosystem(document, target)]
+    file, refused = read_file(path, namespace)
+    problems = [*refused, *generic.check(file), *_of_ecosystem(file, target)]
     if schema is not None:
-        findings += _of_profile(document, schema)
-    order = sorted(set(findings), key=lambda one: (one.line, one.column, one.rule))
-    return Linted(document, tuple(order))
+        problems += _of_profile(file, schema)
+    order = sorted(set(problems), key=lambda one: (one.line, one.column, one.rule))
+    return Linted(file, tuple(order))
 
 
-def _of_ecosystem(document: Document, target: str) -> Iterator[Finding]:
-    if document.format in (ConfigFormat.ROS1_YAML, ConfigFormat.ROS2_YAML):
-        yield from navigation.check(document, target if target in _all_distributions() else "")
+def _of_ecosystem(file: ConfigFile, target: str) -> Iterator[Problem]:
+    if file.format in (ConfigFormat.ROS1_YAML, ConfigFormat.ROS2_YAML):
+        yield from navigation.check(file, target if target in _all_distributions() else "")
         return
-    values = {entry.name: entry for entry in document.entries}
-    yield from contradictions.pairs(document, values, contradictions.VEHICLE_PAIRS)
+    values = {entry.name: entry for entry in file.entries}
+    yield from contradictions.pairs(file, values, contradictions.VEHICLE_PAIRS)
     if ardupilot.is_of_vehicle(values):
-        yield from ardupilot.check(document, "" if target in _all_distributions() else target)
+        yield from ardupilot.check(file, "" if target in _all_distributions() else target)
 
 
 def _all_distributions() -> set[str]:
     return {name for several in DISTRIBUTIONS.values() for name in several}
 
 
-def _of_profile(document: Document, schema: Schema) -> Iterator[Finding]:
+def _of_profile(file: ConfigFile, schema: Schema) -> Iterator[Problem]:
     """Values outside what a profile holds acceptable."""
-    entries = {_setting_name(document, entry): entry for entry in document.entries}
+    entries = {_setting_name(file, entry): entry for entry in file.entries}
     settings = {name: Setting(name, entry.value, "") for name, entry in entries.items()}
-    find = module_of(document.format).finder([settings])
+    find = module_of(file.format).finder([settings])
     for option in schema.options:
         for parameter in readable(option):
             setting = find(parameter)
@@ -91,13 +91,13 @@ def _of_profile(document: Document, schema: Schema) -> Iterator[Finding]:
                 continue
             text = f"{option.name} is {option.show(value)}, acceptable is {option.acceptable}."
             hint = "What is predicted there is a guess."
-            yield generic.found("outside-profile", Severity.NOTE, document, entries[setting.name], text, hint)
+            yield generic.problem_at("outside-profile", Severity.NOTE, file, entries[setting.name], text, hint)
 
 
-def _setting_name(document: Document, entry: Entry) -> str:
+def _setting_name(file: ConfigFile, entry: Entry) -> str:
     """A value's name as the reader of the format has it."""
-    if document.format is not ConfigFormat.ROS2_YAML or "ros__parameters" not in entry.keys:
-        return "/".join((*document.namespace.strip("/").split("/"), *entry.keys)).strip("/")
+    if file.format is not ConfigFormat.ROS2_YAML or "ros__parameters" not in entry.keys:
+        return "/".join((*file.namespace.strip("/").split("/"), *entry.keys)).strip("/")
     split = entry.keys.index("ros__parameters")
-    node = "/".join((document.namespace.strip("/"), *entry.keys[:split])).strip("/")
+    node = "/".join((file.namespace.strip("/"), *entry.keys[:split])).strip("/")
     return f"/{node}.{'.'.join(entry.keys[split + 1 :])}"

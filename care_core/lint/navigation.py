@@ -10,8 +10,8 @@ from difflib import get_close_matches
 
 from care_core.errors import UsageError, nearest
 from care_core.lint import contradictions
-from care_core.lint.generic import found
-from care_core.lint.records import Document, Entry, Finding, Severity
+from care_core.lint.generic import problem_at
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import MEANT, ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED
 from care_core.lint.scopes import COSTMAP, Place, Scoped, costmaps, scoped, split
 from care_core.metadata import navigation
@@ -43,19 +43,19 @@ def distribution_of(target: str, ros: str) -> str:
     raise UsageError(f"No tables for '{target}'.", hint=nearest(target, known), where="--target")
 
 
-def check(document: Document, target: str) -> Iterator[Finding]:
+def check(file: ConfigFile, target: str) -> Iterator[Problem]:
     """What is wrong with a file of ROS parameters."""
-    result = scoped(document)
+    result = scoped(file)
     distribution = distribution_of(target, result.ros)
     likely = frozenset({distribution}) if distribution else _likely(result)
     for place in result.places:
-        yield from _place(document, result, place, likely, is_told=bool(distribution))
+        yield from _place(file, result, place, likely, is_told=bool(distribution))
     for entry, key in result.not_loaded:
         name = split(entry)[-2]
         text = f"Nothing loads {name}: no list of {key} names it."
-        yield found("not-loaded", Severity.NOTE, document, entry, text, f"Add it to {key}, or leave it out.")
-    yield from _nodes(document, distribution)
-    yield from _contradictions(document, result)
+        yield problem_at("not-loaded", Severity.NOTE, file, entry, text, f"Add it to {key}, or leave it out.")
+    yield from _nodes(file, distribution)
+    yield from _contradictions(file, result)
 
 
 def _likely(result: Scoped) -> frozenset[str]:
@@ -72,30 +72,30 @@ def _likely(result: Scoped) -> frozenset[str]:
 
 
 def _place(
-    document: Document, result: Scoped, place: Place, likely: frozenset[str], *, is_told: bool
-) -> Iterator[Finding]:
+    file: ConfigFile, result: Scoped, place: Place, likely: frozenset[str], *, is_told: bool
+) -> Iterator[Problem]:
     ros = result.ros
     facts = [fact for owner in place.owners for fact in navigation.known(ros, owner, place.name)]
     if not place.owners:
         return
     if not facts:
-        finding = _unknown(document, result, place)
-        if finding is not None:
-            yield finding
+        problem = _unknown(file, result, place)
+        if problem is not None:
+            yield problem
         return
     now = [fact for fact in facts if navigation.distributions(fact, ros) & likely]
     if not now:
-        finding = _other_distribution(document, result, place, facts, likely, is_told=is_told)
-        if finding is not None:
-            yield finding
+        problem = _other_distribution(file, result, place, facts, likely, is_told=is_told)
+        if problem is not None:
+            yield problem
     dead = _dead(result, place)
     if dead:
-        yield found("dead-key", Severity.WARNING, document, place.entry, *dead, _COSTMAP_SOURCE)
+        yield problem_at("dead-key", Severity.WARNING, file, place.entry, *dead, _COSTMAP_SOURCE)
         return
-    yield from _value(document, place.entry, now or facts, ros)
+    yield from _value(file, place.entry, now or facts, ros)
 
 
-def _unknown(document: Document, result: Scoped, place: Place) -> Finding | None:
+def _unknown(file: ConfigFile, result: Scoped, place: Place) -> Problem | None:
     """A name that its reader does not read."""
     owner = place.owners[0]
     own = [name for one in place.owners for name in navigation.keys_of(result.ros, one)]
@@ -110,9 +110,9 @@ def _unknown(document: Document, result: Scoped, place: Place) -> Finding | None
     if elsewhere and not (meant and MEANT.get((owner, place.name))):
         text = f"{owner} does not read {place.name}; {', '.join(elsewhere[:3])} would."
         hint = hint if meant else "Move it there, or leave it out."
-        return found("misplaced-key", Severity.WARNING, document, place.entry, text, hint, STACKS[result.ros])
-    text = f"{owner} does not read {place.name}, in no distribution from {' to '.join(_ends(result))}."
-    return found("unknown-key", Severity.WARNING, document, place.entry, text, hint, STACKS[result.ros])
+        return problem_at("misplaced-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
+    text = f"{place.name} is not a parameter of {owner} in any release from {' to '.join(_ends(result))}."
+    return problem_at("unknown-key", Severity.WARNING, file, place.entry, text, hint, STACKS[result.ros])
 
 
 def _ends(result: Scoped) -> tuple[str, str]:
@@ -128,14 +128,14 @@ def _is_searched(result: Scoped, place: Place) -> bool:
 
 
 def _other_distribution(
-    document: Document,
+    file: ConfigFile,
     result: Scoped,
     place: Place,
     facts: Sequence[Fact],
     likely: frozenset[str],
     *,
     is_told: bool,
-) -> Finding | None:
+) -> Problem | None:
     """A name of other distributions than the file's; where nobody says which that is, one that has a new name."""
     severity = Severity.WARNING if is_told else Severity.NOTE
     order = DISTRIBUTIONS[result.ros]
@@ -147,15 +147,15 @@ def _other_distribution(
         if one.owner in place.owners and one.old in (place.name, generic) and is_newer:
             new = one.new.replace("<source>", place.name.partition(".")[0])
             text = f"{place.name} is {new} since {one.since}{told}."
-            return found(
-                "renamed", severity, document, place.entry, text, f"Write {new.rpartition('.')[2]}.", STACKS[result.ros]
+            return problem_at(
+                "renamed", severity, file, place.entry, text, f"Write {new.rpartition('.')[2]}.", STACKS[result.ros]
             )
     if not is_told or not _is_covered(result, place.owners[0], likely):
         return None
     known = frozenset(name for fact in facts for name in navigation.distributions(fact, result.ros))
     text = f"{place.owners[0]} reads {place.name} in {_span(known, order)}, not in {next(iter(likely))}."
-    return found(
-        "unknown-key", severity, document, place.entry, text, "Is the file for this distribution?", STACKS[result.ros]
+    return problem_at(
+        "unknown-key", severity, file, place.entry, text, "Is the file for this distribution?", STACKS[result.ros]
     )
 
 
@@ -185,7 +185,7 @@ def _dead(result: Scoped, place: Place) -> tuple[str, str] | None:
     return None
 
 
-def _value(document: Document, entry: Entry, facts: Sequence[Fact], ros: str) -> Iterator[Finding]:
+def _value(file: ConfigFile, entry: Entry, facts: Sequence[Fact], ros: str) -> Iterator[Problem]:
     """A value that no distribution the file may be for takes."""
     if isinstance(entry.value, str) and _PLACEHOLDER.match(entry.value):
         return
@@ -194,10 +194,10 @@ def _value(document: Document, entry: Entry, facts: Sequence[Fact], ros: str) ->
     fact = facts[-1]
     types: set[str] = {"int" if one.type == "enum" else one.type for one in facts}
     if entry.kind not in types and not _is_taken(entry, types, ros):
-        refused = "rclcpp does not start the node" if ros == "ros2" else "the default is used instead"
+        refused = "the node will not start" if ros == "ros2" else "the default is used instead"
         text = f"{entry.keys[-1]} is {_a(entry.kind)}, declared is {_a(' or '.join(sorted(types)))}: {refused}."
         severity = Severity.ERROR if ros == "ros2" else Severity.WARNING
-        yield found("wrong-type", severity, document, entry, text, _as_type(entry, types), fact.source)
+        yield problem_at("wrong-type", severity, file, entry, text, _as_type(entry, types), fact.source)
         return
     number = entry.number
     if number is None:
@@ -205,15 +205,15 @@ def _value(document: Document, entry: Entry, facts: Sequence[Fact], ros: str) ->
     if fact.values and not any(number == code for code, _ in fact.values):
         listed = ", ".join(f"{code:g} ({label})" for code, label in fact.values)
         text = f"{entry.keys[-1]} is {number:g}, which is none of its values."
-        yield found("not-in-values", Severity.WARNING, document, entry, text, f"They are {listed}.", fact.source)
+        yield problem_at("not-in-values", Severity.WARNING, file, entry, text, f"They are {listed}.", fact.source)
     elif all(_is_outside(number, one) for one in facts):
         low, high = ("any" if bound is None else f"{bound:g}" for bound in (fact.low, fact.high))
         text = f"{entry.keys[-1]} is {number:g}, outside {low} to {high}: the node takes the bound."
-        yield found("out-of-range", Severity.WARNING, document, entry, text, "", fact.source)
+        yield problem_at("out-of-range", Severity.WARNING, file, entry, text, "", fact.source)
     elif _ANGLE_TOLERANCE.search(entry.keys[-1]) and math.pi < abs(number) <= 360 and number > 2 * math.pi:
         text = f"{entry.keys[-1]} is {number:g} rad, more than a whole turn."
         hint = f"Is it in degrees? {math.radians(number):.4g} rad would be."
-        yield found("wrong-unit", Severity.WARNING, document, entry, text, hint, "an angle is at most 2 pi")
+        yield problem_at("wrong-unit", Severity.WARNING, file, entry, text, hint, "an angle is at most 2 pi")
 
 
 def _is_outside(number: float, fact: Fact) -> bool:
@@ -236,7 +236,7 @@ def _is_taken(entry: Entry, types: set[str], ros: str) -> bool:
 
 
 def _a(kind: str) -> str:
-    words = {"int": "an integer", "float": "a number with a point", "bool": "true or false", "str": "a text"}
+    words = {"int": "an integer", "float": "a decimal number", "bool": "true or false", "str": "a string"}
     return " or ".join(words.get(one, f"a {one}") for one in kind.split(" or "))
 
 
@@ -251,10 +251,10 @@ def _as_type(entry: Entry, types: set[str]) -> str:
     return ""
 
 
-def _nodes(document: Document, distribution: str) -> Iterator[Finding]:
+def _nodes(file: ConfigFile, distribution: str) -> Iterator[Problem]:
     order = DISTRIBUTIONS["ros2"]
     seen: set[str] = set()
-    for entry in document.entries:
+    for entry in file.entries:
         for old, new, since in ROS2_NODES_RENAMED:
             if entry.keys[0] == old and old not in seen:
                 seen.add(old)
@@ -263,13 +263,13 @@ def _nodes(document: Document, distribution: str) -> Iterator[Finding]:
                     continue
                 text = f"The node {old} is {new} since {since}: later distributions do not read this part."
                 severity = Severity.WARNING if is_told else Severity.NOTE
-                yield found("renamed", severity, document, entry, text, f"Name it {new}.", STACKS["ros2"])
+                yield problem_at("renamed", severity, file, entry, text, f"Name it {new}.", STACKS["ros2"])
 
 
-def _contradictions(document: Document, result: Scoped) -> Iterator[Finding]:
+def _contradictions(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
     scopes = result.scopes()
     for values in scopes.values():
-        yield from contradictions.pairs(document, values, contradictions.ROS_PAIRS)
+        yield from contradictions.pairs(file, values, contradictions.ROS_PAIRS)
     for scope in costmaps(result):
         own = scopes.get(scope, {})
         radius = contradictions.inscribed_radius(own.get("footprint"), own.get("robot_radius"))
@@ -279,7 +279,7 @@ def _contradictions(document: Document, result: Scoped) -> Iterator[Finding]:
             if "inflation_radius" in values and keys[: len(scope)] == scope and len(keys) <= len(scope) + 1
             and _inflates(result, values["inflation_radius"])
         ]  # fmt: skip
-        yield from contradictions.inflation(document, radius, loaded)
+        yield from contradictions.inflation(file, radius, loaded)
 
 
 def _inflates(result: Scoped, entry: Entry) -> bool:

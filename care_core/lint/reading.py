@@ -14,7 +14,7 @@ from care_core.ecosystems.ardupilot.parameter_file import FLAGS
 from care_core.ecosystems.px4 import parameter_file as qgc_params
 from care_core.ecosystems.ros import yaml_tree
 from care_core.errors import ConfigError
-from care_core.lint.records import Document, Entry, Finding, Severity
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import BY_ID
 
 _PARAMETER = re.compile(r"\s*([^\s,]+)(?:\s*,\s*|\s+)(\S+)")
@@ -24,7 +24,7 @@ _DICTITEMS = "dictitems"
 Named = tuple[tuple[str, ...], str, str]
 
 
-def read_document(path: Path, namespace: str = "") -> tuple[Document, tuple[Finding, ...]]:
+def read_file(path: Path, namespace: str = "") -> tuple[ConfigFile, tuple[Problem, ...]]:
     """A file, and what stands in the way of reading it.
 
     Raises:
@@ -38,19 +38,19 @@ def read_document(path: Path, namespace: str = "") -> tuple[Document, tuple[Find
         root = yaml_tree.compose(text, path)
     except ConfigError as err:
         line = int(number) if (number := err.where.rpartition(":")[2]).isdigit() else 1
-        finding = syntax(path, line, 1, "", err.message, err.hint)
-        return Document(path, format, text, (), (), namespace), (finding,)
+        problem = syntax(path, line, 1, "", err.message, err.hint)
+        return ConfigFile(path, format, text, (), (), namespace), (problem,)
     entries: list[Entry] = []
     named: list[Named] = []
     if root is not None:
         _walk(root, (), entries, named)
-    return Document(path, format, text, tuple(entries), tuple(named), namespace), ()
+    return ConfigFile(path, format, text, tuple(entries), tuple(named), namespace), ()
 
 
-def syntax(path: Path, line: int, column: int, parameter: str, text: str, hint: str) -> Finding:
+def syntax(path: Path, line: int, column: int, parameter: str, text: str, hint: str) -> Problem:
     """A line that cannot be read."""
     source = BY_ID["syntax"].source
-    return Finding("syntax", Severity.ERROR, path, line, column, parameter, text, hint or "Correct the line.", source)
+    return Problem("syntax", Severity.ERROR, path, line, column, parameter, text, hint or "Correct the line.", source)
 
 
 def _walk(node: MappingNode, keys: tuple[str, ...], entries: list[Entry], named: list[Named]) -> None:
@@ -80,8 +80,8 @@ def _text(node: Node) -> str:
     return str(node.value) if isinstance(node, ScalarNode) else ""
 
 
-def _of_parameters(path: Path, format: ConfigFormat, text: str) -> tuple[Document, tuple[Finding, ...]]:
-    entries, findings = [], []
+def _of_parameters(path: Path, format: ConfigFormat, text: str) -> tuple[ConfigFile, tuple[Problem, ...]]:
+    entries, problems = [], []
     for number, line in enumerate(text.splitlines(), start=1):
         body = line.partition("#")[0].rstrip()
         for flag in FLAGS:
@@ -90,16 +90,16 @@ def _of_parameters(path: Path, format: ConfigFormat, text: str) -> tuple[Documen
             continue
         found = _row(line) if format is ConfigFormat.QGC_PARAMS else _pair(body)
         if found is None:
-            findings.append(syntax(path, number, 1, "", "This line is no parameter.", "A line is NAME,VALUE."))
+            problems.append(syntax(path, number, 1, "", "This line is not a parameter.", "A line is NAME,VALUE."))
             continue
         name, value, column, kind = found
         try:
             held = float(int(value, 16)) if value.lower().startswith("0x") else float(value)
         except ValueError:
-            findings.append(syntax(path, number, column, name, f"The value of {name} is no number: '{value}'.", ""))
+            problems.append(syntax(path, number, column, name, f"The value of {name} is not a number: '{value}'.", ""))
             continue
         entries.append(Entry((name,), held, number, column, kind))
-    return Document(path, format, text, tuple(entries)), tuple(findings)
+    return ConfigFile(path, format, text, tuple(entries)), tuple(problems)
 
 
 def _pair(body: str) -> tuple[str, str, int, str] | None:

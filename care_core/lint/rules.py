@@ -20,13 +20,13 @@ RULES: tuple[Rule, ...] = (
     Rule("unknown-key", "A name that nothing reads in any release.", _TABLES),
     Rule("misplaced-key", "A name that is read elsewhere, but not at that place.", _TABLES),
     Rule("renamed", "A name that another release has instead.", _TABLES),
-    Rule("dead-key", "A name that is known and has no effect here.", "the source file that the finding names"),
+    Rule("dead-key", "A name that is known and has no effect here.", "the source file that the problem names"),
     Rule("not-loaded", "Parameters of a plugin that no list names.", "plugins are loaded by the lists that name them"),
     Rule("wrong-type", "A value of another type than is declared.", "rclcpp refuses it, roscpp takes the default"),
     Rule("out-of-range", "A value outside the declared range.", _TABLES),
     Rule("not-in-values", "A value that is none of those declared.", _TABLES),
     Rule("wrong-unit", "A value off by the ratio of two units.", "the declared range, or what an angle can be"),
-    Rule("contradiction", "Two values that cannot both be meant.", "the source that the finding names"),
+    Rule("contradiction", "Two values that cannot both be meant.", "the source that the problem names"),
     Rule("outside-profile", "A value outside what the profile holds acceptable.", "the profile's `range`"),
 )  # fmt: skip
 BY_ID = {rule.id: rule for rule in RULES}

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from care_core.configs.formats import ConfigFormat
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
-from care_core.lint.records import Document, Entry
+from care_core.lint.problems import ConfigFile, Entry
 from care_core.metadata import navigation
 from care_core.metadata.navigation import Ros
 from care_core.records import Struct, field
@@ -79,9 +79,9 @@ def class_of(text: str) -> str:
     return re.split(r"::|/", text)[-1]
 
 
-def scoped(document: Document) -> Scoped:
+def scoped(file: ConfigFile) -> Scoped:
     """Who reads what of a ROS file."""
-    return _ros2(document) if document.format is ConfigFormat.ROS2_YAML else _ros1(document)
+    return _ros2(file) if file.format is ConfigFormat.ROS2_YAML else _ros1(file)
 
 
 def words_of(entry: Entry | None) -> tuple[str, ...]:
@@ -94,9 +94,9 @@ def words_of(entry: Entry | None) -> tuple[str, ...]:
 # ROS 2
 
 
-def _ros2(document: Document) -> Scoped:
+def _ros2(file: ConfigFile) -> Scoped:
     result = Scoped("ros2")
-    values = {split(entry): entry for entry in document.entries}
+    values = {split(entry): entry for entry in file.entries}
     unloaded: set[Keys] = set()
     for keys, entry in values.items():
         if PARAMETERS not in keys[1:-1]:
@@ -176,19 +176,19 @@ def _unloaded(keys: Keys, at: int, owners: Keys, values: Mapping[Keys, Entry]) -
 # ROS 1
 
 
-def _ros1(document: Document) -> Scoped:
+def _ros1(file: ConfigFile) -> Scoped:
     result = Scoped("ros1")
-    values = {entry.keys: entry for entry in document.entries}
+    values = {entry.keys: entry for entry in file.entries}
     parts: dict[Keys, list[Entry]] = {}
-    for entry in document.entries:
+    for entry in file.entries:
         parts.setdefault(entry.keys[:-1], []).append(entry)
-    for keys, name, kind in document.named:
+    for keys, name, kind in file.named:
         if keys[-1] == "plugins":
             result.plugins.setdefault(keys[:-1], {})[name] = class_of(kind)
     everywhere = set(parts) | {key[:depth] for key in parts for depth in range(len(key))} | set(result.plugins)
     owners: dict[Keys, Keys] = {}
     for keys in sorted(everywhere, key=len):
-        owners[keys] = _reader(document, keys, owners, parts, result.plugins)
+        owners[keys] = _reader(file, keys, owners, parts, result.plugins)
     for keys, entries in parts.items():
         for entry in entries:
             result.places.append(_ros1_place(entry, keys, owners, values))
@@ -206,14 +206,14 @@ def _is_layer(entries: Sequence[Entry]) -> bool:
 
 
 def _reader(
-    document: Document,
+    file: ConfigFile,
     keys: Keys,
     owners: Mapping[Keys, Keys],
     parts: Mapping[Keys, list[Entry]],
     plugins: Mapping[Keys, Mapping[str, str]],
 ) -> Keys:
     """Who reads a namespace: by its name, by the list that loads it, or by what is in it."""
-    name = keys[-1] if keys else document.namespace.strip("/").rpartition("/")[2]
+    name = keys[-1] if keys else file.namespace.strip("/").rpartition("/")[2]
     if name in _COSTMAPS:
         return (COSTMAP,)
     if name in navigation.owners("ros1"):

@@ -22,14 +22,14 @@ from care_core.records import Record, replace
 from care_core.variables import OwnLimit, Role, Variable
 
 if TYPE_CHECKING:
-    from care_core.profile.site_file import Limit
+    from care_core.profile.site_file import SiteLimit
 
 
 class Site(Record):
     """Limits by profile and objective, and the file that they stand in."""
 
     path: Path
-    limits: Mapping[str, Mapping[str, Limit]]
+    limits: Mapping[str, Mapping[str, SiteLimit]]
 
     def applied(self, schema: Schema) -> Schema:
         """The schema with these limits in the place of the profile's own.
@@ -41,7 +41,7 @@ class Site(Record):
         changed = {name: self._limited(name, limit, schema) for name, limit in limits.items()}
         return replace(schema, variables={**schema.variables, **changed}) if changed else schema
 
-    def _limited(self, name: str, limit: Limit, schema: Schema) -> Variable:
+    def _limited(self, name: str, limit: SiteLimit, schema: Schema) -> Variable:
         objectives = {v.name: v for v in schema.objectives if v.kind != "functional"}
         if name not in objectives:
             hint = nearest(name, objectives) or f"Known are {', '.join(objectives)}."

@@ -14,17 +14,17 @@ from care_core.profile.schema_file import Bound, Strict
 SITE_SCHEMA = "care.site/1"
 
 
-class Limit(Bound):
+class SiteLimit(Bound):
     mission: dict[str, float] = Field(default_factory=dict)
 
     @model_validator(mode="after")
-    def _is_one_of_both(self) -> Limit:
+    def _is_one_of_both(self) -> SiteLimit:
         if self.value is not None and self.ratio is not None:
             raise ValueError("a limit has a 'value' or a 'ratio', not both")
         return self
 
     @model_validator(mode="after")
-    def _mission_is_that_of_a_value(self) -> Limit:
+    def _mission_is_that_of_a_value(self) -> SiteLimit:
         if self.mission and self.value is None:
             raise ValueError("'mission' belongs to a 'value': a ratio holds for any mission")
         return self
@@ -32,10 +32,10 @@ class Limit(Bound):
 
 class _SiteFile(Strict):
     schema_: Literal["care.site/1"] = Field(alias="schema")
-    limits: dict[str, dict[str, Limit]]
+    limits: dict[str, dict[str, SiteLimit]]
 
 
-def limits_of(file: Path) -> dict[str, dict[str, Limit]]:
+def limits_of(file: Path) -> dict[str, dict[str, SiteLimit]]:
     """Limits by profile and objective.
 
     Raises:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final, Literal
 
 from care_core.lint.linting import Linted
-from care_core.lint.records import Finding, Severity
+from care_core.lint.problems import Problem, Severity
 from care_core.lint.rules import RULES
 from care_core.records import field
 from care_core.report.published import Document
@@ -58,44 +58,44 @@ def lint_document(linted: Sequence[Linted], target: str) -> LintDocument:
     return LintDocument(
         target=target,
         files=[
-            FileEntry(file=str(one.document.path), format=one.document.format.value, values=len(one.document.entries))
+            FileEntry(file=str(one.file.path), format=one.file.format.value, values=len(one.file.entries))
             for one in linted
         ],
-        findings=[_entry(finding) for one in linted for finding in one.findings],
+        findings=[_entry(problem) for one in linted for problem in one.problems],
     )
 
 
-def _entry(finding: Finding) -> FindingEntry:
+def _entry(problem: Problem) -> FindingEntry:
     return FindingEntry(
-        rule=finding.rule,
-        severity=finding.severity.value,
-        file=str(finding.path),
-        line=finding.line,
-        column=finding.column,
-        parameter=clean(finding.parameter),
-        text=clean(finding.text),
-        hint=clean(finding.hint),
-        source=finding.source,
+        rule=problem.rule,
+        severity=problem.severity.value,
+        file=str(problem.path),
+        line=problem.line,
+        column=problem.column,
+        parameter=clean(problem.parameter),
+        text=clean(problem.text),
+        hint=clean(problem.hint),
+        source=problem.source,
     )
 
 
 def lint_text(linted: Sequence[Linted]) -> str:
-    """One paragraph a finding: where, how bad, what, what to do, and the source."""
-    return "".join(f"{line}\n" for one in linted for finding in one.findings for line in _lines(finding))
+    """One paragraph a problem: where, how bad, what, what to do, and the source."""
+    return "".join(f"{line}\n" for one in linted for problem in one.problems for line in _lines(problem))
 
 
-def _lines(finding: Finding) -> Iterator[str]:
-    yield clean(f"{finding.path}:{finding.line}:{finding.column}: {finding.severity.value} [{finding.rule}]")
-    yield from wrapped(f"{finding.text} {finding.hint}".strip(), _INDENT)
-    yield from wrapped(f"source: {finding.source}", _INDENT)
+def _lines(problem: Problem) -> Iterator[str]:
+    yield clean(f"{problem.path}:{problem.line}:{problem.column}: {problem.severity.value} [{problem.rule}]")
+    yield from wrapped(f"{problem.text} {problem.hint}".strip(), _INDENT)
+    yield from wrapped(f"source: {problem.source}", _INDENT)
 
 
 def counted(linted: Sequence[Linted]) -> str:
     """How many findings of each severity in how many files."""
-    findings = [finding for one in linted for finding in one.findings]
+    findings = [problem for one in linted for problem in one.problems]
     parts = []
     for severity in Severity:
-        count = sum(finding.severity is severity for finding in findings)
+        count = sum(problem.severity is severity for problem in findings)
         if count:
             parts.append(f"{count} {severity.value}{'' if count == 1 else 's'}")
     files = f"{len(linted)} file{'' if len(linted) == 1 else 's'}"
@@ -107,7 +107,7 @@ def lint_sarif(linted: Sequence[Linted], version: str) -> dict[str, Any]:
     rules = [{"id": rule.id, "shortDescription": {"text": rule.about}, "help": {"text": rule.source}} for rule in RULES]
     order = {rule.id: index for index, rule in enumerate(RULES)}
     driver = {"name": "care lint", "version": version, "rules": rules}
-    results = [_result(finding, order[finding.rule]) for one in linted for finding in one.findings]
+    results = [_result(problem, order[problem.rule]) for one in linted for problem in one.problems]
     return {
         "$schema": _SARIF_SCHEMA,
         "version": "2.1.0",
@@ -115,11 +115,11 @@ def lint_sarif(linted: Sequence[Linted], version: str) -> dict[str, Any]:
     }
 
 
-def _result(finding: Finding, index: int) -> dict[str, Any]:
-    entry = _entry(finding)
+def _result(problem: Problem, index: int) -> dict[str, Any]:
+    entry = _entry(problem)
     place = {
-        "artifactLocation": {"uri": finding.path.as_posix()},
-        "region": {"startLine": finding.line, "startColumn": finding.column},
+        "artifactLocation": {"uri": problem.path.as_posix()},
+        "region": {"startLine": problem.line, "startColumn": problem.column},
     }
     return {
         "ruleId": entry.rule,

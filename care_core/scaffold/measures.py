@@ -14,7 +14,7 @@ from care_core.extract.read import read_runs
 from care_core.profile.schema import Schema
 from care_core.records import Record, Struct, field, replace
 from care_core.run import Run, Unavailable, is_known
-from care_core.scaffold.seen import Seen
+from care_core.scaffold.inputs import InputLog
 from care_core.variables import Extract, Role, Threshold, Variable
 
 _NUMBERS = ("Float32", "Float64", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64")
@@ -68,7 +68,7 @@ class Measures(Struct, eq=False):
     kept: list[Measure] = field(default_factory=list)
     left: dict[str, str] = field(default_factory=dict)
     """Name -> why no run has a value."""
-    runs: list[tuple[Seen, Run]] = field(default_factory=list)
+    runs: list[tuple[InputLog, Run]] = field(default_factory=list)
     without: dict[str, str] = field(default_factory=dict)
     """Logs that gave no run, and why."""
 
@@ -76,20 +76,20 @@ class Measures(Struct, eq=False):
         return [one for one in self.kept if one.variable.role is role]
 
 
-def find_measures(logs: Sequence[Seen], spec: Mapping[str, Any], bundled: Sequence[Schema]) -> Measures:
+def find_measures(logs: Sequence[InputLog], spec: Mapping[str, Any], bundled: Sequence[Schema]) -> Measures:
     """Try on the logs what the bundled profiles of the same kind of mission measure, and signals of their channels."""
-    vehicle = vehicle_of(logs[0].log.facts, logs[0].settings).kind
+    vehicle = vehicle_of(logs[0].opened.facts, logs[0].settings).kind
     candidates = [*_bundled_measures(str(spec["kind"]), vehicle, bundled), *_objectives_of(str(spec["kind"]))]
     types = {name: kind for log in logs for name, kind in log.channels.items()}
     named = set(MISSION_KINDS[str(spec["kind"])].needs(spec)) if spec["kind"] != "recording" else set()
     candidates += _signals(types, named, {one.name for one in candidates})
-    formats = tuple(dict.fromkeys(log.log.format.name for log in logs))
+    formats = tuple(dict.fromkeys(log.opened.format.name for log in logs))
     variables = {variable.name: variable for variable in candidates}
     trial = Schema("trial", "", "", "", {}, formats, False, {**spec}, (), variables)
     found = Measures()
     for log in logs:
         try:
-            found.runs += [(log, run) for run in read_runs(run_model(log.log), trial, sha256=_unread)]
+            found.runs += [(log, run) for run in read_runs(run_model(log.opened), trial, sha256=_unread)]
         except CareError as err:
             found.without[str(log.path)] = err.message
     for variable in candidates:

@@ -13,7 +13,7 @@ from care_core.ecosystems.vehicles import vehicle_of
 from care_core.metadata.navigation import is_ros
 from care_core.profile.schema import Schema
 from care_core.records import Record
-from care_core.scaffold.seen import Seen
+from care_core.scaffold.inputs import InputLog
 
 _TYPES = {"odometry": ("Odometry",), "commands": ("Twist", "TwistStamped"), "battery": ("BatteryState",)}
 _USUAL = {"odometry": "/odom", "commands": "/cmd_vel", "battery": "/battery_state"}
@@ -30,7 +30,7 @@ class Missions(Record):
     alike: bool
 
 
-def find_missions(logs: Sequence[Seen], bundled: Sequence[Schema]) -> Missions:
+def find_missions(logs: Sequence[InputLog], bundled: Sequence[Schema]) -> Missions:
     """The mission section that fits these logs best; the whole recording where they tell of no mission.
 
     Args:
@@ -55,19 +55,19 @@ def _whole(why: str) -> Missions:
     return Missions({"kind": "recording"}, {"kind": f"the whole recording is the mission: {why}"}, False)
 
 
-def _vehicle_kind(first: Seen, bundled: Sequence[Schema]) -> str:
+def _vehicle_kind(first: InputLog, bundled: Sequence[Schema]) -> str:
     """The mission kind of an ArduPilot vehicle: that of a profile for its like, a flight for what flies, else none."""
-    vehicle = vehicle_of(first.log.facts, first.settings).kind
+    vehicle = vehicle_of(first.opened.facts, first.settings).kind
     own = (str(one.mission.get("kind", "")) for one in bundled if one.match.get("vehicle") == vehicle)
     return next(own, "ardupilot_flight" if vehicle in _FLYING else "")
 
 
-def _found(seen: Seen, spec: Mapping[str, Any]) -> tuple[Any, ...]:
-    kind, model = MISSION_KINDS[str(spec["kind"])], run_model(seen.log)
+def _found(log: InputLog, spec: Mapping[str, Any]) -> tuple[Any, ...]:
+    kind, model = MISSION_KINDS[str(spec["kind"])], run_model(log.opened)
     return kind.missions(model, model.tables(kind.needs(spec)), spec)
 
 
-def _goals(logs: Sequence[Seen]) -> tuple[dict[str, Any], dict[str, str]]:
+def _goals(logs: Sequence[InputLog]) -> tuple[dict[str, Any], dict[str, str]]:
     """Kind, action and topics of a robot that drives to goals; nothing where the logs name no goal server."""
     types = {name: kind for log in logs for name, kind in log.channels.items()}
     spec: dict[str, Any] = {}
@@ -89,7 +89,7 @@ def _goals(logs: Sequence[Seen]) -> tuple[dict[str, Any], dict[str, str]]:
     return spec, remarks
 
 
-def _legs(logs: Sequence[Seen], spec: Mapping[str, Any]) -> list[tuple[Leg, ...]]:
+def _legs(logs: Sequence[InputLog], spec: Mapping[str, Any]) -> list[tuple[Leg, ...]]:
     """The goals of every mission."""
     return [mission.shared(analyse).legs for log in logs for mission in _found(log, spec)]
 

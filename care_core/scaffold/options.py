@@ -12,8 +12,8 @@ from care_core.metadata.fact import Fact
 from care_core.metadata.navigation import fact_of, is_ros
 from care_core.records import Record, Struct, field
 from care_core.run import Setting
-from care_core.scaffold.never import SAFETY, reason_against
-from care_core.scaffold.seen import Seen
+from care_core.scaffold.excluded import SAFETY, reason_to_exclude
+from care_core.scaffold.inputs import InputLog
 from care_core.variables import Role, ValueType, Variable
 
 _SPREAD = 2.0
@@ -77,7 +77,7 @@ def number(value: float | str | None) -> float | None:
     return float(f"{value:.7g}") if value is not None and math.isfinite(value) else None
 
 
-def find_options(logs: Sequence[Seen], known: Mapping[str, Variable], taken: Iterable[str]) -> Options:
+def find_options(logs: Sequence[InputLog], known: Mapping[str, Variable], taken: Iterable[str]) -> Options:
     """The options of these logs.
 
     Args:
@@ -89,7 +89,7 @@ def find_options(logs: Sequence[Seen], known: Mapping[str, Variable], taken: Ite
     chosen: list[tuple[_Driven, Fact | None]] = []
     for driven in _all_driven(logs):
         fact = fact_of(stack, driven.name) if is_ros(stack) else None
-        reason = _against(stack, driven, len(logs), fact, known)
+        reason = _reason_to_exclude(stack, driven, len(logs), fact, known)
         if reason:
             found.leave(driven.name, reason)
         else:
@@ -104,7 +104,7 @@ def find_options(logs: Sequence[Seen], known: Mapping[str, Variable], taken: Ite
     return found
 
 
-def _all_driven(logs: Sequence[Seen]) -> list[_Driven]:
+def _all_driven(logs: Sequence[InputLog]) -> list[_Driven]:
     histories: dict[str, list[tuple[Setting, ...]]] = {}
     for log in logs:
         for name, history in log.settings.items():
@@ -115,13 +115,13 @@ def _all_driven(logs: Sequence[Seen]) -> list[_Driven]:
     ]
 
 
-def _against(stack: str, driven: _Driven, logs: int, fact: Fact | None, known: Mapping[str, Variable]) -> str:
-    """Why a parameter is no option; '' for one that is."""
-    reason = reason_against(stack, driven.name)
+def _reason_to_exclude(stack: str, driven: _Driven, logs: int, fact: Fact | None, known: Mapping[str, Variable]) -> str:
+    """Why a parameter is not an option; '' for one that is."""
+    reason = reason_to_exclude(stack, driven.name)
     if reason:
         return reason
     if any(number(value) is None for value in driven.last):
-        return "their value is a text, a list or no number"
+        return "their value is a string, a list or not a number"
     if len(driven.last) < logs:
         return f"not every log holds them (an option needs a value in all {logs})"
     default = driven.default if fact is None or driven.default is not None else fact.default_number

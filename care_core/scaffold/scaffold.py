@@ -12,12 +12,12 @@ from care_core.metadata.navigation import is_ros
 from care_core.profile.reading import parse_schema
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
-from care_core.scaffold.limits import Limit, good_runs, limits
+from care_core.scaffold.inputs import InputLog
 from care_core.scaffold.measures import Measure, Measures, find_measures
+from care_core.scaffold.mentioned import mentioned_parameters
 from care_core.scaffold.missions import Missions, find_missions
 from care_core.scaffold.options import Options, find_options
-from care_core.scaffold.said import said_parameters
-from care_core.scaffold.seen import Seen
+from care_core.scaffold.thresholds import ProposedThreshold, good_runs, proposed_thresholds
 from care_core.scaffold.writing import comment, listed, scalar, variable_lines
 from care_core.variables import RelativeThreshold, Role, Threshold, Variable
 
@@ -29,15 +29,15 @@ class Scaffold(Record, eq=False):
 
     text: str
     schema: Schema
-    logs: tuple[Seen, ...]
+    logs: tuple[InputLog, ...]
     options: Options
     measures: Measures
     missions: Missions
     good: tuple[int, ...]
-    limits: Mapping[str, Limit]
+    limits: Mapping[str, ProposedThreshold]
 
 
-def scaffold(logs: Sequence[Seen], name: str, bundled: Sequence[Schema]) -> Scaffold:
+def scaffold(logs: Sequence[InputLog], name: str, bundled: Sequence[Schema]) -> Scaffold:
     """Write a profile from the logs of one robot.
 
     Args:
@@ -50,25 +50,25 @@ def scaffold(logs: Sequence[Seen], name: str, bundled: Sequence[Schema]) -> Scaf
         LogError: the logs hold neither parameters nor anything that can be measured.
     """
     _refuse_mixed(logs)
-    readers = [one for one in bundled if logs[0].log.format.name in one.logs and not one.carried_over]
+    readers = [one for one in bundled if logs[0].opened.format.name in one.logs and not one.carried_over]
     missions = find_missions(logs, readers)
     measures = find_measures(logs, missions.spec, readers)
     taken = {one.variable.name for one in measures.kept}
     options = find_options(logs, _known_options(logs, readers), taken)
     if not options.chosen and not measures.kept:
         raise LogError("The logs hold no parameters and no mission.", hint="Look at one with 'care inspect'.")
-    for named in said_parameters(logs, {name for seen in logs for name in seen.settings}):
+    for named in mentioned_parameters(logs, {name for log in logs for name in log.settings}):
         options.leave(named, _ONLY_SAID)
     good = good_runs(measures)
-    bounds = limits(measures.of(Role.OBJECTIVE), good, alike=missions.alike)
+    bounds = proposed_thresholds(measures.of(Role.OBJECTIVE), good, alike=missions.alike)
     text = "\n".join(_lines(name, logs, missions, measures, options, good, bounds)) + "\n"
     schema = parse_schema(text, Path(name) / "profile.yaml")
     reading_plan(schema)
     return Scaffold(text, schema, tuple(logs), options, measures, missions, good, bounds)
 
 
-def _refuse_mixed(logs: Sequence[Seen]) -> None:
-    others = [seen for seen in logs if seen.stack != logs[0].stack]
+def _refuse_mixed(logs: Sequence[InputLog]) -> None:
+    others = [log for log in logs if log.stack != logs[0].stack]
     if others:
         raise UsageError(
             f"The logs are of different robots: {logs[0].path.name} is of {logs[0].stack}, "
@@ -77,7 +77,7 @@ def _refuse_mixed(logs: Sequence[Seen]) -> None:
         )
 
 
-def _known_options(logs: Sequence[Seen], bundled: Sequence[Schema]) -> dict[str, Variable]:
+def _known_options(logs: Sequence[InputLog], bundled: Sequence[Schema]) -> dict[str, Variable]:
     """Options of bundled profiles by parameter; where two have it, of the one that the logs hold more of."""
     held = {name for log in logs for name in log.settings}
     shares = {s.name: sum(bool(held & set(option.parameters)) for option in s.options) for s in bundled}
@@ -91,12 +91,12 @@ def _known_options(logs: Sequence[Seen], bundled: Sequence[Schema]) -> dict[str,
 
 def _lines(
     name: str,
-    logs: Sequence[Seen],
+    logs: Sequence[InputLog],
     missions: Missions,
     measures: Measures,
     options: Options,
     good: Sequence[int],
-    bounds: Mapping[str, Limit],
+    bounds: Mapping[str, ProposedThreshold],
 ) -> Iterator[str]:
     yield from _head(name, logs, measures, good)
     yield from _mission(missions)
@@ -108,7 +108,7 @@ def _lines(
     yield from _left_out(options, measures)
 
 
-def _head(name: str, logs: Sequence[Seen], measures: Measures, good: Sequence[int]) -> Iterator[str]:
+def _head(name: str, logs: Sequence[InputLog], measures: Measures, good: Sequence[int]) -> Iterator[str]:
     first = logs[0]
     yield from comment(
         f"A first profile, written from {_count(len(logs), 'log')} with {_count(len(measures.runs), 'mission')}, "
@@ -124,26 +124,26 @@ def _head(name: str, logs: Sequence[Seen], measures: Measures, good: Sequence[in
     if match:
         yield "# What a log must say to be of this platform."
         yield f"match: {scalar(match)}"
-    formats = list(dict.fromkeys(seen.log.format.name for seen in logs))
+    formats = list(dict.fromkeys(log.opened.format.name for log in logs))
     yield f"logs: {scalar(formats)}"
     yield ""
 
 
-def _platform(seen: Seen) -> str:
-    facts = seen.log.facts
+def _platform(log: InputLog) -> str:
+    facts = log.opened.facts
     named = [facts[key] for key in ("firmware", "stack", "vehicle", "frame") if facts.get(key)]
     ros = f"ROS {facts['ros']}" if "ros" in facts else ""
-    return " ".join(part for part in (ros, *dict.fromkeys(named)) if part) or seen.log.format.name
+    return " ".join(part for part in (ros, *dict.fromkeys(named)) if part) or log.opened.format.name
 
 
-def _match(logs: Sequence[Seen]) -> dict[str, str]:
+def _match(logs: Sequence[InputLog]) -> dict[str, str]:
     """What all logs say alike: the firmware's name, the stack, the kind of vehicle."""
     match = {}
     for key in ("firmware", "stack"):
-        words = {seen.log.facts.get(key, "").partition(" ")[0] for seen in logs}
+        words = {log.opened.facts.get(key, "").partition(" ")[0] for log in logs}
         if len(words) == 1 and (word := words.pop()):
             match[key] = word
-    kinds = {vehicle_of(seen.log.facts, seen.settings).kind for seen in logs}
+    kinds = {vehicle_of(log.opened.facts, log.settings).kind for log in logs}
     if len(kinds) == 1 and not is_ros(logs[0].stack) and (kind := kinds.pop()) != "unknown":
         match["vehicle"] = kind
     return match
@@ -193,7 +193,7 @@ def _seen(measure: Measure) -> str:
     return f"seen: {span}{gaps}"
 
 
-def _objectives(objectives: Sequence[Measure], bounds: Mapping[str, Limit]) -> Iterator[str]:
+def _objectives(objectives: Sequence[Measure], bounds: Mapping[str, ProposedThreshold]) -> Iterator[str]:
     yield ""
     yield from comment("Objectives: what a mission is judged by.", 2)
     for measure in objectives:

@@ -101,7 +101,7 @@ def lint(
     from json import dumps
 
     from care_core.lint.linting import lint as lint_files
-    from care_core.lint.records import Severity
+    from care_core.lint.problems import Severity
     from care_core.report.linting import counted, lint_document, lint_sarif, lint_text
 
     if as_json and sarif:
@@ -119,7 +119,7 @@ def lint(
     else:
         emit(lint_text(found), out, force=force)
     say(counted(found))
-    severe = [one for file in found for one in file.findings if one.severity is not Severity.NOTE]
+    severe = [one for file in found for one in file.problems if one.severity is not Severity.NOTE]
     raise typer.Exit(ExitCode.FAULT if severe else ExitCode.OK)
 
 

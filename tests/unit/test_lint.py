@@ -11,18 +11,18 @@ import pytest
 
 from care_core.errors import UsageError
 from care_core.lint.linting import lint
-from care_core.lint.records import Finding
+from care_core.lint.problems import Problem
 from care_core.lint.rules import ROS1_RENAMED, ROS2_RENAMED, RULES, Renamed
 from care_core.metadata import navigation
 from care_core.report.linting import lint_document, lint_sarif, lint_schema, lint_text
 from tests.conftest import Care
 
 
-def findings(tmp_path: Path, name: str, text: str, target: str = "") -> tuple[Finding, ...]:
+def findings(tmp_path: Path, name: str, text: str, target: str = "") -> tuple[Problem, ...]:
     path = tmp_path / name
     path.write_text(text)
     (linted,) = lint([str(path)], target)
-    return linted.findings
+    return linted.problems
 
 
 def told(tmp_path: Path, name: str, text: str, target: str = "") -> list[tuple[int, str, str]]:
@@ -211,9 +211,9 @@ def test_recorded_configurations_have_the_findings_that_were_looked_at_by_hand(r
     for path in sorted((recorded / "logs" / "configs").rglob("*")):
         if path.is_file():
             (linted,) = lint([str(path)])
-            count = sum(one.severity.value != "note" for one in linted.findings)
+            count = sum(one.severity.value != "note" for one in linted.problems)
             expected = next((n for name, n in wanted.items() if str(path).endswith(name)), 0)
-            assert count == expected, (path.name, linted.findings)
+            assert count == expected, (path.name, linted.problems)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from care_core.learn.outcomes import (
     fit_total,
     groups_that_move_together,
     met,
-    sought_of_objectives,
+    questions_of_objectives,
 )
 from care_core.learn.train import with_weak
 from care_core.profile.schema import Schema
@@ -181,7 +181,7 @@ def test_too_few_or_constant_values_give_no_mechanism() -> None:
 def test_answers_are_the_same_in_any_order() -> None:
     """What chance decides was drawn when a question was asked, so processes may share the answering."""
     frame, rng, effort = missions(), np.random.default_rng(0), replace(QUICK, folds=2)
-    questions = [q for one in sought_of_objectives(frame, SMALL, GRAPH, rng, effort=effort) for q in one.questions]
+    questions = [q for one in questions_of_objectives(frame, SMALL, GRAPH, rng, effort=effort) for q in one.questions]
     error = ask_total("error", frame, SMALL, GRAPH, rng, effort=effort)
     assert error is not None
     assert error.folds

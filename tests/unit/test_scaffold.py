@@ -16,12 +16,12 @@ from care_core.logs import formats
 from care_core.metadata.navigation import fact_of
 from care_core.records import field
 from care_core.run import Setting
-from care_core.scaffold.limits import RATIO, limits
+from care_core.scaffold.excluded import reason_to_exclude
+from care_core.scaffold.inputs import InputLog, open_input
 from care_core.scaffold.measures import Measure
-from care_core.scaffold.never import reason_against
 from care_core.scaffold.options import Options, find_options
 from care_core.scaffold.scaffold import scaffold
-from care_core.scaffold.seen import Seen, see
+from care_core.scaffold.thresholds import RATIO, proposed_thresholds
 from care_core.scaffold.writing import comment, scalar
 from care_core.variables import RelativeThreshold, Role, Threshold, Variable
 from tests.courier import EVENT, event
@@ -41,7 +41,7 @@ class SetLog(MadeLog, eq=False):
         }
 
 
-def seen(parameters: Mapping[str, Any], *, ros: str = "", defaults: Mapping[str, float] | None = None) -> Seen:
+def seen(parameters: Mapping[str, Any], *, ros: str = "", defaults: Mapping[str, float] | None = None) -> InputLog:
     log = SetLog(
         tables={},
         path=Path("a.mcap" if ros else "a.BIN"),
@@ -50,20 +50,20 @@ def seen(parameters: Mapping[str, Any], *, ros: str = "", defaults: Mapping[str,
         parameters=parameters,
         defaults=defaults or {},
     )
-    return Seen(log.path, log, log.settings(), {})
+    return InputLog(log.path, log, log.settings(), {})
 
 
-def recorded_speed(path: Path, parameter: str) -> Seen:
+def recorded_speed(path: Path, parameter: str) -> InputLog:
     """A ROS 2 recording of a number and of one parameter of the node /controller_server."""
     kind = "std_msgs/msg/Float64"
     with McapFile(path) as log:
         log.add("/parameter_events", EVENT, START_NS, cdr(event({f"/controller_server.{parameter}": 1.0})))
         for second in range(20):
             log.add("/speed", kind, START_NS + second * SECOND_NS, cdr(make(ROS2, kind, 1.0 + second % 3)))
-    return see(path)
+    return open_input(path)
 
 
-def options(*logs: Seen, known: Mapping[str, Variable] | None = None) -> Options:
+def options(*logs: InputLog, known: Mapping[str, Variable] | None = None) -> Options:
     return find_options(logs, known or {}, ())
 
 
@@ -73,7 +73,7 @@ def options(*logs: Seen, known: Mapping[str, Variable] | None = None) -> Options
 def test_what_nobody_chose_is_never_an_option(name: str) -> None:
     found = options(seen({name: 3.0}, defaults={name: 0.0}), seen({name: 5.0}, defaults={name: 0.0}))
     assert found.chosen == []
-    assert found.left == {reason_against("ardupilot", name): [name]}
+    assert found.left == {reason_to_exclude("ardupilot", name): [name]}
 
 
 def test_a_parameter_at_its_default_is_left_out_unless_a_profile_knows_it() -> None:
@@ -147,10 +147,10 @@ def test_logs_of_two_ecosystems_make_no_profile() -> None:
 def test_limits_come_from_good_runs_of_one_mission() -> None:
     time = Variable("time", Role.OBJECTIVE, kind="non-functional")
     measure = Measure(time, (10.0, 11.0, 90.0))
-    assert limits([measure], (0, 1), alike=True)["time"].bound == Threshold("<=", 14.3)
-    assert limits([measure], (0, 1), alike=False)["time"].bound == RelativeThreshold("<=", RATIO)
-    assert limits([measure], (), alike=True)["time"].bound == RelativeThreshold("<=", RATIO)
-    many = limits([Measure(time, (10.0, 10.1, 9.9, 10.2, 9.8, 10.0))], range(6), alike=True)["time"].bound
+    assert proposed_thresholds([measure], (0, 1), alike=True)["time"].bound == Threshold("<=", 14.3)
+    assert proposed_thresholds([measure], (0, 1), alike=False)["time"].bound == RelativeThreshold("<=", RATIO)
+    assert proposed_thresholds([measure], (), alike=True)["time"].bound == RelativeThreshold("<=", RATIO)
+    many = proposed_thresholds([Measure(time, (10.0, 10.1, 9.9, 10.2, 9.8, 10.0))], range(6), alike=True)["time"].bound
     assert isinstance(many, Threshold)
     assert 10.2 < many.value < 11.0
 

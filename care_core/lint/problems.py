@@ -10,7 +10,7 @@ from care_core.records import Record
 
 
 class Severity(str, Enum):
-    """How bad a finding is. Only a note leaves the exit code at 0."""
+    """How bad a problem is. Only a note leaves the exit code at 0."""
 
     ERROR = "error"
     """The node or the ground station refuses the file or the value."""
@@ -41,7 +41,7 @@ class Entry(Record):
         return None if isinstance(self.value, str) else float(self.value)
 
 
-class Document(Record):
+class ConfigFile(Record):
     """A configuration file, read as far as it can be."""
 
     path: Path
@@ -53,7 +53,7 @@ class Document(Record):
     namespace: str = ""
 
 
-class Finding(Record):
+class Problem(Record):
     """Something wrong at one place of a file."""
 
     rule: str

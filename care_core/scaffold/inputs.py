@@ -12,11 +12,11 @@ from care_core.records import Record
 from care_core.run import Setting
 
 
-class Seen(Record, eq=False):
+class InputLog(Record, eq=False):
     """A log as far as a profile is made of it."""
 
     path: Path
-    log: Log
+    opened: Log
     settings: Mapping[str, tuple[Setting, ...]]
     channels: Mapping[str, str]
     """Those that hold a message, with their types."""
@@ -24,11 +24,11 @@ class Seen(Record, eq=False):
     @property
     def stack(self) -> str:
         """Whose parameters it holds: `ardupilot`, `px4`, `ros1`, `ros2`."""
-        return ecosystem_of(self.log.format).stack(self.log.facts)
+        return ecosystem_of(self.opened.format).stack(self.opened.facts)
 
 
-def see(path: Path) -> Seen:
+def open_input(path: Path) -> InputLog:
     """Open a log. Raises LogError."""
     log = open_log(path)
-    held = {channel.name: channel.type for channel in run_model(log).log.channels() if channel.count}
-    return Seen(path, log, log.settings(), held)
+    channels = {channel.name: channel.type for channel in run_model(log).log.channels() if channel.count}
+    return InputLog(path, log, log.settings(), channels)

@@ -1,4 +1,4 @@
-"""Parameters that are no options, and why: data, by shell patterns.
+"""Parameters that are not options, and why: data, by shell patterns.
 
 Beside these stand the parameters that a vehicle writes itself (`vehicles.self_written`).
 """
@@ -16,7 +16,7 @@ _CODES = "codes and bit masks whose meaning is not known here"
 _SIMULATOR = {"the simulated world": (f"{SIMULATOR_PREFIX}*", "SIH_*")}
 _ROBOT = "what the robot and its map are"
 
-NEVER: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+EXCLUDED: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "ardupilot": {
         **_SIMULATOR,
         **SELF_WRITTEN,
@@ -64,8 +64,8 @@ SAFETY = re.compile(
 """Failsafes and fences: no fix may loosen them."""
 
 
-def reason_against(stack: str, parameter: str) -> str:
-    """Why a parameter is no option; '' where nothing speaks against it."""
+def reason_to_exclude(stack: str, parameter: str) -> str:
+    """Why a parameter is not an option; '' where nothing speaks against it."""
     name = parameter
     if stack == "ros1":
         name = parameter.rpartition("/")[2]
@@ -73,7 +73,7 @@ def reason_against(stack: str, parameter: str) -> str:
         node, dot, own = parameter.partition(".")
         name = own if dot else node
     spellings = {name, name.rpartition(".")[2]}
-    for reason, patterns in NEVER.get(stack, {}).items():
+    for reason, patterns in EXCLUDED.get(stack, {}).items():
         if any(re.fullmatch(translate(pattern), one) for pattern in patterns for one in spellings):
             return reason
     return ""

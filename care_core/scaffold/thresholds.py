@@ -17,7 +17,7 @@ RATIO = 1.3
 much they differ."""
 
 
-class Limit(Record):
+class ProposedThreshold(Record):
     """A bound, and where it comes from. None: the objective brings its own."""
 
     bound: Threshold | RelativeThreshold
@@ -28,13 +28,13 @@ def good_runs(measures: Measures) -> tuple[int, ...]:
     """Places of the runs that met every functional objective, in logs without a critical finding."""
     functional = [one for one in measures.of(Role.OBJECTIVE) if one.variable.kind == "functional"]
     critical = {
-        id(seen): any(finding.severity == "critical" for finding in examine(run_model(seen.log)).findings)
-        for seen in {id(seen): seen for seen, _ in measures.runs}.values()
+        id(log): any(finding.severity == "critical" for finding in examine(run_model(log.opened)).findings)
+        for log in {id(log): log for log, _ in measures.runs}.values()
     }
     return tuple(
         place
-        for place, (seen, run) in enumerate(measures.runs)
-        if run.mission.ended and not critical[id(seen)] and all(_met(one, place) for one in functional)
+        for place, (log, run) in enumerate(measures.runs)
+        if run.mission.ended and not critical[id(log)] and all(_met(one, place) for one in functional)
     )
 
 
@@ -43,35 +43,37 @@ def _met(objective: Measure, place: int) -> bool:
     return value is not None and bound is not None and bound.met(value)
 
 
-def limits(objectives: Sequence[Measure], good: Sequence[int], *, alike: bool) -> Mapping[str, Limit]:
+def proposed_thresholds(
+    objectives: Sequence[Measure], good: Sequence[int], *, alike: bool
+) -> Mapping[str, ProposedThreshold]:
     """A limit for each objective. Absolute ones belong to a mission, so they are given only where all logs hold one.
 
     Args:
         good: places of the good runs.
         alike: whether the logs hold the same mission.
     """
-    return {one.variable.name: _limit(one, good, alike=alike) for one in objectives}
+    return {one.variable.name: _proposed(one, good, alike=alike) for one in objectives}
 
 
-def _limit(objective: Measure, good: Sequence[int], *, alike: bool) -> Limit:
+def _proposed(objective: Measure, good: Sequence[int], *, alike: bool) -> ProposedThreshold:
     variable = objective.variable
     if variable.kind == "functional" and variable.threshold is not None:
-        return Limit(variable.threshold, "met or not met")
-    seen = [value for place in good if (value := objective.values[place]) is not None]
+        return ProposedThreshold(variable.threshold, "met or not met")
+    values = [value for place in good if (value := objective.values[place]) is not None]
     bound = variable.threshold or variable.relative
     is_ceiling = bound is None or bound.op in ("<=", "<")
-    if alike and seen and min(seen) > 0 and is_ceiling:
-        found = upper_quantile([math.log(value) for value in seen])
+    if alike and values and min(values) > 0 and is_ceiling:
+        found = upper_quantile([math.log(value) for value in values])
         if found is not None:
-            said = f"what 95 % of runs like the {len(seen)} good ones keep ({min(seen):.4g} to {max(seen):.4g})"
-            return Limit(Threshold("<=", float(f"{math.exp(found.high):.3g}")), said)
-        worst = max(seen)
-        said = f"{RATIO:g} x the largest of {len(seen)} good runs ({min(seen):.4g} to {worst:.4g})"
-        return Limit(Threshold("<=", float(f"{RATIO * worst:.3g}")), said)
+            remark = f"what 95 % of runs like the {len(values)} good ones keep ({min(values):.4g} to {max(values):.4g})"
+            return ProposedThreshold(Threshold("<=", float(f"{math.exp(found.high):.3g}")), remark)
+        worst = max(values)
+        remark = f"{RATIO:g} x the largest of {len(values)} good runs ({min(values):.4g} to {worst:.4g})"
+        return ProposedThreshold(Threshold("<=", float(f"{RATIO * worst:.3g}")), remark)
     if not is_ceiling and variable.threshold is not None:
-        return Limit(variable.threshold, "that of the profile it is from: correct it")
-    why = "nothing says that the logs hold the same mission" if seen else "no run was good"
-    return Limit(_ratio(variable), f"a ratio: {why}")
+        return ProposedThreshold(variable.threshold, "that of the profile it is from: correct it")
+    why = "nothing says that the logs hold the same mission" if values else "no run was good"
+    return ProposedThreshold(_ratio(variable), f"a ratio: {why}")
 
 
 def _ratio(variable: Variable) -> RelativeThreshold:

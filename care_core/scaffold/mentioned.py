@@ -6,10 +6,10 @@ import re
 from collections.abc import Collection, Sequence
 
 from care_core.ecosystems.ros.measures.goals import ROSOUT
-from care_core.scaffold.seen import Seen
+from care_core.scaffold.inputs import InputLog
 
 _VALUE = r"(-?\d[\d.eE+-]*|true|false)"
-_SAID = (
+_MENTIONED = (
     re.compile(rf"(?<!\S)(/[A-Za-z]\w*(?:/\w+)+)\s*[:=]\s*{_VALUE}\b", re.IGNORECASE),
     re.compile(rf"\bparam(?:eter)?\s+['\"]?([\w/.~]+)['\"]?\s*(?:[:=]|to|is)\s*{_VALUE}\b", re.IGNORECASE),
 )
@@ -17,13 +17,13 @@ _SAID = (
 _SET_TO = re.compile(r"\b(?:set|changed)\s+to\b", re.IGNORECASE)
 
 
-def said_parameters(logs: Sequence[Seen], held: Collection[str]) -> list[str]:
+def mentioned_parameters(logs: Sequence[InputLog], held: Collection[str]) -> list[str]:
     """`name (value)` of each parameter that messages name and the configuration as driven does not hold."""
     found: dict[str, str] = {}
-    for seen in logs:
-        wanted = {topic: ("msg",) for topic in ROSOUT if topic in seen.channels}
-        for table in seen.log.read(wanted).values() if wanted else ():
+    for log in logs:
+        wanted = {topic: ("msg",) for topic in ROSOUT if topic in log.channels}
+        for table in log.opened.read(wanted).values() if wanted else ():
             for text in map(str, table.columns.get("msg", ())):
-                for pattern in _SAID:
+                for pattern in _MENTIONED:
                     found.update(pattern.findall(_SET_TO.sub("to", text)))
     return [f"{name} ({value})" for name, value in sorted(found.items()) if name not in held]
