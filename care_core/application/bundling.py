@@ -133,16 +133,15 @@ def _missing(case: Case) -> Iterator[str]:
 
 def _parameters(case: Case, sharing: Sharing) -> tuple[str, str, int]:
     """Name and text of the configuration as driven, and how many parameters do not go to others."""
-    from care_core.configs.formats import ConfigFormat, format_for, write_params
+    from care_core.configs.formats import format_for, write_params
 
     settings = {name: history[-1] for name, history in log_of(case).settings().items()}
     kept = {name: one for name, one in settings.items() if _is_shared(one, sharing)}
     if sharing.anonymous:
         kept = _anonymous(case, kept, sharing)
     format = format_for(case.diagnosis.run.log.format, settings)
-    suffix = {ConfigFormat.ARDUPILOT_PARAM: ".param", ConfigFormat.QGC_PARAMS: ".params"}.get(format, ".yaml")
     text = write_params(kept, format, {}) if kept else ""
-    return f"parameters{suffix}", text, len(settings) - len(kept)
+    return f"parameters{format.suffix}", text, len(settings) - len(kept)
 
 
 def _is_shared(one: Setting, sharing: Sharing) -> bool:

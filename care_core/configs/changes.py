@@ -6,14 +6,15 @@ import difflib
 from collections.abc import Iterable, Sequence
 
 from care_core.configs.driven import option_value, parameter_value, readable
-from care_core.configs.formats import ConfigFormat, format_for, module_of
+from care_core.configs.formats import format_for
+from care_core.ecosystems.dialect import Dialect
 from care_core.run import Run
 from care_core.variables import Change, Variable
 
 
 def unified_diff(run: Run, changes: Sequence[Change]) -> str:
     """The configuration as driven against the changes, in the ecosystem's own format; only keys that change."""
-    line_of = module_of(format_for(run.log.format, run.settings)).line_of
+    line_of = format_for(run.log.format, run.settings).functions.line_of
     driven, fixed = {}, {}
     for option, parameter, suggested in _assignments(changes):
         change = next(change for change in changes if change.option is option)
@@ -34,9 +35,9 @@ def unified_diff(run: Run, changes: Sequence[Change]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def apply_commands(changes: Iterable[Change], format: ConfigFormat) -> list[str]:
+def apply_commands(changes: Iterable[Change], format: Dialect) -> list[str]:
     """Shell or ground station commands that make the changes."""
-    commands: list[str] = module_of(format).commands(_assignments(changes))
+    commands: list[str] = format.functions.commands(_assignments(changes))
     return commands
 
 

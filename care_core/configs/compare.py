@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from care_core.configs.driven import same_value
-from care_core.configs.formats import ConfigFormat
 from care_core.configs.loading import ConfigFile, resolve
+from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.records import Record
 from care_core.run import Setting, shown
@@ -21,7 +21,7 @@ class Side(Record):
 
     name: str
     settings: Mapping[str, Setting]
-    format: ConfigFormat | None = None
+    format: Dialect | None = None
     partial: bool = False
 
 

@@ -13,23 +13,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from care_core.configs.driven import as_number, same_value
-from care_core.configs.formats import ConfigFormat, text_for
+from care_core.configs.formats import text_for
 from care_core.configs.loading import ConfigFile, guesses, read_configs, read_text, resolve, split_name
+from care_core.ecosystems.dialect import Dialect
+from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.errors import ConfigError
 from care_core.records import Record, Struct, field
 from care_core.run import Setting, shown
 from care_core.variables import Variable
 
-_YAML_VALUE = (
-    r"""((?:[^#\n]*?[\s{{,]|\s*)["']?[\w/.~]*{key}["']?\s*:\s+)("[^"]*"|'[^']*'|[^\s#&*!|>\[{{,}}][^\s#,}}]*)(.*)"""
-)
-_LINES = {
-    ConfigFormat.ARDUPILOT_PARAM: r"(\s*{key}(?:\s*,\s*|\s+))([^\s,#]+)(.*)",
-    ConfigFormat.QGC_PARAMS: r"(\s*\d+\t\d+\t{key}\t)([^\t]+)(\t.*)",
-    ConfigFormat.ROS1_YAML: _YAML_VALUE,
-    ConfigFormat.ROS2_YAML: _YAML_VALUE,
-}
-"""Before the value, the value, behind it."""
 _ROUNDED = 1e-3
 _APART = "One file is loaded for both: put one of them into a file of its own, loaded after it."
 
@@ -73,7 +65,7 @@ class EditedFile(Struct, eq=False):
     edits: list[Edit] = field(default_factory=list)
 
     @property
-    def format(self) -> ConfigFormat:
+    def format(self) -> Dialect:
         """How the file is written."""
         return self.held[0].format
 
@@ -169,13 +161,13 @@ def _own_name(file: EditedFile, setting: Setting) -> str:
     return setting.name.lstrip("/").removeprefix(namespace.strip("/")).lstrip("/")
 
 
-def _with_line(text: str, format: ConfigFormat, setting: Setting, after: str) -> str:
+def _with_line(text: str, format: Dialect, setting: Setting, after: str) -> str:
     """The text with another value on the line of a setting; unchanged where that line is not of a plain form."""
     lines = text.splitlines(keepends=True)
     index = int(setting.source.rpartition(":")[2]) - 1
     body = lines[index].rstrip("\r\n")
     key = re.escape(re.split(r"[/.]", setting.name)[-1])
-    match = re.fullmatch(_LINES[format].format(key=key), body)
+    match = re.fullmatch(format.line.format(key=key), body)
     if match is not None:
         lines[index] = f"{match[1]}{after}{match[3]}{lines[index][len(body) :]}"
     return "".join(lines)
@@ -231,7 +223,7 @@ def _is(value: float | str, text: str) -> bool:
 
 
 def _add(files: Sequence[EditedFile], one: Wanted) -> None:
-    file = next((f for f in files if f.format in (ConfigFormat.ARDUPILOT_PARAM, ConfigFormat.QGC_PARAMS)), None)
+    file = next((f for f in files if not f.format.is_yaml), None)
     if file is None:
         raise ConfigError(
             f"No file holds {one.parameter}.",
@@ -241,7 +233,7 @@ def _add(files: Sequence[EditedFile], one: Wanted) -> None:
     after = text_for(file.format, one.option, one.value)
     end = "\r\n" if "\r\n" in file.after else "\n"
     separator = "" if not file.after or file.after.endswith(("\n", "\r")) else end
-    if file.format is ConfigFormat.QGC_PARAMS:
+    if file.format is QGC_PARAMS:
         row = f"1\t1\t{one.parameter}\t{after}\t{6 if one.option.type in ('int', 'bool', 'enum') else 9}"
     else:
         row = f"{one.parameter},{after}"

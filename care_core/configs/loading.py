@@ -8,7 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from care_core.configs.formats import ConfigFormat, format_of, module_of
+from care_core.configs.formats import format_of
+from care_core.ecosystems.dialect import Dialect
+from care_core.ecosystems.ros.dialect import ROS1_YAML
 from care_core.errors import ConfigError
 from care_core.records import Record
 from care_core.run import Find, Setting
@@ -20,7 +22,7 @@ class ConfigFile(Record):
     """A configuration file as it was named, and what it holds; `source` of a setting is file:line."""
 
     path: str
-    format: ConfigFormat
+    format: Dialect
     settings: Mapping[str, Setting]
     namespace: str = ""
 
@@ -44,14 +46,14 @@ def _read(path: Path, namespace: str) -> ConfigFile:
 def read_text(text: str, path: Path, namespace: str = "") -> ConfigFile:
     """A configuration file's text as `read_configs` reads the file. Raises ConfigError."""
     format = format_of(text, path)
-    if namespace and format not in (ConfigFormat.ROS1_YAML, ConfigFormat.ROS2_YAML):
+    if namespace and not format.is_yaml:
         raise ConfigError(
             "Only ROS parameters have namespaces.", hint=f"Leave '{namespace}=' out.", where=f"{namespace}={path}"
         )
     with _no_collector():
         if not namespace:
-            return ConfigFile(str(path), format, module_of(format).read(text, path))
-        return ConfigFile(f"{namespace}={path}", format, module_of(format).read(text, path, namespace), namespace)
+            return ConfigFile(str(path), format, format.functions.read(text, path))
+        return ConfigFile(f"{namespace}={path}", format, format.functions.read(text, path, namespace), namespace)
 
 
 @contextmanager
@@ -103,10 +105,10 @@ def resolve(files: Sequence[ConfigFile], parameters: Iterable[str]) -> dict[str,
 
     Names in files are shorter (ROS 1 namespaces) or patterns (ROS 2 wildcards): each format knows how they are meant.
     """
-    loaded: dict[ConfigFormat, list[Mapping[str, Setting]]] = {}
+    loaded: dict[Dialect, list[Mapping[str, Setting]]] = {}
     for file in files:
         loaded.setdefault(file.format, []).append(file.settings)
-    finders: list[Find] = [module_of(format).finder(settings) for format, settings in loaded.items()]
+    finders: list[Find] = [format.functions.finder(settings) for format, settings in loaded.items()]
     found: dict[str, Setting] = {}
     for parameter in parameters:
         for find in finders:
@@ -120,7 +122,7 @@ def guesses(files: Sequence[ConfigFile], found: Mapping[str, Setting]) -> dict[s
     """Per file, the parameters whose value is a bare name of a ROS 1 file that was loaded into no namespace."""
     named: dict[str, list[str]] = {}
     for file in files:
-        if file.format is ConfigFormat.ROS1_YAML:
+        if file.format is ROS1_YAML:
             from care_core.ecosystems.ros import ros1_yaml
 
             own = [p for p, s in found.items() if file.settings.get(s.name) is s and ros1_yaml.is_guess(s.name, p)]

@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
+from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.dictionary import Dictionary, Field, find_field
 from care_core.ecosystems.findings import Event, Finding, Health
 from care_core.logs import formats
@@ -90,6 +91,8 @@ class Ecosystem(ABC):
     name: ClassVar[str]
     """As the rows of `logs.formats` name it."""
     title: ClassVar[str]
+    dialects: ClassVar[tuple[Dialect, ...]]
+    """How configuration files of it are written."""
     measures: ClassVar[tuple[str, ...]]
     """Modules that register its mission kinds and extractors when they are imported."""
 
@@ -127,8 +130,8 @@ class Ecosystem(ABC):
         return find_field(self.messages(), channel.name, name)
 
     @abstractmethod
-    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
-        """The format of its configuration files, for the parameters of a log of that format: `qgc-params`."""
+    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:
+        """How its configuration is written, for the parameters of a log of that format."""
 
     @abstractmethod
     def robots(self, log: Log) -> Iterator[Robot]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from care_core.configs.driven import same_value
-from care_core.configs.formats import ConfigFormat
+from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import BY_ID
 from care_core.run import shown
@@ -30,7 +30,7 @@ def check(file: ConfigFile) -> Iterator[Problem]:
             yield _twice(file, earlier, entry)
         first[keys] = entry
         number = entry.number
-        is_yaml = file.format in (ConfigFormat.ROS1_YAML, ConfigFormat.ROS2_YAML)
+        is_yaml = file.format.is_yaml
         if number is not None and math.isnan(number) and not is_yaml:
             text = f"{entry.name} is not a number."
             yield problem_at("wrong-type", Severity.ERROR, file, entry, text, "Give it one.")
@@ -38,7 +38,7 @@ def check(file: ConfigFile) -> Iterator[Problem]:
 
 def _twice(file: ConfigFile, earlier: Entry, entry: Entry) -> Problem:
     same = same_value(earlier.value, entry.value)
-    counts = "QGroundControl counts the first" if file.format is ConfigFormat.QGC_PARAMS else "this one counts"
+    counts = "QGroundControl counts the first" if file.format is QGC_PARAMS else "this one counts"
     said = "with the same value" if same else f"there {shown(earlier.value)}, here {shown(entry.value)}: {counts}"
     return problem_at(
         "duplicate",

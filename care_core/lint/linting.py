@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from care_core.configs.driven import option_value, readable
-from care_core.configs.formats import ConfigFormat, module_of
 from care_core.configs.loading import split_name
+from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.errors import UsageError, nearest
 from care_core.lint import ardupilot, contradictions, generic, navigation
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
@@ -65,7 +65,7 @@ def _lint(name: str, target: str, schema: Schema | None) -> Linted:
 
 
 def _of_ecosystem(file: ConfigFile, target: str) -> Iterator[Problem]:
-    if file.format in (ConfigFormat.ROS1_YAML, ConfigFormat.ROS2_YAML):
+    if file.format.is_yaml:
         yield from navigation.check(file, target if target in _all_distributions() else "")
         return
     values = {entry.name: entry for entry in file.entries}
@@ -82,7 +82,7 @@ def _of_profile(file: ConfigFile, schema: Schema) -> Iterator[Problem]:
     """Values outside what a profile holds acceptable."""
     entries = {_setting_name(file, entry): entry for entry in file.entries}
     settings = {name: Setting(name, entry.value, "") for name, entry in entries.items()}
-    find = module_of(file.format).finder([settings])
+    find = file.format.functions.finder([settings])
     for option in schema.options:
         for parameter in readable(option):
             setting = find(parameter)
@@ -96,7 +96,7 @@ def _of_profile(file: ConfigFile, schema: Schema) -> Iterator[Problem]:
 
 def _setting_name(file: ConfigFile, entry: Entry) -> str:
     """A value's name as the reader of the format has it."""
-    if file.format is not ConfigFormat.ROS2_YAML or "ros__parameters" not in entry.keys:
+    if file.format is not ROS2_YAML or "ros__parameters" not in entry.keys:
         return "/".join((*file.namespace.strip("/").split("/"), *entry.keys)).strip("/")
     split = entry.keys.index("ros__parameters")
     node = "/".join((file.namespace.strip("/"), *entry.keys[:split])).strip("/")

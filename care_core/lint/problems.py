@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from pathlib import Path
 
-from care_core.configs.formats import ConfigFormat
+from care_core.ecosystems.dialect import Dialect
 from care_core.records import Record
 
 
@@ -45,7 +45,7 @@ class ConfigFile(Record):
     """A configuration file, read as far as it can be."""
 
     path: Path
-    format: ConfigFormat
+    format: Dialect
     text: str
     entries: tuple[Entry, ...]
     named: tuple[tuple[tuple[str, ...], str, str], ...] = ()

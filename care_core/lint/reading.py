@@ -8,10 +8,11 @@ from pathlib import Path
 
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from care_core.configs.formats import ConfigFormat, format_of
+from care_core.configs.formats import format_of
 from care_core.configs.loading import text_of_file
 from care_core.ecosystems.ardupilot.parameter_file import FLAGS
-from care_core.ecosystems.px4 import parameter_file as qgc_params
+from care_core.ecosystems.dialect import Dialect
+from care_core.ecosystems.px4.dialect import QGC_PARAMS, is_row
 from care_core.ecosystems.ros import yaml_tree
 from care_core.errors import ConfigError
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
@@ -32,7 +33,7 @@ def read_file(path: Path, namespace: str = "") -> tuple[ConfigFile, tuple[Proble
     """
     text = text_of_file(path)
     format = format_of(text, path)
-    if format in (ConfigFormat.ARDUPILOT_PARAM, ConfigFormat.QGC_PARAMS):
+    if not format.is_yaml:
         return _of_parameters(path, format, text)
     try:
         root = yaml_tree.compose(text, path)
@@ -80,7 +81,7 @@ def _text(node: Node) -> str:
     return str(node.value) if isinstance(node, ScalarNode) else ""
 
 
-def _of_parameters(path: Path, format: ConfigFormat, text: str) -> tuple[ConfigFile, tuple[Problem, ...]]:
+def _of_parameters(path: Path, format: Dialect, text: str) -> tuple[ConfigFile, tuple[Problem, ...]]:
     entries, problems = [], []
     for number, line in enumerate(text.splitlines(), start=1):
         body = line.partition("#")[0].rstrip()
@@ -88,7 +89,7 @@ def _of_parameters(path: Path, format: ConfigFormat, text: str) -> tuple[ConfigF
             body = body.removesuffix(flag).rstrip()
         if not body.strip():
             continue
-        found = _row(line) if format is ConfigFormat.QGC_PARAMS else _pair(body)
+        found = _row(line) if format is QGC_PARAMS else _pair(body)
         if found is None:
             problems.append(syntax(path, number, 1, "", "This line is not a parameter.", "A line is NAME,VALUE."))
             continue
@@ -108,7 +109,7 @@ def _pair(body: str) -> tuple[str, str, int, str] | None:
 
 
 def _row(line: str) -> tuple[str, str, int, str] | None:
-    if not qgc_params.is_row(line):
+    if not is_row(line):
         return None
     vehicle, component, name, value, kind = line.split("\t")
     column = len(vehicle) + len(component) + 3

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
-from care_core.configs.formats import ConfigFormat
+from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.ecosystems.ros.ros2_yaml import PARAMETERS
 from care_core.lint.problems import ConfigFile, Entry
 from care_core.metadata import navigation
@@ -81,7 +81,7 @@ def class_of(text: str) -> str:
 
 def scoped(file: ConfigFile) -> Scoped:
     """Who reads what of a ROS file."""
-    return _ros2(file) if file.format is ConfigFormat.ROS2_YAML else _ros1(file)
+    return _ros2(file) if file.format is ROS2_YAML else _ros1(file)
 
 
 def words_of(entry: Entry | None) -> tuple[str, ...]:

@@ -58,7 +58,7 @@ def lint_document(linted: Sequence[Linted], target: str) -> LintDocument:
     return LintDocument(
         target=target,
         files=[
-            FileEntry(file=str(one.file.path), format=one.file.format.value, values=len(one.file.entries))
+            FileEntry(file=str(one.file.path), format=one.file.format.name, values=len(one.file.entries))
             for one in linted
         ],
         findings=[_entry(problem) for one in linted for problem in one.problems],

@@ -10,8 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from care_core.configs.changes import apply_commands, unified_diff
-from care_core.configs.formats import ConfigFormat, format_for, write_params
+from care_core.configs.formats import format_for, write_params
 from care_core.configs.loading import guesses, read_config, read_configs, resolve
+from care_core.ecosystems.ardupilot.dialect import ARDUPILOT_PARAM
+from care_core.ecosystems.dialect import Dialect
+from care_core.ecosystems.px4.dialect import QGC_PARAMS
+from care_core.ecosystems.ros.dialect import ROS1_YAML, ROS2_YAML
 from care_core.errors import ConfigError
 from care_core.records import replace
 from care_core.run import Setting
@@ -136,24 +140,24 @@ def values(settings: Mapping[str, Setting]) -> dict[str, float | str]:
 @pytest.mark.parametrize(
     ("name", "text", "format"),
     [
-        ("a.yaml", "# c\n1\t1\tA\t0.5\t9\n", ConfigFormat.QGC_PARAMS),
-        ("a.params", QGC, ConfigFormat.QGC_PARAMS),
-        ("a.params", "A,1.0\n", ConfigFormat.ARDUPILOT_PARAM),
-        ("a.yaml", "A 1.0 # x: y\n", ConfigFormat.ARDUPILOT_PARAM),
-        ("a.txt", "A\t0x10\n", ConfigFormat.ARDUPILOT_PARAM),
-        ("a.param", COMMON, ConfigFormat.ROS1_YAML),
-        ("a", "---\nA: 1\n", ConfigFormat.ROS1_YAML),
+        ("a.yaml", "# c\n1\t1\tA\t0.5\t9\n", QGC_PARAMS),
+        ("a.params", QGC, QGC_PARAMS),
+        ("a.params", "A,1.0\n", ARDUPILOT_PARAM),
+        ("a.yaml", "A 1.0 # x: y\n", ARDUPILOT_PARAM),
+        ("a.txt", "A\t0x10\n", ARDUPILOT_PARAM),
+        ("a.param", COMMON, ROS1_YAML),
+        ("a", "---\nA: 1\n", ROS1_YAML),
         (
             "dump",
             "!!python/object/new:dynamic_reconfigure.encoding.Config\ndictitems: {A: 1}\n",
-            ConfigFormat.ROS1_YAML,
+            ROS1_YAML,
         ),
-        ("a.txt", NODE, ConfigFormat.ROS2_YAML),
-        ("a.yaml", "{/**: {'ros__parameters': {a: 1}}}", ConfigFormat.ROS2_YAML),
-        ("a.yaml", "", ConfigFormat.ROS1_YAML),
+        ("a.txt", NODE, ROS2_YAML),
+        ("a.yaml", "{/**: {'ros__parameters': {a: 1}}}", ROS2_YAML),
+        ("a.yaml", "", ROS1_YAML),
     ],
 )
-def test_formats_are_told_apart_by_content(tmp_path: Path, name: str, text: str, format: ConfigFormat) -> None:
+def test_formats_are_told_apart_by_content(tmp_path: Path, name: str, text: str, format: Dialect) -> None:
     (file,) = read_configs([written(tmp_path, name, text)])
     assert file.format is format
 
@@ -264,7 +268,7 @@ ROS_VALUE = st.one_of(
 )
 
 
-def read_back(tmp: Path, given: dict[str, float | str], format: ConfigFormat) -> dict[str, float | str]:
+def read_back(tmp: Path, given: dict[str, float | str], format: Dialect) -> dict[str, float | str]:
     settings = {name: Setting(name, value, "made") for name, value in given.items()}
     remarks = dict.fromkeys(list(given)[::2], "1 -> 2 at 00:10")
     path = written(tmp, "a.txt", write_params(settings, format, remarks))
@@ -275,14 +279,14 @@ def read_back(tmp: Path, given: dict[str, float | str], format: ConfigFormat) ->
 
 @given(given=st.dictionaries(PARAMETER, FLOAT32, max_size=20))
 def test_written_parameters_read_back(tmp_path_factory: pytest.TempPathFactory, given: dict[str, float | str]) -> None:
-    assert read_back(tmp_path_factory.mktemp("a"), given, ConfigFormat.ARDUPILOT_PARAM) == given
+    assert read_back(tmp_path_factory.mktemp("a"), given, ARDUPILOT_PARAM) == given
 
 
 @given(given=st.dictionaries(PARAMETER, st.one_of(FLOAT32, st.integers(-(2**31), 2**31 - 1)), max_size=20))
 def test_written_rows_read_back_with_their_types(
     tmp_path_factory: pytest.TempPathFactory, given: dict[str, float | str]
 ) -> None:
-    read = read_back(tmp_path_factory.mktemp("a"), given, ConfigFormat.QGC_PARAMS)
+    read = read_back(tmp_path_factory.mktemp("a"), given, QGC_PARAMS)
     assert read == given
     assert [type(read[name]) for name in given] == [type(value) for value in given.values()]
 
@@ -296,7 +300,7 @@ def test_written_ros_parameters_read_back_with_their_types(
     # Two parameters of one path, one with a namespace named like the other, cannot both be in a ROS 1 file.
     ros1 = {"/".join(k): v for k, v in given.items() if not any(k == o[: len(k)] for o in given if o != k)}
     ros2 = {f"/{k[0]}.{'.'.join(('x', *k[1:]))}": v for k, v in given.items()}
-    for names, format in ((ros1, ConfigFormat.ROS1_YAML), (ros2, ConfigFormat.ROS2_YAML)):
+    for names, format in ((ros1, ROS1_YAML), (ros2, ROS2_YAML)):
         read = read_back(folder, names, format)
         assert read == names
         assert [type(read[name]) for name in names] == [type(value) for value in names.values()]
@@ -304,12 +308,12 @@ def test_written_ros_parameters_read_back_with_their_types(
 
 def test_a_remark_stands_by_its_parameter() -> None:
     settings = {name: Setting(name, 3.0, "made") for name in ("/n.A.b", "/n.c")}
-    assert write_params(settings, ConfigFormat.ROS2_YAML, {"/n.A.b": "2.0 -> 3.0 at 00:10"}) == (
+    assert write_params(settings, ROS2_YAML, {"/n.A.b": "2.0 -> 3.0 at 00:10"}) == (
         "/n:\n  ros__parameters:\n    A:\n      b: 3.0  # 2.0 -> 3.0 at 00:10\n    c: 3.0\n"
     )
     settings = {"A": Setting("A", 3, "made")}
-    assert write_params(settings, ConfigFormat.ARDUPILOT_PARAM, {"A": "why"}) == "A,3  # why\n"
-    assert write_params(settings, ConfigFormat.QGC_PARAMS, {"A": "why"}) == f"{QGC}# A: why\n1\t1\tA\t3\t6\n"
+    assert write_params(settings, ARDUPILOT_PARAM, {"A": "why"}) == "A,3  # why\n"
+    assert write_params(settings, QGC_PARAMS, {"A": "why"}) == f"{QGC}# A: why\n1\t1\tA\t3\t6\n"
 
 
 def test_the_diff_shows_only_what_changes() -> None:
@@ -329,14 +333,14 @@ def test_a_fix_that_changes_nothing_has_no_diff() -> None:
 
 def test_commands_of_each_ecosystem() -> None:
     reboots = replace(LAND_SPEED, reboot_required=True)
-    assert format_for("dataflash-bin") is ConfigFormat.ARDUPILOT_PARAM
-    assert apply_commands([Change(reboots, 16.0, 50.0)], ConfigFormat.ARDUPILOT_PARAM) == [
+    assert format_for("dataflash-bin") is ARDUPILOT_PARAM
+    assert apply_commands([Change(reboots, 16.0, 50.0)], ARDUPILOT_PARAM) == [
         "param set LAND_SPEED 50",
         "reboot",
     ]
     occdist = Variable("occdist_scale", Role.OPTION, parameters=("/move_base/DWAPlannerROS/occdist_scale",))
     samples = Variable("samples", Role.OPTION, "int", parameters=("/move_base/a/n", "/move_base/b/n"))
-    assert apply_commands([Change(occdist, 0.1, 1.0), Change(samples, 3.0, 6.0)], ConfigFormat.ROS1_YAML) == [
+    assert apply_commands([Change(occdist, 0.1, 1.0), Change(samples, 3.0, 6.0)], ROS1_YAML) == [
         "rosrun dynamic_reconfigure dynparam set /move_base/DWAPlannerROS occdist_scale 1.0",
         "rosrun dynamic_reconfigure dynparam set /move_base/a n 6",
         "rosrun dynamic_reconfigure dynparam set /move_base/b n 6",
@@ -353,12 +357,12 @@ def test_commands_of_ros_2() -> None:
 
 
 def test_the_format_of_a_log() -> None:
-    assert format_for("px4-ulg") is ConfigFormat.QGC_PARAMS
-    assert format_for("mavlink-tlog") is ConfigFormat.ARDUPILOT_PARAM
-    assert format_for("ros2-db3") is ConfigFormat.ROS2_YAML
-    assert format_for("mcap") is ConfigFormat.ROS2_YAML
-    assert format_for("mcap", [MAX_VEL]) is ConfigFormat.ROS2_YAML
-    assert format_for("mcap", ["/move_base/DWAPlannerROS/sim_time"]) is ConfigFormat.ROS1_YAML
+    assert format_for("px4-ulg") is QGC_PARAMS
+    assert format_for("mavlink-tlog") is ARDUPILOT_PARAM
+    assert format_for("ros2-db3") is ROS2_YAML
+    assert format_for("mcap") is ROS2_YAML
+    assert format_for("mcap", [MAX_VEL]) is ROS2_YAML
+    assert format_for("mcap", ["/move_base/DWAPlannerROS/sim_time"]) is ROS1_YAML
 
 
 def test_every_recorded_configuration_is_read_and_written_back(
@@ -366,10 +370,10 @@ def test_every_recorded_configuration_is_read_and_written_back(
 ) -> None:
     folder = recorded / "logs" / "configs"
     formats = {
-        "ardupilot_param": {ConfigFormat.ARDUPILOT_PARAM, ConfigFormat.QGC_PARAMS},
-        "px4_params": {ConfigFormat.QGC_PARAMS},
-        "ros1_nav": {ConfigFormat.ROS1_YAML},
-        "nav2": {ConfigFormat.ROS2_YAML},
+        "ardupilot_param": {ARDUPILOT_PARAM, QGC_PARAMS},
+        "px4_params": {QGC_PARAMS},
+        "ros1_nav": {ROS1_YAML},
+        "nav2": {ROS2_YAML},
     }
     files = [path for path in folder.rglob("*") if path.is_file()]
     assert len(files) > 30
@@ -382,8 +386,8 @@ def test_every_recorded_configuration_is_read_and_written_back(
         assert all(again[name] == pytest.approx(value, rel=1e-6) for name, value in values(file.settings).items())
 
 
-@pytest.mark.parametrize("format", [ConfigFormat.ARDUPILOT_PARAM, ConfigFormat.QGC_PARAMS])
-def test_a_damaged_name_forges_no_line(tmp_path: Path, format: ConfigFormat) -> None:
+@pytest.mark.parametrize("format", [ARDUPILOT_PARAM, QGC_PARAMS])
+def test_a_damaged_name_forges_no_line(tmp_path: Path, format: Dialect) -> None:
     names = ("A", "B,1\nFENCE_ENABLE", "\x1b[31mC", "D\t9", "")
     text = write_params({name: Setting(name, 2.0, "PARM") for name in names}, format)
     assert "\x1b" not in text

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from care_core.configs.formats import ConfigFormat, format_for
+from care_core.configs.formats import format_for
+from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.ecosystems.registry import ecosystem_of
 from care_core.errors import ProfileError
 from care_core.logs import formats
@@ -83,7 +84,7 @@ def test_a_row_opens_a_log_and_finds_it_in_folders(log: Path) -> None:
 def test_a_row_names_the_ecosystem_and_so_its_dialect(log: Path) -> None:
     assert ecosystem_of(MADE).name == "px4"
     assert MADE in ecosystem_of(MADE).formats
-    assert format_for(MADE.name) is ConfigFormat.QGC_PARAMS
+    assert format_for(MADE.name) is QGC_PARAMS
 
 
 def test_inspect_and_params_show_a_log_of_it(log: Path, care: Care) -> None:

@@ -15,8 +15,9 @@ from rosbags.rosbag2 import CompressionMode
 from ruamel.yaml import YAML
 
 from care_core.configs.compare import Side, compare
-from care_core.configs.formats import ConfigFormat, write_params
+from care_core.configs.formats import write_params
 from care_core.configs.loading import read_config
+from care_core.ecosystems.ros.dialect import ROS2_YAML
 from care_core.errors import LogError
 from care_core.logs import formats
 from care_core.logs.base import Log
@@ -219,14 +220,14 @@ def test_a_file_of_parameters_keeps_the_types_that_they_had(tmp_path: Path) -> N
     log = open_log(write_db3(tmp_path / "bag", messages=[event("/n", 0, new, [])]))
     driven = {name: history[-1] for name, history in log.settings().items()}
     file = tmp_path / "as_driven.yaml"
-    file.write_text(write_params(driven, ConfigFormat.ROS2_YAML), encoding="utf-8")
+    file.write_text(write_params(driven, ROS2_YAML), encoding="utf-8")
     assert YAML(typ="safe").load(file)["/n"]["ros__parameters"] == {
         "sim": True, "count": 3, "rate": 20.0, "frame": "odom", "footprint": [1.0, 2.5], "plugins": ["a", "b c"],
         "flags": [True, False], "text": "1.0",
     }  # fmt: skip
     assert "count: 3\n" in file.read_text(encoding="utf-8")
     assert "rate: 20.0\n" in file.read_text(encoding="utf-8")
-    assert not compare(Side("log", driven), Side("file", read_config(file), ConfigFormat.ROS2_YAML))
+    assert not compare(Side("log", driven), Side("file", read_config(file), ROS2_YAML))
 
 
 def test_what_is_no_bag(tmp_path: Path) -> None:

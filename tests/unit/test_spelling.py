@@ -9,7 +9,7 @@ import pytest
 
 from care_core.configs.changes import apply_commands
 from care_core.configs.driven import configuration
-from care_core.configs.formats import ConfigFormat
+from care_core.ecosystems.ardupilot.dialect import ARDUPILOT_PARAM
 from care_core.extract.spelling import spelled
 from care_core.logs import formats
 from care_core.logs.base import Log
@@ -50,7 +50,7 @@ def test_a_renamed_parameter_is_read_in_the_unit_of_the_option() -> None:
 
 def test_a_change_is_written_in_the_unit_of_the_parameter() -> None:
     option, _ = option_in(WP_SPD=10.0)
-    assert apply_commands([Change(option, 1000.0, 1250.0)], ConfigFormat.ARDUPILOT_PARAM) == ["param set WP_SPD 12.5"]
+    assert apply_commands([Change(option, 1000.0, 1250.0)], ARDUPILOT_PARAM) == ["param set WP_SPD 12.5"]
 
 
 def test_firmware_with_the_profiles_own_name_changes_nothing() -> None:

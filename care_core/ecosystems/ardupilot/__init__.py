@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from care_core.ecosystems.ardupilot.dialect import ARDUPILOT_PARAM
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.dictionary import Dictionary
 from care_core.ecosystems.findings import Event, Health
 from care_core.logs.base import Channel, Log
@@ -18,6 +20,7 @@ class ArduPilot(Ecosystem):
 
     name = "ardupilot"
     title = "ArduPilot"
+    dialects = (ARDUPILOT_PARAM,)
     measures = (
         "care_core.ecosystems.ardupilot.measures.energy",
         "care_core.ecosystems.ardupilot.measures.events",
@@ -53,8 +56,8 @@ class ArduPilot(Ecosystem):
     def messages(self) -> Dictionary:
         return {}
 
-    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
-        return "ardupilot-param"
+    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:
+        return ARDUPILOT_PARAM
 
     def robots(self, log: Log) -> Iterator[Robot]:
         from care_core.ecosystems.vehicles.identity import robots

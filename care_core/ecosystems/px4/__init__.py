@@ -6,8 +6,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.dictionary import Dictionary
 from care_core.ecosystems.findings import Event, Health
+from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.logs.base import Channel, Log
 from care_core.logs.formats import LogFormat
 from care_core.run import Robot
@@ -18,6 +20,7 @@ class Px4(Ecosystem):
 
     name = "px4"
     title = "PX4"
+    dialects = (QGC_PARAMS,)
     measures = ("care_core.ecosystems.px4.missions",)
 
     def model(self, log: Log) -> RunModel:
@@ -50,8 +53,8 @@ class Px4(Ecosystem):
 
         return MESSAGES
 
-    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
-        return "qgc-params"
+    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:
+        return QGC_PARAMS
 
     def robots(self, log: Log) -> Iterator[Robot]:
         from care_core.ecosystems.vehicles.identity import robots

@@ -6,23 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from care_core.ecosystems.ardupilot.parameter_file import commands, finder, is_name, line_of, not_a_name, plain, text_of
+from care_core.ecosystems.px4.dialect import HEADER, is_row
 from care_core.errors import ConfigError
 from care_core.run import Setting
 
-__all__ = ["commands", "finder", "is_row", "line_of", "read", "text_of", "write"]
-
-HEADER = "# Vehicle-Id Component-Id Name Value Type"
+__all__ = ["commands", "finder", "line_of", "read", "text_of", "write"]
 
 _INT32, _REAL32 = 6, 9
 """Types of MAVLink (MAV_PARAM_TYPE): what a PX4 parameter can be."""
 _REALS = (_REAL32, 10)
-_COLUMNS = 5
-
-
-def is_row(line: str) -> bool:
-    """Whether a line has the five columns."""
-    words = line.split("\t")
-    return len(words) == _COLUMNS and all(word.strip().isdigit() for word in (words[0], words[1], words[4]))
 
 
 def read(text: str, path: Path) -> dict[str, Setting]:

@@ -6,8 +6,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.dictionary import Dictionary
 from care_core.ecosystems.findings import Event, Health
+from care_core.ecosystems.ros.dialect import ROS1_YAML, ROS2_YAML
 from care_core.logs.base import Channel, Log
 from care_core.logs.formats import MCAP, ROS1_BAG, LogFormat
 from care_core.run import Robot
@@ -31,6 +33,7 @@ class Ros(Ecosystem):
 
     name = "ros"
     title = "ROS"
+    dialects = (ROS1_YAML, ROS2_YAML)
     measures = (
         "care_core.ecosystems.ros.measures.actionlib",
         "care_core.ecosystems.ros.measures.battery",
@@ -71,11 +74,11 @@ class Ros(Ecosystem):
 
         return MESSAGES
 
-    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> str:
+    def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:
         """An MCAP may be of either ROS: only in ROS 2 have names of parameters a dot, after the node."""
         names = list(parameters) if format is MCAP else []
         is_ros1 = format is ROS1_BAG or (names and not any("." in name for name in names))
-        return "ros1-yaml" if is_ros1 else "ros2-yaml"
+        return ROS1_YAML if is_ros1 else ROS2_YAML
 
     def robots(self, log: Log) -> Iterator[Robot]:
         from care_core.ecosystems.ros.identity import robots
