@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
-from care_core.ecosystems.ros.measures.goals import ROSOUT
+from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS
 from care_core.scaffold.inputs import InputLog
 
 _VALUE = r"(-?\d[\d.eE+-]*|true|false)"
@@ -21,7 +21,7 @@ def mentioned_parameters(logs: Sequence[InputLog], held: Collection[str]) -> lis
     """`name (value)` of each parameter that messages name and the configuration as driven does not hold."""
     found: dict[str, str] = {}
     for log in logs:
-        wanted = {topic: ("msg",) for topic in ROSOUT if topic in log.channels}
+        wanted = {topic: ("msg",) for topic in ROSOUT_TOPICS if topic in log.channels}
         for table in log.opened.read(wanted).values() if wanted else ():
             for text in map(str, table.columns.get("msg", ())):
                 for pattern in _MENTIONED:

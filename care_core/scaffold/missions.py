@@ -8,7 +8,8 @@ from typing import Any
 
 from care_core.ecosystems.measures import MISSION_KINDS
 from care_core.ecosystems.registry import run_model
-from care_core.ecosystems.ros.measures.drive import GOAL_TIMEOUT_S, TOLERANCE_M, Leg, Status, analyse
+from care_core.ecosystems.ros.goals import Goal, Status
+from care_core.ecosystems.ros.measures.window import GOAL_TIMEOUT_S, TOLERANCE_M, window
 from care_core.ecosystems.vehicles import vehicle_of
 from care_core.metadata.navigation import is_ros
 from care_core.profile.schema import Schema
@@ -45,10 +46,10 @@ def find_missions(logs: Sequence[InputLog], bundled: Sequence[Schema]) -> Missio
     spec, remarks = _goals(logs)
     if not spec:
         return _whole("no goals of move_base or Nav2 are in the logs")
-    legs = _legs(logs, spec)
-    if not any(legs):
+    goals = _goal_lists(logs, spec)
+    if not any(goals):
         return _whole(f"the topics of {spec['kind']} hold no goal")
-    return _with_goals(spec, remarks, legs)
+    return _with_goals(spec, remarks, goals)
 
 
 def _whole(why: str) -> Missions:
@@ -89,23 +90,23 @@ def _goals(logs: Sequence[InputLog]) -> tuple[dict[str, Any], dict[str, str]]:
     return spec, remarks
 
 
-def _legs(logs: Sequence[InputLog], spec: Mapping[str, Any]) -> list[tuple[Leg, ...]]:
+def _goal_lists(logs: Sequence[InputLog], spec: Mapping[str, Any]) -> list[tuple[Goal, ...]]:
     """The goals of every mission."""
-    return [mission.shared(analyse).legs for log in logs for mission in _found(log, spec)]
+    return [mission.shared(window).goals for log in logs for mission in _found(log, spec)]
 
 
-def _with_goals(spec: dict[str, Any], remarks: dict[str, str], legs: Sequence[tuple[Leg, ...]]) -> Missions:
-    longest = max(legs, key=len)
-    placed = all(math.isfinite(leg.x) for leg in longest)
+def _with_goals(spec: dict[str, Any], remarks: dict[str, str], goals: Sequence[tuple[Goal, ...]]) -> Missions:
+    longest = max(goals, key=len)
+    placed = all(math.isfinite(goal.x) for goal in longest)
     alike = placed and all(
-        leg.offset(other.x, other.y) <= TOLERANCE_M
-        for mission in legs
-        for leg, other in zip(mission, longest, strict=False)
+        goal.offset(other.x, other.y) <= TOLERANCE_M
+        for mission in goals
+        for goal, other in zip(mission, longest, strict=False)
     )
     if alike:
-        spec["goals"] = [[round(leg.x, 3), round(leg.y, 3)] for leg in longest]
-        remarks["goals"] = f"the same in all {len(legs)} missions; limits belong to them"
-    reached = [leg.time_s for mission in legs for leg in mission if leg.status == Status.SUCCEEDED]
+        spec["goals"] = [[round(goal.x, 3), round(goal.y, 3)] for goal in longest]
+        remarks["goals"] = f"the same in all {len(goals)} missions; limits belong to them"
+    reached = [goal.time_s for mission in goals for goal in mission if goal.status == Status.SUCCEEDED]
     patience = max(GOAL_TIMEOUT_S, math.ceil(_SLACK * max(reached, default=0.0)))
     spec["goal_timeout_s"] = patience
     spec["tolerance_m"] = TOLERANCE_M

@@ -12,21 +12,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
-from care_core.ecosystems.ros.measures.drive import ODOMETRY_FIELDS, ROSOUT_FIELDS, STAMPED_COMMAND_FIELDS, Status
-from care_core.ecosystems.ros.measures.nav2 import (
-    FEEDBACK_FIELDS,
-    PLAN_FIELDS,
-    POSE_FIELDS,
-    STATUS_FIELDS,
-    TREE_FIELDS,
-    find_legs,
-)
+from care_core.ecosystems.ros.drive import Drive
+from care_core.ecosystems.ros.goals import Goal, Status
+from care_core.ecosystems.ros.measures.nav2 import FEEDBACK_FIELDS, PLAN_FIELDS, POSE_FIELDS, goals
+from care_core.ecosystems.ros.messages import FRAME, MESSAGES, TREE, TWIST_STAMPED
+from care_core.ecosystems.ros.messages import STATUS as STATES
 from care_core.logs.base import Table
+from care_core.logs.formats import ROS2_DB3
 from care_core.run import Unavailable, Value
 from tests.tables import no_model, read
 
 KIND = MISSION_KINDS["nav2_goals"]
 DURATION_S = 100.0
+POSE = ("pose.pose.position.x", "pose.pose.position.y", *(f"pose.pose.orientation.{axis}" for axis in "xyzw"))
+ODOMETRY_FIELDS = (FRAME, *POSE, "twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.angular.z")
+ROSOUT_FIELDS = ("level", "name", "msg")
 SPEC: dict[str, Any] = {"kind": "nav2_goals", "goals": [[2.0, 0.0], [4.0, 0.0]], "goal_timeout_s": 60}
 STATUS = "/navigate_to_pose/_action/status"
 ACCEPTED, EXECUTING, SUCCEEDED, CANCELED, ABORTED = 1, 2, 4, 5, 6
@@ -50,7 +50,7 @@ def uuid(number: int) -> Any:
 def states(*told: tuple[float, Sequence[tuple[int, int]]]) -> Table:
     """What the server told: (time, [(goal, code)]), all goals that it remembers each time."""
     rows = [([uuid(goal) for goal, _ in goals], [code for _, code in goals]) for _, goals in told]
-    return table([t for t, _ in told], STATUS_FIELDS, rows)
+    return table([t for t, _ in told], MESSAGES[STATES].reads, rows)
 
 
 def plan(t: float, *points: tuple[float, float], frame: str = "odom") -> tuple[float, Sequence[Any]]:
@@ -66,7 +66,7 @@ def drive(**changed: Table | None) -> dict[str, Table]:
     """Goal 1 accepted at 10 s, there at 20 s; goal 2 accepted at 21 s, there at 31 s; an older goal is remembered."""
     t = np.arange(0.0, DURATION_S, 0.1)
     x = np.interp(t, [0, 10, 20, 21, 31], [0, 0, 2, 2, 4])
-    rows = [("odom", one, 0.0, 0.0, 0.0, 0.0, 1.0, v, 0.0) for one, v in zip(x, np.gradient(x, t), strict=True)]
+    rows = [("odom", one, 0.0, 0.0, 0.0, 0.0, 1.0, v, 0.0, 0.0) for one, v in zip(x, np.gradient(x, t), strict=True)]
     tables: dict[str, Table | None] = {
         STATUS: states(
             (0.5, [(9, SUCCEEDED)]),
@@ -79,15 +79,21 @@ def drive(**changed: Table | None) -> dict[str, Table]:
         "/plan": plans(plan(10.5, (0.0, 0.0), (2.0, 0.0)), plan(15.0, (1.0, 0.0), (2.0, 0.0)),
                        plan(21.5, (2.0, 0.0), (4.0, 0.0))),
         "/odom": table(t.tolist(), ODOMETRY_FIELDS, rows),
-        "/cmd_vel": table(t.tolist(), STAMPED_COMMAND_FIELDS, [(0.2, 0.0)] * len(t)),
+        "/cmd_vel": table(t.tolist(), MESSAGES[TWIST_STAMPED].reads, [(0.2, 0.0, 0.0)] * len(t)),
     }  # fmt: skip
     tables |= {"/" + name.replace("__", "/"): one for name, one in changed.items()}
     return {name: one for name, one in tables.items() if one is not None}
 
 
 def mission(tables: dict[str, Table], spec: dict[str, Any] = SPEC) -> Mission:
-    (one,) = KIND.missions(*read(tables, DURATION_S), spec)
+    (one,) = KIND.missions(*read(tables, DURATION_S, ROS2_DB3), spec)
     return one
+
+
+def sent(tables: dict[str, Table]) -> tuple[Goal, ...]:
+    model, _ = read(tables, DURATION_S, ROS2_DB3)
+    assert isinstance(model, Drive)
+    return goals(model, SPEC)
 
 
 def value(name: str, one: Mission, **args: Any) -> Value:
@@ -116,9 +122,9 @@ def test_how_goals_end() -> None:
         (25, [(3, EXECUTING), (4, ACCEPTED)]),
         (25.1, [(3, ABORTED), (4, EXECUTING)]),
     )
-    legs = find_legs({STATUS: told}, SPEC, DURATION_S)
+    found = sent({STATUS: told})
     ends = [(Status.ABORTED, 9.0), (Status.PREEMPTED, 14.0), (Status.PREEMPTED, 25.0), (None, 100.0)]
-    assert [(leg.status, leg.end_s) for leg in legs] == ends
+    assert [(goal.status, goal.end_s) for goal in found] == ends
     one = mission({STATUS: told}, {"kind": "nav2_goals"})
     assert [e.kind for e in KIND.evidence(one)] == ["abort", "cancel", "cancel", "timeout"]
     assert value("goals_ended", one, status="aborted") == 1.0
@@ -127,9 +133,9 @@ def test_how_goals_end() -> None:
 
 def test_a_goal_of_rviz_lies_where_it_was_clicked() -> None:
     pose = table([20.7], POSE_FIELDS, [("map", 7.0, 1.0, 0.0, 0.0, math.sin(0.5), math.cos(0.5))])
-    legs = find_legs(drive(goal_pose=pose), SPEC, DURATION_S)
-    assert [(leg.x, leg.frame) for leg in legs] == [(2.0, "odom"), (7.0, "map")]
-    assert legs[1].yaw == pytest.approx(1.0)
+    found = sent(drive(goal_pose=pose))
+    assert [(goal.x, goal.frame) for goal in found] == [(2.0, "odom"), (7.0, "map")]
+    assert found[1].yaw == pytest.approx(1.0)
     left = value("distance_left", mission(drive(goal_pose=pose)))
     assert isinstance(left, Unavailable)
     assert "frame map, odom" in left.reason
@@ -166,7 +172,7 @@ def test_goals_on_the_map_are_measured_by_where_the_navigator_says_the_robot_is(
 def test_recoveries_and_failures_of_the_behavior_tree() -> None:
     tree = table(
         [12.0, 13.0, 14.0],
-        TREE_FIELDS,
+        MESSAGES[TREE].reads,
         [
             (["ComputePathToPose", "FollowPath"], ["RUNNING", "RUNNING"], ["SUCCESS", "FAILURE"]),
             (
@@ -219,11 +225,10 @@ def test_a_loop_that_kept_its_rate_by_its_own_clock_did_not_miss_it() -> None:
 
 
 def test_a_log_without_goals_holds_no_mission() -> None:
-    assert KIND.missions(*read({}, DURATION_S), SPEC) == ()
-    assert KIND.missions(*read({STATUS: states()}, DURATION_S), SPEC) == ()
-    assert (
-        KIND.missions(*read({STATUS: states((0.0, [(1, SUCCEEDED)]), (5.0, [(1, SUCCEEDED)]))}, DURATION_S), SPEC) == ()
-    )
+    assert KIND.missions(*read({}, DURATION_S, ROS2_DB3), SPEC) == ()
+    assert KIND.missions(*read({STATUS: states()}, DURATION_S, ROS2_DB3), SPEC) == ()
+    over = states((0.0, [(1, SUCCEEDED)]), (5.0, [(1, SUCCEEDED)]))
+    assert KIND.missions(*read({STATUS: over}, DURATION_S, ROS2_DB3), SPEC) == ()
 
 
 @given(
@@ -233,10 +238,10 @@ def test_a_log_without_goals_holds_no_mission() -> None:
 )
 def test_any_states_make_goals_in_order(told: list[tuple[float, list[tuple[int, int]]]]) -> None:
     tables = {STATUS: states(*sorted(told, key=lambda one: one[0]))}
-    legs = find_legs(tables, SPEC, DURATION_S)
-    assert [leg.sent_s for leg in legs] == sorted(leg.sent_s for leg in legs)
-    assert all(leg.sent_s <= leg.end_s <= DURATION_S for leg in legs)
-    for one in KIND.missions(*read(tables, DURATION_S), SPEC):
+    found = sent(tables)
+    assert [goal.sent_s for goal in found] == sorted(goal.sent_s for goal in found)
+    assert all(goal.sent_s <= goal.end_s <= DURATION_S for goal in found)
+    for one in KIND.missions(*read(tables, DURATION_S, ROS2_DB3), SPEC):
         assert one.start_s <= one.end_s
         KIND.evidence(one)
         KIND.mismatch(one)

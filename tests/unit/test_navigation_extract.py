@@ -17,16 +17,11 @@ from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission, fi
 from care_core.ecosystems.registry import run_model
 from care_core.ecosystems.ros.measures import battery as battery_extractors
 from care_core.ecosystems.ros.measures import navigation
-from care_core.ecosystems.ros.measures.actionlib import GOAL_FIELDS, RECOVERY_FIELDS, RESULT_FIELDS
-from care_core.ecosystems.ros.measures.drive import (
-    BATTERY_FIELDS,
-    COMMAND_FIELDS,
-    ODOMETRY_FIELDS,
-    ROSOUT_FIELDS,
-    angle_between,
-)
+from care_core.ecosystems.ros.measures.window import angle_between
+from care_core.ecosystems.ros.messages import ACTION_GOAL, ACTION_RESULT, FRAME, MESSAGES, RECOVERY, TWIST
 from care_core.extract.read import read_run
 from care_core.logs.base import Table
+from care_core.logs.formats import ROS1_BAG
 from care_core.logs.opening import open_log
 from care_core.profile.reading import read_schema
 from care_core.records import replace
@@ -40,6 +35,10 @@ SPEC: dict[str, Any] = {"goals": [list(goal) for goal in GOALS], "goal_timeout_s
 MODULES = (navigation.__name__, battery_extractors.__name__)
 OWN = [name for name, one in EXTRACTORS.items() if one.compute.__module__ in MODULES]
 DURATION_S = 100.0
+POSE = ("pose.pose.position.x", "pose.pose.position.y", *(f"pose.pose.orientation.{axis}" for axis in "xyzw"))
+ODOMETRY_FIELDS = (FRAME, *POSE, "twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.angular.z")
+BATTERY_FIELDS = ("voltage", "current", "charge")
+ROSOUT_FIELDS = ("level", "name", "msg")
 
 
 def table(t: Sequence[float], fields: Sequence[str], rows: Sequence[Sequence[Any]]) -> Table:
@@ -55,12 +54,16 @@ def table(t: Sequence[float], fields: Sequence[str], rows: Sequence[Sequence[Any
 def goals(*sent: tuple[float, float, float], frame: str = "odom") -> Table:
     """Goals (time, x, y), heading 0."""
     rows = [(f"goal-{n}", frame, x, y, 0.0, 0.0, 0.0, 1.0) for n, (_, x, y) in enumerate(sent)]
-    return table([t for t, *_ in sent], GOAL_FIELDS, rows)
+    return table([t for t, *_ in sent], MESSAGES[ACTION_GOAL].reads, rows)
 
 
 def results(*ended: tuple[float, int, int]) -> Table:
     """Results (time, number of the goal, status)."""
-    return table([t for t, *_ in ended], RESULT_FIELDS, [(f"goal-{n}", float(s), "said why") for _, n, s in ended])
+    return table(
+        [t for t, *_ in ended],
+        MESSAGES[ACTION_RESULT].reads,
+        [(f"goal-{n}", float(s), "said why") for _, n, s in ended],
+    )
 
 
 def odometry(way: Mapping[float, float], frame: str = "odom") -> Table:
@@ -68,14 +71,14 @@ def odometry(way: Mapping[float, float], frame: str = "odom") -> Table:
     t = np.arange(0.0, DURATION_S, 0.1)
     x = np.interp(t, list(way), list(way.values()))
     speed = np.gradient(x, t)
-    rows = [(frame, one, 0.0, 0.0, 0.0, 0.0, 1.0, v, 0.0) for one, v in zip(x, speed, strict=True)]
+    rows = [(frame, one, 0.0, 0.0, 0.0, 0.0, 1.0, v, 0.0, 0.0) for one, v in zip(x, speed, strict=True)]
     return table(t.tolist(), ODOMETRY_FIELDS, rows)
 
 
 def commands(speed: float, turn: Sequence[float]) -> Table:
     """Commands at 5 Hz with one forward speed, turns taken in rotation."""
     t = np.arange(0.0, DURATION_S, 0.2)
-    return table(t.tolist(), COMMAND_FIELDS, [(speed, turn[n % len(turn)]) for n in range(len(t))])
+    return table(t.tolist(), MESSAGES[TWIST].reads, [(speed, 0.0, turn[n % len(turn)]) for n in range(len(t))])
 
 
 def battery(current: float, charge: float = math.nan) -> Table:
@@ -97,7 +100,7 @@ def drive(**changed: Table) -> dict[str, Table]:
 
 
 def mission(tables: Mapping[str, Table], spec: Mapping[str, Any] = SPEC) -> Mission:
-    (one,) = KIND.missions(*read(tables, DURATION_S), spec)
+    (one,) = KIND.missions(*read(tables, DURATION_S, ROS1_BAG), spec)
     return one
 
 
@@ -174,14 +177,14 @@ def test_the_list_starting_again_is_a_new_mission() -> None:
         move_base__goal=goals((10, 2, 0), (21, 4, 0), (40, 2, 0), (51, 4, 0)),
         move_base__result=results((20, 0, 3), (31, 1, 3), (50, 2, 3), (61, 3, 4)),
     )
-    first, second = KIND.missions(*read(twice, DURATION_S), SPEC)
+    first, second = KIND.missions(*read(twice, DURATION_S, ROS1_BAG), SPEC)
     assert (first.start_s, first.end_s, second.start_s, second.end_s) == (10, 31, 40, 61)
     assert [value("goals_success", one) for one in (first, second)] == [1, 0]
     assert [value("goals_sent", one) for one in (first, second)] == [2, 2]
 
 
 def test_no_goals_no_mission() -> None:
-    assert KIND.missions(*read({}, DURATION_S), SPEC) == ()
+    assert KIND.missions(*read({}, DURATION_S, ROS1_BAG), SPEC) == ()
 
 
 @pytest.mark.parametrize(
@@ -304,7 +307,7 @@ def test_commands_that_are_no_numbers_go_no_way() -> None:
 
 def test_recoveries() -> None:
     names = ("conservative_reset", "rotate_recovery", "rotate_recovery")
-    ran = table([12, 13, 14], RECOVERY_FIELDS, [(name,) for name in names])
+    ran = table([12, 13, 14], MESSAGES[RECOVERY].reads, [(name,) for name in names])
     one = mission(drive(move_base__recovery_status=ran))
     assert value("recoveries", one, behavior="rotate") == 2
     assert value("recoveries", one) == 3

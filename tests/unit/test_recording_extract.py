@@ -12,6 +12,7 @@ from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, find_ext
 from care_core.ecosystems.whole_log import KIND
 from care_core.extract.read import reading_plan
 from care_core.logs.base import Table
+from care_core.logs.formats import PX4_ULG
 from care_core.profile.schema import Schema
 from care_core.run import Unavailable
 from care_core.variables import Extract, Role, Variable
@@ -67,7 +68,7 @@ def test_the_outcome_is_the_word_of_the_robot(failsafe: float, expected: float) 
     status = {"arming_state": np.where((T > 0) & (T < 8), 2.0, 1.0), "failsafe": np.where(T == 4, failsafe, 0.0)}
     landed = Table(T, {"landed": np.where((T > 1) & (T < 7), 0.0, 1.0)})
     tables = {"vehicle_status": Table(T, status), "vehicle_land_detected": landed}
-    (mission,) = MISSION_KINDS["px4_flight"].missions(*read(tables, 9.0), {"kind": "px4_flight"})
+    (mission,) = MISSION_KINDS["px4_flight"].missions(*read(tables, 9.0, PX4_ULG), {"kind": "px4_flight"})
     assert find_extractor("outcome").compute(mission, {}) == expected
     assert isinstance(find_extractor("outcome").compute(Mission(no_model(), {}, 0, 9, True, {}), {}), Unavailable)
 

@@ -189,7 +189,7 @@ def goals(*statuses: int | None) -> Value:
         "/move_base/goal": Table(np.linspace(0.0, 10.0 * (count - 1), count), sent),
         "/move_base/result": Table(10.0 * np.array(answered, float) + 8.0, results),
     }
-    missions: tuple[Mission, ...] = kind.missions(*read(tables, 100.0), {"goal_timeout_s": 1e9})
+    missions: tuple[Mission, ...] = kind.missions(*read(tables, 100.0, formats.ROS1_BAG), {"goal_timeout_s": 1e9})
     (check,) = kind.outcome(missions[-1])
     return check.value
 

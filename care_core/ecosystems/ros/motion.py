@@ -108,20 +108,19 @@ class Commands(Record, eq=False):
 
 
 def odometry_of(topic: str, table: Table) -> Odometry | None:
-    """The odometry of a topic; None where its messages are not of that kind, or none tells numbers."""
+    """The odometry of a topic; None where it has no messages of that kind."""
     places, speeds = ("pose.pose.position.x", "pose.pose.position.y"), ("linear.x", "linear.y", "angular.z")
     fields = (*places, *(f"twist.twist.{name}" for name in speeds))
     headings = [f"pose.pose.orientation.{axis}" for axis in "xyzw"]
-    if len(table) < _FEWEST or not {*fields, *headings} <= set(table.columns):
+    if not len(table) or not {*fields, *headings} <= set(table.columns):
         return None
     x, y, speed, sideways, turn = (believable(table, ODOMETRY, name) for name in fields)
     good = np.isfinite(x + y + speed + sideways + turn)
-    if np.count_nonzero(good) < 2:
-        return None
+    frames = table[FRAME][good].tolist() if FRAME in table.columns else []
     t, clock = when_made(table), _clock(table)
     return Odometry(
         topic=topic,
-        frame=str(table[FRAME][good][0]) if FRAME in table.columns else "",
+        frame=str(frames[0]) if frames else "",
         recorded_s=table.t[good],
         t=t[good],
         clock=(t if clock is None else clock)[good],

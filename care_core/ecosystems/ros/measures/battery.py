@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
-from care_core.ecosystems.ros.measures.drive import BATTERY_FIELDS, Floats, has, topics
+from care_core.ecosystems.ros.measures.window import drive_of, topics
+from care_core.ecosystems.ros.sensors import LEAST_V, MOST_V, Battery
 from care_core.logs.plausible import is_alive
-from care_core.records import Record
+from care_core.numbers import Floats
 from care_core.run import Unavailable, Value
 
-_LEAST_V, _MOST_V = 2.0, 1e3
-"""A lithium cell is empty above the one, no vehicle's battery reaches the other. Simple drivers say a fixed voltage."""
 _LEAST_W = 1.0
 """Mean power of a mission: a computer alone takes more."""
 _AGREE, _ENOUGH_AH = 2.0, 0.01
@@ -86,31 +85,17 @@ def battery_voltage(mission: Mission, args: Args) -> Value:
     return float(inside[0] if args.get("of") == "start" else inside.min())
 
 
-class _Battery(Record, eq=False):
-    """Battery of the whole log: s, V, A, Ah, each of shape (n,)."""
-
-    t: Floats
-    voltage: Floats
-    current: Floats
-    charge: Floats
-
-
-def _battery(mission: Mission) -> _Battery | Unavailable:
+def _battery(mission: Mission) -> Battery | Unavailable:
     """The battery's record, which must cover the mission but for a few seconds."""
-    channel = topics(mission.spec).battery
-    table = mission.tables.get(channel)
-    if table is None or not has(table, BATTERY_FIELDS):
+    drive, channel = drive_of(mission), topics(mission.spec).battery
+    battery = None if drive is None else drive.battery_on(channel)
+    if battery is None:
         return missing(channel)
-    known = np.isfinite(table["voltage"])
-    inside = known & (table.t >= mission.start_s) & (table.t <= mission.end_s)
+    inside = battery.t[(battery.t >= mission.start_s) & (battery.t <= mission.end_s)]
     edge_s = max(5.0, 0.05 * (mission.end_s - mission.start_s))
-    if (
-        inside.sum() < 2
-        or table.t[inside][0] > mission.start_s + edge_s
-        or table.t[inside][-1] < mission.end_s - edge_s
-    ):
+    if len(inside) < 2 or inside[0] > mission.start_s + edge_s or inside[-1] < mission.end_s - edge_s:
         return Unavailable(f"{channel} does not cover the mission", "record it from the first goal to the last")
-    volts = float(table["voltage"][known].max())
-    if not _LEAST_V <= volts <= _MOST_V:
+    volts = float(battery.voltage.max())
+    if not LEAST_V <= volts <= MOST_V:
         return Unavailable(f"the battery says {volts:.3g} V, which none has", "check its sensor, and the driver's unit")
-    return _Battery(table.t[known], *(np.asarray(table[name][known], np.float64) for name in BATTERY_FIELDS))
+    return battery

@@ -2,12 +2,11 @@
 
 The planner says little about why it fails (a robot boxed in by its own cost weights dithers on the spot without one
 warning), so the evidence holds what such a failure looks like beside what the log says. How the log tells its goals
-is the goal server's own, see `drive.GoalServer`.
+is the goal server's own, see `window.GoalServer`.
 """
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -15,20 +14,13 @@ import numpy as np
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import Args, Mission, MissionKind, numeric, points
-from care_core.ecosystems.ros.measures.drive import (
-    BATTERY_FIELDS,
-    COMMAND_FIELDS,
-    MOVING_MPS,
-    ODOMETRY_FIELDS,
-    ROSOUT_FIELDS,
-    STAMPED_COMMAND_FIELDS,
-    STAMPED_FIELDS,
+from care_core.ecosystems.ros.drive import BATTERY_FIELDS, COMMAND_FIELDS, LOG_FIELDS, ODOMETRY_FIELDS, Drive
+from care_core.ecosystems.ros.goals import Goal, Status
+from care_core.ecosystems.ros.measures.window import (
     TOLERANCE_M,
-    Commands,
-    Leg,
-    Status,
-    analyse,
+    ActiveCommands,
     difference,
+    drive_of,
     goal_server,
     listed_goals,
     longest,
@@ -36,21 +28,16 @@ from care_core.ecosystems.ros.measures.drive import (
     share,
     time_limit_s,
     topics,
+    window,
 )
+from care_core.ecosystems.ros.motion import STANDS_MPS
+from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS, Level, LogMessage
 from care_core.logs.base import Table, Wanted
 from care_core.logs.plausible import kept_its_rate
 from care_core.run import Check, Evidence, Unavailable, Value
 
-ROSOUT = ("/rosout", "/rosout_agg")
-
 _IDLE_S = 120.0
 """A pause this long between goals ends a mission."""
-
-_WARN = 4
-"""Level of a warning in rosgraph_msgs/Log (1 debug, 2 info, 4 warn, 8 error, 16 fatal)."""
-
-_ROS2_LEVELS = {10: 1, 20: 2, 30: 4, 40: 8, 50: 16}
-"""Levels of rcl_interfaces/Log in those of rosgraph_msgs/Log."""
 
 _STUCK_S = 15.0
 """A robot that stands or only swings for this long with a goal ahead is stuck."""
@@ -87,7 +74,7 @@ GOAL_ARGS: Mapping[str, str] = {
 class GoalMissions(MissionKind):
     """From the first goal of a list to the answer to its last."""
 
-    def __init__(self, name: str, args: Mapping[str, str], rosout: Sequence[str] = ROSOUT) -> None:
+    def __init__(self, name: str, args: Mapping[str, str], rosout: Sequence[str] = ROSOUT_TOPICS) -> None:
         """`name` is the mission kind, which names its goal server too; `args` are those of that goal server alone.
         `rosout` is where its nodes speak."""
         self.name, self.rosout = name, rosout
@@ -97,25 +84,26 @@ class GoalMissions(MissionKind):
         names = topics(spec)
         return {
             **goal_server(spec).needs(spec),
-            names.odometry: (*ODOMETRY_FIELDS, *STAMPED_FIELDS),
-            names.commands: (*COMMAND_FIELDS, *STAMPED_COMMAND_FIELDS),
-            names.battery: (*BATTERY_FIELDS, *STAMPED_FIELDS),
-            **dict.fromkeys(self.rosout, ROSOUT_FIELDS),
+            names.odometry: ODOMETRY_FIELDS,
+            names.commands: COMMAND_FIELDS,
+            names.battery: BATTERY_FIELDS,
+            **dict.fromkeys(self.rosout, LOG_FIELDS),
         }
 
     def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
         """One mission each time the list of goals starts again, or goals come after a long pause."""
+        if not isinstance(model, Drive):
+            return ()
         missions = []
-        groups = _split(goal_server(spec).legs(tables, spec, model.log.duration_s), spec)
-        for number, legs in enumerate(groups):
-            until_s = groups[number + 1][0].sent_s if number + 1 < len(groups) else model.log.duration_s
-            missions.append(
-                Mission(model, tables, legs[0].sent_s, legs[-1].end_s, _has_ended(legs, spec, until_s), spec)
-            )
+        groups = _split(goal_server(spec).goals(model, spec), spec)
+        for number, goals in enumerate(groups):
+            until_s = groups[number + 1][0].sent_s if number + 1 < len(groups) else model.duration_s
+            ended = _has_ended(goals, spec, until_s)
+            missions.append(Mission(model, tables, goals[0].sent_s, goals[-1].end_s, ended, spec))
         return tuple(missions)
 
     def mismatch(self, mission: Mission) -> str:
-        return difference(mission.shared(analyse).legs, mission.spec)
+        return difference(mission.shared(window).goals, mission.spec)
 
     def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
         """Failed goals, recoveries, standstill, and warnings of the log: each kind of message once, with its count."""
@@ -124,50 +112,50 @@ class GoalMissions(MissionKind):
 
     def outcome(self, mission: Mission) -> tuple[Check, ...]:
         """Whether the goals were reached; one that its sender cancelled or replaced is no failure of the robot."""
-        legs = mission.shared(analyse).legs
-        reached = sum(leg.status == Status.SUCCEEDED for leg in legs)
-        failed = sum(leg.status in (Status.ABORTED, Status.REJECTED, Status.LOST) for leg in legs)
-        word = f"{reached} of {len(legs)} goals were reached"
+        goals = mission.shared(window).goals
+        reached = sum(goal.status == Status.SUCCEEDED for goal in goals)
+        failed = sum(goal.status in (Status.ABORTED, Status.REJECTED, Status.LOST) for goal in goals)
+        word = f"{reached} of {len(goals)} goals were reached"
         value: Value = 1.0 if reached else Unavailable(f"{word}, the others were cancelled or left open")
         if failed:
             value = 0.0
-        elif legs and legs[-1].status is None:
+        elif goals and goals[-1].status is None:
             value = Unavailable("the log ends before the last goal was answered", "record until it is")
         return (Check("goals_reached", value, "every goal that was not taken back was reached", word),)
 
 
-def _split(legs: Sequence[Leg], spec: Args) -> list[list[Leg]]:
-    goals = listed_goals(spec)
+def _split(goals: Sequence[Goal], spec: Args) -> list[list[Goal]]:
+    listed = listed_goals(spec)
     tolerance_m = float(spec.get("tolerance_m", TOLERANCE_M))
-    groups: list[list[Leg]] = []
-    for leg in legs:
-        if not groups or _starts_again(leg, groups[-1], goals, tolerance_m):
+    groups: list[list[Goal]] = []
+    for goal in goals:
+        if not groups or _starts_again(goal, groups[-1], listed, tolerance_m):
             groups.append([])
-        groups[-1].append(leg)
+        groups[-1].append(goal)
     return groups
 
 
-def _starts_again(leg: Leg, group: Sequence[Leg], goals: Sequence[tuple[float, float]], tolerance_m: float) -> bool:
+def _starts_again(goal: Goal, group: Sequence[Goal], listed: Sequence[tuple[float, float]], tolerance_m: float) -> bool:
     """Whether a goal begins a new mission after those of `group`."""
-    if leg.sent_s - group[-1].end_s > _IDLE_S:
+    if goal.sent_s - group[-1].end_s > _IDLE_S:
         return True
     # A goal that replaces one still under way belongs to the same mission, wherever it lies.
-    replaces = group[-1].status is None or group[-1].end_s >= leg.sent_s
-    firsts = {(group[0].x, group[0].y), *goals[:1]}
-    return not replaces and any(leg.offset(*first) <= tolerance_m for first in firsts)
+    replaces = group[-1].status is None or group[-1].end_s >= goal.sent_s
+    firsts = {(group[0].x, group[0].y), *listed[:1]}
+    return not replaces and any(goal.offset(*first) <= tolerance_m for first in firsts)
 
 
-def _has_ended(legs: Sequence[Leg], spec: Args, until_s: float) -> bool:
+def _has_ended(goals: Sequence[Goal], spec: Args, until_s: float) -> bool:
     """Whether the log shows the mission's end: its last goal answered or out of time, and no goal of the list to come.
 
     A client may give up after failed goals, so a list that was not finished has ended too once a goal failed; while
     every goal so far was reached, the log must go on for a goal's time without the next.
     """
-    limit_s = time_limit_s(legs, spec)
-    last = legs[-1]
+    limit_s = time_limit_s(goals, spec)
+    last = goals[-1]
     if last.status is None:
         return until_s - last.sent_s > limit_s
-    if len(legs) < len(own_goals(legs, spec)) and all(leg.reached(limit_s) for leg in legs):
+    if len(goals) < len(own_goals(goals, spec)) and all(goal.reached(limit_s) for goal in goals):
         return until_s - last.end_s > limit_s
     return True
 
@@ -176,16 +164,16 @@ def _has_ended(legs: Sequence[Leg], spec: Args, until_s: float) -> bool:
 
 
 def _failed_goals(mission: Mission) -> Iterator[Evidence]:
-    drive = mission.shared(analyse)
-    for number, leg in enumerate(drive.legs, start=1):
-        said = f": {leg.text}" if leg.text else ""
-        if leg.status in (Status.ABORTED, Status.REJECTED, Status.LOST):
-            word = Status(leg.status).name.lower()
-            yield Evidence(leg.end_s, f"goal {number} {word} after {leg.time_s:.0f} s{said}", "abort")
-        elif leg.time_s > drive.timeout_s:
-            yield Evidence(leg.end_s, f"goal {number} not reached within {drive.timeout_s:.0f} s{said}", "timeout")
-        elif leg.status in (Status.PREEMPTED, Status.RECALLED):
-            yield Evidence(leg.end_s, f"goal {number} cancelled after {leg.time_s:.0f} s{said}", "cancel")
+    drive = mission.shared(window)
+    for number, goal in enumerate(drive.goals, start=1):
+        why = f": {goal.text}" if goal.text else ""
+        if goal.status in (Status.ABORTED, Status.REJECTED, Status.LOST):
+            word = Status(goal.status).name.lower()
+            yield Evidence(goal.end_s, f"goal {number} {word} after {goal.time_s:.0f} s{why}", "abort")
+        elif goal.time_s > drive.timeout_s:
+            yield Evidence(goal.end_s, f"goal {number} not reached within {drive.timeout_s:.0f} s{why}", "timeout")
+        elif goal.status in (Status.PREEMPTED, Status.RECALLED):
+            yield Evidence(goal.end_s, f"goal {number} cancelled after {goal.time_s:.0f} s{why}", "cancel")
 
 
 def _recoveries(mission: Mission) -> Iterator[Evidence]:
@@ -196,42 +184,40 @@ def _recoveries(mission: Mission) -> Iterator[Evidence]:
 
 def _stuck(mission: Mission) -> Iterator[Evidence]:
     """Goals on which the robot made no way for long, and what it was commanded meanwhile."""
-    drive = mission.shared(analyse)
+    drive = mission.shared(window)
     if drive.odometry is None or not drive.odometry.tells_speed:
         return
-    for number, leg in enumerate(drive.legs):
-        inside = drive.odometry.leg == number
-        still_s = longest(np.abs(drive.odometry.speed[inside]) < MOVING_MPS, drive.odometry.dt[inside])
-        if still_s < _STUCK_S or leg.reached(drive.timeout_s):
+    for number, goal in enumerate(drive.goals):
+        inside = drive.odometry.goal == number
+        still_s = longest(np.abs(drive.odometry.speed[inside]) < STANDS_MPS, drive.odometry.dt[inside])
+        if still_s < _STUCK_S or goal.reached(drive.timeout_s):
             continue
-        text = f"made no way for {still_s:.0f} s on goal {number + 1}{_commanded(drive.commands, leg)}"
-        yield Evidence(leg.end_s, text, "stuck")
+        text = f"made no way for {still_s:.0f} s on goal {number + 1}{_commanded(drive.commands, goal)}"
+        yield Evidence(goal.end_s, text, "stuck")
 
 
-def _commanded(commands: Commands | None, leg: Leg) -> str:
+def _commanded(commands: ActiveCommands | None, goal: Goal) -> str:
     if commands is None:
         return ""
-    inside = (commands.t >= leg.sent_s) & (commands.t <= leg.end_s)
+    inside = (commands.t >= goal.sent_s) & (commands.t <= goal.end_s)
     shares = {
         "to stand": share(commands.stands[inside], commands.dt[inside]),
         "to turn on the spot": share(commands.turns_on_spot[inside], commands.dt[inside]),
     }
-    order = max(shares, key=lambda one: shares[one])
+    order = max(shares, key=shares.__getitem__)
     return f", commanded {order} {shares[order]:.0%} of the time" if shares[order] > 0 else ""
 
 
 def _warnings(mission: Mission) -> Iterator[Evidence]:
     """Warnings and errors of the log, and recoveries that it announces at a lower level."""
-    table = rosout(mission)
-    if table is None:
-        return
     rows = []
-    for time_s, level, name, text in zip(table.t.tolist(), *(table[one] for one in ROSOUT_FIELDS), strict=True):
+    for message in log_messages(mission) or ():
+        name, text = message.node, message.text
         kind = next((kind for pattern, kind in _MESSAGE_KINDS if pattern.search(text)), None)
-        if (level >= _WARN and not kept_its_rate(text)) or kind == "recovery":
+        if (message.level >= Level.WARN and not kept_its_rate(text)) or kind == "recovery":
             # On ROS 1 one node does it all and its name begins with a slash; on ROS 2 the server that speaks matters.
-            said = text if name.startswith("/") or not name else f"{name}: {text}"
-            rows.append((time_s, said, kind or "warning"))
+            spoken = text if name.startswith("/") or not name else f"{name}: {text}"
+            rows.append((message.time_s, spoken, kind or "warning"))
     yield from _condensed(rows)
 
 
@@ -248,18 +234,10 @@ def _condensed(rows: Sequence[tuple[float, str, str]]) -> Iterator[Evidence]:
         yield Evidence(time_s, text + times, kind)
 
 
-def _is_said(level: object, name: object, text: object) -> bool:
-    return isinstance(level, (int, float)) and math.isfinite(level) and isinstance(name, str) and isinstance(text, str)
-
-
-def rosout(mission: Mission) -> Table | None:
-    """What nodes said during the mission, with levels as ROS 1 has them. What a damaged definition reads as no text, or
-    no level, was said by nobody."""
-    for channel in ROSOUT:
-        table = mission.table(channel)
-        if table is not None and all(name in table.columns for name in ROSOUT_FIELDS):
-            said = zip(*(table[name].tolist() for name in ROSOUT_FIELDS), strict=True)
-            table = table.where(np.array([_is_said(*row) for row in said], dtype=bool))
-            levels = np.array([_ROS2_LEVELS.get(int(level), int(level)) for level in table["level"]], np.float64)
-            return Table(table.t, {**table.columns, "level": levels})
-    return None
+def log_messages(mission: Mission) -> tuple[LogMessage, ...] | None:
+    """What nodes said during the mission; None where that was not recorded."""
+    drive = drive_of(mission)
+    spoken = None if drive is None else drive.log_messages_on(ROSOUT_TOPICS)
+    if spoken is None:
+        return None
+    return tuple(message for message in spoken if mission.start_s <= message.time_s <= mission.end_s)

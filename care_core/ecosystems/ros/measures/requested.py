@@ -15,13 +15,13 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.measures.requested import Asked
 from care_core.ecosystems.measures import Args, Mission, extractor, one_of
-from care_core.ecosystems.ros.measures.drive import (
+from care_core.ecosystems.ros.measures.window import (
     TOLERANCE_M,
-    Drive,
-    analyse,
+    DriveWindow,
     angle_between,
     listed_headings,
     no_odometry,
+    window,
 )
 from care_core.run import Unavailable, Value
 
@@ -35,7 +35,7 @@ Pose = tuple[float, float, float]
 def goals_asked(mission: Mission) -> tuple[Asked, float] | Unavailable:
     """The way through the goals, from where the robot stood, and all turning it asks for in rad; use through
     `mission.shared`."""
-    drive = mission.shared(analyse)
+    drive = mission.shared(window)
     goals = _goals(drive, mission.spec)
     if any(math.isnan(x) for x, _, _ in goals):
         return Unavailable("the log does not say where the goals lie", "ros2 bag record /goal_pose /plan")
@@ -48,14 +48,14 @@ def goals_asked(mission: Mission) -> tuple[Asked, float] | Unavailable:
     return Asked(points, none, none, "open"), sum(_turns(poses))
 
 
-def _goals(drive: Drive, spec: Args) -> tuple[Pose, ...]:
+def _goals(drive: DriveWindow, spec: Args) -> tuple[Pose, ...]:
     """The goals of the mission: all of the profile's own, or those that were sent."""
-    sent = tuple((leg.x, leg.y, leg.yaw) for leg in drive.legs)
-    unsent = tuple((x, y, yaw) for (x, y), yaw in zip(drive.goals, listed_headings(spec), strict=False))
+    sent = tuple((goal.x, goal.y, goal.yaw) for goal in drive.goals)
+    unsent = tuple((x, y, yaw) for (x, y), yaw in zip(drive.listed, listed_headings(spec), strict=False))
     return (*sent, *unsent[len(sent) :])
 
 
-def _start(drive: Drive, first: Pose) -> Pose | Unavailable:
+def _start(drive: DriveWindow, first: Pose) -> Pose | Unavailable:
     """Where the robot stood when the first goal was sent, in the frame of the goals.
 
     Where the odometry has a frame of its own, the way to the first goal is as long as the robot came forward on it.
@@ -63,14 +63,14 @@ def _start(drive: Drive, first: Pose) -> Pose | Unavailable:
     odometry = drive.placed or drive.odometry
     if odometry is None:
         return no_odometry(drive)
-    here = np.flatnonzero(odometry.leg == 0)
+    here = np.flatnonzero(odometry.goal == 0)
     if not len(here):
         return Unavailable("the odometry begins after the first goal was sent", "record the whole mission")
     begin, end = here[0], here[-1]
-    frame, own = drive.legs[0].frame.strip("/"), odometry.frame.strip("/")
+    frame, own = drive.goals[0].frame.strip("/"), odometry.frame.strip("/")
     if not frame or not own or frame == own:
         return float(odometry.x[begin]), float(odometry.y[begin]), float(odometry.yaw[begin])
-    if not drive.legs[0].reached(drive.timeout_s):
+    if not drive.goals[0].reached(drive.timeout_s):
         hint = "name in the mission section a topic of nav_msgs/Odometry in the goals' frame"
         return Unavailable(f"goals are in frame {frame}, odometry is in {own}", hint)
     way_m = math.hypot(odometry.x[end] - odometry.x[begin], odometry.y[end] - odometry.y[begin])
@@ -139,8 +139,8 @@ def divided(compute: Callable[[Mission, Args], Value]) -> Callable[[Mission, Arg
         value, per = compute(mission, args), args.get("per")
         if isinstance(value, Unavailable) or per is None:
             return value
-        drive = mission.shared(analyse)
-        amount = way_asked_m(mission) if per == "metre" else float(len(drive.goals) or len(drive.legs))
+        drive = mission.shared(window)
+        amount = way_asked_m(mission) if per == "metre" else float(len(drive.listed) or len(drive.goals))
         return amount if isinstance(amount, Unavailable) else value / amount
 
     return answer
