@@ -124,7 +124,7 @@ def ask(model: Model, schema: Schema, rows: pd.DataFrame, medians: Mapping[str, 
         there = {**config, **reference}
         seen = {n: float(row[n]) for n in schema.variables if pd.notna(row[n])}
         before, after = CounterfactualQuery(model, config, {}, {}), CounterfactualQuery(model, config, seen, {})
-        limits = {v.name: v.threshold for v in schema.objectives if v.threshold is not None}
+        limits = {v.name: v.fixed for v in schema.objectives if v.fixed is not None}
         flagged = False
         for objective in schema.objectives:
             if objective.relative is None or objective.name not in model.outcomes:

@@ -157,8 +157,8 @@ def objectives_differ(diagnosis: Diagnosis, truth: Mapping[str, Any], platform: 
             true = true / JOULES_PER_WH
         assert result.threshold is not None
         expected = "ok" if result.threshold.met(true) else "fault"
-        near = abs(true - result.threshold.value) <= (
-            0.35 if name == "path_error_max" else 0.05 * result.threshold.value
+        near = abs(true - result.threshold.bound) <= (
+            0.35 if name == "path_error_max" else 0.05 * result.threshold.bound
         )
         if result.status != expected and not (near and result.status in ("ok", "fault")):
             differ.append(f"{name}: {result.status} {result.value}, truth {true}")

@@ -133,7 +133,7 @@ def _asked(
         there = {**config, **reference}
         before = CounterfactualQuery(model, config, {}, {})
         after = CounterfactualQuery(model, config, {str(k): v for k, v in rows.iloc[i].dropna().items()}, {})
-        bounds = {v.name: v.threshold for v in schema.objectives if v.threshold is not None}
+        bounds = {v.name: v.fixed for v in schema.objectives if v.fixed is not None}
         for objective in schema.objectives:
             if objective.relative is not None and objective.name in model.outcomes:
                 need = float(before.predict(objective.name, [there]).value[0])
@@ -258,7 +258,7 @@ def _count(
     limits: Mapping[str, float] = truth["limits"]  # type: ignore[assignment]
     for name, key in (("mission_time", "armed_time_s"), ("energy", "energy_wh")):
         if name in judged.bounds and any(r.variable.name == name and r.value is not None for r in judged.results):
-            found.limits.append(float(np.log(limits[key] / judged.bounds[name].value)))
+            found.limits.append(float(np.log(limits[key] / judged.bounds[name].bound)))
 
 
 def show_faults(found: Faults) -> None:

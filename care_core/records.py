@@ -55,7 +55,12 @@ class UnfitError(ValueError):
 
 def plain(value: Any) -> Any:
     """A record, or what is made of records, in dicts and lists, under the names that files have."""
-    return to_builtins(value, enc_hook=lambda one: one.item())
+    return to_builtins(value, enc_hook=_builtin)
+
+
+def _builtin(value: Any) -> Any:
+    """What `to_builtins` does not know: mappings of other kinds, and numbers of numpy."""
+    return dict(value) if isinstance(value, Mapping) else value.item()
 
 
 def read(kind: type[R], value: Any) -> R:

@@ -39,47 +39,43 @@ leg more is one."""
 
 
 class Threshold(Record):
-    """The bound an objective must keep, in the objective's unit."""
+    """What an objective should keep: a value, a multiple of what the reference configuration needs for the same mission
+    and conditions, or the one for the profile's own mission and the other for any."""
 
     op: Op
-    value: float
+    value: float | None = None
+    """In the objective's unit."""
+    ratio: float | None = None
+    """Times what the reference configuration needs."""
+    at_least: float | None = None
+    """A multiple is never tighter than this, in the objective's unit."""
+    source: str | None = None
+    """Whose it is: the file of the operator's own limits, "" for this run's, None for the profile's."""
+    mission: Mapping[str, float] = field(default_factory=dict)
+    """Contexts of the mission that an operator's value belongs to; empty: any mission."""
+
+    @property
+    def bound(self) -> float:
+        """The value of a threshold that has one. Raises ValueError where it is a multiple alone."""
+        if self.value is None:
+            raise ValueError(f"a threshold of '{self}' has no value before a run is known")
+        return self.value
 
     def met(self, value: float) -> bool:
-        return bool(_COMPARE[self.op](value, self.value))
-
-    def __str__(self) -> str:
-        return f"{self.op} {self.value:g}"
-
-
-class RelativeThreshold(Record):
-    """A bound that is a multiple of what the reference configuration needs for the same mission and conditions."""
-
-    op: Op
-    ratio: float
-    at_least: float | None = None
-    """The bound is never tighter than this, in the objective's unit."""
+        """Whether an objective of this value keeps the bound."""
+        return bool(_COMPARE[self.op](value, self.bound))
 
     def for_need(self, need: float) -> Threshold:
-        """The bound where the reference configuration needs `need`."""
+        """The bound where the reference configuration needs `need`. Raises ValueError where there is no ratio."""
+        if self.ratio is None:
+            raise ValueError(f"a threshold of '{self}' is no multiple")
         value = self.ratio * need
         if self.at_least is not None:
             value = max(value, self.at_least) if self.op in ("<=", "<") else min(value, self.at_least)
         return Threshold(self.op, float(f"{value:.4g}"))
 
-    def __str__(self) -> str:
-        floor = "" if self.at_least is None else f", or {self.at_least:g}"
-        return f"{self.op} {self.ratio:g} x what the reference configuration needs{floor}"
-
-
-class OwnLimit(Record):
-    """What an objective's threshold is where it is the operator's: the file that holds it, and the mission that it
-    belongs to (contexts by name; empty: any mission)."""
-
-    source: str
-    mission: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-
     def mismatch(self, context: Mapping[str, object]) -> str:
-        """Why a run is of another mission, in one clause; empty where it is of this one."""
+        """Why a run is of another mission than this threshold, in one clause; empty where it is of the same."""
         for name, wanted in self.mission.items():
             value = context.get(name)
             if not isinstance(value, (int, float)):
@@ -87,6 +83,12 @@ class OwnLimit(Record):
             if abs(value - wanted) > max(SAME_SHARE * abs(wanted), SAME_LEAST):
                 return f"the limit of {self.source} is for a mission with {name} {wanted:g}, this one has {value:.4g}"
         return ""
+
+    def __str__(self) -> str:
+        if self.value is not None:
+            return f"{self.op} {self.value:g}"
+        floor = "" if self.at_least is None else f", or {self.at_least:g}"
+        return f"{self.op} {self.ratio:g} x what the reference configuration needs{floor}"
 
 
 class Extract(Record):
@@ -131,10 +133,6 @@ class Variable(Record):
     """How fast the robot may go at most: less than the reference's is no fault but what this robot can or is to do."""
     kind: Kind | None = None
     threshold: Threshold | None = None
-    relative: RelativeThreshold | None = None
-    """The bound of an objective that has no fixed one, or has one for the profile's own mission alone."""
-    own_limit: OwnLimit | None = None
-    """Where the bound is from, where it is not the profile's."""
     grows: bool = False
     """Whether an objective only grows while the mission lasts: past its limit it is broken, however that ends."""
     accuracy: float = 0.0
@@ -149,6 +147,16 @@ class Variable(Record):
     order: int | None = None
     """Place in the mission, or in the making of a number out of others: a variable never causes one of a lower
     order. None where nothing is known."""
+
+    @property
+    def fixed(self) -> Threshold | None:
+        """The threshold, where it has a value whatever the mission needs."""
+        return self.threshold if self.threshold is not None and self.threshold.value is not None else None
+
+    @property
+    def relative(self) -> Threshold | None:
+        """The threshold, where it is a multiple of what the reference configuration needs."""
+        return self.threshold if self.threshold is not None and self.threshold.ratio is not None else None
 
     def accepts(self, value: float) -> bool:
         """Whether `value` may be suggested for this option."""

@@ -226,7 +226,7 @@ def _limits(case: Case, group: Sequence[Signal], values: Mapping[Source, Values 
         found = values.get(source)
         for result in case.diagnosis.objectives:
             if result.name == _COUNTERS.get(source) and result.threshold is not None and found is not None:
-                yield Limit(float(found[1][0]) + result.threshold.value, f"limit of {result.name}")
+                yield Limit(float(found[1][0]) + result.threshold.bound, f"limit of {result.name}")
 
 
 def _bands(findings: Collection[Finding], channel: str, span: tuple[float, float]) -> Iterator[Band]:
@@ -257,4 +257,4 @@ def _deadlines(case: Case, span: tuple[float, float]) -> Iterator[Limit]:
             and result.threshold
             and abs((result.value or 0.0) - (span[1] - span[0])) < 0.02 * (span[1] - span[0])
         ):
-            yield Limit(span[0] + result.threshold.value, f"limit of {result.name}")
+            yield Limit(span[0] + result.threshold.bound, f"limit of {result.name}")

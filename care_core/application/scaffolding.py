@@ -108,7 +108,7 @@ def summary(made: Scaffold, out: Path) -> str:
         f"{len(made.good)} of them good",
         f"  options     {len(schema.options)} ({guesses} with a guessed range), {left} parameters left out",
         f"  measures    {measures}",
-        *(f"  objective   {o.name} {o.threshold or o.relative} {o.unit}".rstrip() for o in schema.objectives),
+        *(f"  objective   {o.name} {o.threshold} {o.unit}".rstrip() for o in schema.objectives),
         "Read it and correct what is a guess. Then, with missions under varied options:",
         f"  care ingest LOG... -o {out.name}.parquet --profile {out}",
         f"  care train {out.name}.parquet --schema {out / PROFILE_FILE} -o {out}",

@@ -143,8 +143,10 @@ def mapped(value: object, change: Callable[[str], str]) -> object:
     if isinstance(value, str):
         return value if isinstance(value, Enum) else change(value)
     if isinstance(value, Variable):
-        own = value.own_limit and replace(value.own_limit, source=change(value.own_limit.source))
-        return replace(value, own_limit=own, parameters=tuple(map(change, value.parameters)))
+        limit = value.threshold
+        if limit is not None and limit.source:
+            limit = replace(limit, source=change(limit.source))
+        return replace(value, threshold=limit, parameters=tuple(map(change, value.parameters)))
     if isinstance(value, Record):
         parts = {name: mapped(getattr(value, name), change) for name in value.__struct_fields__}
         return replace(value, **parts)

@@ -348,7 +348,7 @@ def _chance(there: Posterior, passes: float, beyond: FloatArray | float = 0.0) -
 
 def _probability_of(mechanism: Mechanism, bound: Threshold, after: _Next) -> FloatArray:
     # A bound that no value of the target can go below (a time of 0 s) lies infinitely far on a log scale.
-    reachable = bound.value > LEAST[mechanism.transform]
-    limit = transformed(np.array(bound.value), mechanism.transform) if reachable else np.array(-np.inf)
+    reachable = bound.bound > LEAST[mechanism.transform]
+    limit = transformed(np.array(bound.bound), mechanism.transform) if reachable else np.array(-np.inf)
     below = after.share_below(mechanism, limit)
     return below if bound.op in ("<=", "<") else 1.0 - below

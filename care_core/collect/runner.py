@@ -65,7 +65,7 @@ class Collected(Struct, eq=False):
         counts: Counter[str] = Counter()
         for row in self.rows:
             counts.update(missed(row, self.campaign))
-        return {o.name: counts[o.name] for o in self.campaign.schema.objectives if o.threshold is not None}
+        return {o.name: counts[o.name] for o in self.campaign.schema.objectives if o.fixed is not None}
 
 
 def missed(row: TableRow, campaign: Campaign) -> list[str]:
@@ -73,9 +73,9 @@ def missed(row: TableRow, campaign: Campaign) -> list[str]:
     return [
         objective.name
         for objective in campaign.schema.objectives
-        if objective.threshold is not None
+        if objective.fixed is not None
         and isinstance(value := row[objective.name], (int, float))
-        and not objective.threshold.met(value)
+        and not objective.fixed.met(value)
     ]
 
 

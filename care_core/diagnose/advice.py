@@ -65,7 +65,7 @@ def _beyond(fix: Fix, result: ObjectiveResult) -> float:
     if predicted is None or bound is None or result.variable.kind == "functional":
         return 0.0
     sign = 1.0 if bound.op in ("<=", "<") else -1.0
-    return sign * (predicted.value - bound.value) / (abs(bound.value) or 1.0)
+    return sign * (predicted.value - bound.bound) / (abs(bound.bound) or 1.0)
 
 
 def untried(fix: Fix, learned_elsewhere: str) -> str | None:

@@ -20,7 +20,7 @@ from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import Record, replace
 from care_core.run import ProfileChoice, is_known
-from care_core.variables import Op, OwnLimit, Variable
+from care_core.variables import Op, Threshold, Variable
 
 _OF_80_PERCENT = 2 * 1.2816
 """Standard deviations between the ends of an 80 % interval of a normal distribution."""
@@ -51,7 +51,7 @@ class Proposal(Record):
 
     @property
     def op(self) -> Op:
-        bound = self.objective.threshold or self.objective.relative
+        bound = self.objective.threshold
         return bound.op if bound is not None else "<="
 
 
@@ -114,10 +114,10 @@ def propose(runs: Sequence[Judged], profile: Profile) -> tuple[Proposal, ...]:
 
 def missions(runs: Sequence[Judged], schema: Schema) -> int:
     """How many different missions the runs flew, as far as the profile can tell."""
-    different: list[OwnLimit] = []
+    different: list[Threshold] = []
     for judged in runs:
         if all(mission.mismatch(judged.run.context) for mission in different):
-            different.append(OwnLimit("", _asked(judged, schema)))
+            different.append(Threshold("<=", source="", mission=_asked(judged, schema)))
     return len(different)
 
 
@@ -182,7 +182,7 @@ def _spread(objective: Variable, runs: Sequence[Judged], profile: Profile, *, re
 
 def _quantile(objective: Variable, values: Sequence[float], spread: float | None) -> Quantile | None:
     """The 95 % quantile on the bad side. Values above 0 differ by factors, so their logarithms are looked at."""
-    bound = objective.threshold or objective.relative
+    bound = objective.threshold
     sign = 1.0 if bound is None or bound.op in ("<=", "<") else -1.0
     logs = min(values) > 0
     scaled = [sign * (math.log(value) if logs else value) for value in values]
@@ -204,8 +204,9 @@ def _rounded(value: float, *, up: bool) -> float:
 def for_any_mission(schema: Schema) -> Schema:
     """The schema whose objectives are judged whatever the mission: it is the operator's, as the limits will be. The
     profile's fixed limits are for its own mission, so where it has ratios these are what counts."""
-    own = {
-        o.name: replace(o, own_limit=OwnLimit(""), threshold=o.threshold if o.relative is None else None)
-        for o in schema.objectives
-    }
+    own = {}
+    for objective in schema.objectives:
+        if (declared := objective.threshold) is not None:
+            fixed = None if declared.ratio is not None else declared.value
+            own[objective.name] = replace(objective, threshold=replace(declared, value=fixed, source=""))
     return replace(schema, variables={**schema.variables, **own})

@@ -302,10 +302,10 @@ def meaningful(
 
 def _of_another_mission(objective: Variable, run: Run, schema: Schema) -> str:
     """Why the threshold in force is not one of this run's mission, empty where it is."""
-    if objective.own_limit is None:
+    if objective.threshold is None or objective.threshold.source is None:
         travels = objective.relative is not None and not schema.learned_elsewhere
         return "" if travels else run.mission.mismatch
-    return objective.own_limit.mismatch(run.context)
+    return objective.threshold.mismatch(run.context)
 
 
 def _accomplished(run: Run, schema: Schema, bounds: Mapping[str, Threshold]) -> bool:
@@ -320,7 +320,11 @@ def _accomplished(run: Run, schema: Schema, bounds: Mapping[str, Threshold]) -> 
 
 def _without_limits_of(named: Container[str], schema: Schema) -> Schema:
     """The schema without the site file's limits of objectives that the operator bounds for this run."""
-    freed = {o.name: replace(o, own_limit=None) for o in schema.objectives if o.own_limit and o.name in named}
+    freed = {
+        o.name: replace(o, threshold=replace(o.threshold, source=None, mission={}))
+        for o in schema.objectives
+        if o.threshold is not None and o.threshold.source is not None and o.name in named
+    }
     return replace(schema, variables={**schema.variables, **freed}) if freed else schema
 
 
@@ -334,9 +338,9 @@ def thresholds_in_force(
     """
     bounds: dict[str, Threshold] = {}
     for objective in schema.objectives:
-        bound = None if elsewhere and objective.relative is not None else objective.threshold
+        bound = None if elsewhere and objective.relative is not None else objective.fixed
         if objective.name in overrides:
-            declared = bound or objective.relative
+            declared = objective.threshold
             bound = Threshold(declared.op if declared else "<=", overrides[objective.name])
         if bound is not None:
             bounds[objective.name] = bound
@@ -395,7 +399,7 @@ def _judge_one(
 
 def _is_literal(objective: Variable, own: Container[str]) -> bool:
     """Whether the bound is the operator's, for this run or for the site."""
-    return objective.name in own or objective.own_limit is not None
+    return objective.name in own or (objective.threshold is not None and objective.threshold.source is not None)
 
 
 def _is_too_close(objective: Variable, value: float, bound: Threshold) -> bool:

@@ -62,8 +62,8 @@ class ObjectiveResult(Record):
     @property
     def basis(self) -> str:
         """What the threshold was made of and where it is written, empty where it is the profile's fixed one."""
-        own = self.variable.own_limit
-        written = "" if own is None or not own.source or self.threshold is None else f"limit of {own.source}"
+        declared = self.variable.threshold
+        written = f"limit of {declared.source}" if declared and declared.source and self.threshold is not None else ""
         parts = (self._made_of, written)
         return "; ".join(part for part in parts if part)
 

@@ -133,7 +133,7 @@ def verify_log(
         for name, before in promise.objectives.items()
         if before.threshold is not None and before.need is None
     }
-    own = {name: bound.value for name, bound in wanted.items() if name not in usual or usual[name].value != bound.value}
+    own = {name: bound.bound for name, bound in wanted.items() if name not in usual or usual[name].bound != bound.bound}
     judged = read_and_judge(run_model(log), profile, thresholds=own, mission=mission, good=good, sha256=sha256)
     found = verify(promise, judged, schema, _doubt(promise, judged.run, schema))
     return judged.run, replace(found, notes=tuple(_notes(promise, judged.run, schema)))

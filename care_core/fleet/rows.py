@@ -194,5 +194,5 @@ def _asked(query: CounterfactualQuery) -> Asked:
     return Asked(
         dict(query.config),
         {name: value for name, value in known.items() if value is not None},
-        {name: (bound.op, bound.value) for name, bound in query.thresholds.items()},
+        {name: (bound.op, bound.bound) for name, bound in query.thresholds.items()},
     )

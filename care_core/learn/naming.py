@@ -90,7 +90,7 @@ def taught_by(schema: Schema, model: Model, fault: FaultFile) -> Model:
 def _bound_of(schema: Schema, fault: FaultFile) -> Threshold:
     """The profile's threshold where the faulty runs miss it; else, as they were given as faulty, one between them and
     what the other runs mostly reached."""
-    bound = schema.variables[fault.objective].threshold
+    bound = schema.variables[fault.objective].fixed
     values = fault.runs[fault.objective].to_numpy(dtype=float)
     assert bound is not None, "an objective of a profile with faults has a threshold"
     faulty, usual = values[:FAULTY_RUNS], float(np.median(values[FAULTY_RUNS:]))

@@ -107,11 +107,11 @@ def inputs_of(names: Sequence[str], schema: Schema, nominal: Nominal | None = No
 def met(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArray:
     """1 where the objective keeps its threshold, 0 where not, NaN where it has no value; shape (n,)."""
     values = frame[objective.name].to_numpy(dtype=float)
-    if objective.threshold is None and objective.relative is not None:
+    if objective.fixed is None and objective.relative is not None:
         need = needs(objective, frame, schema)
         bounds = [None if np.isnan(n) else objective.relative.for_need(n) for n in need]
     else:
-        bounds = [objective.threshold] * len(values)
+        bounds = [objective.fixed] * len(values)
     kept = [np.nan if np.isnan(v) else float(b.met(v)) if b else 1.0 for v, b in zip(values, bounds, strict=True)]
     return np.array(kept)
 

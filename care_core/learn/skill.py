@@ -100,11 +100,11 @@ def _probabilities(
     filled = test.fillna({v.name: train[v.name].median() for v in schema.contexts})
     names = [name for name in schema.variables if name in filled]
     configs = [{str(k): float(v) for k, v in row.items()} for row in filled[names].to_dict("records")]
-    fixed = {v.name: v.threshold for v in schema.objectives if v.threshold is not None and v.name in outcomes}
+    fixed = {v.name: v.fixed for v in schema.objectives if v.fixed is not None and v.name in outcomes}
     relative_ones = [
         (v.name, v.relative)
         for v in schema.objectives
-        if v.threshold is None and v.relative is not None and v.name in outcomes
+        if v.fixed is None and v.relative is not None and v.name in outcomes
     ]
     if not relative_ones:
         return _asked(CounterfactualQuery(model, configs[0], {}, fixed), configs)

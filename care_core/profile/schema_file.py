@@ -25,7 +25,6 @@ from care_core.variables import (
     Extract,
     Kind,
     Op,
-    RelativeThreshold,
     Role,
     Threshold,
     ValueType,
@@ -61,10 +60,9 @@ class Bound(Strict):
             raise ValueError("'at_least' belongs to a 'ratio'")
         return self
 
-    def thresholds(self) -> tuple[Threshold | None, RelativeThreshold | None]:
-        """The fixed threshold and the relative one, of which there is one at least."""
-        fixed = None if self.value is None else Threshold(self.op, self.value)
-        return fixed, None if self.ratio is None else RelativeThreshold(self.op, self.ratio, self.at_least)
+    def threshold(self) -> Threshold:
+        """As the rest of the program knows it."""
+        return Threshold(self.op, self.value, self.ratio, self.at_least)
 
 
 class _Variable(Strict):
@@ -296,7 +294,6 @@ def _to_variable(name: str, v: _Variable) -> Variable:
     if v.extract is not None:
         args = {key: value for key, value in v.extract.items() if key != "kind"}
         extract = Extract(str(v.extract["kind"]), args)
-    absolute, relative = (None, None) if v.threshold is None else v.threshold.thresholds()
     return Variable(
         name=name,
         role=v.role,
@@ -312,8 +309,7 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         safety=v.safety,
         ceiling=v.ceiling,
         kind=v.kind,
-        threshold=absolute,
-        relative=relative,
+        threshold=None if v.threshold is None else v.threshold.threshold(),
         grows=v.grows,
         about=v.about,
         accuracy=v.accuracy,

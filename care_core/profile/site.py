@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from care_core.errors import ConfigError, nearest
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
-from care_core.variables import OwnLimit, Role, Variable
+from care_core.variables import Role, Variable
 
 if TYPE_CHECKING:
     from care_core.profile.site_file import SiteLimit
@@ -51,9 +51,8 @@ class Site(Record):
             if context not in contexts:
                 hint = nearest(context, contexts)
                 raise ConfigError(f"'{schema.name}' has no context '{context}'.", hint=hint, where=str(self.path))
-        absolute, relative = limit.thresholds()
-        own = OwnLimit(self.path.name, limit.mission)
-        return replace(objectives[name], threshold=absolute, relative=relative, own_limit=own)
+        own = replace(limit.threshold(), source=self.path.name, mission=limit.mission)
+        return replace(objectives[name], threshold=own)
 
 
 def site_path() -> Path:

@@ -373,7 +373,7 @@ def objective_entry(result: ObjectiveResult) -> ObjectiveEntry:
 
 
 def _threshold(threshold: Threshold, *, is_estimate: bool) -> ThresholdEntry:
-    return ThresholdEntry(op=threshold.op, value=six_digits(threshold.value) if is_estimate else threshold.value)
+    return ThresholdEntry(op=threshold.op, value=six_digits(threshold.bound) if is_estimate else threshold.bound)
 
 
 def _mission(verdict: MissionVerdict, judged: int) -> MissionEntry:

@@ -19,7 +19,7 @@ from care_core.scaffold.missions import Missions, find_missions
 from care_core.scaffold.options import Options, find_options
 from care_core.scaffold.thresholds import ProposedThreshold, good_runs, proposed_thresholds
 from care_core.scaffold.writing import comment, listed, scalar, variable_lines
-from care_core.variables import RelativeThreshold, Role, Threshold, Variable
+from care_core.variables import Role, Variable
 
 _ONLY_SAID = "only said in /rosout (record parameter_updates or /parameter_events, or give their file with --config)"
 
@@ -198,11 +198,7 @@ def _objectives(objectives: Sequence[Measure], bounds: Mapping[str, ProposedThre
     yield from comment("Objectives: what a mission is judged by.", 2)
     for measure in objectives:
         limit = bounds[measure.variable.name]
-        variable = replace(
-            measure.variable,
-            threshold=limit.bound if isinstance(limit.bound, Threshold) else None,
-            relative=limit.bound if isinstance(limit.bound, RelativeThreshold) else None,
-        )
+        variable = replace(measure.variable, threshold=limit.bound)
         yield from variable_lines(variable, f"{_seen(measure)}; threshold: {limit.remark}")
     if not objectives:
         yield "  # None: nothing in these logs tells how a mission came out. Add one that names an extractor."

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from care_core.diagnose.tolerance import upper_quantile
 from care_core.ecosystems.examine import examine
 from care_core.ecosystems.registry import run_model
-from care_core.records import Record
+from care_core.records import Record, replace
 from care_core.scaffold.measures import Measure, Measures
-from care_core.variables import RelativeThreshold, Role, Threshold, Variable
+from care_core.variables import Role, Threshold, Variable
 
 RATIO = 1.3
 """What the bundled profiles allow over what the reference configuration needs; used where runs are too few to tell how
@@ -20,7 +20,7 @@ much they differ."""
 class ProposedThreshold(Record):
     """A bound, and where it comes from. None: the objective brings its own."""
 
-    bound: Threshold | RelativeThreshold
+    bound: Threshold
     remark: str
 
 
@@ -39,7 +39,7 @@ def good_runs(measures: Measures) -> tuple[int, ...]:
 
 
 def _met(objective: Measure, place: int) -> bool:
-    value, bound = objective.values[place], objective.variable.threshold
+    value, bound = objective.values[place], objective.variable.fixed
     return value is not None and bound is not None and bound.met(value)
 
 
@@ -60,7 +60,7 @@ def _proposed(objective: Measure, good: Sequence[int], *, alike: bool) -> Propos
     if variable.kind == "functional" and variable.threshold is not None:
         return ProposedThreshold(variable.threshold, "met or not met")
     values = [value for place in good if (value := objective.values[place]) is not None]
-    bound = variable.threshold or variable.relative
+    bound = variable.threshold
     is_ceiling = bound is None or bound.op in ("<=", "<")
     if alike and values and min(values) > 0 and is_ceiling:
         found = upper_quantile([math.log(value) for value in values])
@@ -70,11 +70,11 @@ def _proposed(objective: Measure, good: Sequence[int], *, alike: bool) -> Propos
         worst = max(values)
         remark = f"{RATIO:g} x the largest of {len(values)} good runs ({min(values):.4g} to {worst:.4g})"
         return ProposedThreshold(Threshold("<=", float(f"{RATIO * worst:.3g}")), remark)
-    if not is_ceiling and variable.threshold is not None:
-        return ProposedThreshold(variable.threshold, "that of the profile it is from: correct it")
+    if not is_ceiling and variable.fixed is not None:
+        return ProposedThreshold(variable.fixed, "that of the profile it is from: correct it")
     why = "nothing says that the logs hold the same mission" if values else "no run was good"
     return ProposedThreshold(_ratio(variable), f"a ratio: {why}")
 
 
-def _ratio(variable: Variable) -> RelativeThreshold:
-    return variable.relative or RelativeThreshold("<=", RATIO)
+def _ratio(variable: Variable) -> Threshold:
+    return replace(variable.relative, value=None) if variable.relative else Threshold("<=", ratio=RATIO)

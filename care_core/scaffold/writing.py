@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from care_core.text import clean
-from care_core.variables import RelativeThreshold, Threshold, Variable
+from care_core.variables import Threshold, Variable
 
 WIDTH = 120
 _PLAIN = re.compile(r"[A-Za-z_/][\w./ ()-]*[\w)]|[A-Za-z]")
@@ -77,15 +77,14 @@ def _entry(variable: Variable) -> Iterator[tuple[str, Any]]:
         yield "safety", True
     if variable.ceiling:
         yield "ceiling", True
-    bound = variable.threshold or variable.relative
-    if bound is not None:
-        yield "threshold", _bound(bound)
+    if variable.threshold is not None:
+        yield "threshold", _bound(variable.threshold)
     if variable.extract is not None:
         yield "extract", {"kind": variable.extract.kind, **variable.extract.args}
 
 
-def _bound(bound: Threshold | RelativeThreshold) -> dict[str, Any]:
-    if isinstance(bound, Threshold):
+def _bound(bound: Threshold) -> dict[str, Any]:
+    if bound.value is not None:
         return {"op": bound.op, "value": bound.value}
     floor = {} if bound.at_least is None else {"at_least": bound.at_least}
     return {"op": bound.op, "ratio": bound.ratio, **floor}

@@ -66,7 +66,7 @@ def _gaps(schema: Schema, columns: Columns, runs: int) -> Iterator[str]:
             plural = "s" if len(empty) > 1 else ""
             yield f"{role.value}{plural} without a value in any run ({len(empty)}): {_names(empty)}"
     for objective in schema.objectives:
-        bound = objective.threshold
+        bound = objective.fixed
         met = {bound.met(value) for value in _known(columns, objective)} if bound is not None else set()
         if runs > 1 and len(met) == 1:
             yield f"{objective.name}: every run {'meets' if met == {True} else 'misses'} its threshold"

@@ -105,9 +105,8 @@ def _described(variable: Variable) -> str:
     facts = [variable.name]
     if variable.range is not None:
         facts.append(f"{variable.range[0]:g} to {variable.range[1]:g}")
-    bound = variable.threshold or variable.relative
-    if bound is not None:
-        facts.append(str(bound))
+    if variable.threshold is not None:
+        facts.append(str(variable.threshold))
     facts += [text for text in (variable.unit, variable.doc) if text]
     return "  ".join(facts)
 

@@ -87,7 +87,7 @@ def _strip(result: ObjectiveResult, summary: Summary, glyphs: Glyphs) -> Content
     """The training runs from least to most as a line, with this run's value and the threshold on it."""
     assert result.value is not None
     quantiles, bound = summary.quantiles, result.threshold
-    marks = [result.value] if bound is None else [result.value, bound.value]
+    marks = [result.value] if bound is None else [result.value, bound.bound]
     low, high = min(quantiles[0], *marks), max(quantiles[-1], *marks)
 
     def place(value: float) -> int:
@@ -98,7 +98,7 @@ def _strip(result: ObjectiveResult, summary: Summary, glyphs: Glyphs) -> Content
         first, last = place(quantiles[start]), place(quantiles[end])
         cells[first : last + 1] = sign * (last + 1 - first)
     if bound is not None:
-        cells[place(bound.value)] = glyphs.line
+        cells[place(bound.bound)] = glyphs.line
     cells[place(result.value)] = glyphs.root
     return Content("".join(cells))
 

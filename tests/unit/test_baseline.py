@@ -11,11 +11,11 @@ from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.run import Check, Evidence, Run
-from care_core.variables import OwnLimit, RelativeThreshold, Role, Variable
+from care_core.variables import Role, Threshold, Variable
 from tests.planted import SCHEMA, TIME, planted_run, with_variable
 
-RATIO = RelativeThreshold("<=", 1.3)
-TRAVELLING = with_variable(SCHEMA, replace(TIME, threshold=None, relative=RATIO))
+RATIO = Threshold("<=", ratio=1.3)
+TRAVELLING = with_variable(SCHEMA, replace(TIME, threshold=RATIO))
 LENGTH = Variable("length", Role.CONTEXT, unit="m", about="mission")
 ASKED = with_variable(SCHEMA, LENGTH)
 
@@ -51,7 +51,8 @@ def test_a_relative_limit_is_a_ratio_to_what_the_reference_needs(planted: Profil
 
 
 def test_a_profile_with_a_limit_for_its_own_mission_too_proposes_ratios(planted: Profile) -> None:
-    both = with_variable(SCHEMA, replace(TIME, relative=RATIO))
+    assert TIME.threshold is not None
+    both = with_variable(SCHEMA, replace(TIME, threshold=replace(RATIO, value=TIME.threshold.value)))
     runs = good(planted, both)
     without = propose(good(planted), Profile(planted.path, TRAVELLING))[0]
     assert without.limit is not None
@@ -110,4 +111,4 @@ def test_a_slow_run_is_no_failed_one(planted: Profile) -> None:
 @pytest.mark.parametrize(("length", "known"), [(102.0, True), (130.0, False), (None, False)])
 def test_an_own_limit_knows_its_mission(length: float | None, known: bool) -> None:
     context = {} if length is None else {"length": length}
-    assert (OwnLimit("site.yaml", {"length": 100.0}).mismatch(context) == "") is known
+    assert (Threshold("<=", 9.0, source="site.yaml", mission={"length": 100.0}).mismatch(context) == "") is known

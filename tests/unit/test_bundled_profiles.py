@@ -44,7 +44,7 @@ def test_an_option_has_its_own_parameters(schema: Schema) -> None:
 
 def test_objectives_have_thresholds(schema: Schema) -> None:
     assert any(objective.kind == "functional" for objective in schema.objectives)
-    assert all(objective.threshold or objective.relative for objective in schema.objectives)
+    assert all(objective.threshold for objective in schema.objectives)
 
 
 def test_extraction_names_what_exists(schema: Schema) -> None:

@@ -143,6 +143,6 @@ variables:
 """
     schema = parse_schema(text.replace("VARIATION", "variation"), Path("a.yaml"))
     time = schema.variables["time"]
-    assert (time.threshold is not None, time.relative is not None, schema.travels) == (True, True, True)
+    assert (time.fixed is not None, time.relative is not None, schema.travels) == (True, True, True)
     with pytest.raises(ProfileError, match="'events' names"):
         parse_schema(text.replace("VARIATION", "varation"), Path("a.yaml"))

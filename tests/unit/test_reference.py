@@ -9,11 +9,11 @@ from care_core.diagnose.reference import Good
 from care_core.profile.store import Profile
 from care_core.records import replace
 from care_core.run import Run, Setting
-from care_core.variables import RelativeThreshold, Threshold
+from care_core.variables import Threshold
 from tests.planted import DEFAULTS, SCHEMA, TIME, planted_run, with_variable
 
-RATIO = RelativeThreshold("<=", 1.3)
-TRAVELLING = with_variable(SCHEMA, replace(TIME, threshold=None, relative=RATIO))
+RATIO = Threshold("<=", ratio=1.3)
+TRAVELLING = with_variable(SCHEMA, replace(TIME, threshold=RATIO))
 
 
 def driven(run: Run, default: float) -> Run:
@@ -49,7 +49,7 @@ def test_a_value_within_the_interval_of_the_bound_is_not_sure(planted: Profile) 
     result = judge(planted_run(speed=0.4), TRAVELLING, planted.model).results[1]
     assert result.need is not None
     assert result.threshold is not None
-    near = replace(result, value=result.threshold.value * 1.001)
+    near = replace(result, value=result.threshold.bound * 1.001)
     assert not near.is_sure
 
 
@@ -65,7 +65,7 @@ def test_without_a_model_nothing_is_judged_by_a_need() -> None:
 
 
 def test_a_floor_holds_where_the_reference_needs_little() -> None:
-    floored = RelativeThreshold("<=", 1.3, at_least=2.0)
+    floored = Threshold("<=", ratio=1.3, at_least=2.0)
     assert floored.for_need(1.0) == Threshold("<=", 2.0)
     assert floored.for_need(3.0) == Threshold("<=", 3.9)
 
