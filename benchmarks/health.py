@@ -21,7 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.examining import find, flight_of
+from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.ardupilot.flight import as_flight
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.registry import run_model
 from care_core.errors import LogError
@@ -62,7 +63,7 @@ def read(logs: Path, table: Path) -> Iterator[Flown]:
             log = open_log(logs / f"{row['tag']}.BIN")
         except LogError:
             continue
-        flight = flight_of(run_model(log))
+        flight = as_flight(run_model(log))
         start = time.perf_counter()
         findings = find(flight)
         took = time.perf_counter() - start

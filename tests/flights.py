@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.ardupilot.examining import READS, find
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table
-from care_core.run import Setting
+from care_core.run import Damage, Setting
+from tests.tables import TablesLog
 
 Floats = NDArray[np.float64]
 ARMED_S, UP_S, DOWN_S, END_S = 5.0, 8.0, 100.0, 110.0
@@ -23,6 +24,19 @@ QUAD_X: Mapping[str, float] = {
 }  # fmt: skip
 FACTS = {"firmware": "ArduCopter V4.5.4 (fd1bcc61)", "vehicle": "multicopter"}
 _METRE = 1 / 111319.5
+
+
+def flight_of(
+    tables: Mapping[str, Table],
+    settings: Mapping[str, tuple[Setting, ...]],
+    facts: Mapping[str, str],
+    end_s: float = END_S,
+    damage: Sequence[Damage] = (),
+) -> Flight:
+    """The run model of a DataFlash log that holds these tables."""
+    flight = Flight(TablesLog(tables, end_s, facts=facts, known=settings, damage=tuple(damage)))
+    flight.expect(READS)
+    return flight
 
 
 class Made:
@@ -51,7 +65,12 @@ class Made:
         return find(self.flight())
 
     def flight(self) -> Flight:
-        return Flight(self.tables(), {n: (Setting(n, v, "PARM"),) for n, v in self.settings.items()}, self.facts, END_S)
+        return flight_of(self.tables(), self.known, self.facts)
+
+    @property
+    def known(self) -> dict[str, tuple[Setting, ...]]:
+        """The parameters as a log holds them."""
+        return {name: (Setting(name, value, "PARM"),) for name, value in self.settings.items()}
 
     def tables(self) -> dict[str, Table]:
         made: dict[str, Table] = {}

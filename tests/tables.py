@@ -41,10 +41,10 @@ class TablesLog(Record, eq=False):
 
 
 def read(
-    tables: Mapping[str, Table], duration_s: float, format: LogFormat = formats.DATAFLASH_BIN
+    tables: Mapping[str, Table], duration_s: float, facts: Mapping[str, str] | None = None
 ) -> tuple[RunModel, Mapping[str, Table]]:
-    """The run model of tables, and the tables: what missions are found in."""
-    return run_model(TablesLog(tables, duration_s, format)), tables
+    """The run model of a DataFlash log that holds these tables, and the tables: what missions are found in."""
+    return run_model(TablesLog(tables, duration_s, facts=facts or {})), tables
 
 
 def no_model() -> RunModel:

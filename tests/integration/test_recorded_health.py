@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from care_core.ecosystems.ardupilot.examining import find, flight_of
+from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.ardupilot.flight import as_flight
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.registry import run_model
 from care_core.logs.opening import open_log
@@ -15,7 +16,7 @@ GOOD = Path(__file__).parents[1] / "data" / "arducopter_good.BIN"
 
 
 def findings_of(path: Path) -> tuple[Finding, ...]:
-    return find(flight_of(run_model(open_log(path))))
+    return find(as_flight(run_model(open_log(path))))
 
 
 def test_a_good_flight_is_silent() -> None:

@@ -9,12 +9,14 @@ from hypothesis import strategies as st
 
 from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.examining import find
-from care_core.ecosystems.ardupilot.flight import Flight, runs
 from care_core.ecosystems.ardupilot.messages import expanded, instances
+from care_core.ecosystems.ardupilot.spans import runs
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table
-from care_core.run import Setting
-from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, UP_S, Made
+from care_core.run import Damage, Setting
+from tests.flights import ARMED_S, DOWN_S, END_S, HEIGHT_M, UP_S, Made, flight_of
+
+JUMP = Damage("the clock jumps", 0, 40.0, is_jump=True)
 
 RATES = (0.5, 1.0, 2.5, 10.0, 50.0)
 FAILS_S = 50.0
@@ -153,7 +155,7 @@ def test_a_stopped_controller_is_told_by_its_speed() -> None:
     rpm[(np.repeat(t, 4) > FAILS_S) & (np.tile(np.arange(4), len(t)) == 3)] = 0.0
     tables = {**made.tables(), "ESC": Table(np.repeat(t, 4), {"Instance": np.tile(np.arange(4.0), len(t)), "RPM": rpm})}
     flight = made.flight()
-    finding = find(Flight(tables, flight.settings, flight.facts, END_S))[0]
+    finding = find(flight_of(tables, flight.settings, flight.log.facts, END_S))[0]
     assert finding.title == "motor 4 (rear right) stopped"
 
 
@@ -544,16 +546,16 @@ def test_a_log_that_ends_in_the_air_and_one_with_a_hole() -> None:
     made.rows["ARM"].pop()
     tables = {name: table.between(0.0, 70.0) for name, table in made.tables().items()}
     flight = made.flight()
-    (finding,) = find(Flight(tables, flight.settings, flight.facts, 70.0))
+    (finding,) = find(flight_of(tables, flight.settings, flight.log.facts, 70.0))
     assert (finding.kind, finding.title, finding.severity) == ("log", "the log ends in the air", "warning")
     made.table["POWR"]["Vcc"][made.after(69.5)] = 4.5
     tables = {name: table.between(0.0, 70.0) for name, table in made.tables().items()}
-    finding = find(Flight(tables, flight.settings, flight.facts, 70.0))[0]
+    finding = find(flight_of(tables, flight.settings, flight.log.facts, 70.0))[0]
     assert (finding.kind, finding.title) == ("battery", "power was lost in the air")
     holed = {name: table.where((table.t < 40) | (table.t > 48)) for name, table in Made().tables().items()}
-    (finding,) = find(Flight(holed, flight.settings, flight.facts, END_S))
+    (finding,) = find(flight_of(holed, flight.settings, flight.log.facts, END_S))
     assert finding.title == "the log has 1 hole"
-    assert find(Flight(holed, flight.settings, flight.facts, END_S, clock_jumps=True)) == ()  # not by such a clock
+    assert find(flight_of(holed, flight.settings, flight.log.facts, END_S, [JUMP])) == ()  # not by such a clock
 
 
 def test_an_overloaded_autopilot() -> None:
@@ -568,7 +570,7 @@ def test_parameters_changed_in_the_air() -> None:
     changed = {**flight.settings, "ATC_RAT_RLL_P": (
         Setting("ATC_RAT_RLL_P", 0.135, "PARM"), Setting("ATC_RAT_RLL_P", 0.4, "PARM", changed_at_s=60.0),
     )}  # fmt: skip
-    (finding,) = find(Flight(made.tables(), changed, flight.facts, END_S))
+    (finding,) = find(flight_of(made.tables(), changed, flight.log.facts, END_S))
     assert (finding.title, finding.severity) == ("parameters were changed in the air", "info")
 
 
@@ -617,8 +619,8 @@ def test_whatever_is_missing_or_broken_nothing_is_raised(
             broken = {f: c if c.dtype == object else np.full(len(c), value) for f, c in table.columns.items()}
             tables[which] = Table(table.t, broken)
     flight = made.flight()
-    for facts in (flight.facts, {}, {"firmware": "ArduRover V4.5.4", "vehicle": "rover"}):
-        for finding in find(Flight(tables, flight.settings if keep_rows else {}, facts, END_S)):
+    for facts in (flight.log.facts, {}, {"firmware": "ArduRover V4.5.4", "vehicle": "rover"}):
+        for finding in find(flight_of(tables, flight.settings if keep_rows else {}, facts, END_S)):
             assert 0.0 <= finding.probability <= 1.0
             assert np.isfinite(finding.onset_s)
 
@@ -677,7 +679,7 @@ def test_a_log_whose_last_record_is_the_disarming_does_not_end_in_the_air() -> N
     made.rows["ARM"][-1] = (70.0, {"ArmState": 0.0, "Forced": 0.0})
     tables = {name: table.between(0.0, 70.0) for name, table in made.tables().items()}
     flight = made.flight()
-    assert find(Flight(tables, flight.settings, flight.facts, 70.0)) == ()
+    assert find(flight_of(tables, flight.settings, flight.log.facts, 70.0)) == ()
 
 
 def test_what_is_not_recorded_between_two_flights_is_no_hole() -> None:
@@ -685,7 +687,7 @@ def test_what_is_not_recorded_between_two_flights_is_no_hole() -> None:
     made.rows["ARM"] += [(40.0, {"ArmState": 0.0, "Forced": 0.0}), (60.0, {"ArmState": 1.0, "Forced": 0.0})]
     tables = {name: table.where((table.t <= 40.2) | (table.t >= 59.9)) for name, table in made.tables().items()}
     flight = made.flight()
-    assert not [one for one in find(Flight(tables, flight.settings, flight.facts, END_S)) if one.kind == "log"]
+    assert not [one for one in find(flight_of(tables, flight.settings, flight.log.facts, END_S)) if one.kind == "log"]
 
 
 @pytest.mark.parametrize(
@@ -741,7 +743,7 @@ def test_a_logger_that_is_opened_by_the_arming_tells_of_it_in_words_alone() -> N
     made.rows["ARM"] = [(DOWN_S + 5, {"ArmState": 0.0, "Forced": 0.0})]
     made.rows["MSG"] = [(2.0, {"Message": "Arm: Need Position Estimate"}), (40.0, {"Message": "Arming motors"})]
     tables = {name: table.where((table.t < 20.0) | (table.t >= 39.9)) for name, table in made.tables().items()}
-    flight = Flight(tables, made.flight().settings, made.facts, END_S)
+    flight = flight_of(tables, made.flight().settings, made.facts, END_S)
     assert flight.armed == ((40.0, DOWN_S + 5),)
     assert not [one for one in find(flight) if one.kind in ("log", "prearm")]  # it was closed, and then it did arm
 
@@ -752,7 +754,7 @@ def test_what_is_armed_once_more_was_disarmed_while_nothing_was_recorded() -> No
     whole = made.flight()
     assert whole.armed == ((ARMED_S, 60.0), (60.0, DOWN_S + 5))
     tables = {name: table.where((table.t < 40.0) | (table.t >= 59.9)) for name, table in made.tables().items()}
-    flight = Flight(tables, whole.settings, whole.facts, END_S)
+    flight = flight_of(tables, whole.settings, whole.log.facts, END_S)
     assert np.ravel(flight.armed).tolist() == pytest.approx([ARMED_S, 39.9, 60.0, DOWN_S + 5])
     assert not [one for one in find(flight) if one.kind == "log"]
 

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.ecosystems.ardupilot.measures.flight import analyse, distance_to_legs
+from care_core.ecosystems.ardupilot.measures.flown_mission import analyse, distance_to_legs
 from care_core.ecosystems.ardupilot.measures.mission import ArduPilotFlight
 from care_core.ecosystems.ardupilot.measures.series import statistic
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Mission, find_extractor

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from care_core.ecosystems.ardupilot.measures import rover  # noqa: F401  it registers its extractors
-from care_core.ecosystems.ardupilot.measures.flight import analyse
+from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
 from care_core.ecosystems.vehicles import is_skid_steered
 from care_core.logs.base import Table
@@ -72,8 +72,8 @@ def drive(**replaced: Table) -> dict[str, Table]:
 
 
 def only(tables: Mapping[str, Table], **settings: float) -> Mission:
-    (mission,) = KIND.missions(*read(tables, 65.0), {})
-    return replace(mission, facts=FACTS, settings={**SKID, **settings})
+    (mission,) = KIND.missions(*read(tables, 65.0, FACTS), {})
+    return replace(mission, settings={**SKID, **settings})
 
 
 def value(mission: Mission, kind: str, **args: Any) -> Value:

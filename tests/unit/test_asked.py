@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.measures.requested import (
-    Asked,
-    asked,
+    RequestedMission,
     hover_power,
     internal_resistance,
     mission_asked,
+    requested_mission,
 )
 from care_core.ecosystems.measures import Mission
 from care_core.logs.base import Table
 from care_core.run import Unavailable
-from tests.tables import no_model
+from tests.tables import TablesLog
 
 HOME = (47.0, 8.0)
 EAST = 111_319.49 * math.cos(math.radians(HOME[0]))
@@ -42,7 +43,7 @@ def mission(*items: tuple[float, ...], bat: Table | None = None) -> Mission:
     }
     if bat is not None:
         tables["BAT"] = bat
-    return Mission(no_model(), tables, 0.0, 100.0, True, {})
+    return Mission(Flight(TablesLog(tables, 100.0)), tables, 0.0, 100.0, True, {})
 
 
 def table_of(**columns: list[float]) -> Table:
@@ -50,9 +51,9 @@ def table_of(**columns: list[float]) -> Table:
     return Table(np.linspace(0.0, 1.0, count), {name: np.array(values) for name, values in columns.items()})
 
 
-def found(*items: tuple[float, ...]) -> Asked:
-    answer = asked(mission(*items))
-    assert isinstance(answer, Asked)
+def found(*items: tuple[float, ...]) -> RequestedMission:
+    answer = requested_mission(mission(*items))
+    assert isinstance(answer, RequestedMission)
     return answer
 
 
@@ -102,7 +103,7 @@ def test_a_height_above_the_sea_counts_from_home() -> None:
 
 @pytest.mark.parametrize("items", [(), (TAKEOFF, RETURN)], ids=["none", "no waypoint"])
 def test_without_waypoints_nothing_was_asked(items: tuple[tuple[float, ...], ...]) -> None:
-    assert isinstance(asked(mission(*items)), Unavailable)
+    assert isinstance(requested_mission(mission(*items)), Unavailable)
 
 
 def test_power_and_resistance_are_those_in_the_air() -> None:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from care_core.ecosystems.ardupilot.measure import means, smooth
+from care_core.ecosystems.ardupilot.statistics import means, smooth
 from care_core.ecosystems.timeline import gaps
 from care_core.logs.base import Table
 from care_core.numbers import Floats, known_median, median, pauses, quantile

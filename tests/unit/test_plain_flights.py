@@ -14,7 +14,6 @@ from care_core.causal.model import Model
 from care_core.diagnose.judging import beyond_training, judge, unread_options, verdict
 from care_core.ecosystems.ardupilot.measures.modes import mode_names
 from care_core.ecosystems.measures import Mission
-from care_core.logs.base import Table
 from care_core.profile.reading import read_schema
 from care_core.records import replace
 from care_core.report.terminal import to_text
@@ -32,8 +31,8 @@ PLANE = {"firmware": "ArduPlane V4.4.0", "vehicle": "fixed wing"}
 def flown(facts: Mapping[str, str] = COPTER, *, mode: int = 5, **replaced: Any) -> Mission:
     """The flight of `tests/unit/test_ardupilot_extract.py`, in one mode."""
     tables = flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced)
-    (mission,) = KIND.missions(*read(tables, 75.0), {})
-    return replace(mission, facts=facts)
+    (mission,) = KIND.missions(*read(tables, 75.0, facts), {})
+    return mission
 
 
 def checks(mission: Mission) -> dict[str, Value]:
@@ -125,8 +124,7 @@ def test_old_logs_tell_heights_otherwise_and_modes_by_name() -> None:
     barometer = replace(flight()["POS"], times=at, columns={"BarAlt": 412.0 + height})
     named = table([(0.0, "STABILIZE")], "Mode")
     tables = flight(MODE=named, POS=None, CTUN=barometer)
-    (mission,) = KIND.missions(*read(tables, 75.0), {})
-    mission = replace(mission, facts={"firmware": "ArduCopter V3.1"})
+    (mission,) = KIND.missions(*read(tables, 75.0, {"firmware": "ArduCopter V3.1"}), {})
     assert mode_names(mission) == ("Stabilize",)
     assert checks(mission)["took_off"] == checks(mission)["landed"] == 1.0
 
@@ -215,16 +213,17 @@ def test_what_is_over_or_a_landing_without_its_target_is_no_failsafe(text: str, 
 
 
 def test_a_land_detector_is_believed_over_a_barometer_that_drifted() -> None:
-    high = flown(mode=0)
-    channel, column = "POS", "RelHomeAlt"
-    drifted = high.tables[channel]
-    columns = {**drifted.columns, column: drifted[column] + 5.0}
-    tables = {**high.tables, channel: Table(drifted.t, columns), "EV": table([(0.0, 99)], "Id")}
-    assert checks(replace(high, tables=tables))["landed"] == 0.0
-    tables["EV"] = table([(high.end_s - 1.0, 18)], "Id")
-    assert checks(replace(high, tables=tables))["landed"] == 1.0
-    tables["EV"] = table([(high.end_s, 18)], "Id")  # disarming says so itself
-    assert checks(replace(high, tables=tables))["landed"] == 0.0
+    position = flight()["POS"]
+    columns = {**position.columns, "RelHomeAlt": position["RelHomeAlt"] + 5.0}
+    end_s = flown(mode=0).end_s
+
+    def landed(detected_s: float, number: int = 18) -> Value:
+        events = table([(detected_s, number)], "Id")
+        return checks(flown(mode=0, POS=replace(position, columns=columns), EV=events))["landed"]
+
+    assert landed(0.0, 99) == 0.0
+    assert landed(end_s - 1.0) == 1.0
+    assert landed(end_s) == 0.0  # disarming says so itself
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.files import bundled
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
+from tests.flights import flight_of
 
 SAMPLE = bundled("samples", "ardurover_failed.BIN")
 COMPLETE_S = 105.7
@@ -76,7 +77,7 @@ def stuck(speed_ms: float = 0.02, throttle: float = 30.0, turn_dps: float = 0.5,
         "THR": Table(t, {"ThrOut": np.where(held, throttle, 30.0), "Speed": np.where(held, speed_ms, 3.0)}),
         "STER": Table(t, {"TurnRate": np.where(held, turn_dps, 0.0)}),
     }
-    return Flight(tables, {}, {"firmware": "ArduRover V4.5.4"}, 65.0)
+    return flight_of(tables, {}, {"firmware": "ArduRover V4.5.4"}, 65.0)
 
 
 def test_a_rover_that_is_driven_and_does_not_move_is_blocked() -> None:
@@ -104,7 +105,7 @@ def steering(speed_ms: float = 0.1, mode: int = 10, demand: float = 20.0, swing:
         "THR": Table(t, {"ThrOut": np.full(len(t), 30.0), "Speed": np.full(len(t), speed_ms)}),
         "STER": Table(t, {"TurnRate": asked + swung, "DesTurnRate": asked, "SteerOut": -20 * swung}),
     }
-    return Flight(tables, {}, {"firmware": "ArduRover V4.5.4"}, 95.0)
+    return flight_of(tables, {}, {"firmware": "ArduRover V4.5.4"}, 95.0)
 
 
 def test_a_steering_that_swings_to_and_fro_is_set_wrong() -> None:

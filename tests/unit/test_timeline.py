@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.supply import cells
+from care_core.ecosystems.ardupilot.checks import battery as battery_check
 from care_core.ecosystems.ardupilot.timeline import timeline
 from care_core.ecosystems.findings import Event
 from care_core.ecosystems.timeline import MOST
 from care_core.logs.base import Table
 from care_core.run import Damage, Setting
+from tests.flights import flight_of
 
 COPTER = {"firmware": "ArduCopter V4.5.4 (fd1bcc61)", "vehicle": "multicopter"}
 OLD_COPTER = {"firmware": "ArduCopter V3.1 (5c6503e2)", "vehicle": "multicopter"}
@@ -40,7 +40,7 @@ def height_of(*corners: tuple[float, float]) -> Table:
     """A track by its corners, ten positions a second."""
     t = np.arange(corners[0][0], corners[-1][0], 0.1)
     height = np.interp(t, [at for at, _ in corners], [metres for _, metres in corners])
-    return Table(t, {"Lat": np.full(len(t), 47.0), "Lng": np.full(len(t), 8.0), "RelHomeAlt": height})
+    return Table(t, {"Lat": 47.0 + 1e-7 * t, "Lng": np.full(len(t), 8.0), "RelHomeAlt": height})
 
 
 def told(
@@ -48,7 +48,7 @@ def told(
     settings: Mapping[str, tuple[Setting, ...]] | None = None, damage: Sequence[Damage] = (),
 ) -> list[Event]:  # fmt: skip
     known = {name: (Setting(name, value, "PARM"),) for name, value in QUAD_X.items()} | dict(settings or {})
-    return list(timeline(Flight(tables, known, facts, end_s), damage))
+    return list(timeline(flight_of(tables, known, facts, end_s, damage), tables.values()))
 
 
 def texts(events: Sequence[Event], kind: str = "") -> list[str]:
@@ -207,7 +207,18 @@ def test_battery_and_satellites_in_brief() -> None:
     [(12.6, 3), (11.1, 3), (16.8, 4), (22.2, 6), (25.2, 6), (8.4, 2), (50.4, None), (5.0, None), (0.3, None)],
 )
 def test_cells_are_told_where_one_number_of_them_fits(volts: float, count: int | None) -> None:
-    assert cells(volts) == count
+    pack = rows(*((float(t), volts - 0.001 * t) for t in range(100)), names=("Volt",))
+    (battery,) = flight_of({"BAT": pack, "ARM": ARMED}, {}, COPTER).batteries
+    assert (battery.cells if battery.are_cells_known else None) == count
+
+
+def test_a_report_names_one_count_of_cells() -> None:
+    """12.5 V are three full cells or four drained ones; the parameter of a full pack decides for all who ask."""
+    pack = rows(*((float(t), 12.5 - 0.001 * t) for t in range(100)), names=("Volt",))
+    full = {"MOT_BAT_VOLT_MAX": (Setting("MOT_BAT_VOLT_MAX", 16.8, "PARM"),)}
+    flight = flight_of({"BAT": pack, "ARM": ARMED}, full, COPTER)
+    assert "battery at 12.5 V (4 cells)" in texts(timeline(flight, []), "battery")
+    assert any("each of 4 cells" in finding.evidence for finding in battery_check.find(flight))
 
 
 def test_a_log_that_ends_in_the_air_says_so() -> None:

@@ -45,8 +45,9 @@ def checks(found: tuple[Check, ...]) -> dict[str, Value]:
 
 def judged(facts: Mapping[str, str], mode: int, **replaced: Table | None) -> dict[str, Value]:
     """The checks of the flight of `test_ardupilot_extract`, taken for another vehicle's, in one mode."""
-    (mission,) = KIND.missions(*read(flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced), 75.0), {})
-    return checks(KIND.outcome(replace(mission, facts=facts)))
+    tables = flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced)
+    (mission,) = KIND.missions(*read(tables, 75.0, facts), {})
+    return checks(KIND.outcome(mission))
 
 
 def said(*texts: tuple[float, str]) -> Table:
@@ -68,8 +69,8 @@ def test_a_mission_that_the_vehicle_was_still_at_when_it_was_disarmed_failed() -
 
 def test_a_mission_that_the_pilot_broke_off_is_no_failure_of_the_vehicle() -> None:
     modes = table([(0.0, 10), (40.0, 4)], "ModeNum")
-    (mission,) = KIND.missions(*read(flight(MODE=modes, MSG=said((20.0, "Mission: 2 WP"))), 75.0), {})
-    value = checks(KIND.outcome(replace(mission, facts=ROVER)))["mission_success"]
+    (mission,) = KIND.missions(*read(flight(MODE=modes, MSG=said((20.0, "Mission: 2 WP"))), 75.0, ROVER), {})
+    value = checks(KIND.outcome(mission))["mission_success"]
     assert isinstance(value, Unavailable)
     assert value.reason == "0 of the mission's 1 waypoints were reached, and the last mode was Hold"
 
@@ -77,8 +78,10 @@ def test_a_mission_that_the_pilot_broke_off_is_no_failure_of_the_vehicle() -> No
 def test_a_mission_that_a_failsafe_ended_failed() -> None:
     errors = table([(40.0, 17, 1)], "Subsys", "ECode")
     modes = table([(0.0, 10), (40.0, 4)], "ModeNum")
-    (mission,) = KIND.missions(*read(flight(MODE=modes, ERR=errors, MSG=said((20.0, "Mission: 2 WP"))), 75.0), {})
-    assert checks(KIND.outcome(replace(mission, facts=ROVER)))["mission_success"] == 0.0
+    (mission,) = KIND.missions(
+        *read(flight(MODE=modes, ERR=errors, MSG=said((20.0, "Mission: 2 WP"))), 75.0, ROVER), {}
+    )
+    assert checks(KIND.outcome(mission))["mission_success"] == 0.0
 
 
 def test_a_rover_whose_log_stops_when_all_is_done_is_fine_and_one_on_its_way_is_not_known() -> None:

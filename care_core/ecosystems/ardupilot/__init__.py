@@ -33,14 +33,16 @@ class ArduPilot(Ecosystem):
     )
 
     def model(self, log: Log) -> RunModel:
+        from care_core.ecosystems.ardupilot.flight import Flight
         from care_core.logs.telemetry import as_dataflash
 
-        return RunModel(as_dataflash(log))
+        return Flight(as_dataflash(log))
 
     def examine(self, model: RunModel) -> Health:
         from care_core.ecosystems.ardupilot.examining import examine
+        from care_core.ecosystems.ardupilot.flight import as_flight
 
-        return examine(model)
+        return examine(as_flight(model))
 
     def log_messages(self, model: RunModel) -> Iterator[Event]:
         from care_core.ecosystems.ardupilot.log_messages import log_messages

@@ -76,7 +76,7 @@ def instances(tables: Mapping[str, Table], name: str) -> tuple[Table, ...]:
     for message in MESSAGES.get(name, (name,)):
         table = tables.get(message)
         if table is not None and len(table):
-            found += _split(name, _renamed(name, table))
+            found += split(name, _renamed(name, table))
     return tuple(found)
 
 
@@ -135,7 +135,8 @@ def _top(column: NDArray[Any]) -> float:
     return float(known.max()) if len(known) else 0.0
 
 
-def _split(name: str, table: Table) -> list[Table]:
+def split(name: str, table: Table) -> list[Table]:
+    """The instances that one message holds, in order of their number."""
     field = next((field for field in _INSTANCE.get(name, ()) if field in table.columns), None)
     if field is None:
         return [table]

@@ -1,8 +1,9 @@
-"""Which of a vehicle's texts an account repeats: what every start says is left out, and what records say better."""
+"""What a vehicle's texts mean, and which of them a timeline leaves out: those of every start, and what records say."""
 
 from __future__ import annotations
 
 import re
+from typing import NamedTuple
 
 _ROUTINE = re.compile(
     r"""
@@ -21,7 +22,7 @@ _ROUTINE = re.compile(
     re.VERBOSE,
 )
 _MISSION = re.compile(r"(?:Mission: (\d+) (.+)|Reached (?:command|waypoint) #(\d+))")
-_REFUSAL = re.compile(r"(?:Pre)?Arm: (.*)")
+_REFUSAL = re.compile(r"(?P<before>Pre)?Arm: (?P<why>.*)")
 RECORDED = {
     11: re.compile(r"GPS Glitch|Glitch cleared", re.IGNORECASE),
     16: re.compile(r"EKF variance", re.IGNORECASE),
@@ -37,10 +38,20 @@ def is_routine(text: str) -> bool:
     return not text.strip() or _ROUTINE.match(text) is not None
 
 
-def refusal(text: str) -> str | None:
-    """Why arming was refused, None where the text is no refusal."""
+class Refusal(NamedTuple):
+    """What the firmware says of why it cannot be armed."""
+
+    time_s: float
+    text: str
+    why: str
+    was_tried: bool
+    """Whether somebody tried to arm it: "Arm: ...", not "PreArm: ..."."""
+
+
+def refusal_of(time_s: float, text: str) -> Refusal | None:
+    """The refusal of arming that a text is, None where it is none."""
     match = _REFUSAL.match(text)
-    return match[1] if match else None
+    return None if match is None else Refusal(time_s, text, match["why"], match["before"] is None)
 
 
 def says_what_is_recorded(text: str, subsystem: int) -> bool:

@@ -1,24 +1,26 @@
-"""What an ArduPilot vehicle did, in order of time, and what it said of it: an account that is read in a minute.
+"""What an ArduPilot vehicle did and said, in order of time: a timeline that is read in a minute.
 
-Everything comes from what the vehicle recorded or sent. Repeats are told once with their count; statistics and
-calibration are not told.
+Everything comes from what the vehicle recorded or sent. Repeats are one line with their count; statistics and
+calibration are left out.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Flight, Span
-from care_core.ecosystems.ardupilot.supply import supply
+from care_core.ecosystems.ardupilot.armed import ArmChange
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.recorded import Mode
+from care_core.ecosystems.ardupilot.spans import Span
+from care_core.ecosystems.ardupilot.supply_events import supply_events
 from care_core.ecosystems.ardupilot.texts import (
     RECORDED,
     is_routine,
     mission_item,
-    refusal,
     says_what_is_recorded,
 )
 from care_core.ecosystems.findings import Event
@@ -38,16 +40,10 @@ from care_core.ecosystems.vehicles import (
     event_words,
     flies,
     is_over,
-    method_words,
-    mode_name,
-    mode_number,
     motors_of,
     reason_words,
-    with_said,
 )
-from care_core.ecosystems.vehicles.modes import px4_mode
-from care_core.logs.base import Wanted
-from care_core.run import Damage
+from care_core.logs.base import Table, Wanted
 from care_core.text import listed
 
 READS: Wanted = {
@@ -62,9 +58,9 @@ READS: Wanted = {
     "RSSI": ("RXRSSI",),
 }
 
-_REASON_KNOWN = (4, 0)
-"""Since Copter 4.0 MODE.Rsn means the same on every vehicle (AP_Vehicle/ModeReason.h)."""
 _ARMED, _DISARMED = 10, 11
+_STILL_S = 1.0
+"""Complaints so shortly before the last one stood with it."""
 _TOOK_OFF, _LANDED = (16, 28), 18
 _QUIET_EVENTS = frozenset((_ARMED, _DISARMED, 15, 16, 17, 18, 25, 26, 27, 28, 29, 38, 39, 57, 63, 64, 65, 66, 73))
 """Armed, landed and taken off are told otherwise; the rest are settings of every flight."""
@@ -80,24 +76,24 @@ _SWITCHED_OFF_S = 0.05
 _IN_AIR_M, _LIFTED_M = 2.0, 0.5
 
 
-def timeline(flight: Flight, damage: Sequence[Damage] = ()) -> tuple[Event, ...]:
-    """The account of a flight.
+def timeline(flight: Flight, tables: Iterable[Table]) -> tuple[Event, ...]:
+    """What happened in a flight.
 
     Args:
-        damage: what is broken in its log.
+        tables: everything that is read of its log, to see where nothing is recorded.
     """
     vehicle = flight.vehicle
     found = [
         *_arming(flight),
-        *_modes(flight, vehicle),
+        *_modes(flight),
         *_errors(flight, vehicle),
         *_events(flight),
         *_flown(flight),
         *_texts(flight),
         *parameter_changes(flight.settings, flight.armed, "PARM"),
-        *supply(flight),
-        *gaps(flight.tables.values(), flight.armed),
-        *damage_of(damage),
+        *supply_events(flight),
+        *gaps(tables, flight.armed),
+        *damage_of(flight.log.damage),
         *_clock(flight),
         *_end(flight),
     ]
@@ -106,10 +102,10 @@ def timeline(flight: Flight, damage: Sequence[Damage] = ()) -> tuple[Event, ...]
 
 def _introduced(flight: Flight, vehicle: Vehicle) -> Event:
     parts = [vehicle.title]
-    motors = motors_of(flight.settings, flight.outputs)
+    motors = motors_of(flight.settings, flight.motor_outputs)
     if motors and vehicle.kind == "quadplane":
         parts.append(f"{len(motors)} lift motors")
-    if vehicle.kind == "unknown" and "vehicle" in flight.facts:
+    if vehicle.kind == "unknown" and "vehicle" in flight.log.facts:
         parts.append("neither ArduPilot nor PX4 by what it says of itself")
     return Event(0.0, "vehicle", ", ".join(parts), "MSG" if vehicle.firmware else "the log")
 
@@ -119,97 +115,72 @@ def _introduced(flight: Flight, vehicle: Vehicle) -> Event:
 
 def _arming(flight: Flight) -> Iterator[Event]:
     armed_at: float | None = None
-    for t, is_armed, how in _armings(flight):
-        if is_armed:
-            armed_at = t
-            yield Event(t, "arming", " ".join(filter(None, ("armed", how))), "ARM")
+    for change in _each_once(flight.arm_changes):
+        how = ", ".join(filter(None, (change.how, "by force" if change.is_forced else "")))
+        if change.is_armed:
+            armed_at = change.time_s
+            yield Event(change.time_s, "arming", " ".join(filter(None, ("armed", how))), "ARM")
         else:
-            lasted = f", armed for {t - armed_at:.0f} s" if armed_at is not None else ""
-            yield Event(t, "arming", " ".join(filter(None, ("disarmed", how))) + lasted, "ARM")
+            lasted = f", armed for {change.time_s - armed_at:.0f} s" if armed_at is not None else ""
+            yield Event(change.time_s, "arming", " ".join(filter(None, ("disarmed", how))) + lasted, "ARM")
             armed_at = None
     if not flight.arm_changes and flight.armed:
         how = "it is written while armed only (LOG_DISARMED 0)" if flight.is_written_armed else "by its throttle"
-        yield Event(flight.armed[0][0], "arming", f"armed: the log tells of no arming, {how}", "the log")
+        yield Event(flight.armed[0][0], "arming", f"armed: the log records no arming, {how}", "the log")
     yield from _refusals(flight)
 
 
-def _armings(flight: Flight) -> list[tuple[float, bool, str]]:
-    """When it was armed and disarmed, each state once, and how."""
-    table = flight.one("ARM", "ArmState")
-    if table is None:
-        known = [(t, number == _ARMED, "") for t, number in _numbered(flight) if number in (_ARMED, _DISARMED)]
-    else:
-        known = []
-        for row in range(len(table)):
-            how = method_words(int(table["Method"][row])) if "Method" in table.columns else ""
-            if "Forced" in table.columns and table["Forced"][row] == 1:
-                how = f"{how}, by force".strip(", ")
-            known.append((float(table.t[row]), bool(table["ArmState"][row] == 1), how))
-    ways = {(t, is_armed): how for t, is_armed, how in known}
-    told = with_said([(t, is_armed) for t, is_armed, _ in known], flight.messages)
-    known = [(t, is_armed, ways.get((t, is_armed), "")) for t, is_armed in told]
-    return [one for at, one in enumerate(known) if at == 0 or known[at - 1][1] != one[1]]
+def _each_once(changes: Sequence[ArmChange]) -> list[ArmChange]:
+    """Without the changes to a state that it was in already."""
+    return [one for at, one in enumerate(changes) if at == 0 or changes[at - 1].is_armed != one.is_armed]
 
 
 def _refusals(flight: Flight) -> Iterator[Event]:
     """Refusals of arming, each complaint once between two armings; the last one of a vehicle that never armed leads."""
-    refused = [(t, text) for t, text in flight.messages if refusal(text) is not None]
+    refused = flight.refusals
     if not refused:
         return
-    armed = [t for t, is_armed, _ in _armings(flight) if is_armed]
+    armed = [change.time_s for change in _each_once(flight.arm_changes) if change.is_armed]
+    last_s = refused[-1].time_s
     if not flight.armed:
-        standing = dict.fromkeys(refusal(text) or "" for t, text in refused if t >= refused[-1][0] - 1.0)
+        standing = dict.fromkeys(one.why for one in refused if one.time_s >= last_s - _STILL_S)
         what = f"it never armed: {'; '.join(standing)}"
-        yield Event(refused[-1][0], "arming", f"{what} ({counted(len(refused), 'refusal')})", "MSG")
-    for _, several in groupby(refused, key=lambda one: sum(t <= one[0] for t in armed)):
+        yield Event(last_s, "arming", f"{what} ({counted(len(refused), 'refusal')})", "MSG")
+    for _, several in groupby(refused, key=lambda one: sum(t <= one.time_s for t in armed)):
         complaints = list(several)
-        tried = {refusal(text) for _, text in complaints if text.startswith("Arm: ")}
+        tried = {one.why for one in complaints if one.was_tried}
         yield from repeats([
-            Event(t, "arming", f"Arm: {refusal(text)}" if refusal(text) in tried else text, "MSG")
-            for t, text in complaints
+            Event(one.time_s, "arming", f"Arm: {one.why}" if one.why in tried else one.text, "MSG")
+            for one in complaints
         ])  # fmt: skip
 
 
 # --- modes, errors, events -------------------------------------------------------------------------------------
 
 
-def _modes(flight: Flight, vehicle: Vehicle) -> Iterator[Event]:
-    entered = [(t, name, why) for t, name, why in _entered(flight, vehicle)]
-    changes = [one for at, one in enumerate(entered) if at == 0 or entered[at - 1][1] != one[1]]
+def _modes(flight: Flight) -> Iterator[Event]:
+    modes = flight.modes
+    changes = [mode for at, mode in enumerate(modes) if at == 0 or modes[at - 1].name != mode.name]
     for flurry in _flurries(changes):
-        t, name, why = flurry[0]
         if len(flurry) < _FLURRY:
-            for t, name, why in flurry:
-                yield Event(t, "mode", f"{_mode(name)}{f' ({why})' if why else ''}", "MODE")
+            for mode in flurry:
+                why = reason_words(mode.reason) if mode.reason is not None else ""
+                yield Event(mode.start_s, "mode", f"{_mode(mode.name)}{f' ({why})' if why else ''}", "MODE")
         else:
-            names = list(dict.fromkeys(name for _, name, _ in flurry))
-            yield Event(t, "mode", f"mode changed {len(flurry)} times at once: {', '.join(names)}", "MODE")
-
-
-def _entered(flight: Flight, vehicle: Vehicle) -> Iterator[tuple[float, str, str]]:
-    table = flight.one("MODE", "ModeNum")
-    if table is None:
-        return
-    reasons = table["Rsn"] if "Rsn" in table.columns and (vehicle.version or (0,)) >= _REASON_KNOWN else None
-    for row, (t, mode) in enumerate(zip(table.t.tolist(), table["ModeNum"].tolist(), strict=True)):
-        if isinstance(mode, str):
-            number = mode_number(vehicle.kind, mode)
-            name = mode if number is None else mode_name(vehicle.kind, number)
-        else:
-            name = mode_name(vehicle.kind, px4_mode(int(mode)) if vehicle.kind == "px4" else int(mode))
-        why = reason_words(int(reasons[row])) if reasons is not None and np.isfinite(reasons[row]) else ""
-        yield t, name, why
+            names = list(dict.fromkeys(mode.name for mode in flurry))
+            text = f"mode changed {len(flurry)} times at once: {', '.join(names)}"
+            yield Event(flurry[0].start_s, "mode", text, "MODE")
 
 
 def _mode(name: str) -> str:
     return name if name.startswith("mode ") else f"mode {name}"
 
 
-def _flurries(changes: Sequence[tuple[float, str, str]]) -> Iterator[list[tuple[float, str, str]]]:
+def _flurries(changes: Sequence[Mode]) -> Iterator[list[Mode]]:
     """Mode changes that follow each other faster than anybody flips a switch, together."""
-    flurry: list[tuple[float, str, str]] = []
+    flurry: list[Mode] = []
     for change in changes:
-        if flurry and change[0] - flurry[-1][0] > _FLURRY_S:
+        if flurry and change.start_s - flurry[-1].start_s > _FLURRY_S:
             yield flurry
             flurry = []
         flurry.append(change)
@@ -219,11 +190,7 @@ def _flurries(changes: Sequence[tuple[float, str, str]]) -> Iterator[list[tuple[
 
 def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Event]:
     """ERR records; one that is over again is one line with how long it lasted, and so is one that is said again."""
-    table = flight.one("ERR", "Subsys", "ECode")
-    if table is None:
-        return
-    rows = list(zip(table.t.tolist(), table["Subsys"].astype(int).tolist(), table["ECode"].astype(int).tolist(),
-                    strict=True))  # fmt: skip
+    rows = flight.error_records
     lasted: dict[tuple[int, int], list[tuple[float, float]]] = {}
     lanes: list[tuple[float, int]] = []
     for at, (t, subsystem, code) in enumerate(rows):
@@ -255,20 +222,11 @@ def _lasting(times: Sequence[tuple[float, float]]) -> str:
     return f", over after {end - start:.1f} s" if math.isfinite(end) else ""
 
 
-def _numbered(flight: Flight) -> list[tuple[float, int]]:
-    """Times and numbers of the EV records."""
-    table = flight.one("EV", "Id")
-    if table is None:
-        return []
-    return list(zip(table.t.tolist(), table["Id"].astype(int).tolist(), strict=True))
-
-
 def _events(flight: Flight) -> Iterator[Event]:
     ended = [end for _, end in flight.armed]
-    numbered = _numbered(flight)
     aligned: set[Span] = set()
     told = []
-    for t, number in numbered:
+    for t, number in flight.event_records:
         span = next((span for span in flight.armed if span[0] <= t <= span[1]), None)
         if number in _QUIET_EVENTS or (number in _AT_START and span is None):
             continue
@@ -288,7 +246,7 @@ def _flown(flight: Flight) -> Iterator[Event]:
         if top is not None and top[1] < _LIFTED_M:
             continue  # the land detector of old firmware goes by throttle alone
         state = ""
-        for t, number in _numbered(flight):
+        for t, number in flight.event_records:
             what = "took off" if number in _TOOK_OFF else "landed" if number == _LANDED else ""
             is_switched_off = what == "landed" and t > end - _SWITCHED_OFF_S
             if is_switched_off:
@@ -301,7 +259,7 @@ def _flown(flight: Flight) -> Iterator[Event]:
 def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | None:
     """When a vehicle that flies was highest while armed, and how high."""
     known = flight.height
-    if known is None or flight.vehicle.kind in ("rover", "sub"):
+    if known is None or flight.kind in ("rover", "sub"):
         return None
     t, height = known
     inside = np.flatnonzero((t >= start) & (t <= end) & np.isfinite(height))
@@ -316,7 +274,8 @@ def _highest(flight: Flight, start: float, end: float) -> tuple[float, float] | 
 
 def _texts(flight: Flight) -> Iterator[Event]:
     """The vehicle's texts but for those of every flight; mission items that follow each other are one line."""
-    said = [(t, text) for t, text in flight.messages if refusal(text) is None]
+    refused = {one.text for one in flight.refusals}
+    said = [(t, text) for t, text in flight.messages if text not in refused]
     items: list[tuple[float, int, str]] = []
     told: list[Event] = []
     for t, text in said:
@@ -366,18 +325,18 @@ def _ranges(numbers: Sequence[int]) -> str:
 
 
 def _clock(flight: Flight) -> Iterator[Event]:
-    if "clock" in flight.facts:
-        yield Event(0.0, "log", f"the log has no times: they are {flight.facts['clock']}", "the log")
+    if "clock" in flight.log.facts:
+        yield Event(0.0, "log", f"the log has no times: they are {flight.log.facts['clock']}", "the log")
 
 
 def _end(flight: Flight) -> Iterator[Event]:
     """A log that ends while the vehicle is armed says nothing of how the flight ended."""
-    changes = _armings(flight)
-    is_armed = changes[-1][1] if changes else bool(flight.armed) and flight.armed[-1][1] > flight.end_s - 1.0
+    changes = flight.arm_changes
+    is_armed = changes[-1].is_armed if changes else bool(flight.armed) and flight.armed[-1][1] > flight.end_s - 1.0
     if not is_armed:
         return
     where = ""
-    if flies(flight.vehicle.kind) and (told := flight.height) is not None:
+    if flies(flight.kind) and (told := flight.height) is not None:
         t, height = told
         known = np.isfinite(height)
         if known.any() and t[known][-1] > flight.end_s - 5.0 and height[known][-1] > _IN_AIR_M:

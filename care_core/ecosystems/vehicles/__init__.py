@@ -3,7 +3,7 @@
 Facts of ArduPilot's and PX4's source, as tables. Knows nothing of logs.
 """
 
-from care_core.ecosystems.vehicles.arming import method_words, with_said
+from care_core.ecosystems.vehicles.arming import method_words, unrecorded_changes
 from care_core.ecosystems.vehicles.errors import FAILSAFE, error_kind, error_words, is_over
 from care_core.ecosystems.vehicles.events import event_words
 from care_core.ecosystems.vehicles.modes import Way, mode_name, mode_number, reason_words, way_of
@@ -36,7 +36,7 @@ __all__ = [
     "renamed",
     "spelled_in",
     "spellings",
+    "unrecorded_changes",
     "vehicle_of",
     "way_of",
-    "with_said",
 ]

@@ -25,23 +25,23 @@ def method_words(method: int) -> str:
     return _METHODS.get(method, "")
 
 
-_SAID: Mapping[str, bool] = {
+_SPOKEN: Mapping[str, bool] = {
     "Arming motors": True, "Disarming motors": False, "Throttle armed": True, "Throttle disarmed": False,
 }  # fmt: skip
 """What the firmware says when arming cannot fail any more, and when it is over (AP_Arming.cpp of Copter, Sub, Plane and
 Rover: send_arm_disarm_statustext)."""
 
 
-def with_said(
+def unrecorded_changes(
     recorded: Sequence[tuple[float, bool]], messages: Iterable[tuple[float, str]]
 ) -> list[tuple[float, bool]]:
-    """When a vehicle was armed (True) and disarmed by its records, in order of time, and by what it said where they
-    tell of none: a log that is written while armed only is opened after the record of the arming."""
+    """When a vehicle says that it was armed (True) or disarmed where its records, in order of time, tell of none: a log
+    that is written while armed only is opened after the record of the arming."""
     times = [t for t, _ in recorded]
 
-    def is_untold(t: float, state: bool) -> bool:
+    def is_unrecorded(t: float, state: bool) -> bool:
         at = bisect(times, t)
         return state not in [now for _, now in recorded[max(at - 1, 0) : at + 1]]
 
-    said = [(t, _SAID[text]) for t, text in messages if text in _SAID]
-    return sorted((*recorded, *(one for one in said if is_untold(*one))))
+    spoken = [(t, _SPOKEN[text]) for t, text in messages if text in _SPOKEN]
+    return [change for change in spoken if is_unrecorded(*change)]

@@ -11,10 +11,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.airborne import UPSIDE_DOWN_DEG
 from care_core.ecosystems.ardupilot.checks.thrust import saturated
-from care_core.ecosystems.ardupilot.flight import STANDS_MS, UPSIDE_DOWN_DEG, Flight, Mask, Span, parts
-from care_core.ecosystems.ardupilot.measure import lasting, means, records, top
-from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts
+from care_core.ecosystems.ardupilot.statistics import lasting, means, records, top
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
@@ -70,19 +71,24 @@ def _lost(flight: Flight, lost: float) -> Iterator[Finding]:
         return
     after = error[1][(error[0] >= lost) & (error[0] <= lost + 5)]
     yield Finding(
-        "attitude", "control was lost", lost, flight.impact_s or flight.end_s, "critical",
-        f"the attitude is up to {float(np.max(after)):.0f} degrees off its demand and does not come back",
-        "ATT; 30 degrees: ArduCopter's crash check", probability=0.3,
-    )  # fmt: skip
+        kind="attitude",
+        title="control was lost",
+        onset_s=lost,
+        end_s=flight.impact_s or flight.end_s,
+        severity="critical",
+        evidence=f"the attitude is up to {float(np.max(after)):.0f} degrees off its demand and does not come back",
+        source="ATT; 30 degrees: ArduCopter's crash check",
+        probability=0.3,
+    )
 
 
 def _upside_down(flight: Flight) -> Iterator[Finding]:
     """A rover that rolled over, a submarine that turned, or a board that is mounted otherwise than it is told."""
-    if flight.vehicle.kind not in _KEEP_UPRIGHT or flight.tilt is None:
+    if flight.kind not in _KEEP_UPRIGHT or flight.tilt is None:
         return
     t, tilt = flight.tilt
-    over = (tilt > UPSIDE_DOWN_DEG) & flight.during(flight.armed, t)
-    if flight.vehicle.kind == "sub":
+    over = (tilt > UPSIDE_DOWN_DEG) & during(flight.armed, t)
+    if flight.kind == "sub":
         over &= ~np.isin(flight.modes_at(t), tuple(_ANY_WAY_UP))
     spans = lasting(t, over, _LIES_S)
     if not spans:
@@ -91,26 +97,40 @@ def _upside_down(flight: Flight) -> Iterator[Finding]:
     before = tilt[(t < start) & (t >= start - _BEFORE_S)]
     turned = len(before) > 0 and float(np.min(before)) < UPSIDE_DOWN_DEG / 2
     yield Finding(
-        "attitude", "the vehicle turned over" if turned else "the vehicle is upside down", start, end, "critical",
-        f"its upper side points {float(median(tilt[flight.during(spans, t)])):.0f} degrees away from the sky"
-        + ("" if turned else " from the start: it lies so, or AHRS_ORIENTATION is not how the board is mounted"),
-        "ATT.Roll, Pitch", suspect="world" if turned else "parameter", probability=0.5,
-    )  # fmt: skip
+        kind="attitude",
+        title="the vehicle turned over" if turned else "the vehicle is upside down",
+        onset_s=start,
+        end_s=end,
+        severity="critical",
+        evidence=(
+            f"its upper side points {float(median(tilt[during(spans, t)])):.0f} degrees away from the sky"
+            + ("" if turned else " from the start: it lies so, or AHRS_ORIENTATION is not how the board is mounted")
+        ),
+        source="ATT.Roll, Pitch",
+        suspect="world" if turned else "parameter",
+        probability=0.5,
+    )
 
 
 def _far(flight: Flight) -> Iterator[Finding]:
     if flight.lean_error is None:
         return
     t, error = flight.lean_error
-    spans = lasting(t, (error > FAR_DEG) & flight.during(flight.flown, t), _LASTS_S)
+    spans = lasting(t, (error > FAR_DEG) & during(flight.flown, t), _LASTS_S)
     if spans:
         worst = top(error[(t >= spans[0][0]) & (t <= spans[-1][1])], 0.9)
         severity: Severity = "critical" if flight.impact_s is not None else "warning"
         yield Finding(
-            "attitude", "the attitude does not follow its demand", spans[0][0], spans[-1][1], severity,
-            f"roll and pitch are up to {worst:.0f} degrees off (limit {FAR_DEG:g})",
-            "ATT against DesRoll, DesPitch", probability=0.25, suspect="parameter",
-        )  # fmt: skip
+            kind="attitude",
+            title="the attitude does not follow its demand",
+            onset_s=spans[0][0],
+            end_s=spans[-1][1],
+            severity=severity,
+            evidence=f"roll and pitch are up to {worst:.0f} degrees off (limit {FAR_DEG:g})",
+            source="ATT against DesRoll, DesPitch",
+            probability=0.25,
+            suspect="parameter",
+        )
 
 
 def _yaw(flight: Flight) -> Iterator[Finding]:
@@ -120,15 +140,20 @@ def _yaw(flight: Flight) -> Iterator[Finding]:
     off = np.abs((table["Yaw"] - table["DesYaw"] + 180) % 360 - 180)
     spans = [
         span
-        for span in lasting(table.t, (off > YAW_DEG) & flight.during(flight.flown, table.t), _YAW_LASTS_S)
-        if not _is_a_turn(off[flight.during((span,), table.t)])
+        for span in lasting(table.t, (off > YAW_DEG) & during(flight.flown, table.t), _YAW_LASTS_S)
+        if not _is_a_turn(off[during((span,), table.t)])
     ]
     if spans:
         yield Finding(
-            "attitude", "the heading does not follow its demand", spans[0][0], spans[-1][1], "warning",
-            f"up to {top(off[flight.during(spans, table.t)]):.0f} degrees off (limit {YAW_DEG:g})",
-            "ATT.Yaw against DesYaw", probability=0.25,
-        )  # fmt: skip
+            kind="attitude",
+            title="the heading does not follow its demand",
+            onset_s=spans[0][0],
+            end_s=spans[-1][1],
+            severity="warning",
+            evidence=f"up to {top(off[during(spans, table.t)]):.0f} degrees off (limit {YAW_DEG:g})",
+            source="ATT.Yaw against DesYaw",
+            probability=0.25,
+        )
 
 
 def _is_a_turn(off: Floats) -> bool:
@@ -141,7 +166,7 @@ def _swings(flight: Flight) -> Iterator[Finding]:
     table = flight.one("RATE", "R", "P", "RDes", "PDes")
     if table is None:
         return
-    flown = flight.during(flight.flown, table.t)
+    flown = during(flight.flown, table.t)
     if flown.sum() < _ENOUGH:
         return
     found = []
@@ -159,32 +184,48 @@ def _swings(flight: Flight) -> Iterator[Finding]:
         f"; the motors are at their limit for {spent:.0f} s of it" if spent else "; then it came down" if down else ""
     )
     yield Finding(
-        "tuning", f"{name} oscillates", spans[0][0], spans[-1][1], "critical" if lost else "warning",
-        f"the {name} rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
-        f"{OVER_DEMAND:g} times what is asked, or all that the motors have){limit}",
-        "RATE against its demand", suspect="parameter", probability=_SPENT if spent or down else 0.2,
-    )  # fmt: skip
+        kind="tuning",
+        title=f"{name} oscillates",
+        onset_s=spans[0][0],
+        end_s=spans[-1][1],
+        severity="critical" if lost else "warning",
+        evidence=(
+            f"the {name} rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
+            f"{OVER_DEMAND:g} times what is asked, or all that the motors have){limit}"
+        ),
+        source="RATE against its demand",
+        suspect="parameter",
+        probability=_SPENT if spent or down else 0.2,
+    )
 
 
 def _steering(flight: Flight) -> Iterator[Finding]:
     """A rover that steers by itself turns to and fro: gains of the steering that are too high."""
     table = flight.one("STER", "TurnRate", "DesTurnRate")
-    if flight.vehicle.kind != "rover" or table is None:
+    if flight.kind != "rover" or table is None:
         return
     steered = flight.drives_itself(table.t)
     spans, peak = _unasked(flight, table, "TurnRate", "DesTurnRate", steered, ("SteerOut", _ALL_STEERING))
     if not spans:
         return
     driven = flight.one("THR", "Speed")
-    swung = np.zeros(0) if driven is None else np.abs(driven["Speed"][flight.during(spans, driven.t)])
+    swung = np.zeros(0) if driven is None else np.abs(driven["Speed"][during(spans, driven.t)])
     stays = len(swung) > 0 and spans[-1][1] - spans[0][0] > _GETS_ON_S and float(median(swung)) < STANDS_MS
     end = "; the vehicle does not get on" if stays else ""
     yield Finding(
-        "tuning", "the steering oscillates", spans[0][0], spans[-1][1], "critical" if stays else "warning",
-        f"the turn rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
-        f"{OVER_DEMAND:g} times what is asked, or all that the steering has){end}",
-        "STER.TurnRate against its demand", suspect="parameter", probability=_SPENT if stays else 0.2,
-    )  # fmt: skip
+        kind="tuning",
+        title="the steering oscillates",
+        onset_s=spans[0][0],
+        end_s=spans[-1][1],
+        severity="critical" if stays else "warning",
+        evidence=(
+            f"the turn rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
+            f"{OVER_DEMAND:g} times what is asked, or all that the steering has){end}"
+        ),
+        source="STER.TurnRate against its demand",
+        suspect="parameter",
+        probability=_SPENT if stays else 0.2,
+    )
 
 
 def _unasked(
@@ -211,7 +252,7 @@ def _unasked(
     spans = lasting(table.t, far & (np.concatenate(over) | _exhausted(table, n, *limit)), _SWING_S)
     if not spans:
         return [], 0.0
-    swung = flight.during(spans, table.t)
+    swung = during(spans, table.t)
     if not _to_and_fro((table[rate] - table[wanted])[swung]):
         return [], 0.0
     return spans, top(np.concatenate(list(level()))[swung], 0.9)

@@ -11,9 +11,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Flight, Mask, parts
-from care_core.ecosystems.ardupilot.measure import Calibration, aligned, lasting, likely, roughness, smooth
-from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, parts
+from care_core.ecosystems.ardupilot.statistics import (
+    Calibration,
+    aligned,
+    calibrated_probability,
+    lasting,
+    roughness,
+    smooth,
+)
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
@@ -78,17 +85,23 @@ def find(flight: Flight) -> Iterator[Finding]:
         for peak, (_, _, words, limit) in zip(peaks, broken, strict=True)
     )
     yield Finding(
-        "barometer", "the barometer is noisy or drifts", start, end, _severity(flight, start, max(peaks)),
-        f"it {said}", "BARO.Alt against its neighbours, BARO of the second, GPS.Alt; Copter's pre-arm check allows 1 m",
-        probability=likely(max(peaks), _CALIBRATION), mission_lost=_LOST,
-    )  # fmt: skip
+        kind="barometer",
+        title="the barometer is noisy or drifts",
+        onset_s=start,
+        end_s=end,
+        severity=_severity(flight, start, max(peaks)),
+        evidence=f"it {said}",
+        source="BARO.Alt against its neighbours, BARO of the second, GPS.Alt; Copter's pre-arm check allows 1 m",
+        probability=calibrated_probability(max(peaks), _CALIBRATION),
+        mission_lost=_LOST,
+    )
 
 
 def _contradicted(flight: Flight) -> Iterator[Finding]:
     """A barometer that moved away from the range finder, low and where the vehicle began: terrain explains it not."""
     baro = _first(flight, ("BARO", "Alt"), ("CTUN", "BAlt"))
     ranger = _first(flight, ("RFND", "Dist"), ("CTUN", "SAlt"))
-    if baro is None or ranger is None or not flies(flight.vehicle.kind):
+    if baro is None or ranger is None or not flies(flight.kind):
         return
     (heard, height), (table, distance) = baro, ranger
     near = (table[distance] > _NO_RANGE_M) & (table[distance] < _LOW_M)
@@ -107,11 +120,15 @@ def _contradicted(flight: Flight) -> Iterator[Finding]:
     if spans:
         most = quantile(np.abs(apart)[np.abs(apart) > APART_M], 0.9)
         yield Finding(
-            "barometer", "barometer and range finder are at odds", spans[0][0], spans[-1][1], "info",
-            f"they moved {most:.1f} m apart within {_LOW_M:g} m of the ground (limit {APART_M:g} m)",
-            "BARO or CTUN.BAlt against RFND or CTUN.SAlt; Copter's pre-arm check allows 1 m to the estimator",
+            kind="barometer",
+            title="barometer and range finder are at odds",
+            onset_s=spans[0][0],
+            end_s=spans[-1][1],
+            severity="info",
+            evidence=f"they moved {most:.1f} m apart within {_LOW_M:g} m of the ground (limit {APART_M:g} m)",
+            source="BARO or CTUN.BAlt against RFND or CTUN.SAlt; Copter's pre-arm check allows 1 m to the estimator",
             probability=0.3,
-        )  # fmt: skip
+        )
 
 
 def _first(flight: Flight, *places: tuple[str, str]) -> tuple[Table, str] | None:

@@ -13,7 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
-from care_core.ecosystems.ardupilot.measure import lasting
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 from care_core.numbers import median
@@ -28,7 +29,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     """The first time that it stood still although it was driven, or leant."""
     yield from _held(flight)
     driven = flight.one("THR", "ThrOut", "Speed")
-    if flight.vehicle.kind != "rover" or driven is None:
+    if flight.kind != "rover" or driven is None:
         return
     turned = flight.one("STER", "TurnRate")
     still = np.abs(driven["Speed"]) < STANDING_MS
@@ -40,11 +41,18 @@ def find(flight: Flight) -> Iterator[Finding]:
         start, end = spans[0]
         most = float(np.abs(driven["ThrOut"])[(driven.t >= start) & (driven.t <= end)].max())
         yield Finding(
-            "blocked", "the vehicle is driven and does not move", start, end, "critical",
-            f"for {end - start:.0f} s below {STANDING_MS:g} m/s at up to {most:.0f} % throttle "
-            f"(limit {THROTTLE_PERCENT:g} % for {_LASTS_S:g} s)",
-            "THR, STER; Rover/crash_check.cpp", suspect="world",
-        )  # fmt: skip
+            kind="blocked",
+            title="the vehicle is driven and does not move",
+            onset_s=start,
+            end_s=end,
+            severity="critical",
+            evidence=(
+                f"for {end - start:.0f} s below {STANDING_MS:g} m/s at up to {most:.0f} % throttle "
+                f"(limit {THROTTLE_PERCENT:g} % for {_LASTS_S:g} s)"
+            ),
+            source="THR, STER; Rover/crash_check.cpp",
+            suspect="world",
+        )
 
 
 def _held(flight: Flight) -> Iterator[Finding]:
@@ -52,10 +60,16 @@ def _held(flight: Flight) -> Iterator[Finding]:
     if flight.held and flight.tilt is not None:
         start, end = flight.held[0][0], flight.held[-1][1]
         t, tilt = flight.tilt
-        lean = float(median(tilt[flight.during(flight.held, t)]))
+        lean = float(median(tilt[during(flight.held, t)]))
         lasted = sum(b - a for a, b in flight.held)
         yield Finding(
-            "blocked", "something holds it: it leans and does not move", start, end, "critical",
-            f"for {lasted:.0f} s below {STANDS_MS:g} m/s at a lean of {lean:.0f} degrees, after a blow",
-            "ATT, GPS.Spd; blows by VIBE.Clip and IMU", suspect="world", probability=0.9,
-        )  # fmt: skip
+            kind="blocked",
+            title="something holds it: it leans and does not move",
+            onset_s=start,
+            end_s=end,
+            severity="critical",
+            evidence=f"for {lasted:.0f} s below {STANDS_MS:g} m/s at a lean of {lean:.0f} degrees, after a blow",
+            source="ATT, GPS.Spd; blows by VIBE.Clip and IMU",
+            suspect="world",
+            probability=0.9,
+        )

@@ -27,7 +27,14 @@ def find(flight: Flight) -> Iterator[Finding]:
     )
     if changed and not flight.events(*range(30, 38)):  # autotune changes gains by itself
         yield Finding(
-            "tuning", "parameters were changed in the air", changed[0][0], changed[-1][0], "info",
-            ", ".join(f"{name}={value}" for _, name, value in changed[:5]) + (", ..." if len(changed) > 5 else ""),
-            "PARM", suspect="parameter", probability=0.2,
-        )  # fmt: skip
+            kind="tuning",
+            title="parameters were changed in the air",
+            onset_s=changed[0][0],
+            end_s=changed[-1][0],
+            severity="info",
+            evidence=", ".join(f"{name}={value}" for _, name, value in changed[:5])
+            + (", ..." if len(changed) > 5 else ""),
+            source="PARM",
+            suspect="parameter",
+            probability=0.2,
+        )

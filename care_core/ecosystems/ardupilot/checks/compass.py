@@ -12,9 +12,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Flight, Mask
-from care_core.ecosystems.ardupilot.measure import Calibration, aligned, lasting, length, likely, smooth
-from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
+from care_core.ecosystems.ardupilot.statistics import (
+    Calibration,
+    aligned,
+    calibrated_probability,
+    lasting,
+    length,
+    smooth,
+)
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median, quantile
@@ -69,11 +76,19 @@ def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     replaced = any(len(other) and float(_silent(other).mean()) < 0.5 for other in others)
     broken = _not_a_number(flight)
     yield Finding(
-        "compass", "the compass reads nothing", start, end,
-        "critical" if not replaced or flight.lost_control_s is not None or _rejected(flight, start) else "warning",
-        "the field of compass 1 is zero or marked unhealthy" + (f"; {broken} is not a number" if broken else ""),
-        "MAG", suspect="parameter" if broken else "hardware", probability=0.95,
-    )  # fmt: skip
+        kind="compass",
+        title="the compass reads nothing",
+        onset_s=start,
+        end_s=end,
+        severity="critical"
+        if not replaced or flight.lost_control_s is not None or _rejected(flight, start)
+        else "warning",
+        evidence="the field of compass 1 is zero or marked unhealthy"
+        + (f"; {broken} is not a number" if broken else ""),
+        source="MAG",
+        suspect="parameter" if broken else "hardware",
+        probability=0.95,
+    )
 
 
 def _silent(compass: Table) -> Mask:
@@ -113,12 +128,20 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
         size = float(median((moved if has_moved else level)[inside]))
         worse = _odd_one(compasses, n)
         yield Finding(
-            "compass", f"compass {worse} is disturbed", start, end, _gravity(flight, start, worse == 1),
-            f"the difference of compasses 1 and {n} changes by {size:.0f} mGauss in flight (limit {MOVED:.0f})"
-            if has_moved else f"compasses 1 and {n} differ by {size:.0f} mGauss in the level plane (limit {APART:.0f})",
-            "MAG, MAG2; AP_COMPASS_MAX_XY_LENGTH_DIFF 200 mGauss", probability=likely(ratio, _CALIBRATION),
+            kind="compass",
+            title=f"compass {worse} is disturbed",
+            onset_s=start,
+            end_s=end,
+            severity=_gravity(flight, start, worse == 1),
+            evidence=(
+                f"the difference of compasses 1 and {n} changes by {size:.0f} mGauss in flight (limit {MOVED:.0f})"
+                if has_moved
+                else f"compasses 1 and {n} differ by {size:.0f} mGauss in the level plane (limit {APART:.0f})"
+            ),
+            source="MAG, MAG2; AP_COMPASS_MAX_XY_LENGTH_DIFF 200 mGauss",
+            probability=calibrated_probability(ratio, _CALIBRATION),
             mission_lost=_LOST,
-        )  # fmt: skip
+        )
 
 
 def _odd_one(compasses: list[Table], other: int) -> int:
@@ -156,9 +179,15 @@ def _refused(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     if begin is not None:
         said = next(text for t, text in flight.messages if t == begin)
         yield Finding(
-            "compass", "the firmware finds the compass wrong", begin, flight.end_s, "critical", said,
-            "MSG; AP_Arming's compass checks", probability=0.7,
-        )  # fmt: skip
+            kind="compass",
+            title="the firmware finds the compass wrong",
+            onset_s=begin,
+            end_s=flight.end_s,
+            severity="critical",
+            evidence=said,
+            source="MSG; AP_Arming's compass checks",
+            probability=0.7,
+        )
 
 
 def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
@@ -179,12 +208,18 @@ def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     share = abs(slope) * quantile(x, 0.95) / max(base, 1.0)
     if share > GREY and abs(match) > 0.6:
         yield Finding(
-            "compass", "the motors' currents disturb the compass", float(first.t[usable][0]), float(first.t[-1]),
-            "critical" if share > TOO_MUCH and _rejected(flight, 0.0) else "warning",
-            f"the field changes by {100 * share:.0f} % with the throttle (correlation {match:.2f}; limit 30 %, above "
-            "60 % it is unusable)",
-            "MAG against CTUN.ThO; ArduPilot, Compass setup", probability=0.7 if share > TOO_MUCH else 0.5,
-        )  # fmt: skip
+            kind="compass",
+            title="the motors' currents disturb the compass",
+            onset_s=float(first.t[usable][0]),
+            end_s=float(first.t[-1]),
+            severity="critical" if share > TOO_MUCH and _rejected(flight, 0.0) else "warning",
+            evidence=(
+                f"the field changes by {100 * share:.0f} % with the throttle (correlation {match:.2f}; limit 30 %, "
+                "above 60 % it is unusable)"
+            ),
+            source="MAG against CTUN.ThO; ArduPilot, Compass setup",
+            probability=0.7 if share > TOO_MUCH else 0.5,
+        )
 
 
 def _line(x: Floats, y: Floats) -> tuple[float, float]:
@@ -201,22 +236,33 @@ def _implausible(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     if spans:
         worst = strength[(first.t >= spans[0][0]) & (first.t <= spans[-1][1])]
         yield Finding(
-            "compass", "the magnetic field is implausible", spans[0][0], spans[-1][1],
-            "critical" if _rejected(flight, spans[0][0]) else "warning",
-            f"length between {worst.min():.0f} and {worst.max():.0f} mGauss (plausible: {_SHORTEST:.0f} to "
-            f"{_LONGEST:.0f})",
-            "MAG; AP_Arming's limits of the field", probability=0.5,
-        )  # fmt: skip
+            kind="compass",
+            title="the magnetic field is implausible",
+            onset_s=spans[0][0],
+            end_s=spans[-1][1],
+            severity="critical" if _rejected(flight, spans[0][0]) else "warning",
+            evidence=(
+                f"length between {worst.min():.0f} and {worst.max():.0f} mGauss (plausible: {_SHORTEST:.0f} to "
+                f"{_LONGEST:.0f})"
+            ),
+            source="MAG; AP_Arming's limits of the field",
+            probability=0.5,
+        )
 
 
 def _doubted(flight: Flight) -> Iterator[Finding]:
     """The estimator found the compass wrong in the air, though the compass alone shows nothing."""
     for one in flight.all("XKF4", "SM"):
-        spans = lasting(one.t, (one["SM"] > 1.0) & flight.during(flight.flown, one.t), 3.0)
+        spans = lasting(one.t, (one["SM"] > 1.0) & during(flight.flown, one.t), 3.0)
         if spans:
             yield Finding(
-                "compass", "the estimator rejects the compass", spans[0][0], spans[-1][1], "warning",
-                f"test ratio {np.max(one['SM'][flight.watch(one.t)]):.1f} (limit 1)",
-                "XKF4.SM; 1 is the limit of its innovation test", probability=0.2,
-            )  # fmt: skip
+                kind="compass",
+                title="the estimator rejects the compass",
+                onset_s=spans[0][0],
+                end_s=spans[-1][1],
+                severity="warning",
+                evidence=f"test ratio {np.max(one['SM'][flight.watch(one.t)]):.1f} (limit 1)",
+                source="XKF4.SM; 1 is the limit of its innovation test",
+                probability=0.2,
+            )
             return

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.measure import lasting
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 
@@ -26,13 +27,21 @@ def find(flight: Flight) -> Iterator[Finding]:
     """Overload while armed."""
     stuck = [t for t, code in flight.errors(_FAILSAFE_CPU) if code and any(a <= t <= b for a, b in flight.armed)]
     if stuck:
-        yield Finding("cpu", "the main loop got stuck", stuck[0], stuck[-1], "critical", "CPU failsafe", "ERR 19",
-                      probability=0.8)  # fmt: skip
+        yield Finding(
+            kind="cpu",
+            title="the main loop got stuck",
+            onset_s=stuck[0],
+            end_s=stuck[-1],
+            severity="critical",
+            evidence="CPU failsafe",
+            source="ERR 19",
+            probability=0.8,
+        )
         return
     table = flight.one("PM")
     if table is None or flight.is_simulated:  # whose computer's load that is
         return
-    armed = flight.during(flight.armed, table.t)
+    armed = during(flight.armed, table.t)
     slow = np.zeros(len(table), dtype=bool)
     said = []
     if {"NLon", "NL"} <= table.columns.keys():
@@ -47,5 +56,13 @@ def find(flight: Flight) -> Iterator[Finding]:
         said.append(f"load {float(np.max(table['Load'][armed])) / 10:.0f} %")
     spans = lasting(table.t, slow & armed, 5.0, gap_s=15.0, records=2)
     if spans and said:
-        yield Finding("cpu", "the autopilot is overloaded", spans[0][0], spans[-1][1], "warning", "; ".join(said),
-                      "PM.NLon, NL, Load", probability=0.4)  # fmt: skip
+        yield Finding(
+            kind="cpu",
+            title="the autopilot is overloaded",
+            onset_s=spans[0][0],
+            end_s=spans[-1][1],
+            severity="warning",
+            evidence="; ".join(said),
+            source="PM.NLon, NL, Load",
+            probability=0.4,
+        )

@@ -8,7 +8,6 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.vehicles import way_of
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"RCIN": ("C3",)}
@@ -30,33 +29,60 @@ def find(flight: Flight) -> Iterator[Finding]:
     elif _tipped(flight, lost if lost is not None else begin):
         start = lost if lost is not None else begin
         yield Finding(
-            "takeoff", "it tipped over at take-off", start, told or start, "critical",
-            f"never above {_LOW_M:g} m before control was lost; wrong motor order, turning direction or propellers "
-            "show like this",
-            "ATT, height, ERR 12; 30 degrees: ArduCopter's crash check", probability=0.5, suspect="operation",
-        )  # fmt: skip
+            kind="takeoff",
+            title="it tipped over at take-off",
+            onset_s=start,
+            end_s=told or start,
+            severity="critical",
+            evidence=(
+                f"never above {_LOW_M:g} m before control was lost; wrong motor order, turning direction or propellers "
+                "show like this"
+            ),
+            source="ATT, height, ERR 12; 30 degrees: ArduCopter's crash check",
+            probability=0.5,
+            suspect="operation",
+        )
     elif told is not None or said is not None or impact is not None:
         first = min(t for t in (told, said, impact) if t is not None)
         steered = _steered(flight, first)
         what = "it hit something" if flight.was_struck else "it crashed"
         what = "it flew into the ground as steered" if steered else what
         yield Finding(
-            "crash", what, first, first, "critical",
-            ("the firmware says: crash" if told is not None or said is not None else "control was lost, then it hit")
-            + (f"; {steered}" if steered else "")
-            + ("; a blow came before control was lost" if flight.was_struck else ""),
-            "ERR 12, MSG, ATT, IMU", suspect="operation" if steered else "hardware", probability=0.1,
-        )  # fmt: skip
+            kind="crash",
+            title=what,
+            onset_s=first,
+            end_s=first,
+            severity="critical",
+            evidence=(
+                (
+                    "the firmware says: crash"
+                    if told is not None or said is not None
+                    else "control was lost, then it hit"
+                )
+                + (f"; {steered}" if steered else "")
+                + ("; a blow came before control was lost" if flight.was_struck else "")
+            ),
+            source="ERR 12, MSG, ATT, IMU",
+            suspect="operation" if steered else "hardware",
+            probability=0.1,
+        )
 
 
 def _stranded(flight: Flight) -> Iterator[Finding]:
     if flight.stranded is not None:
         start, end = flight.stranded
         yield Finding(
-            "crash", "it came down and could not rise again", start, end, "critical",
-            f"on the ground for {end - start:.0f} s with the motors up and a height wanted that it does not reach",
-            "CTUN", probability=0.0,  # it says that the run failed, and nothing of why
-        )  # fmt: skip
+            kind="crash",
+            title="it came down and could not rise again",
+            onset_s=start,
+            end_s=end,
+            severity="critical",
+            evidence=(
+                f"on the ground for {end - start:.0f} s with the motors up, below the height that it is told to reach"
+            ),
+            source="CTUN",
+            probability=0.0,
+        )
 
 
 def _tipped(flight: Flight, at: float) -> bool:
@@ -81,7 +107,7 @@ def _steered(flight: Flight, at: float) -> str:
     """What shows that it went down as told: the attitude was followed, and the pilot's throttle stick was at its
     bottom."""
     mode = flight.mode_at(at - 2.0)
-    by_stick = mode is not None and way_of(flight.vehicle.kind, mode) in ("manual", "hold")
+    by_stick = mode is not None and mode.way in ("manual", "hold")
     if not by_stick or (flight.lost_control_s is not None and flight.lost_control_s < at - 1.0):
         return ""
     sticks = flight.one("RCIN", "C3")

@@ -12,7 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.measure import lasting
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Wanted
 
@@ -30,7 +31,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     worst: dict[str, tuple[float, float, float]] = {}
     for core in flight.all("XKF4", "SV", "SP", "SH", "SM"):
         for field in _WORDS:
-            spans = lasting(core.t, (core[field] > RATIO) & flight.during(flight.flown, core.t), _LASTS_S)
+            spans = lasting(core.t, (core[field] > RATIO) & during(flight.flown, core.t), _LASTS_S)
             if spans:
                 start, end = spans[0][0], spans[-1][1]
                 peak = float(np.max(core[field][(core.t >= start) & (core.t <= end)]))
@@ -43,9 +44,15 @@ def find(flight: Flight) -> Iterator[Finding]:
         return
     if not worst and not failed:
         yield Finding(
-            "estimator", "the estimator changed its lane or sensor", switched[0], switched[-1], "info",
-            "; ".join(dict.fromkeys(text for t, text in flight.messages if t in switched)), "MSG", probability=0.3,
-        )  # fmt: skip
+            kind="estimator",
+            title="the estimator changed its lane or sensor",
+            onset_s=switched[0],
+            end_s=switched[-1],
+            severity="info",
+            evidence="; ".join(dict.fromkeys(text for t, text in flight.messages if t in switched)),
+            source="MSG",
+            probability=0.3,
+        )
         return
     start = min([span[0] for span in worst.values()] + failed)
     end = max([span[1] for span in worst.values()] + failed)
@@ -55,9 +62,15 @@ def find(flight: Flight) -> Iterator[Finding]:
         evidence += f"; EKF check or failsafe at {min(failed):.1f} s"
     severity: Severity = "critical" if failed else "warning"
     yield Finding(
-        "estimator", "the estimator rejects its measurements", start, end, severity, evidence,
-        "XKF4.SV, SP, SH, SM, ERR; limit 1 of AP_NavEKF3, 0.8 of FS_EKF_THRESH", probability=0.2,
-    )  # fmt: skip
+        kind="estimator",
+        title="the estimator rejects its measurements",
+        onset_s=start,
+        end_s=end,
+        severity=severity,
+        evidence=evidence,
+        source="XKF4.SV, SP, SH, SM, ERR; limit 1 of AP_NavEKF3, 0.8 of FS_EKF_THRESH",
+        probability=0.2,
+    )
 
 
 def _inside(flight: Flight, times: list[float]) -> list[float]:

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Flight, Span
-from care_core.ecosystems.ardupilot.measure import Calibration, lasting, likely
-from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import Floats, Span, during
+from care_core.ecosystems.ardupilot.statistics import Calibration, calibrated_probability, lasting
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import quantile
@@ -80,12 +80,18 @@ def _frozen(flight: Flight, table: Table) -> Iterator[Finding]:
         return
     north_m = float(np.ptp(moved["Lat"])) * _METRES
     east_m = float(np.ptp(moved["Lng"])) * _METRES * float(np.cos(np.radians(moved["Lat"][0])))
-    if np.hypot(north_m, east_m) > MOVED_M:
+    moved_m = float(np.hypot(north_m, east_m))
+    if moved_m > MOVED_M:
         yield Finding(
-            "gps", "the GPS position never changes", start, end, "warning",
-            f"the same in {len(fixed)} records with a fix, while the estimate went {np.hypot(north_m, east_m):.0f} m",
-            "GPS.Lat, Lng against POS.Lat, Lng", probability=0.9,
-        )  # fmt: skip
+            kind="gps",
+            title="the GPS position never changes",
+            onset_s=start,
+            end_s=end,
+            severity="warning",
+            evidence=f"the same in {len(fixed)} records with a fix, while the estimate went {moved_m:.0f} m",
+            source="GPS.Lat, Lng against POS.Lat, Lng",
+            probability=0.9,
+        )
 
 
 def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
@@ -110,13 +116,18 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     over = float((off / limit)[beyond].max())
     estimate = "; the estimator's position innovation is over its limit" if _upset(flight, start) else ""
     yield Finding(
-        "gps", f"the GPS position jumps by {size:.0f} m", start, float(t[1:][beyond[-1]]),
-        _gravity(flight, start, size > 3 * JUMP_M or bool(estimate)),
-        f"{len(beyond)} jump{'s' * (len(beyond) > 1)} of up to {size:.1f} m that its own velocity does not explain "
-        f"(limit {JUMP_M:g} m and 10 m/s^2){estimate}",
-        "GPS.Lat, Lng against Spd and GCrs; GPSGLITCH_RADIUS 5 m, GPSGLITCH_ACCEL 10 m/s^2 of ArduPilot",
-        probability=likely(over, _JUMP),
-    )  # fmt: skip
+        kind="gps",
+        title=f"the GPS position jumps by {size:.0f} m",
+        onset_s=start,
+        end_s=float(t[1:][beyond[-1]]),
+        severity=_gravity(flight, start, size > 3 * JUMP_M or bool(estimate)),
+        evidence=(
+            f"{len(beyond)} jump{'s' * (len(beyond) > 1)} of up to {size:.1f} m that its own velocity does not explain "
+            f"(limit {JUMP_M:g} m and 10 m/s^2){estimate}"
+        ),
+        source="GPS.Lat, Lng against Spd and GCrs; GPSGLITCH_RADIUS 5 m, GPSGLITCH_ACCEL 10 m/s^2 of ArduPilot",
+        probability=calibrated_probability(over, _JUMP),
+    )
 
 
 def _unexplained(table: Table) -> tuple[Floats, Floats]:
@@ -147,10 +158,15 @@ def _told(flight: Flight) -> Iterator[Finding]:
     if inside:
         cleared = [t for t, code in flight.errors(_ERR_GPS) if code == 0 and t > inside[0][0]]
         yield Finding(
-            "gps", "GPS glitch", inside[0][0], cleared[-1] if cleared else inside[-1][0], "warning",
-            f"{len(inside)} GPS glitch{'es' * (len(inside) > 1)} reported in flight", "ERR 11-2 (GPS glitch)",
+            kind="gps",
+            title="GPS glitch",
+            onset_s=inside[0][0],
+            end_s=cleared[-1] if cleared else inside[-1][0],
+            severity="warning",
+            evidence=f"{len(inside)} GPS glitch{'es' * (len(inside) > 1)} reported in flight",
+            source="ERR 11-2 (GPS glitch)",
             probability=0.6,
-        )  # fmt: skip
+        )
 
 
 def _in(spans: tuple[Span, ...], t: float) -> bool:
@@ -160,15 +176,21 @@ def _in(spans: tuple[Span, ...], t: float) -> bool:
 def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
     """A fix that went away in the air."""
     had = np.cumsum(table["Status"] >= _FIX) > 0
-    out = lasting(table.t, had & (table["Status"] < _FIX) & flight.during(flight.flown, table.t), 0.5, records=2)
+    out = lasting(table.t, had & (table["Status"] < _FIX) & during(flight.flown, table.t), 0.5, records=2)
     if out:
         start = out[0][0]
         total = sum(b - a for a, b in out)
         severity: Severity = "critical" if total > 5 and not flight.all("GPS")[1:] else "warning"
         yield Finding(
-            "gps", "the GPS fix was lost in the air", start, out[-1][1], severity,
-            f"no 3D fix for {total:.0f} s", "GPS.Status below 3", probability=0.9,
-        )  # fmt: skip
+            kind="gps",
+            title="the GPS fix was lost in the air",
+            onset_s=start,
+            end_s=out[-1][1],
+            severity=severity,
+            evidence=f"no 3D fix for {total:.0f} s",
+            source="GPS.Status below 3",
+            probability=0.9,
+        )
 
 
 def _few(flight: Flight, table: Table) -> Iterator[Finding]:
@@ -185,23 +207,33 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
         least = float(np.min(sats[(t >= start) & (t <= end)]))
         harmed = _harmed(flight, start)
         yield Finding(
-            "gps", f"only {least:.0f} satellites", start, end,
-            "critical" if harmed else "warning",
-            f"{least:.0f} satellites (the estimator wants {FEWEST}, {usual:.0f} were there)",
-            "GPS.NSats; 6: AP_NavEKF3_VehicleStatus.cpp", probability=likely(FEWEST / max(least, 1.0), _FEW),
+            kind="gps",
+            title=f"only {least:.0f} satellites",
+            onset_s=start,
+            end_s=end,
+            severity="critical" if harmed else "warning",
+            evidence=f"{least:.0f} satellites (the estimator wants {FEWEST}, {usual:.0f} were there)",
+            source="GPS.NSats; 6: AP_NavEKF3_VehicleStatus.cpp",
+            probability=calibrated_probability(FEWEST / max(least, 1.0), _FEW),
             mission_lost=None if harmed else _LOST,
-        )  # fmt: skip
+        )
         return
     if "HDop" not in table.columns:
         return
-    poor = lasting(t, (table["HDop"] > BAD_HDOP) & (table["HDop"] < 90) & flight.during(flight.flown, t), 5.0)
+    poor = lasting(t, (table["HDop"] > BAD_HDOP) & (table["HDop"] < 90) & during(flight.flown, t), 5.0)
     if poor:
         worst = float(np.max(table["HDop"][(t >= poor[0][0]) & (t <= poor[-1][1])]))
         yield Finding(
-            "gps", f"poor satellite geometry (HDop {worst:.1f})", poor[0][0], poor[-1][1], "warning",
-            f"HDop up to {worst:.1f} (good below 1.5, poor above {POOR_HDOP:g})",
-            "GPS.HDop; ArduPilot, Diagnosing problems using logs", suspect="world", probability=0.4,
-        )  # fmt: skip
+            kind="gps",
+            title=f"poor satellite geometry (HDop {worst:.1f})",
+            onset_s=poor[0][0],
+            end_s=poor[-1][1],
+            severity="warning",
+            evidence=f"HDop up to {worst:.1f} (good below 1.5, poor above {POOR_HDOP:g})",
+            source="GPS.HDop; ArduPilot, Diagnosing problems using logs",
+            suspect="world",
+            probability=0.4,
+        )
 
 
 def _harmed(flight: Flight, start: float) -> bool:
@@ -217,11 +249,17 @@ def _inaccurate(flight: Flight) -> Iterator[Finding]:
     table = flight.one("GPA", "HAcc", "SAcc")
     if table is None:
         return
-    bad = lasting(table.t, ((table["HAcc"] > 10) | (table["SAcc"] > 3)) & flight.during(flight.flown, table.t), 5.0)
+    bad = lasting(table.t, ((table["HAcc"] > 10) | (table["SAcc"] > 3)) & during(flight.flown, table.t), 5.0)
     if bad:
         part = table.between(bad[0][0], bad[-1][1])
         yield Finding(
-            "gps", "the GPS doubts its position", bad[0][0], bad[-1][1], "warning",
-            f"accuracy down to {np.max(part['HAcc']):.1f} m and {np.max(part['SAcc']):.1f} m/s",
-            "GPA.HAcc, SAcc; the firmware's checks want 5 m and 1 m/s", suspect="world", probability=0.4,
-        )  # fmt: skip
+            kind="gps",
+            title="the GPS doubts its position",
+            onset_s=bad[0][0],
+            end_s=bad[-1][1],
+            severity="warning",
+            evidence=f"accuracy down to {np.max(part['HAcc']):.1f} m and {np.max(part['SAcc']):.1f} m/s",
+            source="GPA.HAcc, SAcc; the firmware's checks want 5 m and 1 m/s",
+            suspect="world",
+            probability=0.4,
+        )

@@ -13,9 +13,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Flight, Mask, Span
-from care_core.ecosystems.ardupilot.measure import Calibration, aligned, lasting, length, likely, smooth
-from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
+from care_core.ecosystems.ardupilot.statistics import (
+    Calibration,
+    aligned,
+    calibrated_probability,
+    lasting,
+    length,
+    smooth,
+)
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median, quantile
@@ -70,10 +77,15 @@ def _unhealthy(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
             spans = lasting(table.t, table[flag] == 0, 0.5)
             if spans:
                 yield Finding(
-                    "imu", f"{name} {n} failed", spans[0][0], spans[-1][1], "critical",
-                    f"{name} {n} is marked unhealthy for {sum(b - a for a, b in spans):.1f} s", f"IMU.{flag}",
+                    kind="imu",
+                    title=f"{name} {n} failed",
+                    onset_s=spans[0][0],
+                    end_s=spans[-1][1],
+                    severity="critical",
+                    evidence=f"{name} {n} is marked unhealthy for {sum(b - a for a, b in spans):.1f} s",
+                    source=f"IMU.{flag}",
                     probability=0.9,
-                )  # fmt: skip
+                )
 
 
 def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
@@ -97,13 +109,21 @@ def _gyros(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     allowed = float(median(limit[inside])) if is_noise else OFFSET_DPS
     severity = _severity(flight, ratio, start)
     yield Finding(
-        "imu", "the gyros are noisy" if is_noise else "the gyros disagree", start, end, severity,
-        f"gyros 1 and 2 differ by {size:.2g} degrees/s on every axis (limit {allowed:.2g} at a vibration of "
-        f"{float(median(vibration[inside])):.1f} m/s^2)"
-        if is_noise else f"gyros 1 and 2 differ by {size:.1f} degrees/s (limit {OFFSET_DPS:g})",
-        "IMU.GyrX, GyrY, GyrZ of both; AP_Arming allows 5 degrees/s at rest", probability=likely(ratio, _CALIBRATION),
+        kind="imu",
+        title="the gyros are noisy" if is_noise else "the gyros disagree",
+        onset_s=start,
+        end_s=end,
+        severity=severity,
+        evidence=(
+            f"gyros 1 and 2 differ by {size:.2g} degrees/s on every axis (limit {allowed:.2g} at a vibration of "
+            f"{float(median(vibration[inside])):.1f} m/s^2)"
+            if is_noise
+            else f"gyros 1 and 2 differ by {size:.1f} degrees/s (limit {OFFSET_DPS:g})"
+        ),
+        source="IMU.GyrX, GyrY, GyrZ of both; AP_Arming allows 5 degrees/s at rest",
+        probability=calibrated_probability(ratio, _CALIBRATION),
         mission_lost=_LOST if is_noise and severity == "warning" else None,
-    )  # fmt: skip
+    )
 
 
 def _turning(table: Table) -> Floats:
@@ -139,7 +159,7 @@ def _severity(flight: Flight, ratio: float, start: float) -> Severity:
     error = flight.lean_error
     if flight.lost_control_s is not None or error is None:
         return "critical" if flight.lost_control_s is not None else "warning"
-    bad = (error[1] > 10.0) & (error[0] >= start) & flight.during(flight.flown, error[0])
+    bad = (error[1] > 10.0) & (error[0] >= start) & during(flight.flown, error[0])
     return "critical" if bad.mean() > 0.02 and ratio > 1.5 else "warning"
 
 
@@ -154,8 +174,15 @@ def _accelerometers(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     if spans:
         inside = (t >= spans[0][0]) & (t <= spans[-1][1])
         yield Finding(
-            "imu", "the accelerometers disagree", spans[0][0], spans[-1][1], "warning",
-            f"accelerometers 1 and 2 differ by {median(apart[inside]):.1f} m/s^2 (limit {OFFSET_ACC:g} beside what "
-            "vibration explains)",
-            "IMU.AccX, AccY, AccZ of both; ARMING_ACCTHRESH 0.75 m/s^2 at rest", probability=0.7,
-        )  # fmt: skip
+            kind="imu",
+            title="the accelerometers disagree",
+            onset_s=spans[0][0],
+            end_s=spans[-1][1],
+            severity="warning",
+            evidence=(
+                f"accelerometers 1 and 2 differ by {median(apart[inside]):.1f} m/s^2 (limit {OFFSET_ACC:g} beside what "
+                "vibration explains)"
+            ),
+            source="IMU.AccX, AccY, AccZ of both; ARMING_ACCTHRESH 0.75 m/s^2 at rest",
+            probability=0.7,
+        )

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Flight, Mask
-from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import Floats, Mask
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 from care_core.numbers import median, pauses
@@ -40,16 +40,27 @@ def _holes(flight: Flight) -> Iterator[Finding]:
         total = float((high - low).sum())
         if flight.is_telemetry:
             yield Finding(
-                "radio", "telemetry was interrupted", float(low[0]), float(high[-1]), "info",
-                f"{len(low)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
-                "times of the telemetry", suspect="world", probability=0.3,
-            )  # fmt: skip
+                kind="radio",
+                title="telemetry was interrupted",
+                onset_s=float(low[0]),
+                end_s=float(high[-1]),
+                severity="info",
+                evidence=f"{len(low)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
+                source="times of the telemetry",
+                suspect="world",
+                probability=0.3,
+            )
             return
         yield Finding(
-            "log", f"the log has {len(low)} hole{'s' * (len(low) > 1)}", float(low[0]),
-            float(high[-1]), "warning", f"{total:.1f} s without any record (limit {limit:.0f} s)",
-            "times of ATT, RCOU, CTUN, IMU", probability=0.3,
-        )  # fmt: skip
+            kind="log",
+            title=f"the log has {len(low)} hole{'s' * (len(low) > 1)}",
+            onset_s=float(low[0]),
+            end_s=float(high[-1]),
+            severity="warning",
+            evidence=f"{total:.1f} s without any record (limit {limit:.0f} s)",
+            source="times of ATT, RCOU, CTUN, IMU",
+            probability=0.3,
+        )
 
 
 def _inside(flight: Flight, start: Floats, end: Floats) -> Mask:
@@ -75,11 +86,16 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         return
     sagging = _supply_falls(flight)
     yield Finding(
-        "battery" if sagging else "log", "power was lost in the air" if sagging else "the log ends in the air",
-        flight.end_s, flight.end_s, "critical" if sagging else "warning",
-        f"armed {last_m:.0f} m up at the last record: " + (sagging or "power was lost or the recording was stopped"),
-        "EV, ARM, CTUN, POS, POWR", probability=0.7 if sagging else 0.4,
-    )  # fmt: skip
+        kind="battery" if sagging else "log",
+        title="power was lost in the air" if sagging else "the log ends in the air",
+        onset_s=flight.end_s,
+        end_s=flight.end_s,
+        severity="critical" if sagging else "warning",
+        evidence=f"armed {last_m:.0f} m up at the last record: "
+        + (sagging or "power was lost or the recording was stopped"),
+        source="EV, ARM, CTUN, POS, POWR",
+        probability=0.7 if sagging else 0.4,
+    )
 
 
 def _supply_falls(flight: Flight) -> str:

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.flight import Flight, Mask
-from care_core.ecosystems.ardupilot.measure import Calibration, lasting, likely, means, records
-from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
+from care_core.ecosystems.ardupilot.statistics import Calibration, calibrated_probability, lasting, means, records
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.vehicles import Motor, motors_of
 from care_core.logs.base import Table, Wanted
@@ -95,7 +95,7 @@ def _outputs(flight: Flight) -> _Outputs | None:
     table = flight.one("RCOU")
     if table is None or not flight.is_copter:
         return None
-    motors = motors_of(flight.settings, flight.outputs) or _nameless(table.columns)
+    motors = motors_of(flight.settings, flight.motor_outputs) or _nameless(table.columns)
     columns = [_column(motor) for motor in motors]
     if len(columns) < 3 or not all(column in table.columns for column in columns):
         return None
@@ -132,11 +132,11 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
     lifting = flight.watch(t)
     for rows in pieces(len(t)):
         lifting[rows] &= median(outputs.share(rows), axis=0) > _LIFTING
-    lifting &= ~flight.during(flight.held, t)
+    lifting &= ~during(flight.held, t)
     if (tilt := flight.tilt) is not None:
         lifting &= np.interp(t, *tilt) < 60.0
     if flight.flown:
-        return lifting & flight.during(flight.flown, t)
+        return lifting & during(flight.flown, t)
     return lifting & (t < t[lifting][0] + _TRYING_S) if lifting.any() else lifting
 
 
@@ -200,7 +200,7 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         f"{100 * median(np.delete(share, n, axis=0)):.0f} % (limit: {100 * ALONE:.0f} points above them)"
         + ("; before, they were even" if changed else "")
         + (f"; at its limit {100 * limit:.0f} % of the time" if limit > 0.05 else ""),
-        _SOURCE, likely(over, _CALIBRATION if changed or over > 2 else _ALWAYS),
+        _SOURCE, calibrated_probability(over, _CALIBRATION if changed or over > 2 else _ALWAYS),
     )  # fmt: skip
 
 
@@ -302,4 +302,13 @@ def _finding(
 ) -> Finding:  # fmt: skip
     place = f" ({motor.place})" if motor.place else ""
     title = f"motor {motor.number}{place} {what}"
-    return Finding("motor", title, start, max(end, start), severity, evidence, source, probability=probability)
+    return Finding(
+        kind="motor",
+        title=title,
+        onset_s=start,
+        end_s=max(end, start),
+        severity=severity,
+        evidence=evidence,
+        source=source,
+        probability=probability,
+    )

@@ -12,7 +12,6 @@ from care_core.logs.base import Wanted
 
 READS: Wanted = {}
 
-_REFUSAL = re.compile(r"^(Pre)?Arm: (?P<why>.+)")
 _BY_OPERATOR = re.compile(
     r"""
       mode\snot\sarmable | \bRC\d*\s?.*(not\s(found|calibrated)|neutral|radio) | not\sneutral | rudder
@@ -35,7 +34,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     """The refusal that lasted, where no arming followed it."""
     if flight.armed:
         return
-    refusals = [(t, match["why"], match[1] is None) for t, text in flight.messages if (match := _REFUSAL.match(text))]
+    refusals = [(one.time_s, one.why, one.was_tried) for one in flight.refusals]
     if not refusals:
         return
     last = refusals[-1][0]
@@ -48,10 +47,16 @@ def find(flight: Flight) -> Iterator[Finding]:
     by_operator = all(_BY_OPERATOR.search(one) for _, one, _ in lasting)
     suspect: Suspect = "operation" if by_operator else "parameter"
     yield Finding(
-        "prearm", f"arming was refused: {why}", begin, last, severity,
-        "; ".join(dict.fromkeys(_plain(one) for _, one, _ in lasting)), "MSG", suspect=suspect,
+        kind="prearm",
+        title=f"arming was refused: {why}",
+        onset_s=begin,
+        end_s=last,
+        severity=severity,
+        evidence="; ".join(dict.fromkeys(_plain(one) for _, one, _ in lasting)),
+        source="MSG",
+        suspect=suspect,
         probability=_SURE if by_operator else 0.3,
-    )  # fmt: skip
+    )
 
 
 def _plain(why: str) -> str:

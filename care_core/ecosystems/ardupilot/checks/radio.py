@@ -32,7 +32,13 @@ def find(flight: Flight) -> Iterator[Finding]:
         if not flight.armed:
             severity = "info"  # a transmitter that is switched off on the ground
         yield Finding(
-            "radio", title, gone[0], end, severity,
-            f"failsafe at {gone[0]:.1f} s, " + (f"back after {away:.1f} s" if back else "not back"),
-            f"ERR {subsystem}", suspect="world", probability=0.3 if away < _BRIEF_S else 0.8,
-        )  # fmt: skip
+            kind="radio",
+            title=title,
+            onset_s=gone[0],
+            end_s=end,
+            severity=severity,
+            evidence=f"failsafe at {gone[0]:.1f} s, " + (f"back after {away:.1f} s" if back else "not back"),
+            source=f"ERR {subsystem}",
+            suspect="world",
+            probability=0.3 if away < _BRIEF_S else 0.8,
+        )

@@ -10,8 +10,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Flight, Span
-from care_core.ecosystems.ardupilot.measure import lasting, smooth
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import Span, during
+from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.findings import Finding, Severity, Suspect
 from care_core.logs.base import Wanted
 from care_core.numbers import median
@@ -33,10 +34,10 @@ hence more than that where no option keeps the motors down."""
 def find(flight: Flight) -> Iterator[Finding]:
     """Saturation first, for it says more than a high hover throttle."""
     driven = flight.throttle
-    if not flight.is_copter or flight.vehicle.kind == "heli" or driven is None:
+    if not flight.is_copter or flight.kind == "heli" or driven is None:
         return  # what a helicopter records as throttle is its collective pitch
     t, throttle = driven
-    flown = flight.during(flight.flown or flight.watched, t) & (throttle > 0.05)
+    flown = during(flight.flown or flight.watched, t) & (throttle > 0.05)
     if flown.sum() < 5:
         return
     level = smooth(t, throttle, 4.0)
@@ -53,20 +54,35 @@ def find(flight: Flight) -> Iterator[Finding]:
         severity: Severity = "critical" if grounded or lost or below > 2 * _BELOW_M else "warning"
         suspect, why = _by_option(flight)
         yield Finding(
-            "thrust", "too little thrust", begin, end, severity,
-            f"throttle above {100 * FULL:.0f} % for {lasted:.0f} s from {start:.0f} s on"
-            + (f", {below:.1f} m below the height wanted" if below else "")
-            + f"; {100 * hover:.0f} % before that" + why,
-            "CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875", suspect=suspect, probability=_PROBABILITY[suspect],
-        )  # fmt: skip
+            kind="thrust",
+            title="too little thrust",
+            onset_s=begin,
+            end_s=end,
+            severity=severity,
+            evidence=(
+                f"throttle above {100 * FULL:.0f} % for {lasted:.0f} s from {start:.0f} s on"
+                + (f", {below:.1f} m below the height wanted" if below else "")
+                + f"; {100 * hover:.0f} % before that"
+                + why
+            ),
+            source="CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875",
+            suspect=suspect,
+            probability=_PROBABILITY[suspect],
+        )
     elif high and sum(b - a for a, b in high) > 0.3 * float(flown.sum()) * float(median(np.diff(t))):
         share = float(median(level[flown]))
         suspect, why = _by_option(flight)
         yield Finding(
-            "thrust", f"hovering takes {100 * share:.0f} % of the throttle", high[0][0], high[-1][1], "warning",
-            f"mean throttle {100 * share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %){why}",
-            "CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875", suspect=suspect, probability=_PROBABILITY[suspect],
-        )  # fmt: skip
+            kind="thrust",
+            title=f"hovering takes {100 * share:.0f} % of the throttle",
+            onset_s=high[0][0],
+            end_s=high[-1][1],
+            severity="warning",
+            evidence=f"mean throttle {100 * share:.0f} % (the firmware learns up to {100 * HOVER_MOST:.0f} %){why}",
+            source="CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875",
+            suspect=suspect,
+            probability=_PROBABILITY[suspect],
+        )
 
 
 def saturated(flight: Flight) -> list[Span]:
@@ -75,7 +91,7 @@ def saturated(flight: Flight) -> list[Span]:
     if driven is None:
         return []
     t, throttle = driven
-    flown = flight.during(flight.flown or flight.watched, t)
+    flown = during(flight.flown or flight.watched, t)
     return lasting(t, flown & (throttle > FULL), _FULL_LASTS_S, gap_s=1.0)
 
 

@@ -12,7 +12,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.measure import Calibration, lasting, length, likely, roughness, smooth, steady, top
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import (
+    Calibration,
+    calibrated_probability,
+    lasting,
+    length,
+    roughness,
+    smooth,
+    steady,
+    top,
+)
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import quantile
@@ -56,7 +66,7 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
         return None
     level = np.maximum(np.maximum(table["VibeX"], table["VibeY"]), table["VibeZ"])[calm]
     level = steady(t, np.where(np.isfinite(level), level, 0.0), _LASTS_S)  # not a blow, which fades within a second
-    aloft = flight.during(flight.flown, t)  # on the ground its motors idle, which says nothing of what it was
+    aloft = during(flight.flown, t)  # on the ground its motors idle, which says nothing of what it was
     before = quantile(level[aloft] if aloft.any() else level, 0.05)
     upset = _upset(flight)
     limit = ROSE if before < ROSE / _TIMES or upset else FELT
@@ -71,14 +81,14 @@ def _of(flight: Flight, table: Table, number: int) -> Finding | None:
     lasted = sum(b - a for a, b in spans) if spans else end - start
     clipping = f"; {clips:.0f} clips of the accelerometer's range" if clips else ""
     return Finding(
-        "vibration",
-        f"strong vibration ({peak:.0f} m/s^2)",
-        start,
-        end,
-        severity,
-        f"VIBE of IMU {number + 1} at {peak:.0f} m/s^2{rose} for {lasted:.0f} s ({_against(peak)}){clipping}",
-        _SOURCE,
-        probability=likely(max(peak / HIGH, 1.0 if clips >= _CLIPS else 0.0), _CALIBRATION),
+        kind="vibration",
+        title=f"strong vibration ({peak:.0f} m/s^2)",
+        onset_s=start,
+        end_s=end,
+        severity=severity,
+        evidence=f"VIBE of IMU {number + 1} at {peak:.0f} m/s^2{rose} for {lasted:.0f} s ({_against(peak)}){clipping}",
+        source=_SOURCE,
+        probability=calibrated_probability(max(peak / HIGH, 1.0 if clips >= _CLIPS else 0.0), _CALIBRATION),
     )
 
 
@@ -124,7 +134,7 @@ def _raw(flight: Flight) -> Finding | None:
     if table is None or len(table) < 50:
         return None
     t = table.t
-    calm = flight.during(flight.flown, t)
+    calm = during(flight.flown, t)
     if flight.tilt is not None:
         calm &= np.interp(t, *flight.tilt) < 15
     rough = smooth(t, length(roughness(table[axis]) for axis in ("AccX", "AccY", "AccZ")), 2.0)
@@ -135,7 +145,12 @@ def _raw(flight: Flight) -> Finding | None:
     peak = top(rough[calm & (t >= start) & (t <= end)], 0.9)
     severity: Severity = "critical" if peak > 15 else "warning"
     return Finding(
-        "vibration", f"strong vibration ({peak:.0f} m/s^2)", start, end, severity,
-        f"accelerations leap by {peak:.0f} m/s^2 from record to record for {end - start:.0f} s (limit 5)",
-        "IMU; limits of 3 and 5 m/s^2 for logs without VIBE: ArduPilot, Measuring Vibration", probability=0.6,
-    )  # fmt: skip
+        kind="vibration",
+        title=f"strong vibration ({peak:.0f} m/s^2)",
+        onset_s=start,
+        end_s=end,
+        severity=severity,
+        evidence=f"accelerations leap by {peak:.0f} m/s^2 from record to record for {end - start:.0f} s (limit 5)",
+        source="IMU; limits of 3 and 5 m/s^2 for logs without VIBE: ArduPilot, Measuring Vibration",
+        probability=0.6,
+    )

@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN, is_armed
-from care_core.ecosystems.ardupilot.measures.flight import NEEDS
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, span_of_phase
-from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, instances, series, statistic
+from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, series, statistic
+from care_core.ecosystems.ardupilot.messages import split
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.logs.plausible import is_alive
@@ -37,7 +38,7 @@ def energy_used(mission: Mission, args: Args) -> Value:
     table = mission.tables.get("BAT")
     if table is None or not len(table):
         return missing("BAT")
-    batteries = [battery for battery in instances(table) if not has(battery, "Volt") or _has_voltage(battery)]
+    batteries = [battery for battery in split("BAT", table) if not has(battery, "Volt") or _has_voltage(battery)]
     if not batteries:
         return _NO_VOLTAGE
     used = [_energy(battery, *span) for battery in batteries]
@@ -102,7 +103,7 @@ def min_voltage(mission: Mission, args: Args) -> Value:
     if not is_armed(mission):
         return NOT_FLOWN
     table = mission.tables.get("BAT")
-    if table is not None and has(table, "Volt") and not _has_voltage(next(iter(instances(table)), table)):
+    if table is not None and has(table, "Volt") and not _has_voltage(next(iter(split("BAT", table)), table)):
         return _NO_VOLTAGE
     volts = series(mission, "BAT", ("Volt",), {}, under_way=False)
     return volts if isinstance(volts, Unavailable) else statistic(volts["Volt"], "min")
@@ -114,7 +115,7 @@ def start_voltage(mission: Mission, args: Args) -> Value:
     table = mission.tables.get("BAT")
     if table is None or not has(table, "Volt"):
         return missing("BAT")
-    battery = next(iter(instances(table)), table)
+    battery = next(iter(split("BAT", table)), table)
     if is_armed(mission) and not _has_voltage(battery):  # no motor, no change
         return _NO_VOLTAGE
     before = battery.between(-math.inf, mission.start_s)

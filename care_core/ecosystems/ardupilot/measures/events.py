@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 
-import numpy as np
-
-from care_core.ecosystems.ardupilot.measures.flight import NEEDS, analyse, messages
-from care_core.ecosystems.measures import Args, Mission, extractor, has, missing
-from care_core.ecosystems.vehicles import FAILSAFE, error_kind, error_words, with_said
-from care_core.logs.base import Table, Wanted
+from care_core.ecosystems.ardupilot.armed import ArmChange
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, SAID_AFTER_S, analyse
+from care_core.ecosystems.ardupilot.measures.modes import flight_of
+from care_core.ecosystems.ardupilot.recorded import ErrorRecord
+from care_core.ecosystems.ardupilot.texts import Refusal, refusal_of
+from care_core.ecosystems.measures import Args, Mission, extractor, missing
+from care_core.ecosystems.vehicles import FAILSAFE, error_kind, error_words
+from care_core.logs.base import Wanted
 from care_core.run import Unavailable, Value
 
-_EV_ARMED, _EV_DISARMED = 10, 11
-REFUSAL = re.compile(r"(?:Pre)?Arm: (.*)")
-_SAID_AFTER_S = 0.6
-"""A crash disarms first and is said then; telemetry knows a disarming to half a second (its heartbeats)."""
+_STILL_S = 0.5
+"""A complaint so shortly before the last attempt to arm stood when it was refused."""
 _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
     (re.compile(r"crash", re.IGNORECASE), "crash"),
     (re.compile(rf"{FAILSAFE.pattern}|battery .* is (low|critical)", re.IGNORECASE), "failsafe"),
@@ -28,83 +27,43 @@ _MESSAGE_KINDS: tuple[tuple[re.Pattern[str], str], ...] = (
 """Messages of a flight that speak about its failure, first match counts."""
 
 
-def armed_spans(tables: Mapping[str, Table], duration_s: float) -> list[tuple[float, float, bool]]:
-    """Start, end and whether it ended, of every time the motors were armed."""
-    spans: list[tuple[float, float, bool]] = []
-    armed_at: float | None = None
-    for t, armed in arm_events(tables):
-        if armed and armed_at is None:
-            armed_at = t
-        elif not armed and armed_at is not None:
-            spans.append((armed_at, t, True))
-            armed_at = None
-    if armed_at is not None:
-        spans.append((armed_at, duration_s, False))
-    return spans
-
-
-def arm_events(tables: Mapping[str, Table]) -> list[tuple[float, bool]]:
-    """Times of arming (true) and disarming, from records and messages."""
-    arm, events = tables.get("ARM"), tables.get("EV")
-    recorded: list[tuple[float, bool]] = []
-    if arm is not None and has(arm, "ArmState"):
-        recorded = list(zip(arm.t.tolist(), (arm["ArmState"] == 1).tolist(), strict=True))
-    elif events is not None and has(events, "Id"):
-        part = events.where(np.isin(events["Id"], (_EV_ARMED, _EV_DISARMED)))
-        recorded = list(zip(part.t.tolist(), (part["Id"] == _EV_ARMED).tolist(), strict=True))
-    return with_said(recorded, messages(tables.get("MSG")))
-
-
-def refusals(table: Table | None) -> list[tuple[float, str]]:
-    return [(t, text) for t, text in messages(table) if REFUSAL.match(text)]
-
-
-def last_refusals(mission: Mission) -> list[tuple[float, str]]:
+def last_refusals(mission: Mission) -> list[Refusal]:
     """The complaints that still stood when arming was last refused, each once, latest time."""
-    said = refusals(mission.tables.get("MSG"))
-    attempts = [t for t, text in said if text.startswith("Arm:")] or [t for t, _ in said]
-    if not attempts:
-        return []
-    standing: dict[str, tuple[float, str]] = {}
-    for t, text in said:
-        if t >= attempts[-1] - 0.5:
-            standing[REFUSAL.sub(r"\1", text)] = (t, text)
-    return sorted(standing.values())
+    refusals = flight_of(mission).refusals
+    attempts = [one for one in refusals if one.was_tried] or list(refusals)
+    standing = {one.why: one for one in refusals if one.time_s >= attempts[-1].time_s - _STILL_S}
+    return sorted(standing.values(), key=lambda one: (one.time_s, one.text))
 
 
 def is_armed(mission: Mission) -> bool:
-    return mission.shared(_was_armed)
+    """Whether the vehicle was armed before the mission's end."""
+    return any(change.is_armed and change.time_s <= mission.end_s for change in flight_of(mission).arm_changes)
 
 
-def _was_armed(mission: Mission) -> bool:
-    return any(armed and t <= mission.end_s for t, armed in arm_events(mission.tables))
-
-
-def errors(mission: Mission) -> list[tuple[float, int, int]]:
-    table = mission.table("ERR")
-    if table is None or not has(table, "Subsys", "ECode"):
-        return []
-    return [
-        (t, int(subsystem), int(code))
-        for t, subsystem, code in zip(table.t.tolist(), table["Subsys"], table["ECode"], strict=True)
-    ]
+def errors(mission: Mission) -> list[ErrorRecord]:
+    """The ERR records of the mission."""
+    records = flight_of(mission).error_records
+    return [one for one in records if mission.start_s <= one.time_s <= mission.end_s]
 
 
 def telling(mission: Mission) -> list[tuple[float, str, str]]:
     """Messages of the flight that speak about a failure: time, text and kind."""
     found = []
-    for t, text in messages(mission.tables.get("MSG"), mission.start_s, mission.end_s + _SAID_AFTER_S):
+    for t, text in flight_of(mission).messages_between(mission.start_s, mission.end_s + SAID_AFTER_S):
         kind = next((kind for pattern, kind in _MESSAGE_KINDS if pattern.search(text)), None)
-        if kind is not None and not REFUSAL.match(text):
+        if kind is not None and refusal_of(t, text) is None:
             found.append((t, text, kind))
     return found
 
 
 def forced(mission: Mission) -> bool:
-    arm = mission.table("ARM")
-    if arm is None or not has(arm, "ArmState", "Forced"):
-        return False
-    return bool(np.any((arm["ArmState"] == 0) & (arm["Forced"] == 1)))
+    """Whether somebody disarmed the vehicle by force."""
+    return any(change.is_forced and not change.is_armed for change in _arm_changes(mission))
+
+
+def _arm_changes(mission: Mission) -> list[ArmChange]:
+    changes = flight_of(mission).arm_changes
+    return [change for change in changes if mission.start_s <= change.time_s <= mission.end_s]
 
 
 CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
@@ -137,8 +96,8 @@ def is_over(mission: Mission) -> bool:
     """Whether the vehicle was disarmed, or drove its mission to the end: what stands on the ground stays there."""
     if mission.ended or not is_armed(mission):
         return mission.ended
-    flight = mission.shared(analyse)
-    return flight.drive is not None and flight.completed
+    flown = mission.shared(analyse)
+    return flown.drive is not None and flown.completed
 
 
 @extractor("arming_refused", needs=_EVENTS, unit="", args={"text": "count only refusals whose message holds this text"})
@@ -147,7 +106,7 @@ def arming_refused(mission: Mission, args: Args) -> Value:
     if is_armed(mission):
         return 0.0
     word = str(args.get("text", "")).casefold()
-    return float(any(word in text.casefold() for _, text in last_refusals(mission)))
+    return float(any(word in one.text.casefold() for one in last_refusals(mission)))
 
 
 @extractor("failsafe", needs=_EVENTS, unit="", args={"about": "battery, radio, EKF, ...; any when not given"})
@@ -179,8 +138,8 @@ def forced_disarm(mission: Mission, args: Args) -> Value:
     """1 when the operator disarmed the vehicle by force, else 0."""
     if not is_armed(mission):
         return NOT_FLOWN
-    arm = mission.table("ARM")
-    return float(forced(mission)) if arm is not None and has(arm, "Forced") else missing("ARM with Forced")
+    is_recorded = any(change.is_forced is not None for change in _arm_changes(mission))
+    return float(forced(mission)) if is_recorded else missing("ARM with Forced")
 
 
 @extractor("arming_time", needs=_EVENTS, unit="s")
@@ -188,7 +147,7 @@ def arming_time(mission: Mission, args: Args) -> Value:
     """Time from the first refusal of arming to the arming, 0 when it was never refused."""
     if not is_armed(mission):
         return NOT_FLOWN
-    earlier = [end for _, end, _ in armed_spans(mission.tables, mission.end_s) if end < mission.start_s]
-    since = max(earlier, default=-math.inf)
-    refused = [t for t, _ in refusals(mission.tables.get("MSG")) if since < t < mission.start_s]
+    flight = flight_of(mission)
+    since = max((end for _, end in flight.recorded_armed if end < mission.start_s), default=-math.inf)
+    refused = [one.time_s for one in flight.refusals if since < one.time_s < mission.start_s]
     return mission.start_s - min(refused, default=mission.start_s)

@@ -1,33 +1,31 @@
 """How missions are found in a DataFlash log, and what is said of one that no threshold belongs to.
 
-A mission is one arming to the next disarm. A log without any arming in which arming was refused is one mission
-too: the vehicle never left the ground, and its last refusals say why.
+A mission is one arming to the next disarm; what was armed when its log began has no beginning to measure from. A log
+without any arming in which arming was refused is one mission too: the vehicle never left the ground, and its last
+refusals say why.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from care_core.ecosystems.ardupilot.flight import as_flight
 from care_core.ecosystems.ardupilot.measures.events import (
-    arm_events,
-    armed_spans,
     errors,
     failed,
     forced,
     is_armed,
     is_over,
     last_refusals,
-    refusals,
     telling,
 )
-from care_core.ecosystems.ardupilot.measures.flight import NEEDS, analyse, waypoint_offsets
-from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, kind_flown, mode_names
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse, waypoint_offsets
+from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, mode_names
 from care_core.ecosystems.ardupilot.measures.outcome import HEIGHTS, WAYPOINT_TOLERANCE_M, plain_checks
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric, points
 from care_core.ecosystems.vehicles import error_kind, error_words
 from care_core.logs.base import Table, Wanted, merge_needs
-from care_core.logs.plausible import plausible
 from care_core.run import Check, Evidence, Unavailable
 
 
@@ -44,11 +42,16 @@ class ArduPilotFlight(MissionKind):
         return merge_needs((NEEDS, HEIGHTS))
 
     def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
-        spans = armed_spans(tables, model.log.duration_s)
-        if not spans and not arm_events(tables) and refusals(tables.get("MSG")):
-            spans = [(0.0, model.log.duration_s, True)]
-        sound = plausible(tables)
-        return tuple(Mission(model, sound, start_s, end_s, ended, spec) for start_s, end_s, ended in spans)
+        flight = as_flight(model)
+        armed, disarmed = (
+            {one.time_s for one in flight.arm_changes if one.is_armed is state} for state in (True, False)
+        )
+        spans = [(start, end, end in disarmed) for start, end in flight.recorded_armed if start in armed]
+        if not flight.arm_changes and flight.refusals:
+            spans = [(0.0, flight.end_s, True)]
+        sound = {name: flight.sound_table(name, table) for name, table in tables.items()}
+        kept = {name: table for name, table in sound.items() if table is not None}
+        return tuple(Mission(model, kept, start_s, end_s, has_ended, spec) for start_s, end_s, has_ended in spans)
 
     def mismatch(self, mission: Mission) -> str:
         expected = mission.spec.get("waypoints", ())
@@ -65,13 +68,13 @@ class ArduPilotFlight(MissionKind):
 
     def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
         if not is_armed(mission):
-            return tuple(Evidence(t, text, "refusal") for t, text in last_refusals(mission))
+            return tuple(Evidence(one.time_s, one.text, "refusal") for one in last_refusals(mission))
         found = [Evidence(t, text, kind) for t, text, kind in telling(mission)]
         spoken = {one.kind for one in found}
         for t, subsystem, code in errors(mission):
             kind = error_kind(subsystem)
             if kind and code and kind not in spoken:
-                found.append(Evidence(t, f"ERR: {error_words(subsystem, code, kind_flown(mission))}", kind))
+                found.append(Evidence(t, f"ERR: {error_words(subsystem, code, flight_of(mission).mode_kind)}", kind))
         if forced(mission):
             found.append(Evidence(mission.end_s, "Disarmed by force in flight", "forced"))
         return tuple(sorted(found, key=lambda one: one.time_s))
@@ -85,7 +88,7 @@ class ArduPilotFlight(MissionKind):
     def outcome(self, mission: Mission) -> tuple[Check, ...]:
         if is_armed(mission):
             return tuple(plain_checks(mission, and_mission=True))
-        asked_for = any(text.startswith("Arm:") for _, text in refusals(mission.tables.get("MSG")))
+        asked_for = any(one.was_tried for one in flight_of(mission).refusals)
         never = 0.0 if asked_for else Unavailable("the vehicle never armed, and nobody asked it to")
         return (Check("armed", never, "the vehicle armed", "arming was refused"),)
 

@@ -8,11 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.measures.events import CUT, failed, forced, has_event, is_armed, is_over
-from care_core.ecosystems.ardupilot.measures.flight import AIRBORNE_M, NEEDS, Flight, analyse, metres_between
-from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, kind_flown, modes_in_force
+from care_core.ecosystems.ardupilot.measures.flown_mission import (
+    AIRBORNE_M,
+    NEEDS,
+    FlownMission,
+    analyse,
+    metres_between,
+)
+from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, modes_in_force
 from care_core.ecosystems.ardupilot.measures.route import landing_error
 from care_core.ecosystems.measures import Args, Mission, extractor, has
-from care_core.ecosystems.vehicles import flies, mode_name
+from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Wanted
 from care_core.run import Check, Unavailable, Value, is_known
 
@@ -34,9 +40,9 @@ HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
 """Where heights are told: above home, else above some other ground."""
 
 
-def _nothing_to_judge(mission: Mission, flight: Flight) -> Unavailable | None:
+def _nothing_to_judge(mission: Mission, flown: FlownMission) -> Unavailable | None:
     """Why a flight says nothing about a mission, None when it does."""
-    if not flight.waypoints:
+    if not flown.waypoints:
         return Unavailable("the log names no waypoints", "record CMD")
     if "MSG" not in mission.tables:
         return Unavailable("the log does not say which waypoints were reached", "record MSG")
@@ -47,13 +53,13 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Che
     """What a flight or drive is judged by that no limit belongs to; with its mission, where one was begun."""
     crashed = bool(has_event(mission, "crash"))
     yield Check("armed", 1.0, "the vehicle armed")
-    kind = kind_flown(mission)
+    kind = flight_of(mission).mode_kind
     if flies(kind):
         yield Check("took_off", _took_off(mission, crashed=crashed), "it left the ground", "it never left the ground")
     elif and_mission and kind in _DRIVES:
         yield Check("moved", _moved(mission), "it moved")
     done: Value = 0.0
-    if and_mission and any(mode.way == "mission" for mode in mission.shared(modes_in_force)):
+    if and_mission and any(mode.way == "mission" for mode in modes_in_force(mission)):
         done = _mission_done(mission)
         yield Check("mission_success", done, "every waypoint of the mission was reached", short_of(mission))
     yield Check("no_crash", 1.0 - crashed, "the autopilot reported no crash", "the autopilot reported a crash")
@@ -71,28 +77,29 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Che
 def _mission_done(mission: Mission) -> Value:
     """1 where the vehicle says that its mission is complete or reached every waypoint of it, 0 where a crash or a
     failsafe ended it or it was disarmed on its way; what somebody broke off is no failure of the mission."""
-    flight = mission.shared(analyse)
-    if flight.completed:
+    flown = mission.shared(analyse)
+    if flown.completed:
         return 1.0
-    unknown = _nothing_to_judge(mission, flight)
+    unknown = _nothing_to_judge(mission, flown)
     if unknown is not None:
         return unknown
-    if flight.reached >= len(flight.waypoints):
+    if flown.reached >= len(flown.waypoints):
         return 1.0
     if failed(mission):
         return 0.0
     if not mission.ended:
         return CUT
-    last = mission.shared(modes_in_force)[-1]
+    last = modes_in_force(mission)[-1]
     if last.way == "mission":
         return 0.0
-    name = mode_name(kind_flown(mission), last.number)
-    return Unavailable(f"{short_of(mission)}, and the last mode was {name}", "judge a run that ends in its mission")
+    return Unavailable(
+        f"{short_of(mission)}, and the last mode was {last.name}", "judge a run that ends in its mission"
+    )
 
 
 def short_of(mission: Mission) -> str:
-    flight = mission.shared(analyse)
-    return f"{flight.reached} of the mission's {len(flight.waypoints)} waypoints were reached"
+    flown = mission.shared(analyse)
+    return f"{flown.reached} of the mission's {len(flown.waypoints)} waypoints were reached"
 
 
 def _moved(mission: Mission) -> Value:
@@ -122,7 +129,7 @@ def _landed(mission: Mission) -> Value:
     heights = _heights(mission)
     low = bool(heights[-1] <= AIRBORNE_M) if len(heights) else _detected(mission, _LANDED)
     low = low or _touched_down(mission)
-    if not low and kind_flown(mission) in _GLIDES:
+    if not low and flight_of(mission).kind in _GLIDES:
         return Unavailable(f"it was disarmed {heights[-1]:.0f} m above home" if len(heights) else "nothing says so")
     return float(low)
 
@@ -142,17 +149,13 @@ def _heights(mission: Mission) -> Floats:
 def _touched_down(mission: Mission) -> bool:
     """Whether the land detector found the ground just before it was disarmed, whatever a barometer that drifted says:
     disarming itself sets the detector as well, so that record does not count."""
-    table = mission.table("EV")
-    if not has(table, "Id"):
-        return False
-    said = table.t[np.isin(table["Id"], _LANDED)]
+    said = np.array(flight_of(mission).events(*_LANDED))
     return bool(((said > mission.end_s - _TOUCHED_S) & (said < mission.end_s - _SWITCHED_OFF_S)).any())
 
 
 def _detected(mission: Mission, events: tuple[int, ...]) -> bool:
     """Whether the land detector said so."""
-    table = mission.table("EV")
-    return table is not None and has(table, "Id") and bool(np.isin(table["Id"], events).any())
+    return any(mission.start_s <= t <= mission.end_s for t in flight_of(mission).events(*events))
 
 
 @extractor("mission_success", needs=NEEDS, unit="")
@@ -171,15 +174,15 @@ def mission_success(mission: Mission, args: Args) -> Value:
 
 def _mission_flown(mission: Mission) -> Value:
     """1 when every waypoint was reached and the vehicle landed where the mission ends, or said so, else 0."""
-    flight = mission.shared(analyse)
-    unknown = _nothing_to_judge(mission, flight)
+    flown = mission.shared(analyse)
+    unknown = _nothing_to_judge(mission, flown)
     if unknown is not None:
         return unknown
-    if flight.reached < len(flight.waypoints):
+    if flown.reached < len(flown.waypoints):
         return 0.0
-    if flight.drive is not None:
-        return float(flight.completed)
-    if flight.end is None:
+    if flown.drive is not None:
+        return float(flown.completed)
+    if flown.end is None:
         return 1.0
     off_m = landing_error(mission, {})
     if not is_known(off_m):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN, is_armed
-from care_core.ecosystems.ardupilot.measures.flight import Flight, analyse
+from care_core.ecosystems.ardupilot.measures.flown_mission import FlownMission, analyse
 from care_core.ecosystems.measures import Args, Mission, numeric, one_of
 from care_core.run import Unavailable
 
@@ -17,17 +17,18 @@ PHASE_ARGS = {
 }
 
 
-def flight_of(mission: Mission) -> Flight | Unavailable:
+def flown_mission(mission: Mission) -> FlownMission | Unavailable:
+    """What was flown of a mission; why nothing was."""
     return mission.shared(analyse) if is_armed(mission) else NOT_FLOWN
 
 
 def span_of_phase(mission: Mission, args: Args) -> tuple[float, float] | Unavailable:
     """Start and end in the log of the part of the flight that `args` name."""
-    flight = flight_of(mission)
-    if isinstance(flight, Unavailable):
-        return flight
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
     name, index = str(args.get("phase", "")), int(args.get("index", 0))
-    phase = flight.phases.get((name, index))
+    phase = flown.phases.get((name, index))
     if phase is None:
         return Unavailable(f"the flight did not complete '{name}{f' {index}' if index else ''}'")
     return phase.start_s, phase.end_s

@@ -1,6 +1,6 @@
-"""What was asked of one ArduPilot flight: its mission in numbers, and the vehicle that flew it. Never a cause.
+"""What was requested of one ArduPilot flight: its mission in numbers, and the vehicle that flew it. Never a cause.
 
-A mission item's number 0 is home and never flown. Jumps are followed as often as they say. What is asked is known
+A mission item's number 0 is home and never flown. Jumps are followed as often as they say. What is requested is known
 before the flight, so a vehicle that never armed has it too.
 """
 
@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems.ardupilot.messages import split
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
@@ -27,7 +28,7 @@ ITEMS: Wanted = {
     "ORGN": ("Type", "Lat", "Lng", "Alt"),
     "POS": ("Lat", "Lng"),
 }
-"""What `asked` reads."""
+"""What `requested_mission` reads."""
 
 # Commands of MAVLink's common dialect (MAV_CMD).
 _WAYPOINT, _LOITER_TURNS, _LOITER_TIME, _RETURN, _LAND, _TAKEOFF, _SPLINE = 16, 18, 19, 20, 21, 22, 82
@@ -60,7 +61,7 @@ class Item(Record):
     frame: int
 
 
-class Asked(Record, eq=False):
+class RequestedMission(Record, eq=False):
     """A mission in metres from home. Legs begin above home, at the height of the take-off."""
 
     points: Floats
@@ -102,7 +103,7 @@ class Asked(Record, eq=False):
         return float(max(chosen, key=lambda speed: float(chosen[speed]), default=0.0))
 
 
-def asked(mission: Mission) -> Asked | Unavailable:
+def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     """The mission that the vehicle was given; use through `mission.shared`."""
     items = items_of(mission.tables.get("CMD"), mission.end_s)
     if not items:
@@ -133,7 +134,7 @@ def asked(mission: Mission) -> Asked | Unavailable:
             break
     if len(points) < 2:
         return Unavailable("the mission has no waypoints")
-    return Asked(np.array(points), np.array(holds), np.array(speeds), ending)
+    return RequestedMission(np.array(points), np.array(holds), np.array(speeds), ending)
 
 
 def items_of(table: Table | None, until_s: float) -> dict[int, Item]:
@@ -200,7 +201,7 @@ def _place(item: Item, home: Sequence[float], before: tuple[float, float, float]
 # --- the mission ------------------------------------------------------------------------------------------------
 
 
-_MISSION: Mapping[str, Callable[[Asked], float]] = {
+_MISSION: Mapping[str, Callable[[RequestedMission], float]] = {
     "path_length": lambda a: float(a.lengths.sum()),
     "legs": lambda a: float(len(a.lengths)),
     "leg_variation": lambda a: float(a.lengths.std() / max(a.lengths.mean(), 1e-9)),
@@ -230,7 +231,7 @@ def mission_asked(mission: Mission, args: Args) -> Value:
     measure = _MISSION.get(str(args.get("what")))
     if measure is None:
         return Unavailable(f"there is no '{args.get('what')}' of a mission", f"use one of {', '.join(_MISSION)}")
-    found = mission.shared(asked)
+    found = mission.shared(requested_mission)
     return found if isinstance(found, Unavailable) else measure(found)
 
 
@@ -259,8 +260,7 @@ def _in_the_air(mission: Mission, *fields: str) -> Table | Unavailable:
     table = mission.table("BAT")
     if table is None or not has(table, "Curr", *fields):
         return missing(f"BAT with {' and '.join(fields)}")
-    number = next((name for name in ("Inst", "Instance") if name in table.columns), None)
-    first = table if number is None else table.where(table[number] == table[number].min())
+    first = split("BAT", table)[0]
     most = float(first["Curr"].max())
     flown = first.where(first["Curr"] > 0.5 * most) if most > 0 else first.where(slice(0, 0))
     return flown if len(flown) else Unavailable("the battery's current was never above 0", "calibrate the monitor")

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN, is_armed
-from care_core.ecosystems.ardupilot.measures.flight import NEEDS
-from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flight_of, span_of_phase
-from care_core.ecosystems.ardupilot.measures.requested import asked
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
+from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission, span_of_phase
+from care_core.ecosystems.ardupilot.measures.requested import requested_mission
 from care_core.ecosystems.ardupilot.measures.series import statistic
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
 from care_core.run import Unavailable, Value
@@ -18,34 +18,34 @@ from care_core.run import Unavailable, Value
 @extractor("waypoints_reached", needs=NEEDS, unit="")
 def waypoints_reached(mission: Mission, args: Args) -> Value:
     """How many of the mission's waypoints the autopilot reported as reached."""
-    flight = flight_of(mission)
-    if isinstance(flight, Unavailable):
-        return flight
-    return float(flight.reached) if flight.waypoints else Unavailable("the log names no waypoints", "record CMD")
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    return float(flown.reached) if flown.waypoints else Unavailable("the log names no waypoints", "record CMD")
 
 
 @extractor("landing_error", needs=NEEDS, unit="m")
 def landing_error(mission: Mission, args: Args) -> Value:
     """Horizontal distance at the end of the flight from where the mission ends: home, or where it lands."""
-    flight = flight_of(mission)
-    if isinstance(flight, Unavailable):
-        return flight
-    if flight.track is None:
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    if flown.track is None:
         return missing("POS")
-    if flight.end is None:
+    if flown.end is None:
         return Unavailable("the mission does not say where it ends")
-    return math.hypot(flight.track.north[-1] - flight.end[0], flight.track.east[-1] - flight.end[1])
+    return math.hypot(flown.track.north[-1] - flown.end[0], flown.track.east[-1] - flown.end[1])
 
 
 @extractor("waypoint_miss", needs=NEEDS, unit="m")
 def waypoint_miss(mission: Mission, args: Args) -> Value:
     """The largest, over the waypoints, of the smallest horizontal distance from the waypoint: corners cut."""
-    flight = flight_of(mission)
-    if isinstance(flight, Unavailable):
-        return flight
-    if flight.track is None or not len(flight.route):
-        return missing("POS" if flight.track is None else "CMD")
-    north, east = flight.track.north[:, None] - flight.route[:, 0], flight.track.east[:, None] - flight.route[:, 1]
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    if flown.track is None or not len(flown.route):
+        return missing("POS" if flown.track is None else "CMD")
+    north, east = flown.track.north[:, None] - flown.route[:, 0], flown.track.east[:, None] - flown.route[:, 1]
     return float(np.hypot(north, east).min(axis=0).max())
 
 
@@ -57,7 +57,7 @@ def mission_time(mission: Mission, args: Args) -> Value:
 
 @extractor("phase_time", needs=NEEDS, unit="s", args=PHASE_ARGS)
 def phase_time(mission: Mission, args: Args) -> Value:
-    """Duration of one completed part of the flight."""
+    """Duration of one completed part of the flown."""
     span = span_of_phase(mission, args)
     return span if isinstance(span, Unavailable) else span[1] - span[0]
 
@@ -65,17 +65,17 @@ def phase_time(mission: Mission, args: Args) -> Value:
 @extractor("cruise_speed", needs=NEEDS, unit="m/s")
 def cruise_speed(mission: Mission, args: Args) -> Value:
     """Length of the legs that were completed over the time for them, without the waits at their ends."""
-    flight = flight_of(mission)
-    if isinstance(flight, Unavailable):
-        return flight
-    given = mission.shared(asked)
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    given = mission.shared(requested_mission)
     if isinstance(given, Unavailable):
         return given
-    done = [i - 1 for name, i in flight.phases if name == "leg"]
-    if not done or len(given.lengths) != len(flight.waypoints):
+    done = [i - 1 for name, i in flown.phases if name == "leg"]
+    if not done or len(given.lengths) != len(flown.waypoints):
         return Unavailable("the flight completed no leg")
-    waited_s = 0.0 if flight.drive is not None else float(given.holds_s[done].sum())
-    moving_s = sum(flight.phases["leg", i + 1].duration_s for i in done) - waited_s
+    waited_s = 0.0 if flown.drive is not None else float(given.holds_s[done].sum())
+    moving_s = sum(flown.phases["leg", i + 1].duration_s for i in done) - waited_s
     length_m = float(given.lengths[done].sum())
     return length_m / moving_s if moving_s > 0 and length_m > 0 else Unavailable("the legs have no length")
 
@@ -84,33 +84,33 @@ def cruise_speed(mission: Mission, args: Args) -> Value:
 def return_height(mission: Mission, args: Args) -> Value:
     """The greatest height above home on the way back."""
     span = span_of_phase(mission, {"phase": "return_climb"})
-    flight = flight_of(mission)
+    flown = flown_mission(mission)
     if isinstance(span, Unavailable):
         return span
-    if isinstance(flight, Unavailable) or flight.track is None:
+    if isinstance(flown, Unavailable) or flown.track is None:
         return missing("POS")
-    return float(flight.track.height[flight.track.t >= span[0]].max())
+    return float(flown.track.height[flown.track.t >= span[0]].max())
 
 
 @extractor("distance", needs=NEEDS, unit="m")
 def distance(mission: Mission, args: Args) -> Value:
     """Length of the way over ground while airborne; of a rover, in its mission."""
-    flight = flight_of(mission)
-    if isinstance(flight, Unavailable):
-        return flight
-    if flight.track is None:
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    if flown.track is None:
         return missing("POS")
-    steps = np.hypot(np.diff(flight.track.north), np.diff(flight.track.east))
-    return float(steps[flight.under_way(flight.track.t)[1:]].sum())
+    steps = np.hypot(np.diff(flown.track.north), np.diff(flown.track.east))
+    return float(steps[flown.under_way(flown.track.t)[1:]].sum())
 
 
 @extractor("path_error", needs=NEEDS, unit="m", args={"stat": one_of("max or mean", "max", "mean")})
 def path_error(mission: Mission, args: Args) -> Value:
     """Horizontal distance from the legs (home, waypoints, home if it returns) while airborne, or in a rover's
     mission."""
-    flight = flight_of(mission)
-    if isinstance(flight, Unavailable):
-        return flight
-    if flight.track is None or not len(flight.corners):
-        return missing("POS" if flight.track is None else "CMD")
-    return statistic(flight.path_errors(), str(args.get("stat", "max")))
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
+    if flown.track is None or not len(flown.corners):
+        return missing("POS" if flown.track is None else "CMD")
+    return statistic(flown.path_errors(), str(args.get("stat", "max")))

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.measures.flight import NEEDS
-from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flight_of
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
+from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission
 from care_core.ecosystems.ardupilot.measures.series import register, series
 from care_core.ecosystems.measures import Args, Mission, extractor, one_of
 from care_core.ecosystems.vehicles import is_skid_steered
@@ -130,9 +130,9 @@ def energy_per_metre(mission: Mission, args: Args) -> Value:
 
 def _steady(mission: Mission) -> Table | Unavailable:
     """The rows of THR in which a rover is faster than half of its usual speed."""
-    flight = flight_of(mission)
-    if isinstance(flight, Unavailable):
-        return flight
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
     driven = series(mission, "THR", ("ThrOut", "DesSpeed", "Speed"), {})
     if isinstance(driven, Unavailable):
         return driven

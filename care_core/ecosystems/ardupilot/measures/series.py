@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.measures.flight import NEEDS
-from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flight_of, span_of_phase
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
+from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission, span_of_phase
+from care_core.ecosystems.ardupilot.messages import split
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
 from care_core.logs.base import Table, Wanted, merge_needs
-from care_core.numbers import distinct, quantile
+from care_core.numbers import quantile
 from care_core.run import Unavailable, Value
 
 Floats = NDArray[np.float64]
@@ -24,22 +25,22 @@ def series(
     mission: Mission, channel: str, fields: Sequence[str], args: Args, *, under_way: bool = True
 ) -> Table | Unavailable:
     """Rows of a channel while under way (or in a phase), first instance only, with all of `fields` finite."""
-    flight = flight_of(mission)
-    if isinstance(flight, Unavailable):
-        return flight
+    flown = flown_mission(mission)
+    if isinstance(flown, Unavailable):
+        return flown
     table = mission.table(channel)
     if table is None or not all(field in table.columns for field in fields):
         return missing(channel)
-    table = next(iter(instances(table)), table)
+    table = next(iter(split(channel, table)), table)
     if "phase" in args:
         span = span_of_phase(mission, args)
         if isinstance(span, Unavailable):
             return span
         table = table.between(*span)
     elif under_way:
-        if flight.track is None and flight.drive is None:
+        if flown.track is None and flown.drive is None:
             return missing("POS")
-        table = table.where(flight.under_way(table.t))
+        table = table.where(flown.under_way(table.t))
     finite = np.ones(len(table), dtype=bool)
     for field in fields:
         finite &= np.isfinite(table[field])
@@ -47,14 +48,6 @@ def series(
     if len(table) < MIN_ROWS:
         return Unavailable(f"too little {channel} in this part of the flight", "was the vehicle under way?")
     return table
-
-
-def instances(table: Table) -> list[Table]:
-    """The table split by the column that numbers its sensors, lowest first."""
-    name = next((name for name in ("I", "IMU", "C", "Inst", "Instance") if name in table.columns), None)
-    if name is None:
-        return [table]
-    return [table.where(table[name] == number) for number in distinct(table[name])]
 
 
 def statistic(values: Floats, stat: str) -> Value:

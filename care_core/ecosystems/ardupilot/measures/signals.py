@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.measures.flight import NEEDS
+from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS
 from care_core.ecosystems.ardupilot.measures.series import register, series, statistic
 from care_core.ecosystems.measures import Args, Mission, extractor, one_of

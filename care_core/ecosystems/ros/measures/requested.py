@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.measures.requested import Asked
+from care_core.ecosystems.ardupilot.measures.requested import RequestedMission
 from care_core.ecosystems.measures import Args, Mission, extractor, one_of
 from care_core.ecosystems.ros.measures.window import (
     TOLERANCE_M,
@@ -32,7 +32,7 @@ Pose = tuple[float, float, float]
 """x and y in m, heading in rad; nan where the log does not say."""
 
 
-def goals_asked(mission: Mission) -> tuple[Asked, float] | Unavailable:
+def goals_asked(mission: Mission) -> tuple[RequestedMission, float] | Unavailable:
     """The way through the goals, from where the robot stood, and all turning it asks for in rad; use through
     `mission.shared`."""
     drive = mission.shared(window)
@@ -45,7 +45,7 @@ def goals_asked(mission: Mission) -> tuple[Asked, float] | Unavailable:
     poses = (start, *goals)
     points = np.array([(x, y, 0.0) for x, y, _ in poses])
     none = np.zeros(len(goals))
-    return Asked(points, none, none, "open"), sum(_turns(poses))
+    return RequestedMission(points, none, none, "open"), sum(_turns(poses))
 
 
 def _goals(drive: DriveWindow, spec: Args) -> tuple[Pose, ...]:
@@ -92,7 +92,7 @@ def _turn(a: float, b: float) -> float:
     return angle if angle >= _LEAST_RAD else 0.0
 
 
-_ASKED: Mapping[str, Callable[[Asked, float], float]] = {
+_ASKED: Mapping[str, Callable[[RequestedMission, float], float]] = {
     "goals": lambda way, turn: float(len(way.lengths)),
     "path_length": lambda way, turn: float(way.lengths.sum()),
     "goal_distance": lambda way, turn: float(way.lengths.mean()),

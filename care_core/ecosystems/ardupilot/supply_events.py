@@ -6,13 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Flight, Span
+from care_core.ecosystems.ardupilot.battery import Battery
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import Span
 from care_core.ecosystems.findings import Event
 from care_core.logs.base import Table
 
-_CELL_LOW_V, _CELL_FULL_V = 3.5, 4.25
-"""A lithium polymer cell at rest, worth flying on, to fully charged."""
-_PACKS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14)
 _DEAD_V = 1.0
 _SAGS, _WEAK = 0.9, 0.3
 _FIXES = {0: "no GPS", 1: "no fix", 2: "2D fix", 3: "3D fix", 4: "3D fix, DGPS", 5: "3D fix, RTK float",
@@ -22,16 +21,10 @@ _NO_HDOP = 50.0
 """Receivers without a fix say 99.99 or 655.35."""
 
 
-def cells(volts: float) -> int | None:
-    """Cells in series of a pack by its voltage at rest, None where more than one number of them could have it."""
-    possible = [count for count in _PACKS if _CELL_LOW_V <= volts / count <= _CELL_FULL_V]
-    return possible[0] if len(possible) == 1 else None
-
-
-def supply(flight: Flight) -> Iterator[Event]:
+def supply_events(flight: Flight) -> Iterator[Event]:
     """Moments about supplies: at each first arming, and the worst while armed."""
-    for battery, table in enumerate(flight.all("BAT", "Volt"), start=1):
-        yield from _battery(flight, table, f"battery {battery}" if battery > 1 else "battery")
+    for battery in flight.batteries:
+        yield from _battery(flight, battery)
     satellites = flight.one("GPS", "Status")
     if satellites is not None:
         yield from _gps(flight, satellites)
@@ -43,17 +36,14 @@ def supply(flight: Flight) -> Iterator[Event]:
             yield Event(float(worst.t[0]), "radio", text, "RSSI")
 
 
-def _battery(flight: Flight, table: Table, name: str) -> Iterator[Event]:
-    sane = table.where(np.isfinite(table["Volt"]) & np.isfinite(table.t))
-    if not len(sane) or sane["Volt"].max() < _DEAD_V:
+def _battery(flight: Flight, battery: Battery) -> Iterator[Event]:
+    table, name = battery.table, battery.name
+    if not len(table) or table["Volt"].max() < _DEAD_V:
         return
-    at, before = _at_start(flight, sane)
-    volts = float(before["Volt"][-1])
-    count = cells(volts)
-    pack = f" ({count} cells)" if count and count > 1 else ""
-    yield Event(at, "battery", f"{name} at {volts:.1f} V{pack}", "BAT")
-    worst = _worst(flight.armed, sane, "Volt")
-    if worst is None or worst["Volt"][0] > _SAGS * volts:
+    pack = f" ({battery.cells} cells)" if battery.are_cells_known and battery.cells > 1 else ""
+    yield Event(battery.start_s, "battery", f"{name} at {battery.start_v:.1f} V{pack}", "BAT")
+    worst = _worst(flight.armed, table, "Volt")
+    if worst is None or worst["Volt"][0] > _SAGS * battery.start_v:
         return
     amps = f" at {worst['Curr'][0]:.0f} A" if "Curr" in worst.columns and worst["Curr"][0] > 0.5 else ""
     text = f"{name} at its lowest while armed: {worst['Volt'][0]:.1f} V{amps}"

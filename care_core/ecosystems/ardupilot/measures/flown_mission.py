@@ -1,6 +1,6 @@
-"""What one ArduPilot flight or drive did: its mission items, its track around home, and its phases.
+"""What of a mission was flown or driven: its items, the track around home, and its phases.
 
-Everything is worked out once per mission (`Mission.shared(analyse)`) and read by the extractors of `ardupilot`.
+Everything is worked out once per mission (`Mission.shared(analyse)`) and read by the extractors of this package.
 Positions are metres north and east of home on a plane, which is exact to centimetres over a few kilometres.
 """
 
@@ -15,28 +15,29 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.measures.modes import MODES, kind_flown, modes_in_force
-from care_core.ecosystems.ardupilot.measures.requested import ITEMS, Asked, Item, asked, home_of, items_of
+from care_core.ecosystems.ardupilot import armed, recorded
+from care_core.ecosystems.ardupilot.measures.modes import flight_of, modes_in_force
+from care_core.ecosystems.ardupilot.measures.requested import (
+    ITEMS,
+    Item,
+    RequestedMission,
+    home_of,
+    items_of,
+    requested_mission,
+)
+from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.measures import Mission, has
-from care_core.logs.base import Table, Wanted, merge_needs
+from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import distinct, known_median, median
 from care_core.records import Record
 from care_core.run import Unavailable
 
-NEEDS: Wanted = merge_needs(
-    (
-        ITEMS,
-        {
-            "POS": ("RelHomeAlt",),
-            "GPS": ("I", "GMS"),
-            **MODES,
-            "MSG": ("Message",),
-            "ARM": ("ArmState", "Forced"),
-            "EV": ("Id",),
-            "ERR": ("Subsys", "ECode"),
-        },
-    )
-)
+NEEDS: Wanted = merge_needs((
+    ITEMS,
+    {"POS": ("RelHomeAlt",), "GPS": ("I", "GMS")},
+    expanded(recorded.READS),
+    expanded({"ARM": armed.READS["ARM"]}),
+))  # fmt: skip
 """What `analyse` and the search for missions read."""
 
 FILL_S = 0.05
@@ -56,8 +57,9 @@ _REACHED = re.compile(r"Reached (?:command|waypoint) #(\d+)")
 (Rover/mode_auto.cpp)."""
 _COMPLETE = ("Mission Complete", "Mission complete")
 """What a rover (Rover/mode_auto.cpp) and a submarine say when no item is left."""
-_SAID_AFTER_S = 0.6
-"""What ends a mission may be said a moment after it has ended."""
+SAID_AFTER_S = 0.6
+"""What ends a mission may be said a moment after it: a crash disarms first, and telemetry knows a disarming to half a
+second (its heartbeats)."""
 
 Floats = NDArray[np.float64]
 
@@ -100,9 +102,9 @@ class Track(Record, eq=False):
         )
 
 
-class Flight(Record, eq=False):
-    """One flight. `phases` holds only what was completed, by name and index (legs count from 1, the rest is 0);
-    of a drive, the mission as far as it went."""
+class FlownMission(Record, eq=False):
+    """What was flown or driven of a mission. `phases` holds only what was completed, by name and index (legs count from
+    1, the rest is 0); of a drive, the mission as far as it went."""
 
     waypoints: tuple[Waypoint, ...]
     """The waypoints of the mission that the vehicle was given."""
@@ -144,22 +146,22 @@ class Flight(Record, eq=False):
         return distance_to_legs(points, self.corners)
 
 
-def analyse(mission: Mission) -> Flight:
-    """Work out the flight of a mission; use through `mission.shared`."""
+def analyse(mission: Mission) -> FlownMission:
+    """Works out what was flown of a mission; use through `mission.shared`."""
     items = _items(mission)
     numbers = [number for number, item in items.items() if _is_waypoint(item)]
     waypoints = tuple(Waypoint(items[n].lat, items[n].lng, items[n].alt_m) for n in numbers)
     home = home_of(mission)
     track = _track(mission, home)
     started, reached = _milestones(mission)
-    said = messages(mission.tables.get("MSG"), mission.start_s, mission.end_s + _SAID_AFTER_S)
-    complete_s = next((t for t, text in reversed(said) if text.startswith(_COMPLETE)), None)
-    drive = _drive(mission, complete_s) if kind_flown(mission) == "rover" else None
+    texts = flight_of(mission).messages_between(mission.start_s, mission.end_s + SAID_AFTER_S)
+    complete_s = next((t for t, text in reversed(texts) if text.startswith(_COMPLETE)), None)
+    drive = _drive(mission, complete_s) if flight_of(mission).kind == "rover" else None
     if drive is not None and numbers:
         started.setdefault(numbers[0], drive.start_s)  # named once, before the vehicle may move
     route = np.array([_offset(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
-    corners, end = _way(mission.shared(asked))
-    return Flight(
+    corners, end = _way(mission.shared(requested_mission))
+    return FlownMission(
         waypoints=waypoints,
         route=route.astype(np.float64),
         corners=corners,
@@ -212,19 +214,11 @@ def metres_between(lat: Floats, lng: Floats) -> float:
     return math.hypot(north, east * math.cos(math.radians(known_median(lat))))
 
 
-def messages(table: Table | None, start_s: float = -math.inf, end_s: float = math.inf) -> list[tuple[float, str]]:
-    """Time and text of the vehicle's messages between two times."""
-    if table is None or "Message" not in table.columns:
-        return []
-    part = table.between(start_s, end_s)
-    return list(zip(part.t.tolist(), part["Message"].tolist(), strict=True))
-
-
 def _items(mission: Mission) -> dict[int, Item]:
     return items_of(mission.tables.get("CMD"), mission.end_s)
 
 
-def _way(found: Asked | Unavailable) -> tuple[Floats, tuple[float, float] | None]:
+def _way(found: RequestedMission | Unavailable) -> tuple[Floats, tuple[float, float] | None]:
     """The corners of the way that was asked for, from home, and where it ends."""
     if isinstance(found, Unavailable):
         return np.empty((0, 2)), None
@@ -259,7 +253,7 @@ def _milestones(mission: Mission) -> tuple[dict[int, float], dict[int, float]]:
     """When each mission item was first started, and when it was first reported as reached."""
     started: dict[int, float] = {}
     reached: dict[int, float] = {}
-    for t, text in messages(mission.tables.get("MSG"), mission.start_s, mission.end_s):
+    for t, text in flight_of(mission).messages_between(mission.start_s, mission.end_s):
         for pattern, found in ((_STARTED, started), (_REACHED, reached)):
             match = pattern.match(text)
             if match:
@@ -277,7 +271,7 @@ def _phases(
     for index, number in enumerate(numbers, start=1):
         if number in started and number in reached:
             phases["leg", index] = Phase(started[number], reached[number])
-    homeward, way = _homeward(mission, started), mission.shared(asked)
+    homeward, way = _homeward(mission, started), mission.shared(requested_mission)
     returns = isinstance(way, Unavailable) or way.ending == "return"
     if homeward is not None and track is not None:
         phases.update(
@@ -288,7 +282,7 @@ def _phases(
 
 def _drive(mission: Mission, complete_s: float | None) -> Phase:
     """A ground vehicle's mission in the time that it was armed: to where it said that it is complete."""
-    automatic = [mode.t for mode in mission.shared(modes_in_force) if mode.way == "mission"]
+    automatic = [mode.start_s for mode in modes_in_force(mission) if mode.way == "mission"]
     start_s = max(mission.start_s, min(automatic, default=mission.start_s))
     return Phase(start_s, mission.end_s if complete_s is None else max(start_s, min(complete_s, mission.end_s)))
 
@@ -299,7 +293,7 @@ def _drive_phases(
 ) -> dict[tuple[str, int], Phase]:  # fmt: skip
     """The legs of a ground vehicle, each to its arrival, and its waits: to the next item, or the mission's end."""
     phases = {("mission", 0): drive}
-    way = mission.shared(asked)
+    way = mission.shared(requested_mission)
     waits = () if isinstance(way, Unavailable) else way.holds_s
     ends = sorted((*started.values(), *(() if complete_s is None else (complete_s,))))
     for index, number in enumerate(numbers, start=1):
@@ -316,8 +310,8 @@ def _homeward(mission: Mission, started: Mapping[int, float]) -> float | None:
     """When the vehicle set out for home: by a mission item, a failsafe or the operator."""
     items = _items(mission)
     times = [t for number, t in started.items() if number in items and items[number].command in _HOMEWARD]
-    entered = mission.shared(modes_in_force)
-    times += [mode.t for mode in entered if mode.way in ("return", "land") and mode.t >= mission.start_s]
+    homeward = (mode.start_s for mode in modes_in_force(mission) if mode.way in ("return", "land"))
+    times += [t for t in homeward if t >= mission.start_s]
     return min(times, default=None)
 
 

@@ -1,4 +1,4 @@
-"""Small measures that checks share. Arrays have shape (n,) and one row a record."""
+"""Statistics of columns that checks share. Arrays have shape (n,) and one row a record."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.flight import Mask, Span, runs
-from care_core.ecosystems.ardupilot.messages import Floats
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, runs
 from care_core.numbers import median, pieces, quantile
 
 Calibration = Sequence[tuple[float, float]]
@@ -16,7 +15,7 @@ Calibration = Sequence[tuple[float, float]]
 _DOZENS = 40
 
 
-def likely(over: float, points: Calibration) -> float:
+def calibrated_probability(over: float, points: Calibration) -> float:
     """Probability at `over` times the limit, between measured points on a logarithmic scale."""
     ratios, shares = zip(*points, strict=True)
     return float(np.interp(np.log(max(over, 1e-9)), np.log(ratios), shares))

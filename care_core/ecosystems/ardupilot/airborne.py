@@ -1,0 +1,248 @@
+"""When a vehicle was in the air, out of control and down: the third layer of the run model.
+
+Nothing here needs a message at a rate: logs come thinned to one record in two seconds, and at 400 Hz.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.armed import Armed
+from care_core.ecosystems.ardupilot.recorded import UNKNOWN_MODE
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts, runs
+from care_core.logs.base import Table, Wanted
+from care_core.numbers import pieces
+
+READS: Wanted = {
+    "CTUN": ("ThO", "Alt", "BAlt", "DAlt"),
+    "ATT": ("Roll", "Pitch", "DesRoll", "DesPitch"),
+    "IMU": ("AccX", "AccY", "AccZ"),
+}
+
+UPSIDE_DOWN_DEG = 100.0
+"""No mode that levels a plane banks it so far, ROLL_LIMIT_DEG is at most 90; nor is it a slope or a wave."""
+_ERR_CRASH = 12
+_CRASH_CHECK_S = 2.0
+"""The firmware says "crash" when control was lost for this long (crash_check.cpp: CRASH_CHECK_TRIGGER_SEC)."""
+_OUT_OF_CONTROL_DEG = 30.0
+"""Lean error of the firmware's crash check (crash_check.cpp: CRASH_CHECK_ANGLE_DEVIATION_DEG)."""
+FOLLOWED_DEG, _BACK_S = 15.0, 5.0
+"""Within this of its demand for so long in the air, it had come back."""
+_OVER_DEG = 70.0
+"""No copter leans this far in any mode but acro, sport and flip: ANGLE_MAX is at most 80, 30 to 45 as shipped."""
+_LIFTING = 0.2
+"""Throttle above which a copter is about to lift; MOT_SPIN_MIN and what armed motors idle at is below."""
+AIRBORNE_M = 1.0
+_GROUND_M = 2.0
+_STRIVING, _STRANDED_S = 0.5, 10.0
+"""Throttle that lifts any vehicle that can fly, and how long it may take to do so."""
+_CLIMBS_M = 20.0
+"""A copter that has hit the ground cannot climb so far, whatever its estimator reports."""
+_STRUCK_S = 1.0
+"""A blow so shortly before control was lost is what took it."""
+_SHOCK = 30.0
+"""m/s^2: three times gravity is no flight."""
+_WINGED = frozenset(("plane", "quadplane"))
+_TUMBLING_DEG, _TUMBLES_S = 45.0, 2.0
+_ROLLS = frozenset((UNKNOWN_MODE, 0, 3, 4, 23))
+"""Plane modes in which the pilot may roll it over: manual, training, acro, QAcro; any where the log does not say."""
+_ACRO = frozenset((1, 13, 14))
+"""Copter modes in which any attitude is meant: acro, sport, flip."""
+
+
+class Airborne(Armed):
+    """When the vehicle was in the air, and when it was lost."""
+
+    @cached_property
+    def airborne(self) -> tuple[Span, ...]:
+        """Spans in the air: armed, and higher than a metre or lifted by more than half of what hovering takes."""
+        if not self.is_copter:
+            return self.armed
+        throttle, height = self.throttle, self.height
+        if throttle is None and height is None:
+            return ()
+        t = throttle[0] if throttle is not None else height[0]  # type: ignore[index]
+        up = np.zeros(len(t), dtype=bool)
+        if height is not None:
+            for rows in pieces(len(t)):
+                up[rows] = np.interp(t[rows], *height) > AIRBORNE_M
+        if throttle is not None:
+            up &= throttle[1] > 0.02
+            if height is None:
+                up |= throttle[1] > 0.25
+        spans: list[Span] = []
+        for start, end in self.armed:
+            spans += runs(t, up & (t >= start) & (t <= end), gap_s=3.0)
+        return tuple((a, b) for a, b in spans if b - a >= 1.0)
+
+    @cached_property
+    def stranded(self) -> Span | None:
+        """The first span on the ground, after it had flown, in which it wants up with all its might and does not rise;
+        None where there is none."""
+        table = self.one("CTUN", "Alt", "DAlt", "ThO")
+        if table is None or not self.is_copter or not self.airborne:
+            return None
+        t = table.t
+        wants = (table["DAlt"] - table["Alt"] > _GROUND_M) & (table["ThO"] > _STRIVING) & during(self.armed, t)
+        down = (t > self.airborne[0][1]) & ~during(self.airborne, t)
+        return next((span for span in runs(t, wants & down, gap_s=1.0) if span[1] - span[0] >= _STRANDED_S), None)
+
+    @property
+    def lean_error(self) -> tuple[Floats, Floats] | None:
+        """Time and angle (degrees) between the thrust direction wanted and the one there is."""
+        return None if self._lean_error is None else (self._lean_error[0].t, self._lean_error[1])
+
+    @cached_property
+    def _lean_error(self) -> tuple[Table, Floats] | None:
+        table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+        return None if table is None else (table, np.concatenate([*map(_off_demand, parts(table))]))
+
+    @property
+    def tilt(self) -> tuple[Floats, Floats] | None:
+        """Time and lean from level (degrees)."""
+        return None if self._tilt is None else (self._tilt[0].t, self._tilt[1])
+
+    @cached_property
+    def _tilt(self) -> tuple[Table, Floats] | None:
+        table = self.one("ATT", "Roll", "Pitch")
+        return None if table is None else (table, np.concatenate([*map(_off_level, parts(table))]))
+
+    @cached_property
+    def lost_control_s(self) -> float | None:
+        """When a copter in the air, or about to lift, stopped following its attitude demand for good: it never came
+        back within limits before the end, the ground, or the disarming."""
+        if self.kind in _WINGED:
+            return self._tumbled_s
+        if not self.is_copter:
+            return None
+        up = self.airborne
+        leans, off_demand = self.tilt, self.lean_error
+        if leans is None or off_demand is None:
+            return None
+        t, error = off_demand
+        off = (error > _OUT_OF_CONTROL_DEG) | (leans[1] > _OVER_DEG)
+        before_flight = t < (up[0][0] if up else math.inf)
+        matters = during(((start - 1.0, end) for start, end in up), t) | before_flight
+        flying = during(up, t)
+        held = (error < FOLLOWED_DEG) & flying
+        back = runs(t, held, gap_s=0.5)
+        height = self.height
+        for start, end in runs(t, off & matters & self._is_driven(t)):
+            fell_s = self._fell_from(start, height)
+            until = start + _CRASH_CHECK_S if fell_s is None else fell_s
+            stays = off[(t >= start) & (t <= until)].mean() > 0.6  # else it swings
+            brief = end - start < 0.5 and end < t[-1] - 2.0 and end < self.armed[-1][1] - 2.0
+            if not stays or (brief and fell_s is None):
+                continue
+            rest = held[flying & (t > end)]
+            flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
+            if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
+                return start
+        return None
+
+    @cached_property
+    def _tumbled_s(self) -> float | None:
+        """When a plane left its demand for good, to turn over, in a mode that levels it."""
+        table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+        off_demand = self.lean_error
+        if table is None or off_demand is None:
+            return None
+        t, error = off_demand
+        levels = ~np.isin(self.modes_at(t), tuple(_ROLLS))
+        off = (error > _TUMBLING_DEG) & levels & during(self.armed, t)
+        over = t[(np.abs(table["Roll"]) > UPSIDE_DOWN_DEG) & off]
+        for start, end in runs(t, off, gap_s=1.0):
+            if end - start >= _TUMBLES_S and ((over >= start) & (over <= end)).any():
+                return start
+        return None
+
+    def _fell_from(self, start: float, height: tuple[Floats, Floats] | None) -> float | None:
+        """When it was down, if it came down from a height sooner than the firmware's check takes to call it a crash:
+        what the attitude does on the ground says nothing."""
+        if height is None or float(np.interp(start, *height)) < _GROUND_M:
+            return None
+        return next((b for a, b in self.airborne if a <= start <= b < start + _CRASH_CHECK_S), None)
+
+    def _is_driven(self, t: Floats) -> Mask:
+        """Where the motors were to lift it, in a mode in which not every attitude is meant."""
+        driven, throttle = during(self.armed, t), self.throttle
+        for rows in pieces(len(t)):
+            driven[rows] &= ~np.isin(self.modes_at(t[rows]), tuple(_ACRO))
+            if throttle is not None:
+                driven[rows] &= np.interp(t[rows], *throttle) > _LIFTING
+        return driven
+
+    @cached_property
+    def impact_s(self) -> float | None:
+        """When it hit something, or its firmware found it crashed; None where neither happened."""
+        crash = min((t for t, code in self.errors(_ERR_CRASH) if code > 0), default=None)
+        lost = self.lost_control_s
+        if crash is None and lost is None:
+            return None
+        first = lost if lost is not None and (crash is None or lost < crash) else crash
+        assert first is not None
+        candidates = [] if crash is None else [max(crash - _CRASH_CHECK_S, first)]
+        shock = self.shock_after(first - _STRUCK_S)
+        if shock is not None:
+            candidates.append(shock)
+        ground = self._ground_after(first)
+        if ground is not None:
+            candidates.append(ground)
+        return min((at for at in candidates if not self._flies_on(at)), default=None)
+
+    def _flies_on(self, at: float) -> bool:
+        """Whether it still climbs well after: what shook it, or brought it low, was not the end of the flight."""
+        known = self.height
+        if known is None:
+            return False
+        t, height = known
+        after = height[t >= at + _BACK_S]
+        return len(after) > 0 and float(after.max()) - float(np.interp(at, t, height)) > _CLIMBS_M
+
+    @cached_property
+    def down_s(self) -> float | None:
+        """When the flight was over against its will: it hit something, or came down and could not rise again."""
+        strandings = () if self.stranded is None else (self.stranded[0],)
+        return min((t for t in (self.impact_s, *strandings) if t is not None), default=None)
+
+    def shock_after(self, first: float) -> float | None:
+        """When it was first shaken beyond what flight does, from a time on; None where it was not."""
+        table = self.one("IMU", "AccX", "AccY", "AccZ")
+        if table is None:
+            return None
+        hit = (np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2) > _SHOCK) & (table.t >= first)
+        return float(table.t[hit][0]) if hit.any() else None
+
+    def _ground_after(self, first: float) -> float | None:
+        known = self.height
+        if known is None:
+            return None
+        t, height = known
+        low = (t >= first) & (height < _GROUND_M)
+        return float(t[low][0]) if low.any() else None
+
+    @cached_property
+    def was_struck(self) -> bool:
+        """Whether a blow came before control was lost: it hit something while its attitude was still followed."""
+        lost, shock = self.lost_control_s, None
+        if lost is not None:
+            shock = self.shock_after(lost - _STRUCK_S)
+        return lost is not None and shock is not None and shock < lost
+
+
+def _off_demand(part: Table) -> Floats:
+    aligned = (_up(part["Roll"], part["Pitch"]) * _up(part["DesRoll"], part["DesPitch"])).sum(axis=0)
+    return np.asarray(np.degrees(np.arccos(np.clip(aligned, -1.0, 1.0))))
+
+
+def _off_level(part: Table) -> Floats:
+    return np.asarray(np.degrees(np.arccos(_up(part["Roll"], part["Pitch"])[2])))
+
+
+def _up(roll: Floats, pitch: Floats) -> Floats:
+    """The thrust axis in a level frame that turns with the vehicle, shape (3, n)."""
+    r, p = np.radians(roll), np.radians(pitch)
+    return np.stack((np.cos(r) * np.sin(p), -np.sin(r), np.cos(r) * np.cos(p)))

@@ -1,0 +1,158 @@
+"""When a vehicle was armed, how high it was, and what its motors were asked for: the second layer of the run model."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.recorded import Recorded
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, runs
+from care_core.ecosystems.vehicles import method_words, unrecorded_changes
+from care_core.logs.base import Table, Wanted
+from care_core.numbers import median
+
+READS: Wanted = {
+    "ARM": ("ArmState", "Forced", "Method"),
+    "STAT": ("Armed",),
+    "CTUN": ("ThO", "Alt", "BAlt"),
+    "POS": ("RelHomeAlt",),
+    "ATT": ("Roll",),
+    "RCOU": tuple(f"C{n}" for n in range(1, 15)),
+}
+
+_EV_ARMED, _EV_DISARMED = 10, 11
+_OPENED_S, _CLOSED_S = 0.5, 2.0
+"""A logger writes so shortly before the record of the arming that opened it, and was silent for longer than so."""
+_MOTORS = frozenset((*range(33, 41), *range(82, 86), 70, 73, 74))
+"""SERVOn_FUNCTION of motors and throttles (SRV_Channel.h)."""
+_LEAST_PWM, _WORKS_PWM = 1000.0, 150.0
+"""Microseconds; so far above the least of an output is more than idling (MOT_SPIN_ARM 0.1 of 1000)."""
+_BY_ITSELF = frozenset(("mission", "return", "guided"))
+
+
+class ArmChange(NamedTuple):
+    """An arming or disarming."""
+
+    time_s: float
+    is_armed: bool
+    how: str = ""
+    """By what or whom, where the record says so."""
+    is_forced: bool | None = None
+    """None where the log does not say."""
+
+
+class Armed(Recorded):
+    """When the vehicle was armed, and its height and throttle."""
+
+    @cached_property
+    def arm_changes(self) -> tuple[ArmChange, ...]:
+        """When it was armed and disarmed by its records, and by its texts where these tell of none."""
+        table = self.one("ARM", "ArmState")
+        if table is not None:
+            recorded = [_arm_change(table, row) for row in range(len(table))]
+        else:
+            by_number = ((_EV_ARMED, True), (_EV_DISARMED, False))
+            recorded = [ArmChange(t, is_armed) for number, is_armed in by_number for t in self.events(number)]
+        recorded.sort(key=lambda change: change[:2])
+        spoken = unrecorded_changes([change[:2] for change in recorded], self.messages)
+        return tuple(sorted((*recorded, *(ArmChange(*change) for change in spoken)), key=lambda change: change[:2]))
+
+    @cached_property
+    def armed(self) -> tuple[Span, ...]:
+        """Spans armed. A log that tells of no arming was armed as its status says (STAT of Plane), else all along where
+        it is written while armed only, else where its throttle is up."""
+        if self.arm_changes:
+            return self.recorded_armed
+        status = self.one("STAT", "Armed")
+        if status is not None:
+            return tuple(runs(status.t, status["Armed"] > 0, gap_s=_CLOSED_S))
+        return ((0.0, self.end_s),) if self.is_written_armed else self._driven()
+
+    @cached_property
+    def recorded_armed(self) -> tuple[Span, ...]:
+        """Spans armed by the records of arming. A log whose first word is a disarming was armed from its start. What is
+        armed once more was disarmed between, as far as nothing is recorded before: the logger was closed."""
+        spans: list[Span] = []
+        start = 0.0 if self.arm_changes and not self.arm_changes[0].is_armed else None
+        for change in self.arm_changes:
+            if start is not None:
+                spans.append((start, self._recorded_before(change.time_s) if change.is_armed else change.time_s))
+            start = change.time_s if change.is_armed else None
+        if start is not None:
+            spans.append((start, self.end_s))
+        return tuple(span for span in spans if span[1] > span[0])
+
+    def _recorded_before(self, t: float) -> float:
+        """The last record of the attitude before the logger was opened at a time; that time where it was open."""
+        table = self.one("ATT", "Roll")
+        before = table.t[table.t < t - _OPENED_S] if table is not None else np.empty(0)
+        return t if not len(before) or t - float(before[-1]) < _CLOSED_S else float(before[-1])
+
+    @cached_property
+    def is_written_armed(self) -> bool:
+        """Whether the log is one that is written while armed only: LOG_DISARMED is 0, no refused arming kept it open
+        (AP_Logger: log_while_disarmed), and its motors work."""
+        is_only = not self.is_telemetry and self.setting("LOG_DISARMED") == 0 and not self.refusals
+        return is_only and (bool(self._driven()) or self._motors_work)
+
+    @property
+    def _motors_work(self) -> bool:
+        """Whether an output that drives a motor ever left its least."""
+        table = self.one("RCOU", "C1")
+        outputs = [n for n in range(1, 15) if self.setting(f"SERVO{n}_FUNCTION") in _MOTORS] if table else []
+        return table is not None and any(
+            f"C{n}" in table.columns
+            and np.nanmax(table[f"C{n}"]) > (self.setting(f"SERVO{n}_MIN") or _LEAST_PWM) + _WORKS_PWM
+            for n in outputs
+        )
+
+    def _driven(self) -> tuple[Span, ...]:
+        throttle = self.throttle
+        if throttle is None:
+            return ()
+        up = np.flatnonzero(throttle[1] > 0.05)
+        return ((float(throttle[0][up[0]]), float(throttle[0][up[-1]])),) if len(up) else ()
+
+    @cached_property
+    def was_refused(self) -> bool:
+        """Whether it never armed though that was asked for."""
+        return not self.armed and bool(self.refusals)
+
+    def drives_itself(self, t: Floats) -> Mask:
+        """Which of these times lie in an armed span and a mode of a rover that drives without a pilot."""
+        automatic = [mode.number for mode in self.modes if mode.number is not None and mode.way in _BY_ITSELF]
+        return np.asarray(during(self.armed, t) & np.isin(self.modes_at(t), automatic))
+
+    @property
+    def throttle(self) -> tuple[Floats, Floats] | None:
+        """Time and throttle out (0 to 1) of the motors together. Read each time: of a large log not all is held."""
+        table = self.one("CTUN", "ThO")
+        return None if table is None else (table.t, table["ThO"])
+
+    @property
+    def height(self) -> tuple[Floats, Floats] | None:
+        """Time and height (m) above where it was armed, as estimated by the vehicle."""
+        if self._height is None:
+            return None
+        table, column, zero = self._height
+        return table.t, table[column] - zero
+
+    @cached_property
+    def _height(self) -> tuple[Table, str, float] | None:
+        """The message and the field that tell the height, and what they say where it was armed."""
+        for name, column in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("CTUN", "BAlt")):
+            table = self.one(name, column)
+            if table is not None and len(table) > 1 and np.ptp(table[column]) > 0:
+                start = self.armed[0][0] if self.armed else 0.0
+                before = table[column][table.t <= start + 1.0]
+                zero = float(median(before[-20:])) if len(before) else float(table[column][0])
+                return table, column, zero if abs(zero) < 50 or name == "CTUN" else 0.0
+        return None
+
+
+def _arm_change(table: Table, row: int) -> ArmChange:
+    how = method_words(int(table["Method"][row])) if "Method" in table.columns else ""
+    is_forced = bool(table["Forced"][row] == 1) if "Forced" in table.columns else None
+    return ArmChange(float(table.t[row]), bool(table["ArmState"][row] > 0), how, is_forced)
