@@ -41,10 +41,13 @@ class TablesLog(Record, eq=False):
 
 
 def read(
-    tables: Mapping[str, Table], duration_s: float, facts: Mapping[str, str] | None = None
+    tables: Mapping[str, Table],
+    duration_s: float,
+    format: LogFormat = formats.DATAFLASH_BIN,
+    facts: Mapping[str, str] | None = None,
 ) -> tuple[RunModel, Mapping[str, Table]]:
-    """The run model of a DataFlash log that holds these tables, and the tables: what missions are found in."""
-    return run_model(TablesLog(tables, duration_s, facts=facts or {})), tables
+    """The run model of a log that holds these tables, and the tables: what missions are found in."""
+    return run_model(TablesLog(tables, duration_s, format, facts or {})), tables
 
 
 def no_model() -> RunModel:

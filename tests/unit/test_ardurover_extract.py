@@ -72,7 +72,7 @@ def drive(**replaced: Table) -> dict[str, Table]:
 
 
 def only(tables: Mapping[str, Table], **settings: float) -> Mission:
-    (mission,) = KIND.missions(*read(tables, 65.0, FACTS), {})
+    (mission,) = KIND.missions(*read(tables, 65.0, facts=FACTS), {})
     return replace(mission, settings={**SKID, **settings})
 
 

@@ -31,7 +31,7 @@ PLANE = {"firmware": "ArduPlane V4.4.0", "vehicle": "fixed wing"}
 def flown(facts: Mapping[str, str] = COPTER, *, mode: int = 5, **replaced: Any) -> Mission:
     """The flight of `tests/unit/test_ardupilot_extract.py`, in one mode."""
     tables = flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced)
-    (mission,) = KIND.missions(*read(tables, 75.0, facts), {})
+    (mission,) = KIND.missions(*read(tables, 75.0, facts=facts), {})
     return mission
 
 
@@ -124,7 +124,7 @@ def test_old_logs_tell_heights_otherwise_and_modes_by_name() -> None:
     barometer = replace(flight()["POS"], times=at, columns={"BarAlt": 412.0 + height})
     named = table([(0.0, "STABILIZE")], "Mode")
     tables = flight(MODE=named, POS=None, CTUN=barometer)
-    (mission,) = KIND.missions(*read(tables, 75.0, {"firmware": "ArduCopter V3.1"}), {})
+    (mission,) = KIND.missions(*read(tables, 75.0, facts={"firmware": "ArduCopter V3.1"}), {})
     assert mode_names(mission) == ("Stabilize",)
     assert checks(mission)["took_off"] == checks(mission)["landed"] == 1.0
 

@@ -46,7 +46,7 @@ def checks(found: tuple[Check, ...]) -> dict[str, Value]:
 def judged(facts: Mapping[str, str], mode: int, **replaced: Table | None) -> dict[str, Value]:
     """The checks of the flight of `test_ardupilot_extract`, taken for another vehicle's, in one mode."""
     tables = flight(MODE=table([(0.0, mode)], "ModeNum"), **replaced)
-    (mission,) = KIND.missions(*read(tables, 75.0, facts), {})
+    (mission,) = KIND.missions(*read(tables, 75.0, facts=facts), {})
     return checks(KIND.outcome(mission))
 
 
@@ -69,7 +69,7 @@ def test_a_mission_that_the_vehicle_was_still_at_when_it_was_disarmed_failed() -
 
 def test_a_mission_that_the_pilot_broke_off_is_no_failure_of_the_vehicle() -> None:
     modes = table([(0.0, 10), (40.0, 4)], "ModeNum")
-    (mission,) = KIND.missions(*read(flight(MODE=modes, MSG=said((20.0, "Mission: 2 WP"))), 75.0, ROVER), {})
+    (mission,) = KIND.missions(*read(flight(MODE=modes, MSG=said((20.0, "Mission: 2 WP"))), 75.0, facts=ROVER), {})
     value = checks(KIND.outcome(mission))["mission_success"]
     assert isinstance(value, Unavailable)
     assert value.reason == "0 of the mission's 1 waypoints were reached, and the last mode was Hold"
@@ -79,7 +79,7 @@ def test_a_mission_that_a_failsafe_ended_failed() -> None:
     errors = table([(40.0, 17, 1)], "Subsys", "ECode")
     modes = table([(0.0, 10), (40.0, 4)], "ModeNum")
     (mission,) = KIND.missions(
-        *read(flight(MODE=modes, ERR=errors, MSG=said((20.0, "Mission: 2 WP"))), 75.0, ROVER), {}
+        *read(flight(MODE=modes, ERR=errors, MSG=said((20.0, "Mission: 2 WP"))), 75.0, facts=ROVER), {}
     )
     assert checks(KIND.outcome(mission))["mission_success"] == 0.0
 

@@ -31,6 +31,7 @@ READS: Wanted = {
     "EV": ("Id",),
 }
 
+_MODES = 2.0**32
 _LAST_S = 1.0
 """Damage so near to the end is the end."""
 _REASONS_KNOWN = (4, 0)
@@ -216,7 +217,7 @@ class Recorded(RunModel):
         are_reasons = "Rsn" in table.columns and (self.vehicle_version or (0,)) >= _REASONS_KNOWN
         reasons = table["Rsn"].tolist() if are_reasons else [math.nan] * len(table)
         entered = zip(table.t.tolist(), table["ModeNum"].tolist(), reasons, strict=True)
-        return tuple(self._mode(t, mode, reason) for t, mode, reason in entered if mode == mode)
+        return tuple(self._mode(t, mode, reason) for t, mode, reason in entered if _can_be(mode))
 
     def _mode(self, t: float, mode: float | str, reason: float) -> Mode:
         kind = self.mode_kind
@@ -250,6 +251,11 @@ class Recorded(RunModel):
         numbers = (UNKNOWN_MODE if mode.number is None else mode.number for mode in self.modes)
         codes = np.array([UNKNOWN_MODE, *numbers], dtype=np.int64)
         return np.asarray(codes[np.searchsorted([mode.start_s for mode in self.modes], t, side="right")])
+
+
+def _can_be(mode: float | str) -> bool:
+    """Whether a mode is a name, or a number of 32 bits as it is sent (custom_mode)."""
+    return isinstance(mode, str) or abs(mode) < _MODES
 
 
 UNKNOWN_MODE = -1
