@@ -17,7 +17,7 @@ from care_core import plain_yaml
 from care_core.causal.nominal import nominal
 from care_core.ecosystems.vehicles import Kind as VehicleKind
 from care_core.errors import ProfileError, nearest
-from care_core.logs.formats import FORMATS
+from care_core.logs import formats
 from care_core.profile.schema import EvidenceRule, Schema, Side
 from care_core.variables import (
     About,
@@ -187,12 +187,12 @@ class _Profile(Strict):
 
     @field_validator("logs")
     @classmethod
-    def _are_formats(cls, formats: list[str]) -> list[str]:
-        known = [format.name for format in FORMATS]
-        for format in formats:
-            if format not in known:
-                raise ValueError(f"there is no log format '{format}'. {nearest(format, known)}".strip())
-        return formats
+    def _are_formats(cls, names: list[str]) -> list[str]:
+        known = [format.name for format in formats.FORMATS]
+        for name in names:
+            if name not in known:
+                raise ValueError(f"there is no log format '{name}'. {nearest(name, known)}".strip())
+        return names
 
     @model_validator(mode="after")
     def _names_are_declared(self) -> _Profile:
