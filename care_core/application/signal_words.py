@@ -1,14 +1,13 @@
 """Units of the signals that logs hold, and what they are in words, where that is documented.
 
-ArduPilot: docs "Log messages" and the FMTU records of its logs; MAVLink: common.xml; ROS: REP 103 and the comments of
-the message definitions. Those of PX4 are in its ecosystem's dictionary.
+ArduPilot: docs "Log messages" and the FMTU records of its logs; MAVLink: common.xml. Those of PX4 and ROS stand in the
+dictionaries of their ecosystems.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from care_core.application.signals import type_name
 from care_core.ecosystems.dictionary import Field
 from care_core.ecosystems.registry import ecosystem_of
 from care_core.logs.base import Log
@@ -102,29 +101,6 @@ _WORDS: Mapping[str, Mapping[str, Words]] = {
     "VIBRATION": {f"vibration_{axis}": ("m/s2", "vibration") for axis in "xyz"},
     "SERVO_OUTPUT_RAW": _SERVOS,
 }
-_WORDS_OF_TYPES: Mapping[str, Mapping[str, Words]] = {
-    "Odometry": {
-        "twist.twist.linear.x": ("m/s", "speed forward"),
-        "twist.twist.linear.y": ("m/s", "speed to the left"),
-        "twist.twist.angular.z": ("rad/s", "turn rate"),
-        "pose.pose.position.x": ("m", "position x"),
-        "pose.pose.position.y": ("m", "position y"),
-    },
-    "Twist": {"linear.x": ("m/s", "commanded speed"), "angular.z": ("rad/s", "commanded turn rate")},
-    "BatteryState": {
-        "voltage": ("V", "battery voltage"),
-        "current": ("A", "battery current"),
-        "percentage": ("", "charge left, 0 to 1"),
-    },
-    "Imu": {
-        "linear_acceleration.z": ("m/s2", "vertical acceleration"),
-        "angular_velocity.z": ("rad/s", "turn rate of the gyro"),
-    },
-    "PoseWithCovarianceStamped": {
-        "pose.pose.position.x": ("m", "position x"),
-        "pose.pose.position.y": ("m", "position y"),
-    },
-}
 
 _POSITIONS = {
     "POS": {"Lat", "Lng", "Alt"},
@@ -146,16 +122,14 @@ def meanings_of(log: Log) -> Callable[[str, str], Field]:
 
     def meaning(name: str, field: str) -> Field:
         channel = channels.get(name)
-        known = ecosystem.field(channel, field) if channel is not None else None
-        known = known or _worded(name, type_name(channel.type) if channel is not None else "", field)
+        known = (ecosystem.field(channel, field) if channel is not None else None) or _worded(name, field)
         return replace(known, is_position=known.is_position or _is_position(name, field))
 
     return meaning
 
 
-def _worded(channel: str, type: str, field: str) -> Field:
-    known = _WORDS.get(channel) or _WORDS_OF_TYPES.get(type.removesuffix("Stamped")) or _WORDS_OF_TYPES.get(type) or {}
-    return Field(*known.get(field, ("", "")))
+def _worded(channel: str, field: str) -> Field:
+    return Field(*_WORDS.get(channel, {}).get(field, ("", "")))
 
 
 def _is_position(channel: str, field: str) -> bool:

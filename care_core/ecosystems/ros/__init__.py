@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
 from care_core.ecosystems.dialect import Dialect
-from care_core.ecosystems.dictionary import Dictionary
+from care_core.ecosystems.dictionary import Dictionary, Field, find_field
 from care_core.ecosystems.findings import Event, Health
 from care_core.ecosystems.ros.dialect import ROS1_YAML, ROS2_YAML
 from care_core.logs.base import Channel, Log
@@ -73,6 +73,11 @@ class Ros(Ecosystem):
         from care_core.ecosystems.ros.messages import MESSAGES
 
         return MESSAGES
+
+    def field(self, channel: Channel, name: str) -> Field | None:
+        from care_core.ecosystems.ros.messages import type_of
+
+        return find_field(self.messages(), type_of(channel), name)
 
     def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:
         """An MCAP may be of either ROS: only in ROS 2 have names of parameters a dot, after the node."""
