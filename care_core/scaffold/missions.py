@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from care_core.ecosystems.measures import MISSION_KINDS
-from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.registry import ecosystem_of, run_model
 from care_core.ecosystems.ros.goals import Goal, Status
 from care_core.ecosystems.ros.measures.window import GOAL_TIMEOUT_S, TOLERANCE_M, window
 from care_core.ecosystems.vehicles import vehicle_of
@@ -18,7 +18,7 @@ from care_core.scaffold.inputs import InputLog
 
 _TYPES = {"odometry": ("Odometry",), "commands": ("Twist", "TwistStamped"), "battery": ("BatteryState",)}
 _USUAL = {"odometry": "/odom", "commands": "/cmd_vel", "battery": "/battery_state"}
-_FLYING = ("copter", "heli", "plane", "quadplane", "unknown")
+_FLYING = ("copter", "heli", "plane", "quadplane", "px4", "unknown")
 _SLACK = 2.0
 """A goal may take this times the longest that was reached."""
 
@@ -39,7 +39,7 @@ def find_missions(logs: Sequence[InputLog], bundled: Sequence[Schema]) -> Missio
     """
     first = logs[0]
     if not is_ros(first.stack):
-        kind = "px4_flight" if first.stack == "px4" else _vehicle_kind(first, bundled)
+        kind = _vehicle_kind(first, bundled)
         if kind and any(_found(log, {"kind": kind}) for log in logs):
             return Missions({"kind": kind}, {"kind": "arming to disarming"}, False)
         return _whole("no log holds a mission from arming to disarming that is known how to judge")
@@ -57,10 +57,11 @@ def _whole(why: str) -> Missions:
 
 
 def _vehicle_kind(first: InputLog, bundled: Sequence[Schema]) -> str:
-    """The mission kind of an ArduPilot vehicle: that of a profile for its like, a flight for what flies, else none."""
+    """The mission kind of a vehicle: of a profile for its like, of its ecosystem for what flies, else none."""
     vehicle = vehicle_of(first.opened.facts, first.settings).kind
-    own = (str(one.mission.get("kind", "")) for one in bundled if one.match.get("vehicle") == vehicle)
-    return next(own, "ardupilot_flight" if vehicle in _FLYING else "")
+    kinds = (str(one.mission.get("kind", "")) for one in bundled if one.match.get("vehicle") == vehicle)
+    usual = (str(spec["kind"]) for spec in ecosystem_of(first.opened.format).missions(first.opened.channels()))
+    return next(kinds, next(usual, "") if vehicle in _FLYING else "")
 
 
 def _found(log: InputLog, spec: Mapping[str, Any]) -> tuple[Any, ...]:
