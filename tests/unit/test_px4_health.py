@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from care_core.ecosystems.dictionary import find_field
 from care_core.ecosystems.findings import Health
-from care_core.ecosystems.px4.examining import examine
+from care_core.ecosystems.px4.examining import READS, examine
 from care_core.ecosystems.px4.flight import Px4Flight
+from care_core.ecosystems.px4.messages import MESSAGES
 from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.formats import LogFormat
@@ -170,3 +172,33 @@ def test_what_falls_after_the_kill_switch_is_the_kill_switchs_doing() -> None:
     (finding,) = killed(1.2).findings
     assert (finding.title, finding.suspect) == ("the kill switch cut the motors in the air", "operation")
     assert killed(0.1).findings == ()  # a pilot killed what did not let itself be disarmed
+
+
+def test_newer_firmware_tells_of_the_heading_in_place_of_the_compass() -> None:
+    ratios = states(hdg_test_ratio=[(0, 0.1), (30, 1.4), (36, 0.2)])
+    health = examine(Px4Flight(MadeLog({"vehicle_status": FLOWN, "estimator_status": ratios})))
+    assert [(one.kind, one.title) for one in health.findings] == [("compass", "estimator rejects heading")]
+
+
+def test_a_height_is_that_above_where_it_was_armed() -> None:
+    flight = Px4Flight(MadeLog({
+        "vehicle_status": FLOWN,
+        "vehicle_local_position": states(z=[(0, 0.0), (5, -30.0), (20, -35.0)]),
+    }))  # fmt: skip
+    assert flight.armed == ((10.0, 50.0),)
+    assert flight.height_m(30.0) == 5.0, "carried uphill before it was armed"
+
+
+def test_every_field_that_is_read_is_in_the_dictionary() -> None:
+    unknown = {
+        f"{topic}.{name}"
+        for topic, fields in READS.items()
+        for name in fields
+        if find_field(MESSAGES, topic, name) is None
+    }
+    assert not unknown
+
+
+def test_a_former_name_means_what_todays_does() -> None:
+    assert find_field(MESSAGES, "sensor_gps", "lat") == find_field(MESSAGES, "sensor_gps", "latitude_deg")
+    assert find_field(MESSAGES, "sensor_gps", "nonsense") is None

@@ -8,11 +8,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from care_core.ecosystems.dictionary import Dictionary, Field, Message
+from care_core.ecosystems.px4.checks import flags
 
 _SHARE = (0.0, 1.0)
 _LATITUDE, _LONGITUDE = (-90.0, 90.0), (-180.0, 180.0)
 _RATIO = (0.0, float("inf"))
 
+_FLAGS: Mapping[str, Mapping[str, Field]] = {
+    topic: {state.field: Field(label=state.means, plausible=_SHARE) for state in flags.STATES if state.topic == topic}
+    for topic in flags.READS
+}
 _GPS: Mapping[str, Field] = {
     "fix_type": Field(label="kind of fix", plausible=(0.0, 8.0)),
     "satellites_used": Field(label="satellites", plausible=(0.0, 255.0)),
@@ -31,10 +36,11 @@ def _along(axes: str, unit: str, words: str) -> dict[str, Field]:
 
 
 MESSAGES: Dictionary = {
+    **{topic: Message(fields) for topic, fields in _FLAGS.items()},
     "vehicle_status": Message({
+        **_FLAGS["vehicle_status"],
         "arming_state": Field(label="arming state"),
         "nav_state": Field(label="mode"),
-        "failsafe": Field(label="failsafe", plausible=_SHARE),
         "failure_detector_status": Field(label="failures detected, as bits"),
         "vehicle_type": Field(label="kind of vehicle"),
     }),
@@ -45,7 +51,6 @@ MESSAGES: Dictionary = {
         "failure": Field(label="mission failed", plausible=_SHARE),
         "seq_reached": Field(label="last waypoint reached"),
     }),
-    "failsafe_flags": Message({}, former=("vehicle_status_flags",)),
     "vehicle_local_position": Message({
         "x": Field("m", "position north", is_position=True),
         "y": Field("m", "position east", is_position=True),
@@ -103,5 +108,6 @@ MESSAGES: Dictionary = {
         "pos_test_ratio": Field(label="position test ratio of the estimator", plausible=_RATIO),
         "hgt_test_ratio": Field(label="height test ratio of the estimator", plausible=_RATIO),
         "mag_test_ratio": Field(label="compass test ratio of the estimator", plausible=_RATIO),
+        "hdg_test_ratio": Field(label="heading test ratio of the estimator", plausible=_RATIO),
     }),
 }  # fmt: skip

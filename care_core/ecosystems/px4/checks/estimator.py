@@ -16,7 +16,9 @@ STATES = (
     State(_TOPIC, "pos_test_ratio", "estimator rejects position", "gps"),
     State(_TOPIC, "hgt_test_ratio", "estimator rejects height", "barometer"),
     State(_TOPIC, "mag_test_ratio", "estimator rejects compass", "compass"),
+    State(_TOPIC, "hdg_test_ratio", "estimator rejects heading", "compass"),
 )
+"""Newer firmware publishes the ratio of the heading, whatever gives it, in place of the compass's."""
 
 READS: Wanted = {_TOPIC: tuple(state.field for state in STATES)}
 LIMITS = Limits()
@@ -41,4 +43,4 @@ def find(flight: Px4Flight) -> Iterator[Finding]:
     yield from filter(None, (found.finding() for found in episodes(flight)))
 
 
-CHECK = Check("estimator", "velocity, position, height or compass that the estimator rejects", READS, LIMITS, find)
+CHECK = Check("estimator", "sensors that the estimator rejects", READS, LIMITS, find)
