@@ -10,7 +10,7 @@ import numpy as np
 
 from care_core.ecosystems.dictionary import find_field
 from care_core.ecosystems.findings import Health
-from care_core.ecosystems.px4.examining import READS, examine
+from care_core.ecosystems.px4.examining import examine, reads
 from care_core.ecosystems.px4.flight import Px4Flight
 from care_core.ecosystems.px4.messages import MESSAGES
 from care_core.logs import formats
@@ -192,7 +192,7 @@ def test_a_height_is_that_above_where_it_was_armed() -> None:
 def test_every_field_that_is_read_is_in_the_dictionary() -> None:
     unknown = {
         f"{topic}.{name}"
-        for topic, fields in READS.items()
+        for topic, fields in reads().items()
         for name in fields
         if find_field(MESSAGES, topic, name) is None
     }

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health
+from care_core.ecosystems.px4 import checks, timeline
 from care_core.ecosystems.px4 import flight as flights
-from care_core.ecosystems.px4 import timeline
-from care_core.ecosystems.px4.checks import CHECKS
 from care_core.ecosystems.px4.explains import EXPLAINS
 from care_core.ecosystems.px4.flight import STATUS, Px4Flight
 from care_core.ecosystems.ranking import rank_findings
@@ -16,12 +15,15 @@ _TOO_SHORT_S = 2.0
 _FALLING: frozenset[FindingKind] = frozenset(("attitude", "motor", "vibration", "estimator", "imu"))
 """What a vehicle shows that falls, or lies, with its motors cut."""
 
-READS: Wanted = merge_needs((flights.READS, timeline.READS, *(check.reads for check in CHECKS)))
+
+def reads() -> Wanted:
+    """All that the model, the timeline and the checks read."""
+    return merge_needs((flights.READS, timeline.READS, *(check.reads for check in checks.CHECKS)))
 
 
 def examine(flight: Px4Flight) -> Health:
     """What happened in a ULog."""
-    tables = flight.tables(READS)
+    tables = flight.tables(reads())
     findings = rank_findings(_findings(flight), EXPLAINS)
     is_readable = STATUS in tables and flight.end_s >= _TOO_SHORT_S
     too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
@@ -32,5 +34,5 @@ def examine(flight: Px4Flight) -> Health:
 def _findings(flight: Px4Flight) -> list[Finding]:
     """What the checks find, but for what only tells that a vehicle falls after somebody cut its motors."""
     cut_s = flight.killed_s()
-    found = [finding for check in CHECKS for finding in check.find(flight)]
+    found = [finding for check in checks.CHECKS for finding in check.find(flight)]
     return [one for one in found if cut_s is None or one.onset_s < cut_s or one.kind not in _FALLING]
