@@ -52,6 +52,7 @@ READ = """
 import sys, time
 from pathlib import Path
 import care_core.diagnose.triage
+from care_core.ecosystems.registry import run_model
 from care_core.extract.read import read_run
 from care_core.application.case import choose
 from care_core.logs.opening import open_log

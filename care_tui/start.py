@@ -11,16 +11,11 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import Any
 
-_CONTAINERS = 200_000
-"""New ones after which cycles are looked for. Python looks a hundred times while modules are imported and a small log
-is read, which took 5 % of a small triage and found nothing to free."""
 _INTERRUPTED = 128 + signal.SIGINT
 
 
 def main() -> None:
     """Entry point of the console script."""
-    usual = gc.get_threshold()
-    gc.set_threshold(_CONTAINERS)
     is_listening = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN  # a shell's background job is not
     if is_listening:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
@@ -37,8 +32,7 @@ def main() -> None:
     except KeyboardInterrupt:  # typer builds its commands before it handles any
         raise SystemExit(_INTERRUPTED) from None
     finally:
-        gc.set_threshold(*usual)
-        gc.freeze()  # the memory goes with the process: to look through it for cycles first takes 40 ms
+        gc.freeze()  # the memory goes with the process: looking through it for cycles first is a sixth of a triage
         if is_listening:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 

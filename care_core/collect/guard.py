@@ -42,7 +42,7 @@ def main(grace_s: float, record: Path, command: list[str]) -> None:
         return
     stopped = threading.Event()
 
-    def attend() -> None:
+    def wait_for_child() -> None:
         code = child.wait()
         if not stopped.is_set():
             time_s = time.monotonic() - started
@@ -50,7 +50,7 @@ def main(grace_s: float, record: Path, command: list[str]) -> None:
             _write(record, {"code": code, "time_s": round(time_s, 3)})
             os._exit(0)
 
-    threading.Thread(target=attend, daemon=True).start()
+    threading.Thread(target=wait_for_child, daemon=True).start()
     while os.read(0, 1024):
         pass
     stopped.set()
@@ -72,7 +72,7 @@ def _end(group: int, grace_s: float) -> None:
 
 def _signal(group: int, sign: int) -> bool:
     """Send a signal to the group and to what left it; whether anybody was there to get it."""
-    _bury()
+    _reap()
     is_left = False
     for send, target in [(os.killpg, group), *((os.kill, process) for process in _below(os.getpid()))]:
         try:
@@ -83,7 +83,7 @@ def _signal(group: int, sign: int) -> bool:
     return is_left
 
 
-def _bury() -> None:
+def _reap() -> None:
     """Take note of adopted processes that ended, so that none counts as left."""
     with contextlib.suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:

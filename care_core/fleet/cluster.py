@@ -130,7 +130,7 @@ def _local(workers: int, memory: str | None) -> Iterator[Any]:
         }
         with (
             dask.config.set(settings),
-            _deaf(),
+            _ignoring_interrupts(),
             patiently(lambda: distributed.LocalCluster(**ours)) as cluster,
             distributed.Client(cluster) as client,
         ):
@@ -138,7 +138,7 @@ def _local(workers: int, memory: str | None) -> Iterator[Any]:
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
+def _ignoring_interrupts() -> Iterator[None]:
     """Have the server that our processes are forked from, and with it all of them, not hear Ctrl+C: it is this
     process's to handle, which ends them."""
     from multiprocessing import forkserver

@@ -150,6 +150,8 @@ def read_contents(log: FileBytes) -> McapContents:
                 _take(log, record, contents)
                 pos = record.end
         except BrokenRecordError as err:
+            if contents.chunks:  # where its index is cut short, topics are missing from it: `_complete` makes it anew
+                contents.chunks[-1].index.clear()
             resumed = next((known for known in _summarised(log) if known > pos), None)
             contents.flaws[f"record {pos}"] = Flaw(str(err), pos, cuts=resumed is None)
             if resumed is None:

@@ -14,7 +14,9 @@ from rosbags.rosbag2 import StoragePlugin
 from care_core.ecosystems.examine import examine
 from care_core.ecosystems.registry import run_model
 from care_core.logs import formats
+from care_core.logs.file_windows import opened
 from care_core.logs.mcap_log import McapLog
+from care_core.logs.mcap_records import MAGIC, read_contents
 from care_core.logs.opening import open_log
 from tests.ros_samples import (
     IMU,
@@ -128,6 +130,18 @@ def test_a_broken_record_costs_one_chunk(tmp_path: Path) -> None:
     assert table["data"][-1] == f"message {MESSAGES - 1} é"
     assert log.damage[0].byte == chunk
     assert log.damage[0].time_s is not None
+
+
+def test_a_cut_in_a_chunks_index_costs_no_message(tmp_path: Path) -> None:
+    """The chunk itself is whole: topics whose part of the index is gone are found in it."""
+    path = tmp_path / "a.mcap"
+    write_mcap(path)
+    raw = path.read_bytes()
+    with opened(path, MAGIC, "an MCAP file") as log:
+        end = read_contents(log).chunks[-1].end
+    for size in range(end, len(raw), 31):
+        path.write_bytes(raw[:size])
+        assert {channel.name: channel.count for channel in open_log(path).channels()} == {"/imu": 60, "/note": 60}
 
 
 def test_encodings_that_are_not_decoded(tmp_path: Path) -> None:
