@@ -20,8 +20,8 @@ def _are_names(value: object) -> bool:
 def parameter(mission: Mission, args: Args) -> Value:
     """The number that a parameter was driven with, of several the largest."""
     names = args.get("names", ())
-    told = [mission.settings[name] for name in names if name in mission.settings]
-    numbers = [float(value) for value in told if isinstance(value, (int, float)) and not isinstance(value, bool)]
+    values = [mission.settings[name] for name in names if name in mission.settings]
+    numbers = [float(value) for value in values if isinstance(value, (int, float)) and not isinstance(value, bool)]
     if not numbers:
         return Unavailable(f"the log does not hold {' or '.join(names)}", "record the parameters as driven")
     return max(numbers)

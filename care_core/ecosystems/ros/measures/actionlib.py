@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, missing
+from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, has, missing
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.goals import Goal, actionlib_goals
 from care_core.ecosystems.ros.measures.goals import GoalMissions
-from care_core.ecosystems.ros.measures.window import GOAL_SERVERS, GoalServer, has
+from care_core.ecosystems.ros.measures.window import GOAL_SERVERS, GoalServer
 from care_core.ecosystems.ros.messages import ACTION_GOAL, ACTION_RESULT, MESSAGES, RECOVERY
 from care_core.ecosystems.ros.recoveries import Recoveries, announced
 from care_core.logs.base import Wanted
@@ -28,7 +28,7 @@ def goals(drive: Drive, spec: Args) -> tuple[Goal, ...]:
     """Every goal that is a place, in the order they were sent."""
     action, tables = _action(spec), drive.tables(_needs(spec))
     sent = tables.get(f"{action}/goal")
-    if sent is None or not has(sent, MESSAGES[ACTION_GOAL].reads):
+    if not has(sent, *MESSAGES[ACTION_GOAL].reads):
         return ()
     return actionlib_goals(action, sent, tables.get(f"{action}/result"), drive.duration_s)
 

@@ -11,12 +11,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, extractor, missing, one_of
+from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, extractor, has, missing, one_of
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, nav2_goals
 from care_core.ecosystems.ros.measures.goals import GoalMissions
 from care_core.ecosystems.ros.measures.requested import PER_GOAL, PER_METRE, divided
-from care_core.ecosystems.ros.measures.window import GOAL_SERVERS, GoalServer, Poses, has, window
+from care_core.ecosystems.ros.measures.window import GOAL_SERVERS, GoalServer, Poses, window
 from care_core.ecosystems.ros.messages import FRAME, MESSAGES, STATUS, TREE, holds, yaw_of
 from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS
 from care_core.ecosystems.ros.recoveries import Recoveries, changes, repairs
@@ -94,7 +94,7 @@ def goals(drive: Drive, spec: Args) -> tuple[Goal, ...]:
 
 def _placed(goal: Goal, tables: Mapping[str, Table], spec: Args) -> Goal:
     poses, plans = tables.get(_pose_topic(spec)), tables.get(_plan_topic(spec))
-    if poses is not None and has(poses, POSE_FIELDS):
+    if has(poses, *POSE_FIELDS):
         rows = np.flatnonzero(np.abs(poses.t - goal.sent_s) <= _SAME_MOMENT_S)
         if len(rows):
             row = rows[-1]
@@ -102,7 +102,7 @@ def _placed(goal: Goal, tables: Mapping[str, Table], spec: Args) -> Goal:
             return replace(
                 goal, x=x, y=y, yaw=float(yaw_of(poses, "pose.orientation")[row]), frame=str(poses[FRAME][row])
             )
-    if plans is None or not has(plans, PLAN_FIELDS):
+    if not has(plans, *PLAN_FIELDS):
         return goal
     towards = np.flatnonzero((plans.t >= goal.sent_s) & (plans.t <= goal.end_s)).tolist()
     first = next((row for row in towards if len(plans[f"{_POSES}.position.x"][row])), None)
@@ -155,7 +155,7 @@ def plan_length(mission: Mission, args: Args) -> Value:
     """Length of the first plan of each goal, summed over the goals: the way that was meant."""
     topic = _plan_topic(mission.spec)
     table = mission.table(topic)
-    if table is None or not has(table, PLAN_FIELDS):
+    if not has(table, *PLAN_FIELDS):
         return missing(topic)
     sent = mission.shared(window).goals
     rows = [np.flatnonzero((table.t >= goal.sent_s) & (table.t <= goal.end_s)) for goal in sent]
@@ -173,15 +173,15 @@ def _length(table: Table, row: int) -> float:
 def poses(mission: Mission) -> Poses | None:
     """Where the navigator said that the robot was, while it was on its way to a goal."""
     table = mission.table(_feedback_topic(_actions(mission.spec)[0]))
-    if table is None or not has(table, FEEDBACK_FIELDS):
+    if not has(table, *FEEDBACK_FIELDS):
         return None
     x, y = (np.asarray(table[f"{_PLACE}.pose.position.{axis}"], np.float64) for axis in "xy")
     yaw = yaw_of(table, f"{_PLACE}.pose.orientation")
-    told = np.isfinite(x + y + yaw)
-    frames = table[f"{_PLACE}.{FRAME}"][told]
+    known = np.isfinite(x + y + yaw)
+    frames = table[f"{_PLACE}.{FRAME}"][known]
     if not len(frames) or not (frames == frames[0]).all():
         return None
-    return Poses(table.t[told], x[told], y[told], yaw[told], str(frames[0]))
+    return Poses(table.t[known], x[known], y[known], yaw[known], str(frames[0]))
 
 
 GOAL_SERVERS[KIND] = GoalServer(_needs, goals, recoveries, poses)

@@ -17,7 +17,7 @@ from care_core.ecosystems.measures import Args, Mission, extractor, missing, num
 from care_core.ecosystems.ros.drive import LOG_FIELDS
 from care_core.ecosystems.ros.goals import Goal, Status
 from care_core.ecosystems.ros.measures.goals import log_messages
-from care_core.ecosystems.ros.measures.requested import PER_GOAL, PER_METRE, divided, goals_asked
+from care_core.ecosystems.ros.measures.requested import PER_GOAL, PER_METRE, divided, requested_way
 from care_core.ecosystems.ros.measures.window import (
     TOLERANCE_M,
     ActiveCommands,
@@ -218,10 +218,10 @@ def goal_time(mission: Mission, args: Args) -> Value:
     goals = mission.shared(window).goals
     times = [goal.time_s for goal in goals]
     if args.get("per") == "metre":
-        found = mission.shared(goals_asked)
-        if isinstance(found, Unavailable):
-            return found
-        times = [time / max(way_m, TOLERANCE_M) for time, way_m in zip(times, found[0].lengths.tolist(), strict=False)]
+        way = mission.shared(requested_way)
+        if isinstance(way, Unavailable):
+            return way
+        times = [time / max(way_m, TOLERANCE_M) for time, way_m in zip(times, way.lengths.tolist(), strict=False)]
     if "index" in args:
         number = int(args["index"])
         if not 1 <= number <= len(goals):

@@ -1,6 +1,6 @@
-"""What was asked of one drive along goals: how many, how far apart, how much turning. Known before it, never a cause.
+"""What a mission along goals requests: how many, how far apart, how much turning. Known before it, never a cause.
 
-A drive of the profile's own goals was asked for all of them, however many were sent before it was given up. Distances
+A mission of the profile's own goals requests all of them, however many were sent before it was given up. Distances
 are straight lines: what the map puts between two goals is not in the log.
 """
 
@@ -13,7 +13,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.measures.requested import RequestedMission
 from care_core.ecosystems.measures import Args, Mission, extractor, one_of
 from care_core.ecosystems.ros.measures.window import (
     TOLERANCE_M,
@@ -23,6 +22,8 @@ from care_core.ecosystems.ros.measures.window import (
     no_odometry,
     window,
 )
+from care_core.numbers import Floats
+from care_core.records import Record
 from care_core.run import Unavailable, Value
 
 _LEAST_RAD = 0.2
@@ -32,9 +33,17 @@ Pose = tuple[float, float, float]
 """x and y in m, heading in rad; nan where the log does not say."""
 
 
-def goals_asked(mission: Mission) -> tuple[RequestedMission, float] | Unavailable:
-    """The way through the goals, from where the robot stood, and all turning it asks for in rad; use through
-    `mission.shared`."""
+class RequestedWay(Record, eq=False):
+    """The way through the goals of a mission, from where the robot stood."""
+
+    lengths: Floats
+    """From goal to goal, m, shape (goals,)."""
+    turn: float
+    """All turning that it asks for, rad."""
+
+
+def requested_way(mission: Mission) -> RequestedWay | Unavailable:
+    """The way that a mission requests; use through `mission.shared`."""
     drive = mission.shared(window)
     goals = _goals(drive, mission.spec)
     if any(math.isnan(x) for x, _, _ in goals):
@@ -43,9 +52,8 @@ def goals_asked(mission: Mission) -> tuple[RequestedMission, float] | Unavailabl
     if isinstance(start, Unavailable):
         return start
     poses = (start, *goals)
-    points = np.array([(x, y, 0.0) for x, y, _ in poses])
-    none = np.zeros(len(goals))
-    return RequestedMission(points, none, none, "open"), sum(_turns(poses))
+    lengths = [math.hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(poses)]
+    return RequestedWay(np.array(lengths), sum(_turns(poses)))
 
 
 def _goals(drive: DriveWindow, spec: Args) -> tuple[Pose, ...]:
@@ -92,12 +100,12 @@ def _turn(a: float, b: float) -> float:
     return angle if angle >= _LEAST_RAD else 0.0
 
 
-_ASKED: Mapping[str, Callable[[RequestedMission, float], float]] = {
-    "goals": lambda way, turn: float(len(way.lengths)),
-    "path_length": lambda way, turn: float(way.lengths.sum()),
-    "goal_distance": lambda way, turn: float(way.lengths.mean()),
-    "turn": lambda way, turn: turn,
-    "goal_turn": lambda way, turn: turn / len(way.lengths),
+_REQUESTS: Mapping[str, Callable[[RequestedWay], float]] = {
+    "goals": lambda way: float(len(way.lengths)),
+    "path_length": lambda way: float(way.lengths.sum()),
+    "goal_distance": lambda way: float(way.lengths.mean()),
+    "turn": lambda way: way.turn,
+    "goal_turn": lambda way: way.turn / len(way.lengths),
 }
 
 
@@ -106,24 +114,23 @@ _ASKED: Mapping[str, Callable[[RequestedMission, float], float]] = {
     needs={},
     parts=("goals", "odometry"),
     unit="",
-    args={"what": one_of(", ".join(_ASKED), *_ASKED)},
+    args={"what": one_of(", ".join(_REQUESTS), *_REQUESTS)},
 )
-def goals_asked_for(mission: Mission, args: Args) -> Value:
+def goals_asked(mission: Mission, args: Args) -> Value:
     """One number of what the goals ask for: `goals`, `path_length` (m, straight from goal to goal), `turn` (rad), and
     `goal_distance` and `goal_turn`, the same for each goal."""
-    measure = _ASKED.get(str(args.get("what")))
+    measure = _REQUESTS.get(str(args.get("what")))
     if measure is None:
-        return Unavailable(f"there is no '{args.get('what')}' of goals", f"use one of {', '.join(_ASKED)}")
-    found = mission.shared(goals_asked)
-    return found if isinstance(found, Unavailable) else measure(*found)
+        return Unavailable(f"there is no '{args.get('what')}' of goals", f"use one of {', '.join(_REQUESTS)}")
+    way = mission.shared(requested_way)
+    return way if isinstance(way, Unavailable) else measure(way)
 
 
-def way_asked_m(mission: Mission) -> float | Unavailable:
-    """Length of the way through the goals."""
-    found = mission.shared(goals_asked)
-    if isinstance(found, Unavailable):
-        return found
-    length_m = float(found[0].lengths.sum())
+def _length_m(mission: Mission) -> float | Unavailable:
+    way = mission.shared(requested_way)
+    if isinstance(way, Unavailable):
+        return way
+    length_m = float(way.lengths.sum())
     return length_m if length_m > 0 else Unavailable("the goals ask for no way", "judge a mission that leads somewhere")
 
 
@@ -140,7 +147,7 @@ def divided(compute: Callable[[Mission, Args], Value]) -> Callable[[Mission, Arg
         if isinstance(value, Unavailable) or per is None:
             return value
         drive = mission.shared(window)
-        amount = way_asked_m(mission) if per == "metre" else float(len(drive.listed) or len(drive.goals))
+        amount = _length_m(mission) if per == "metre" else float(len(drive.listed) or len(drive.goals))
         return amount if isinstance(amount, Unavailable) else value / amount
 
     return answer

@@ -17,7 +17,7 @@ from care_core.ecosystems.ros.drive import Drive, way_through
 from care_core.ecosystems.ros.goals import Goal
 from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS, Commands, Odometry
 from care_core.ecosystems.ros.recoveries import Recoveries
-from care_core.logs.base import Table, Wanted
+from care_core.logs.base import Wanted
 from care_core.logs.plausible import APART, STAMP, is_simulated, never_moved, stamps_pace
 from care_core.numbers import Bools, Floats
 from care_core.records import Record, replace
@@ -288,11 +288,6 @@ def _active(t: Floats, mission: Mission, goals: Sequence[Goal]) -> tuple[NDArray
     dt = np.minimum(np.diff(times, append=times[-1:]), _MAX_GAP_S)
     active = number >= 0
     return inside[active], number[active], dt[active]
-
-
-def has(table: Table, fields: Sequence[str]) -> bool:
-    """Whether a table holds all the fields, and a message at all."""
-    return len(table) > 0 and all(name in table.columns for name in fields)
 
 
 def share(where: Bools, weight: Floats) -> float:
