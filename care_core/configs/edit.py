@@ -42,7 +42,7 @@ class Edit(Struct, eq=False):
     where: str
     """file:line"""
     parameters: list[str]
-    held: Setting | None
+    setting: Setting | None
     after: str
     notes: list[str]
     shared: set[str] = field(default_factory=set)
@@ -51,14 +51,14 @@ class Edit(Struct, eq=False):
     @property
     def before(self) -> float | str | None:
         """The value that the file had, None where it had none."""
-        return None if self.held is None else self.held.value
+        return None if self.setting is None else self.setting.value
 
 
 class EditedFile(Struct, eq=False):
     """A file with its text before and after."""
 
     path: Path
-    held: tuple[ConfigFile, ...]
+    loads: tuple[ConfigFile, ...]
     """What it holds, once for each namespace that it is loaded into."""
     before: str
     after: str
@@ -67,11 +67,11 @@ class EditedFile(Struct, eq=False):
     @property
     def format(self) -> Dialect:
         """How the file is written."""
-        return self.held[0].format
+        return self.loads[0].format
 
     def holds(self, setting: Setting) -> bool:
         """Whether a setting is of this file."""
-        return any(held.settings.get(setting.name) is setting for held in self.held)
+        return any(load.settings.get(setting.name) is setting for load in self.loads)
 
 
 def apply_changes(names: Sequence[str], wanted: Sequence[Wanted]) -> tuple[EditedFile, ...]:
@@ -85,25 +85,27 @@ def apply_changes(names: Sequence[str], wanted: Sequence[Wanted]) -> tuple[Edite
     Raises:
         ConfigError: a file cannot be read, or a parameter cannot be set in any of them.
     """
-    held = read_configs(names)
-    files = _opened(held, [split_name(name)[0] for name in names])
-    found = resolve(held, [one.parameter for one in wanted])
-    unsure = {parameter for named in guesses(held, found).values() for parameter in named}
-    for one in wanted:
-        setting = found.get(one.parameter)
+    loads = read_configs(names)
+    files = _opened(loads, [split_name(name)[0] for name in names])
+    settings = resolve(loads, [change.parameter for change in wanted])
+    unsure = {parameter for named in guesses(loads, settings).values() for parameter in named}
+    for change in wanted:
+        setting = settings.get(change.parameter)
         if setting is None:
-            _add(files, one)
+            _add(files, change)
         else:
-            _set(next(file for file in files if file.holds(setting)), setting, one, unsure=one.parameter in unsure)
+            _set(
+                next(file for file in files if file.holds(setting)), setting, change, unsure=change.parameter in unsure
+            )
     for file in files:
         _check(file)
     return files
 
 
-def _opened(held: Sequence[ConfigFile], paths: Sequence[Path]) -> tuple[EditedFile, ...]:
+def _opened(loads: Sequence[ConfigFile], paths: Sequence[Path]) -> tuple[EditedFile, ...]:
     """Each file once, however often it is loaded, in the order in which it is named first."""
     loaded: dict[Path, list[ConfigFile]] = {}
-    for file, path in zip(held, paths, strict=True):
+    for file, path in zip(loads, paths, strict=True):
         same = next((known for known in loaded if known.samefile(path)), path)
         loaded.setdefault(same, []).append(file)
     return tuple(EditedFile(path, tuple(several), text := _as_it_is(path), text) for path, several in loaded.items())
@@ -114,50 +116,52 @@ def _as_it_is(path: Path) -> str:
         return stream.read()
 
 
-def _set(file: EditedFile, setting: Setting, one: Wanted, *, unsure: bool) -> None:
-    after = text_for(file.format, one.option, one.value)
-    earlier = next((edit for edit in file.edits if edit.held is not None and _is_same(file, edit.held, setting)), None)
+def _set(file: EditedFile, setting: Setting, wanted: Wanted, *, unsure: bool) -> None:
+    after = text_for(file.format, wanted.option, wanted.value)
+    earlier = next(
+        (edit for edit in file.edits if edit.setting is not None and _is_same(file, edit.setting, setting)), None
+    )
     if earlier is not None:
         if earlier.after != after:
             raise ConfigError(
-                f"{earlier.parameters[0]} and {one.parameter} want different values on one line.",
+                f"{earlier.parameters[0]} and {wanted.parameter} want different values on one line.",
                 hint=_APART,
                 where=setting.source,
             )
-        earlier.parameters.append(one.parameter)
+        earlier.parameters.append(wanted.parameter)
         earlier.shared.discard(setting.name)
         return
     file.after = _with_line(file.after, file.format, setting, after)
-    notes = ["takes effect after a restart"] if one.option.reboot_required else []
+    notes = ["takes effect after a restart"] if wanted.option.reboot_required else []
     if unsure:
         notes.append("the file does not say whose parameter this is: every node that loads it gets the value")
-    if one.driven is not None and _differs(setting.value, one.driven):
-        notes.append(_not_driven(setting, one))
-    others = [held for held in file.held if held.settings.get(setting.name) is not setting]
-    shared = {other.name for held in others for other in held.settings.values() if _is_same(file, setting, other)}
-    file.edits.append(Edit(setting.source, [one.parameter], setting, after, notes, shared))
+    if wanted.driven is not None and _differs(setting.value, wanted.driven):
+        notes.append(_not_driven(setting, wanted))
+    others = [load for load in file.loads if load.settings.get(setting.name) is not setting]
+    shared = {other.name for load in others for other in load.settings.values() if _is_same(file, setting, other)}
+    file.edits.append(Edit(setting.source, [wanted.parameter], setting, after, notes, shared))
 
 
-def _differs(held: float | str, driven: float) -> bool:
+def _differs(value: float | str, driven: float) -> bool:
     """By more than a report rounds."""
-    number = as_number(held)
+    number = as_number(value)
     return number is not None and not math.isclose(number, driven, rel_tol=_ROUNDED, abs_tol=_ROUNDED)
 
 
-def _not_driven(setting: Setting, one: Wanted) -> str:
+def _not_driven(setting: Setting, wanted: Wanted) -> str:
     """A robot that does not drive with what its file says will not do so after a change of the file either."""
-    says = "this already" if same_value(setting.value, one.value) else shown(setting.value)
-    return f"the file says {says}, and {shown(one.driven)} was driven: it is not from this file, look on the robot"
+    has = "this already" if same_value(setting.value, wanted.value) else shown(setting.value)
+    return f"the file has {has} but the robot ran {shown(wanted.driven)}: this is not the file it used"
 
 
 def _is_same(file: EditedFile, one: Setting, other: Setting) -> bool:
     """Whether two settings are one value of a file that is loaded more than once."""
-    return one.source == other.source and _own_name(file, one) == _own_name(file, other)
+    return one.source == other.source and _bare_name(file, one) == _bare_name(file, other)
 
 
-def _own_name(file: EditedFile, setting: Setting) -> str:
+def _bare_name(file: EditedFile, setting: Setting) -> str:
     """A setting's name without the namespace that the file is loaded into."""
-    namespace = next(held.namespace for held in file.held if held.settings.get(setting.name) is setting)
+    namespace = next(load.namespace for load in file.loads if load.settings.get(setting.name) is setting)
     return setting.name.lstrip("/").removeprefix(namespace.strip("/")).lstrip("/")
 
 
@@ -175,12 +179,12 @@ def _with_line(text: str, format: Dialect, setting: Setting, after: str) -> str:
 
 def _check(file: EditedFile) -> None:
     """Raise ConfigError where the edited text does not read as the old one with the new values."""
-    changed = [edit for edit in file.edits if edit.held is not None]
+    changed = [edit for edit in file.edits if edit.setting is not None]
     if not changed or _reads_back(file, file.after, file.edits):
         return
     for edit in changed:
-        assert edit.held is not None
-        alone = _with_line(file.before, file.format, edit.held, edit.after)
+        assert edit.setting is not None
+        alone = _with_line(file.before, file.format, edit.setting, edit.after)
         if not _reads_back(file, alone, [edit]):
             break
     raise ConfigError(
@@ -192,22 +196,24 @@ def _check(file: EditedFile) -> None:
 
 def _reads_back(file: EditedFile, text: str, edits: Sequence[Edit]) -> bool:
     """Whether a text holds what was changed and added, and everything else as before."""
-    return all(_reads_back_in(file, held, text, edits) for held in file.held)
+    return all(_reads_back_in(file, load, text, edits) for load in file.loads)
 
 
-def _reads_back_in(file: EditedFile, held: ConfigFile, text: str, edits: Sequence[Edit]) -> bool:
+def _reads_back_in(file: EditedFile, load: ConfigFile, text: str, edits: Sequence[Edit]) -> bool:
     try:
-        now = read_text(text.lstrip("\ufeff"), file.path, held.namespace)
+        now = read_text(text.lstrip("\ufeff"), file.path, load.namespace)
     except ConfigError:
         return False
-    lines = {edit.where for edit in edits if edit.held is not None}
-    new_values = {(edit.where, _own_name(file, edit.held)): edit.after for edit in edits if edit.held is not None}
-    added = {edit.parameters[0] for edit in edits if edit.held is None}
-    if now.format is not held.format or now.settings.keys() != held.settings.keys() | added:
+    lines = {edit.where for edit in edits if edit.setting is not None}
+    new_values = {
+        (edit.where, _bare_name(file, edit.setting)): edit.after for edit in edits if edit.setting is not None
+    }
+    added = {edit.parameters[0] for edit in edits if edit.setting is None}
+    if now.format is not load.format or now.settings.keys() != load.settings.keys() | added:
         return False
-    for name, before in held.settings.items():
+    for name, before in load.settings.items():
         value = now.settings[name].value
-        new = new_values.get((before.source, _own_name(file, before))) if before.source in lines else None
+        new = new_values.get((before.source, _bare_name(file, before))) if before.source in lines else None
         if not (shown(value) == shown(before.value) if new is None else _is(value, new)):
             return False
     return True
@@ -222,21 +228,21 @@ def _is(value: float | str, text: str) -> bool:
         return False
 
 
-def _add(files: Sequence[EditedFile], one: Wanted) -> None:
+def _add(files: Sequence[EditedFile], wanted: Wanted) -> None:
     file = next((f for f in files if not f.format.is_yaml), None)
     if file is None:
         raise ConfigError(
-            f"No file holds {one.parameter}.",
+            f"No file holds {wanted.parameter}.",
             hint="Name the file that does, with its namespace if it has none (NAMESPACE=FILE), or add the line to it.",
             where=", ".join(str(f.path) for f in files),
         )
-    after = text_for(file.format, one.option, one.value)
+    after = text_for(file.format, wanted.option, wanted.value)
     end = "\r\n" if "\r\n" in file.after else "\n"
     separator = "" if not file.after or file.after.endswith(("\n", "\r")) else end
     if file.format is QGC_PARAMS:
-        row = f"1\t1\t{one.parameter}\t{after}\t{6 if one.option.type in ('int', 'bool', 'enum') else 9}"
+        row = f"1\t1\t{wanted.parameter}\t{after}\t{6 if wanted.option.type in ('int', 'bool', 'enum') else 9}"
     else:
-        row = f"{one.parameter},{after}"
+        row = f"{wanted.parameter},{after}"
     file.after += f"{separator}{row}{end}"
     where = f"{file.path}:{len(file.after.splitlines())}"
-    file.edits.append(Edit(where, [one.parameter], None, after, ["no file held it: added at the end"]))
+    file.edits.append(Edit(where, [wanted.parameter], None, after, ["no file has it: added at the end"]))

@@ -257,7 +257,7 @@ def test_a_recorded_configuration_keeps_every_byte_and_a_change_is_the_only_diff
     for path in files:
         (file,) = apply_changes([str(path)], [])
         assert file.after.encode() == path.read_bytes()
-        held = file.held[0].settings
+        held = file.loads[0].settings
         numbers = [one for one in held.values() if isinstance(one.value, (int, float))][::7]
         changes = []
         for one in numbers:

@@ -163,13 +163,13 @@ def nav2_goals(states: Mapping[str, Table], until_s: float) -> tuple[Goal, ...]:
         states: messages of the status topic by action.
         until_s: the end of the recording.
     """
-    told = sorted(
+    accepted = sorted(
         (goal for action, table in states.items() for goal in _states(action, table)), key=lambda goal: goal.sent_s
     )
     goals = []
-    for number, goal in enumerate(told):
-        is_last = number + 1 == len(told)
-        next_s = until_s if is_last else told[number + 1].sent_s
+    for number, goal in enumerate(accepted):
+        is_last = number + 1 == len(accepted)
+        next_s = until_s if is_last else accepted[number + 1].sent_s
         ended_s, status = goal.ended_s, goal.status
         replaced = not is_last and (ended_s is None or ended_s >= next_s)
         if replaced:

@@ -22,6 +22,7 @@ DROP = LIMITS.add(
 DROP_IN_S = LIMITS.add("time in which it is lost", 5.0, "s", "healthy missions fall by 0.1 % a second at most")
 STAYS = LIMITS.add("share of the drop that stays", 0.7, "", "one sample that reads low is a bad reading")
 STAYS_SAMPLES = LIMITS.add("samples after a drop", 5, "", "fewer do not show that it stays")
+STAYS_SHARE = LIMITS.add("share of later samples that stay low", 0.8, "", "a load that goes is no drop")
 SAMPLES = LIMITS.add("samples of a battery", 10, "", "fewer tell no trend")
 MOVED_M = LIMITS.add("way of a drive", 1.0, "m", "a robot that went so far drew more than one that stands")
 FROZEN = LIMITS.add("messages of a frozen battery", 20, "", "so many on a drive would show a change")
@@ -66,7 +67,7 @@ def _drops(drive: Drive, battery: Battery) -> Iterator[Finding]:
     limit = DROP * float(median(battery.voltage[: max(5, len(t) // 20)]))
     for row in np.flatnonzero(fell > limit):
         after = open_circuit[row:]
-        if len(after) < STAYS_SAMPLES or quantile(after, 0.8) >= open_circuit[first[row]] - STAYS * limit:
+        if len(after) < STAYS_SAMPLES or quantile(after, STAYS_SHARE) >= open_circuit[first[row]] - STAYS * limit:
             continue
         steps = np.diff(open_circuit[first[row] : row + 1])
         at = float(t[first[row] + 1 + int(np.argmin(steps))])

@@ -25,6 +25,7 @@ ASIDE_M = LIMITS.add("how far aside it appears at most", 0.8, "m", _WAY)
 WIDE_M = LIMITS.add("how wide it is at least", 0.4, "m", "a leg or a box; less is noise or a pole")
 RAYS = LIMITS.add("rays that see it", 8, "", "fewer are stray returns")
 FEWEST_RAYS = LIMITS.add("rays of a scan", 30, "", "fewer do not show a thing's width")
+BESIDE = int(LIMITS.add("rays beside each that must have seen further", 2, "", "edges of what stood there before"))
 TURN_RAD = LIMITS.add("turn between the scans", 0.1, "rad", "where the laser sits on the robot is not known")
 STUCK_S = LIMITS.add("time without getting further", 10.0, "s", "move_base's oscillation_timeout")
 STUCK_M = LIMITS.add("way in that time", 0.5, "m", "Nav2's progress checker: required_movement_radius")
@@ -91,8 +92,9 @@ def _new_points(scans: Scans, poses: Floats, row: int, earlier: int) -> Floats:
     world_y = y + ahead * np.sin(yaw) + aside * np.cos(yaw) - y0
     angle = (np.arctan2(world_y, world_x) - yaw0 + np.pi) % (2 * np.pi) - np.pi
     ray = np.round((angle - scans.angles[0]) / (scans.angles[1] - scans.angles[0])).astype(int)
-    inside = (ray >= 2) & (ray < len(scans.angles) - 2)
-    around = scans.ranges[earlier][np.clip(ray, 2, len(scans.angles) - 3)[:, None] + np.arange(-2, 3)]
+    inside = (ray >= BESIDE) & (ray < len(scans.angles) - BESIDE)
+    middle = np.clip(ray, BESIDE, len(scans.angles) - BESIDE - 1)
+    around = scans.ranges[earlier][middle[:, None] + np.arange(-BESIDE, BESIDE + 1)]
     # A ray that came back from nowhere says nothing: np.min keeps its nan, and the comparison fails.
     free = np.min(around, axis=1) > np.hypot(world_x, world_y) + FREE_M
     points: Floats = np.stack([ahead, aside], axis=1)[inside & free]

@@ -44,6 +44,9 @@ LOAD = LIMITS.add("share of the driving current beyond idle", 0.5, "", "wheels t
 IDLE = LIMITS.add("ratio of driving to idle current", 1.2, "", "a smaller one does not tell them apart")
 DRIVES_MPS = LIMITS.add("speed at which current is that of driving", 0.1, "m/s", "slower, little is drawn")
 RESTS = LIMITS.add("speed and turn at which current is idle", 0.01, "m/s, rad/s", "noise of odometry at rest")
+SETTLES_S = LIMITS.add("time until a held drive's current is steady", 1.0, "s", "inrush of motors takes less")
+CURRENTS = LIMITS.add("samples of current in each state", 3, "", "fewer are chance")
+MOSTLY = LIMITS.add("share of slow samples that stand", 0.5, "", "with more of them it stands, and is not slow")
 LATER = LIMITS.add("samples that show a drive obeys", 10, "", "fewer are too few")
 OBEYS = LIMITS.add("share of them that stand", 0.1, "", "standing still for an instant, as at each turn")
 
@@ -109,7 +112,7 @@ def _stood(motion: Following) -> Bools:
     wanted, wanted_turn = np.abs(motion.wanted_speed), np.abs(motion.wanted_turn)
     stands = speed < np.maximum(STANDING * wanted, STILL)
     stands &= turn < np.maximum(STANDING * wanted_turn, STILL)
-    # A robot asked to drive a curve that only turns does not drive either.
+    # A robot that only turns where a curve was commanded does not drive either.
     return motion.to_move & (stands | ((wanted >= BREAKS_LOOSE_MPS) & (speed < STANDING * wanted)))
 
 
@@ -140,11 +143,11 @@ def _currents(
     odometry = motion.odometry
     stood = np.zeros(len(battery.t), bool)
     for start, end in long:
-        stood |= (battery.t >= start + 1.0) & (battery.t <= end)
+        stood |= (battery.t >= start + SETTLES_S) & (battery.t <= end)
     speed = np.interp(battery.t, odometry.t, np.abs(odometry.speed))
     turn = np.interp(battery.t, odometry.t, np.abs(odometry.turn))
     drives, idles = (speed > DRIVES_MPS) & ~stood, (speed < RESTS) & (turn < RESTS) & ~stood
-    if min(np.count_nonzero(rows) for rows in (stood, drives, idles)) < 3:
+    if min(np.count_nonzero(rows) for rows in (stood, drives, idles)) < CURRENTS:
         return None
     drawn, idle, driving = (known_median(battery.drawn[rows]) for rows in (stood, idles, drives))
     return (drawn, idle, driving) if driving > IDLE * idle > 0 else None
@@ -177,17 +180,17 @@ def _stopping(drive: Drive, motion: Following, still: list[tuple[float, float]])
 def _slow(drive: Drive, motion: Following, stood: Bools) -> Iterator[Finding]:
     """Moves, but slower than every command of the last second."""
     odometry, wanted = motion.odometry, motion.wanted_speed
-    asks = np.abs(wanted) >= BREAKS_LOOSE_MPS
-    share = np.divide(odometry.speed, wanted, out=np.ones(len(wanted)), where=asks)
-    slow = (share < SLOW)[asks]
-    t = odometry.t[asks]
-    found = _slow_spans(t, slow, stood[asks])
+    ordered = np.abs(wanted) >= BREAKS_LOOSE_MPS
+    share = np.divide(odometry.speed, wanted, out=np.ones(len(wanted)), where=ordered)
+    slow = (share < SLOW)[ordered]
+    t = odometry.t[ordered]
+    found = _slow_spans(t, slow, stood[ordered])
     if not found:
         return
     rows = np.concatenate([np.arange(first, last) for first, last in found])
-    speeds, demands = np.abs(odometry.speed[asks]), np.abs(wanted[asks])
+    speeds, demands = np.abs(odometry.speed[ordered]), np.abs(wanted[ordered])
     reached, demanded = float(median(speeds[rows])), float(median(demands[rows]))
-    # It was weak since it last was clearly faster, though before a higher speed was asked for nobody could see.
+    # It was weak since it last was clearly faster, though nobody could see that before a higher speed was commanded.
     faster = np.flatnonzero(speeds[: found[0][0]] > FASTER * reached)
     lasting = slow & np.append(slow[1:], False) & (demands > FASTER * reached)
     since = np.flatnonzero(lasting & (np.arange(len(t)) > (faster[-1] if len(faster) else -1)))
@@ -202,7 +205,7 @@ def _slow_spans(t: Floats, slow: Bools, stood: Bools) -> list[tuple[int, int]]:
     found: list[tuple[int, int]] = []
     for row in range(len(t) + 1):
         if row == len(t) or not slow[row] or (row and t[row] - t[row - 1] > SLOW_LOST_S):
-            if row > begin and t[row - 1] - t[begin] >= SLOW_S and not stood[begin:row].mean() > 0.5:
+            if row > begin and t[row - 1] - t[begin] >= SLOW_S and not stood[begin:row].mean() > MOSTLY:
                 found.append((begin, row))
             begin = row + 1 if row < len(t) and not slow[row] else row
     return found

@@ -29,6 +29,8 @@ RAYS = LIMITS.add("rays of a scan", 30, "", "fewer do not tell noise from corner
 FROZEN_SCANS = LIMITS.add("scans alike to the last bit", 3, "", _FROZEN)
 FROZEN_M = LIMITS.add("way while they are alike", 0.15, "m", _FROZEN)
 FROZEN_RAD = LIMITS.add("turn while they are alike", 0.15, "rad", _FROZEN)
+BREAK_PERIODS = LIMITS.add("break in a fault, in periods", 2.5, "", "one scan may be lost")
+NOISE_BREAK_PERIODS = LIMITS.add("break in noise, in periods", 3.5, "", "two scans may see a smooth wall")
 BLIND = LIMITS.add("share of rays that return to a blind laser", 0.02, "", "stray returns")
 SEEING = LIMITS.add("share of rays that return before", 0.2, "", "in the open hardly any does")
 BLIND_S = LIMITS.add("time without returns", 3.0, "s", "turning away from a wall takes less")
@@ -79,7 +81,7 @@ def _dead(drive: Drive, topic: str, last_s: float, period_s: float) -> Finding:
 
 def _frozen(drive: Drive, scans: Scans) -> Iterator[Finding]:
     same = np.array([a.tobytes() == b.tobytes() for a, b in pairwise(scans.raw)], bool)
-    for start, end in stretches(scans.t[1:], same, 2.5 * _period(scans)):
+    for start, end in stretches(scans.t[1:], same, BREAK_PERIODS * _period(scans)):
         rows = (scans.t >= start) & (scans.t <= end)
         if np.count_nonzero(rows) < FROZEN_SCANS or not _moved(drive, start, end):
             continue
@@ -111,7 +113,7 @@ def _noisy(drive: Drive, scans: Scans) -> Iterator[Finding]:
     loud = noise > max(NOISE_M, NOISE_RISES * quiet)
     found = [
         (start, end)
-        for start, end in stretches(t, loud, 3.5 * _period(scans))
+        for start, end in stretches(t, loud, NOISE_BREAK_PERIODS * _period(scans))
         if np.count_nonzero((t >= start) & (t <= end)) >= NOISE_SCANS
     ]
     if found:
@@ -133,7 +135,7 @@ def _blind(drive: Drive, scans: Scans) -> Iterator[Finding]:
     seen = np.isfinite(scans.ranges).mean(axis=1)
     if float(median(seen[: max(5, len(seen) // 10)])) < SEEING:
         return
-    for start, end in stretches(scans.t, seen <= BLIND, 2.5 * _period(scans)):
+    for start, end in stretches(scans.t, seen <= BLIND, BREAK_PERIODS * _period(scans)):
         if end - start >= BLIND_S:
             evidence = f"{median(seen):.0%} of its rays return usually, at most {BLIND:.0%} for {end - start:.0f} s"
             yield _finding(drive, "the laser sees nothing", (start, end), evidence, scans.topic, 0.7)

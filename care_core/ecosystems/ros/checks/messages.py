@@ -13,7 +13,7 @@ from care_core.ecosystems.ros.messages import DIAGNOSTICS, ROSOUT, reading
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, Report
 
 LIMITS = Limits()
-MOST = int(LIMITS.add("kinds of error that are told", 3, "", "the first of them; more are noise of what failed first"))
+MOST = int(LIMITS.add("kinds of error that are reported", 3, "", "what fails first brings about the rest"))
 BAD = LIMITS.add("level of diagnostics", 2, "", "diagnostic_msgs/DiagnosticStatus: 2 is ERROR, 3 is STALE")
 _HARMLESS = re.compile(
     r"transition callback on a goal handle that we're not tracking|rotate recovery can't rotate", re.IGNORECASE

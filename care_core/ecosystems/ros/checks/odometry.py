@@ -41,6 +41,7 @@ SHRINK = LIMITS.add("share by which it advances less far", 0.35, "", "thin sampl
 COVERED = LIMITS.add("share of the way that is compared", 0.8, "", "over less, noise is more than drift")
 AGREED_M = LIMITS.add("way on which position and speed agreed", 0.7, "m", "else that odometry is made so")
 CORRECTION_M = LIMITS.add("step of map -> odom", 0.5, "m", "amcl corrects below update_min_d (0.2 m) times its error")
+PLACES = LIMITS.add("transforms of map -> odom", 3, "", "fewer show no step")
 FOUND_S = LIMITS.add("time to find the robot on the map", 5.0, "s", "the first corrections are large")
 PAUSE_S = LIMITS.add("pause between samples", STALE_S, "s", "over a longer one the speed is not known")
 
@@ -192,7 +193,7 @@ def _corrections(drive: Drive) -> Iterator[Finding]:
         if not holds(table, TF[0]):
             continue
         places = _map_to_odom(table.t, *(table[name] for name in MESSAGES[TF[0]].reads))
-        if len(places) < 3:
+        if len(places) < PLACES:
             continue
         t, x, y = places.T
         steps = np.hypot(np.diff(x), np.diff(y))

@@ -134,11 +134,11 @@ def _nowhere(odometry: Odometry, goal: Goal) -> tuple[float, float] | None:
 
 def _commanded(commands: Commands, start_s: float, end_s: float) -> tuple[float, float] | None:
     """Shares of the commands of a time that ask to move forward, and to turn on the spot; None: hardly any came."""
-    asked = (commands.t >= start_s) & (commands.t <= end_s)
-    if np.count_nonzero(asked) < COMMANDS:
+    inside = (commands.t >= start_s) & (commands.t <= end_s)
+    if np.count_nonzero(inside) < COMMANDS:
         return None
-    forward = np.abs(commands.speed[asked]) >= BREAKS_LOOSE_MPS
-    turns = np.abs(commands.turn[asked]) >= STANDS_RADPS
+    forward = np.abs(commands.speed[inside]) >= BREAKS_LOOSE_MPS
+    turns = np.abs(commands.turn[inside]) >= STANDS_RADPS
     return float(forward.mean()), float((turns & ~forward).mean())
 
 

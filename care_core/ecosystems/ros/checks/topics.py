@@ -57,12 +57,12 @@ def find(drive: Drive) -> Iterator[Finding]:
 
 def _qos(drive: Drive) -> Iterator[Finding]:
     counts = {channel.name: channel.count for channel in drive.channels}
-    told: dict[str, tuple[float, str, str]] = {}
+    complaints: dict[str, tuple[float, str, str]] = {}
     for message in drive.log_messages:
         if message.level >= Level.WARN and _QOS.search(message.text):
             topic = _TOPIC.search(message.text)
-            told.setdefault(topic.group(1) if topic else "a topic", (message.time_s, message.node, message.text))
-    for name, (at, node, text) in told.items():
+            complaints.setdefault(topic.group(1) if topic else "a topic", (message.time_s, message.node, message.text))
+    for name, (at, node, text) in complaints.items():
         empty = counts.get(name) == 0
         what = "nothing of it was recorded" if empty else f"{counts.get(name, 0)} messages were recorded"
         yield Finding(

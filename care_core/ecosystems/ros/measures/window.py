@@ -245,10 +245,10 @@ def _placed(odometry: ActiveOdometry, poses: Poses | None) -> ActiveOdometry | N
     """The odometry moved to the last pose that was told before each sample, the first one before it."""
     if poses is None or poses.frame.strip("/") == odometry.frame.strip("/"):
         return None
-    told = np.interp(poses.t, odometry.t, np.arange(len(odometry.t))).round().astype(np.intp)
+    rows = np.interp(poses.t, odometry.t, np.arange(len(odometry.t))).round().astype(np.intp)
     at = np.clip(np.searchsorted(poses.t, odometry.t, side="right") - 1, 0, None)
-    off = poses.yaw[at] - odometry.yaw[told[at]]
-    dx, dy = odometry.x - odometry.x[told[at]], odometry.y - odometry.y[told[at]]
+    off = poses.yaw[at] - odometry.yaw[rows[at]]
+    dx, dy = odometry.x - odometry.x[rows[at]], odometry.y - odometry.y[rows[at]]
     return replace(
         odometry,
         x=poses.x[at] + np.cos(off) * dx - np.sin(off) * dy,
