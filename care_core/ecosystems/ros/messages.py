@@ -38,7 +38,10 @@ LOCALISED = "geometry_msgs/PoseWithCovarianceStamped"
 ACTION_GOAL, ACTION_RESULT = "ActionGoal", "ActionResult"
 """How the types of a ROS 1 action's goals and results end."""
 
-ROBOT = (ODOMETRY, TWIST, TWIST_STAMPED, SCAN, BATTERY)
+COMMANDS = (TWIST, TWIST_STAMPED)
+GOALS = (ACTION_GOAL, ACTION_RESULT, STATUS)
+"""What tells of goals, and so of how much a finding matters."""
+ROBOT = (ODOMETRY, *COMMANDS, SCAN, BATTERY)
 """What a robot that drives publishes."""
 STAMPED = (ODOMETRY, SCAN, IMU)
 """What carries the time at which the robot made it, by its own clock."""

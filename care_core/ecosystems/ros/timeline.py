@@ -15,18 +15,15 @@ import numpy as np
 from care_core.ecosystems.findings import Event
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import (
-    ACTION_GOAL,
-    ACTION_RESULT,
     BATTERY,
+    COMMANDS,
     DIAGNOSTICS,
+    GOALS,
     ODOMETRY,
     RECOVERY,
     ROSOUT,
-    STATUS,
     TRANSITION,
     TREE,
-    TWIST,
-    TWIST_STAMPED,
     WITHOUT_STREAM,
     holds,
     reading,
@@ -47,8 +44,7 @@ _TEXT = 110
 _URGENT = {2: 0, 3: 1, 1: 2}
 """An error of diagnostics comes before silence, and that before a warning."""
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e-?\d+)?")
-READS = reading(ODOMETRY, TWIST, TWIST_STAMPED, BATTERY, DIAGNOSTICS, STATUS, TREE, RECOVERY, TRANSITION, ACTION_GOAL,
-                ACTION_RESULT, *ROSOUT)  # fmt: skip
+READS = reading(ODOMETRY, *COMMANDS, BATTERY, DIAGNOSTICS, TREE, RECOVERY, TRANSITION, *GOALS, *ROSOUT)
 
 
 def timeline(drive: Drive) -> tuple[Event, ...]:

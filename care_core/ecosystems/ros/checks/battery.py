@@ -10,7 +10,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.checks.drive import obeys
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.messages import BATTERY, ODOMETRY, TWIST, TWIST_STAMPED, reading
+from care_core.ecosystems.ros.messages import BATTERY, COMMANDS, GOALS, ODOMETRY, reading
 from care_core.ecosystems.ros.sensors import Battery
 from care_core.numbers import median, quantile
 
@@ -98,5 +98,5 @@ def _resistance(battery: Battery) -> float:
     return resistance if 0 < resistance < RESISTANCE * float(median(battery.voltage)) else 0.0
 
 
-READS = reading(BATTERY, ODOMETRY, TWIST, TWIST_STAMPED)
+READS = reading(BATTERY, ODOMETRY, *COMMANDS, *GOALS)
 CHECK = Check("battery", "a voltage that drops more than its load explains, a frozen battery", READS, LIMITS, find)

@@ -10,7 +10,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.checks import laser
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.messages import ODOMETRY, SCAN, reading
+from care_core.ecosystems.ros.messages import GOALS, ODOMETRY, SCAN, reading
 from care_core.ecosystems.ros.motion import Odometry
 from care_core.ecosystems.ros.sensors import Scans
 from care_core.numbers import Floats, median
@@ -120,4 +120,5 @@ def _stuck(odometry: Odometry, at: float) -> float | None:
     return None
 
 
-CHECK = Check("blocked", "something that appears ahead and stops the robot", reading(SCAN, ODOMETRY), LIMITS, find)
+READS = reading(SCAN, ODOMETRY, *GOALS)
+CHECK = Check("blocked", "something that appears ahead and stops the robot", READS, LIMITS, find)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity, Suspect
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.messages import BATTERY, ODOMETRY, TWIST, TWIST_STAMPED, reading
+from care_core.ecosystems.ros.messages import BATTERY, COMMANDS, GOALS, ODOMETRY, reading
 from care_core.ecosystems.ros.motion import BREAKS_LOOSE_MPS, Following
 from care_core.ecosystems.ros.sensors import Battery
 from care_core.numbers import Bools, Floats, known_median, median
@@ -248,7 +248,7 @@ def _spaced(t: Floats, rows: NDArray[np.intp]) -> NDArray[np.intp]:
     return spaced
 
 
-READS = reading(ODOMETRY, TWIST, TWIST_STAMPED, BATTERY)
+READS = reading(ODOMETRY, *COMMANDS, BATTERY, *GOALS)
 CHECK = Check(
     "drive", "a robot that stands, stops and goes, is slow or pulls against its commands", READS, LIMITS, find
 )

@@ -9,7 +9,7 @@ import numpy as np
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.messages import IMU, ODOMETRY, TWIST, TWIST_STAMPED, believable, holds, reading
+from care_core.ecosystems.ros.messages import COMMANDS, GOALS, IMU, ODOMETRY, believable, holds, reading
 from care_core.logs.base import Table
 from care_core.numbers import Floats, median
 
@@ -75,4 +75,5 @@ def _tilt(table: Table) -> Floats:
     return angle
 
 
-CHECK = Check("imu", "shocks, and a robot that tips", reading(IMU, ODOMETRY, TWIST, TWIST_STAMPED), LIMITS, find)
+READS = reading(IMU, ODOMETRY, *COMMANDS, *GOALS)
+CHECK = Check("imu", "shocks, and a robot that tips", READS, LIMITS, find)

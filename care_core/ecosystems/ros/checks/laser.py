@@ -11,7 +11,7 @@ import numpy as np
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.messages import CLOUD, ODOMETRY, ROSOUT, SCAN, reading, type_of
+from care_core.ecosystems.ros.messages import CLOUD, GOALS, ODOMETRY, ROSOUT, SCAN, reading, type_of
 from care_core.ecosystems.ros.motion import stretches
 from care_core.ecosystems.ros.sensors import Scans
 from care_core.numbers import Floats, median, quantile
@@ -146,5 +146,5 @@ def _period(scans: Scans) -> float:
     return float(median(np.diff(scans.t))) if len(scans.t) > 1 else 1.0
 
 
-READS = reading(SCAN, ODOMETRY, *ROSOUT)
+READS = reading(SCAN, ODOMETRY, *ROSOUT, *GOALS)
 CHECK = Check("laser", "scanners that fall silent, freeze, scatter or see nothing", READS, LIMITS, find)

@@ -9,7 +9,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
 from care_core.ecosystems.ros.checks import planner, timing
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.messages import DIAGNOSTICS, ROSOUT, reading
+from care_core.ecosystems.ros.messages import DIAGNOSTICS, GOALS, ROSOUT, reading
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, Report
 
 LIMITS = Limits()
@@ -108,4 +108,4 @@ def gist(text: str, most: int = 80) -> str:
     return f"{lines[-1][:most]}{place}"
 
 
-CHECK = Check("messages", "errors of nodes and of diagnostics", reading(DIAGNOSTICS, *ROSOUT), LIMITS, find)
+CHECK = Check("messages", "errors of nodes and of diagnostics", reading(DIAGNOSTICS, *ROSOUT, *GOALS), LIMITS, find)

@@ -11,18 +11,7 @@ from numpy.typing import NDArray
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive, way_through
-from care_core.ecosystems.ros.messages import (
-    ACTION_GOAL,
-    ACTION_RESULT,
-    MESSAGES,
-    ODOMETRY,
-    STATUS,
-    TF,
-    TWIST,
-    TWIST_STAMPED,
-    holds,
-    reading,
-)
+from care_core.ecosystems.ros.messages import COMMANDS, GOALS, MESSAGES, ODOMETRY, TF, holds, reading
 from care_core.ecosystems.ros.motion import STALE_S, Odometry
 from care_core.logs.base import Table
 from care_core.logs.plausible import STAMP, never_moved
@@ -232,7 +221,7 @@ def _is_number(*values: object) -> bool:
     return all(isinstance(value, (int, float, np.number)) for value in values)
 
 
-READS = reading(ODOMETRY, *TF, TWIST, TWIST_STAMPED, ACTION_GOAL, ACTION_RESULT, STATUS)
+READS = reading(ODOMETRY, *TF, *COMMANDS, *GOALS)
 CHECK = Check(
     "odometry", "odometry without numbers, that jumps or drifts, a localisation that jumps", READS, LIMITS, find
 )

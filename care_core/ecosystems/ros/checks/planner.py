@@ -12,16 +12,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.goals import Goal
-from care_core.ecosystems.ros.messages import (
-    ACTION_GOAL,
-    ACTION_RESULT,
-    ODOMETRY,
-    ROSOUT,
-    STATUS,
-    TWIST,
-    TWIST_STAMPED,
-    reading,
-)
+from care_core.ecosystems.ros.messages import COMMANDS, GOALS, ODOMETRY, ROSOUT, reading
 from care_core.ecosystems.ros.motion import (
     BREAKS_LOOSE_MPS,
     STANDS_RADPS,
@@ -52,7 +43,7 @@ COVERED = LIMITS.add("share of that time that samples cover", 0.8, "", "over les
 BREAK_S = LIMITS.add("break in which the robot moves a little", 2.0, "s", "a shorter one is no way made")
 FORWARD = LIMITS.add("share of commands to move forward", 0.3, "", "with more of them the robot does not obey")
 TURNING = LIMITS.add("share of commands to turn", 0.5, "", "most of what the controller asks for")
-COMMANDS = LIMITS.add("commands in that time", 5, "", "fewer tell nothing of a controller")
+FEWEST = LIMITS.add("commands in that time", 5, "", "fewer tell nothing of a controller")
 SAMPLES = LIMITS.add("samples of odometry on a goal", 5, "", "fewer tell of no way")
 
 
@@ -135,12 +126,12 @@ def _nowhere(odometry: Odometry, goal: Goal) -> tuple[float, float] | None:
 def _commanded(commands: Commands, start_s: float, end_s: float) -> tuple[float, float] | None:
     """Shares of the commands of a time that ask to move forward, and to turn on the spot; None: hardly any came."""
     inside = (commands.t >= start_s) & (commands.t <= end_s)
-    if np.count_nonzero(inside) < COMMANDS:
+    if np.count_nonzero(inside) < FEWEST:
         return None
     forward = np.abs(commands.speed[inside]) >= BREAKS_LOOSE_MPS
     turns = np.abs(commands.turn[inside]) >= STANDS_RADPS
     return float(forward.mean()), float((turns & ~forward).mean())
 
 
-READS = reading(*ROSOUT, ODOMETRY, TWIST, TWIST_STAMPED, ACTION_GOAL, ACTION_RESULT, STATUS)
+READS = reading(*ROSOUT, ODOMETRY, *COMMANDS, *GOALS)
 CHECK = Check("planner", "a planner that finds no path, a controller that is stuck", READS, LIMITS, find)

@@ -10,7 +10,7 @@ import numpy as np
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.messages import ROSOUT, STAMPED, reading
+from care_core.ecosystems.ros.messages import GOALS, ROSOUT, STAMPED, reading
 from care_core.ecosystems.ros.node_messages import Level, LogMessage
 from care_core.ecosystems.timeline import counted
 from care_core.logs.plausible import APART, STAMP, is_simulated, kept_its_rate, stamps_pace
@@ -111,5 +111,5 @@ def _lags(drive: Drive) -> Iterator[Finding]:
     )
 
 
-CHECK = Check("timing", "clocks that run apart, loops and transforms that are late", reading(*ROSOUT, *STAMPED), LIMITS,
-              find)  # fmt: skip
+READS = reading(*ROSOUT, *STAMPED, *GOALS)
+CHECK = Check("timing", "clocks that run apart, loops and transforms that are late", READS, LIMITS, find)

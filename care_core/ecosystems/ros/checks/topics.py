@@ -13,13 +13,13 @@ from care_core.ecosystems.ros.drive import SILENT_PERIODS, SILENT_S, Drive
 from care_core.ecosystems.ros.messages import (
     BATTERY,
     CLOUD,
+    COMMANDS,
+    GOALS,
     IMU,
     ODOMETRY,
     ROSOUT,
     SCAN,
     STATUS,
-    TWIST,
-    TWIST_STAMPED,
     reading,
     type_of,
 )
@@ -44,7 +44,7 @@ _TOPIC = re.compile(r"topic '?\"?([\w/~]+)")
 _KINDS: dict[str, FindingKind] = {ODOMETRY: "localisation", IMU: "imu", BATTERY: "battery"}
 _CONTACT = re.compile(r"contact|collision|bumper", re.IGNORECASE)
 """Topics that speak only while something touches (gazebo_ros bumpers and their like)."""
-_JUDGED_ELSEWHERE = (SCAN, CLOUD, TWIST, TWIST_STAMPED, STATUS)
+_JUDGED_ELSEWHERE = (SCAN, CLOUD, *COMMANDS, STATUS)
 
 
 def find(drive: Drive) -> Iterator[Finding]:
@@ -164,4 +164,6 @@ def _renamed(drive: Drive) -> Iterator[Finding]:
         )
 
 
-CHECK = Check("topics", "incompatible QoS, outages, streams that end early", reading(*ROSOUT, ODOMETRY), LIMITS, find)
+CHECK = Check(
+    "topics", "incompatible QoS, outages, streams that end early", reading(*ROSOUT, ODOMETRY, *GOALS), LIMITS, find
+)
