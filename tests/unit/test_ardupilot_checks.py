@@ -627,7 +627,7 @@ def test_whatever_is_missing_or_broken_nothing_is_raised(
 
 def test_every_check_says_what_it_reads() -> None:
     for check in CHECKS:
-        assert all(isinstance(fields, tuple) for fields in check.READS.values())
+        assert all(isinstance(fields, tuple) for fields in check.reads.values())
 
 
 @pytest.mark.parametrize(("drift_m", "kinds"), [(0.0, []), (6.0, ["barometer"])])

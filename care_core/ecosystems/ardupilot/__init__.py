@@ -50,7 +50,9 @@ class ArduPilot(Ecosystem):
         return log_messages(model)
 
     def checks(self) -> tuple[Check[Any], ...]:
-        return ()
+        from care_core.ecosystems.ardupilot.checks import CHECKS
+
+        return CHECKS
 
     def missions(self, channels: tuple[Channel, ...]) -> Iterator[Mapping[str, Any]]:
         yield {"kind": "ardupilot_flight"}

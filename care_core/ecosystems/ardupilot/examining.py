@@ -19,7 +19,7 @@ _TOO_SHORT_S = 2.0
 _TELLING = ("MODE", "MSG", "ATT", "IMU")
 
 READS: Wanted = merge_needs(
-    expanded(reads) for reads in (flight_model.READS, timeline.READS, *(check.READS for check in CHECKS))
+    expanded(reads) for reads in (flight_model.READS, timeline.READS, *(check.reads for check in CHECKS))
 )
 """All that the timeline and any check look at, for one reading."""
 

@@ -7,12 +7,20 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, runs
+from care_core.ecosystems.base import Limits
 from care_core.numbers import median, pieces, quantile
 
 Calibration = Sequence[tuple[float, float]]
 """Points (how many times over the limit, probability that the part really failed), rising."""
 
 _DOZENS = 40
+
+
+def calibrated(limits: Limits, points: Calibration, source: str, over: str = "the limit") -> Calibration:
+    """Declares the points of a calibration among the limits of a check; `over` names what they are multiples of."""
+    for ratio, share in points:
+        limits.add(f"probability at {ratio:g} times {over}", share, "", source)
+    return points
 
 
 def calibrated_probability(over: float, points: Calibration) -> float:

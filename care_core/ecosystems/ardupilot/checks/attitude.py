@@ -16,6 +16,7 @@ from care_core.ecosystems.ardupilot.checks.thrust import saturated
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts
 from care_core.ecosystems.ardupilot.statistics import lasting, means, records, top
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
@@ -26,28 +27,38 @@ READS: Wanted = {
     "STER": ("TurnRate", "DesTurnRate", "SteerOut"),
 }
 
-FAR_DEG, YAW_DEG = 15.0, 45.0
-_WAVERS_DEG = 10.0
-_LASTS_S, _YAW_LASTS_S = 1.0, 3.0
+LIMITS = Limits()
+FAR_DEG = LIMITS.add("roll and pitch off their demand", 15.0, "deg", "half of ArduCopter's crash check")
+_LASTS_S = LIMITS.add("shortest time off the demand", 1.0, "s", "a choice: a gust is over sooner")
+YAW_DEG = LIMITS.add("heading off its demand", 45.0, "deg", "a choice: turns to a new heading come nearer")
+_YAW_LASTS_S = LIMITS.add("shortest time off the heading", 3.0, "s", "a choice")
+_WAVERS_DEG = LIMITS.add("heading that wavers in a turn", 10.0, "deg", "a choice")
+_NEARER = LIMITS.add("share of the error left after a turn", 0.6, "", "a choice")
+_OFF = LIMITS.add("probability of a part, off its demand", 0.25, "", "a choice: gains and wind show alike")
+_LOST = LIMITS.add("probability of a part, control lost", 0.3, "", "a choice: control is lost for many reasons")
+_AFTER_S = LIMITS.add("attitude looked at after control was lost", 5.0, "s", "a choice")
+_OVER = LIMITS.add("probability of what lies upside down", 0.5, "", "a choice: it turned, or its board is mounted so")
+LIMITS.add("tilt of what is upside down", UPSIDE_DOWN_DEG, "deg", "a choice: no slope and no wave")
 _KEEP_UPRIGHT = frozenset(("rover", "sub"))
 _ANY_WAY_UP = frozenset((1, 19))
 """Modes of a submarine in which the pilot may turn it over: acro, manual (ArduSub/mode.h)."""
-_LIES_S, _BEFORE_S = 5.0, 10.0
-"""What is upside down for so long lies so; it had been upright so shortly before where it turned over."""
-SWING_DPS, OVER_DEMAND = 30.0, 3.0
-"""degrees/s; how many times the demand's own movement."""
-_SWING_S, _ENOUGH = 5.0, 10
-_WINDOW_S = 3.0
-"""What is a swing of a rate comes and goes within it."""
-_ALL = 1.0
-"""All that the motors have for one axis (AP_Motors.h: roll and pitch run from -1 to 1)."""
-_ALL_STEERING = 4500.0
-"""The same of a rover's steering (AP_MotorsUGV.h)."""
-_GETS_ON_S = 30.0
-_SPENT = 0.85
-"""Probability that a swing which takes all that the motors have is what fails the mission. 31 of the 34 training
-flights that swing and then run out of thrust or fall fail; all 106 that swing have a gain of that axis raised or the
-gyros' filter lowered."""
+_LIES_S = LIMITS.add("shortest time upside down", 5.0, "s", "a choice: a flip is over sooner")
+_BEFORE_S = LIMITS.add("upright so shortly before it turned over", 10.0, "s", "a choice")
+SWING_DPS = LIMITS.add("swing of a rate around its target", 30.0, "deg/s", "a choice")
+OVER_DEMAND = LIMITS.add("swing, in movements of the target", 3.0, "", "a choice: what is told to move moves")
+_SWING_S = LIMITS.add("shortest swing", 5.0, "s", "a choice: a manoeuvre is over sooner")
+_WINDOW_S = LIMITS.add("window of a swing", 3.0, "s", "a choice: one swing comes and goes within it")
+_TURNS = LIMITS.add("share of records in which a swing turns", 0.15, "", "a choice: slow logs miss the others")
+_EVEN = LIMITS.add("mean of a swing over its size", 0.5, "", "a choice: what stays on one side is no swing")
+_ALL = LIMITS.add("output of all that the motors have", 1.0, "", "AP_Motors.h: roll and pitch run from -1 to 1")
+_ALL_STEERING = LIMITS.add("output of all that the steering has", 4500.0, "", "AP_MotorsUGV.h")
+_GETS_ON_S = LIMITS.add("swing that keeps a rover from its way", 30.0, "s", "a choice")
+_SPENT = LIMITS.add(
+    "probability of a swing that takes all the motors have", 0.85, "",
+    "31 of 34 such training flights fail; all 106 that swing have a gain raised or the gyros' filter lowered",
+)  # fmt: skip
+_SWINGS = LIMITS.add("probability of any other swing", 0.2, "", "a choice: the motors have more to give")
+_ENOUGH = 10
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -69,16 +80,16 @@ def _lost(flight: Flight, lost: float) -> Iterator[Finding]:
     error = flight.lean_error
     if error is None:
         return
-    after = error[1][(error[0] >= lost) & (error[0] <= lost + 5)]
+    after = error[1][(error[0] >= lost) & (error[0] <= lost + _AFTER_S)]
     yield Finding(
         kind="attitude",
         title="control was lost",
         onset_s=lost,
         end_s=flight.impact_s or flight.end_s,
         severity="critical",
-        evidence=f"the attitude is up to {float(np.max(after)):.0f} degrees off its demand and does not come back",
+        evidence=f"the attitude is up to {float(np.max(after)):.0f} deg off its target and does not recover",
         source="ATT; 30 degrees: ArduCopter's crash check",
-        probability=0.3,
+        probability=_LOST,
     )
 
 
@@ -103,12 +114,12 @@ def _upside_down(flight: Flight) -> Iterator[Finding]:
         end_s=end,
         severity="critical",
         evidence=(
-            f"its upper side points {float(median(tilt[during(spans, t)])):.0f} degrees away from the sky"
-            + ("" if turned else " from the start: it lies so, or AHRS_ORIENTATION is not how the board is mounted")
+            f"it leans {float(median(tilt[during(spans, t)])):.0f} deg from level"
+            + ("" if turned else " from the start: it lies like this, or AHRS_ORIENTATION does not match the board")
         ),
         source="ATT.Roll, Pitch",
         suspect="world" if turned else "parameter",
-        probability=0.5,
+        probability=_OVER,
     )
 
 
@@ -126,9 +137,9 @@ def _far(flight: Flight) -> Iterator[Finding]:
             onset_s=spans[0][0],
             end_s=spans[-1][1],
             severity=severity,
-            evidence=f"roll and pitch are up to {worst:.0f} degrees off (limit {FAR_DEG:g})",
+            evidence=f"roll and pitch are up to {worst:.0f} deg off (limit {FAR_DEG:g})",
             source="ATT against DesRoll, DesPitch",
-            probability=0.25,
+            probability=_OFF,
             suspect="parameter",
         )
 
@@ -150,15 +161,15 @@ def _yaw(flight: Flight) -> Iterator[Finding]:
             onset_s=spans[0][0],
             end_s=spans[-1][1],
             severity="warning",
-            evidence=f"up to {top(off[during(spans, table.t)]):.0f} degrees off (limit {YAW_DEG:g})",
+            evidence=f"up to {top(off[during(spans, table.t)]):.0f} deg off (limit {YAW_DEG:g})",
             source="ATT.Yaw against DesYaw",
-            probability=0.25,
+            probability=_OFF,
         )
 
 
 def _is_a_turn(off: Floats) -> bool:
     """Whether a heading only comes nearer to its demand, and much: it turns to one that was given at once."""
-    return bool(np.all(off <= np.minimum.accumulate(off) + _WAVERS_DEG)) and float(off[-1]) < 0.6 * float(off[0])
+    return bool(np.all(off <= np.minimum.accumulate(off) + _WAVERS_DEG)) and float(off[-1]) < _NEARER * float(off[0])
 
 
 def _swings(flight: Flight) -> Iterator[Finding]:
@@ -190,17 +201,17 @@ def _swings(flight: Flight) -> Iterator[Finding]:
         end_s=spans[-1][1],
         severity="critical" if lost else "warning",
         evidence=(
-            f"the {name} rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
-            f"{OVER_DEMAND:g} times what is asked, or all that the motors have){limit}"
+            f"the {name} rate swings {peak:.0f} deg/s around its target (above {SWING_DPS:g} is abnormal where it is "
+            f"{OVER_DEMAND:g} times the target's own movement, or takes all that the motors have){limit}"
         ),
         source="RATE against its demand",
         suspect="parameter",
-        probability=_SPENT if spent or down else 0.2,
+        probability=_SPENT if spent or down else _SWINGS,
     )
 
 
 def _steering(flight: Flight) -> Iterator[Finding]:
-    """A rover that steers by itself turns to and fro: gains of the steering that are too high."""
+    """A rover that steers by itself swings around its course: gains of the steering that are too high."""
     table = flight.one("STER", "TurnRate", "DesTurnRate")
     if flight.kind != "rover" or table is None:
         return
@@ -211,7 +222,7 @@ def _steering(flight: Flight) -> Iterator[Finding]:
     driven = flight.one("THR", "Speed")
     swung = np.zeros(0) if driven is None else np.abs(driven["Speed"][during(spans, driven.t)])
     stays = len(swung) > 0 and spans[-1][1] - spans[0][0] > _GETS_ON_S and float(median(swung)) < STANDS_MS
-    end = "; the vehicle does not get on" if stays else ""
+    end = "; the vehicle makes no progress" if stays else ""
     yield Finding(
         kind="tuning",
         title="the steering oscillates",
@@ -219,12 +230,12 @@ def _steering(flight: Flight) -> Iterator[Finding]:
         end_s=spans[-1][1],
         severity="critical" if stays else "warning",
         evidence=(
-            f"the turn rate is {peak:.0f} degrees/s off its demand, to and fro (limit {SWING_DPS:g}, and "
-            f"{OVER_DEMAND:g} times what is asked, or all that the steering has){end}"
+            f"the turn rate swings {peak:.0f} deg/s around its target (above {SWING_DPS:g} is abnormal where it is "
+            f"{OVER_DEMAND:g} times the target's own movement, or takes all that the steering has){end}"
         ),
         source="STER.TurnRate against its demand",
         suspect="parameter",
-        probability=_SPENT if stays else 0.2,
+        probability=_SPENT if stays else _SWINGS,
     )
 
 
@@ -269,8 +280,8 @@ def _exhausted(table: Table, n: int, output: str, most: float) -> Mask:
 def _to_and_fro(error: Floats) -> bool:
     """Whether an error changes its side: often, or, in a log too slow to show each swing, so that it comes out even."""
     turns = int((np.diff(np.sign(error)) != 0).sum())
-    often = turns > 0.15 * (len(error) - 1)
-    return often or (turns >= 2 and abs(float(np.mean(error))) < 0.5 * float(np.mean(np.abs(error))))
+    often = turns > _TURNS * (len(error) - 1)
+    return often or (turns >= 2 and abs(float(np.mean(error))) < _EVEN * float(np.mean(np.abs(error))))
 
 
 def _came_down(flight: Flight, swings: list[Span]) -> bool:
@@ -291,3 +302,6 @@ def _spent(flight: Flight, swings: list[Span]) -> float:
     if not full or full[0][0] < start:
         return 0.0
     return sum(max(0.0, min(b, end) - a) for a, b in full)
+
+
+CHECK = Check("attitude", "control lost, an attitude off its demand, oscillation", READS, LIMITS, find)

@@ -14,13 +14,14 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, parts
 from care_core.ecosystems.ardupilot.statistics import (
-    Calibration,
     aligned,
+    calibrated,
     calibrated_probability,
     lasting,
     roughness,
     smooth,
 )
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
@@ -34,22 +35,28 @@ READS: Wanted = {
     "CTUN": ("Alt", "BAlt", "SAlt"),
 }
 
-APART_M = 3.0
-"""Between two barometers; three times what arming allows between barometer and estimator."""
-DRIFT_M = 10.0
-NOISE_M = 0.5
-"""Standard deviation from record to record: three times what a barometer resolves."""
-_LOW_M, _BEGAN_M, _NO_RANGE_M, _RANGE_GOOD = 3.0, 10.0, 0.02, 4
-"""Where barometer and range finder are compared; RangeFinder::Status::Good is 4 (AP_RangeFinder.h)."""
+LIMITS = Limits()
+APART_M = LIMITS.add("two barometers apart", 3.0, "m", "three times what arming allows between barometer and estimator")
+DRIFT_M = LIMITS.add("drift from the GPS height", 10.0, "m", "a choice: GPS heights wander by some metres in minutes")
+NOISE_M = LIMITS.add("noise from record to record", 0.5, "m", "three times what a good barometer resolves")
+_LASTS_S = LIMITS.add("shortest time over a limit", 5.0, "s", "a choice: landing gusts press on it for a second")
+_SEVERE = LIMITS.add("times the limit that cost the height", 2.0, "", "a choice: the vehicle holds its height by it")
+_LOW_M = LIMITS.add("range at which it is compared", 3.0, "m", "a choice: higher, terrain explains a difference")
+_BEGAN_M = LIMITS.add("distance from the start at which it is compared", 10.0, "m", "a choice: the same terrain")
+_NO_RANGE_M = LIMITS.add("least range", 0.02, "m", "a choice: range finders say 0 where they see nothing")
+_GOOD_SATS = LIMITS.add("satellites of a height to compare with", 8, "", "a choice: two more than the estimator wants")
+_CALIBRATION = calibrated(
+    LIMITS, ((1.0, 0.8), (2.0, 0.97)), "only training flights with a failing barometer exceed a limit (17 of 17)"
+)
+_LOST = LIMITS.add(
+    "probability that it costs the mission", 0.55, "",
+    "12 of those 17 failed, of flights without a failed part 48 % (a critical finding counts as four flights)",
+)  # fmt: skip
+_ODDS = LIMITS.add("probability where a range finder contradicts it", 0.3, "", "a choice: either may be wrong")
+_RANGE_GOOD = 4
+"""RangeFinder::Status::Good (AP_RangeFinder.h)."""
+_FIX = 3
 _METRES_PER_DEGREE = 111_319.5
-_GOOD_SATS = 8
-_LASTS_S = 5.0
-_CALIBRATION: Calibration = ((1.0, 0.8), (2.0, 0.97))
-"""By the largest of the three over its limit; on the training table only flights with a failing barometer exceed one
-(17 of 17, no healthy one)."""
-_LOST = 0.55
-"""12 of those 17 failed, of the flights without a failed part 48 %: about 0.43 by it (the 0.95 of a critical finding
-counts as four flights)."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -125,9 +132,9 @@ def _contradicted(flight: Flight) -> Iterator[Finding]:
             onset_s=spans[0][0],
             end_s=spans[-1][1],
             severity="info",
-            evidence=f"they moved {most:.1f} m apart within {_LOW_M:g} m of the ground (limit {APART_M:g} m)",
+            evidence=f"they drifted {most:.1f} m apart within {_LOW_M:g} m of the ground (limit {APART_M:g} m)",
             source="BARO or CTUN.BAlt against RFND or CTUN.SAlt; Copter's pre-arm check allows 1 m to the estimator",
-            probability=0.3,
+            probability=_ODDS,
         )
 
 
@@ -165,7 +172,7 @@ def _drift(flight: Flight, first: Table) -> Floats | None:
     gps = flight.one("GPS", "Status", "Alt", "NSats")
     if gps is None:
         return None
-    good = gps.where((gps["Status"] >= 3) & (gps["NSats"] >= _GOOD_SATS) & flight.watch(gps.t))
+    good = gps.where((gps["Status"] >= _FIX) & (gps["NSats"] >= _GOOD_SATS) & flight.watch(gps.t))
     if len(good) < 10:
         return None
     apart = first["Alt"] - aligned(first.t, good.t, good["Alt"])
@@ -177,4 +184,7 @@ def _drift(flight: Flight, first: Table) -> Floats | None:
 
 def _severity(flight: Flight, start: float, over: float) -> Severity:
     """Critical far out of limits in the air: the vehicle holds its height by it."""
-    return "critical" if over > 2.0 and any(end > start for _, end in flight.flown) else "warning"
+    return "critical" if over > _SEVERE and any(end > start for _, end in flight.flown) else "warning"
+
+
+CHECK = Check("barometer", "a noisy or drifting barometer, two at odds", READS, LIMITS, find)

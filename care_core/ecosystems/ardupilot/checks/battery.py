@@ -15,21 +15,39 @@ import numpy as np
 from care_core.ecosystems.ardupilot.battery import Battery, within_reason
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
-from care_core.ecosystems.ardupilot.statistics import Calibration, calibrated_probability, lasting, smooth
+from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median
 
 READS: Wanted = {"BAT": ("Volt", "Curr"), "POWR": ("Vcc",)}
 
-NOT_FULL, LOW, CRITICAL, RUINOUS = 3.9, 3.5, 3.3, 3.0
-"""Volts a cell."""
-_LASTS_S = 2.0
-_ALIVE_V = 4.0
-_BOARD_V = 4.3
-_CALIBRATION: Calibration = ((0.001, 0.6), (0.05, 0.9), (0.1, 0.97))
-"""By share of a cell's 3.9 V that is missing at rest; on the training table all flights that rest below 3.9 V a cell
-have a drained pack (16 of 16), and no other does."""
+LIMITS = Limits()
+_CELLS = "voltages of lithium polymer cells"
+_ADVICE = "ArduPilot, Battery Failsafe"
+NOT_FULL = LIMITS.add("cell at rest, charged", 3.9, "V", _CELLS)
+LOW = LIMITS.add("usual low level of a cell", 3.5, "V", _ADVICE)
+CRITICAL = LIMITS.add("critical level of a cell", 3.3, "V", _ADVICE)
+RUINOUS = LIMITS.add("level that harms a cell", 3.0, "V", _CELLS)
+_LASTS_S = LIMITS.add("shortest sag", 2.0, "s", "a choice: a burst of throttle is over sooner")
+_EARLY_V = LIMITS.add("failsafe above the usual low level by", 0.05, "V", "a choice: voltages are set to a tenth")
+_ALIVE_V = LIMITS.add("voltage that drives a vehicle", 4.0, "V", "one full cell")
+_DRAWS_A = LIMITS.add("current that is drawn", 0.5, "A", "a choice: monitors are off by less")
+_BOARD_V = LIMITS.add("supply of the board", 4.3, "V", "ArduPilot, Power module and brown-outs")
+_BOARD_LEAST_V = LIMITS.add("supply that is measured", 0.5, "V", "a choice: below it nothing measures")
+_DIPS = LIMITS.add("records of a critical dip", 5, "", "a choice: one or two may be noise")
+_CALIBRATION = calibrated(
+    LIMITS,
+    ((0.001, 0.6), (0.05, 0.9), (0.1, 0.97)),
+    "by the share of 3.9 V that is missing: all 16 training flights that rest below it have a drained pack, no other",
+    "missing",
+)
+_DEEP = LIMITS.add("probability of a pack that sags deep", 0.4, "", "a choice: a weak pack, or a full throttle")
+_SAGS = LIMITS.add("probability of a pack that sags", 0.25, "", "a choice: most packs do at the end of a flight")
+_FAILSAFE = LIMITS.add("probability of a bad pack, failsafe alone", 0.1, "", "a choice: mostly a flight too long")
+_MONITOR = LIMITS.add("probability of a monitor not calibrated", 0.3, "", "a choice: it harms failsafes only")
+_BOARD = LIMITS.add("probability of a weak board supply", 0.7, "", "a choice: below 4.3 V the board may restart")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -81,12 +99,12 @@ def _pack(flight: Flight, battery: Battery, table: Table) -> Iterator[Finding]:
                 f"critical level" + _said(failsafe)
             ),
             source="BAT.Volt; 3.3 V a cell: ArduPilot, Battery Failsafe",
-            probability=0.4 if deep else 0.25,
+            probability=_DEEP if deep else _SAGS,
         )
     elif failsafe is not None:
         limit = flight.setting("BATT_LOW_VOLT", "FS_BATT_VOLTAGE", "LOW_VOLT") or 0.0
         at_v = float(np.interp(failsafe, t, volts))
-        early = limit / cells > LOW + 0.05
+        early = limit / cells > LOW + _EARLY_V
         yield Finding(
             kind="battery",
             title="battery failsafe",
@@ -103,7 +121,7 @@ def _pack(flight: Flight, battery: Battery, table: Table) -> Iterator[Finding]:
             ),
             source="ERR of the battery failsafe; BAT.Volt",
             suspect="parameter" if early else "operation",
-            probability=0.1,
+            probability=_FAILSAFE,
         )
 
 
@@ -115,7 +133,7 @@ def _load(table: Table, start: float, end: float) -> str:
     if "Curr" not in table.columns:
         return ""
     part = table["Curr"][(table.t >= start) & (table.t <= end)]
-    return f" at {median(part):.0f} A" if len(part) and median(part) > 0.5 else ""
+    return f" at {median(part):.0f} A" if len(part) and median(part) > _DRAWS_A else ""
 
 
 def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
@@ -133,7 +151,7 @@ def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
         odd = f"the voltage stays at {known[0]:.2f} V in flight"
     elif float(median(known)) < _ALIVE_V:
         odd = f"{median(known):.2f} V drive no vehicle: nothing is connected to it, or its scale is wrong"
-    elif len(amps) and np.isfinite(amps).any() and known_median(amps) < -0.5:
+    elif len(amps) and np.isfinite(amps).any() and known_median(amps) < -_DRAWS_A:
         odd = f"the current reads {known_median(amps):.1f} A"
     if odd:
         span = flight.flown[0][0], flight.flown[-1][1]
@@ -146,7 +164,7 @@ def _monitor(flight: Flight, table: Table) -> Iterator[Finding]:
             evidence=odd,
             source="BAT",
             suspect="parameter",
-            probability=0.3,
+            probability=_MONITOR,
         )
 
 
@@ -156,7 +174,7 @@ def _board(flight: Flight) -> Iterator[Finding]:
     if table is None:
         return
     volts: Floats = np.where(table["Vcc"] > 100, table["Vcc"] / 1000, table["Vcc"])
-    weak: Mask = (volts > 0.5) & (volts < _BOARD_V) & flight.watch(table.t)
+    weak: Mask = (volts > _BOARD_LEAST_V) & (volts < _BOARD_V) & flight.watch(table.t)
     if weak.sum() < 2:
         return
     at = table.t[weak]
@@ -165,8 +183,11 @@ def _board(flight: Flight) -> Iterator[Finding]:
         title="the autopilot's own supply dips",
         onset_s=float(at[0]),
         end_s=float(at[-1]),
-        severity=("critical" if weak.sum() > 5 else "warning"),
+        severity=("critical" if weak.sum() > _DIPS else "warning"),
         evidence=f"Vcc down to {volts[weak].min():.2f} V (limit {_BOARD_V})",
         source="POWR.Vcc; 4.3 V: ArduPilot, Diagnosing problems using logs",
-        probability=0.7,
+        probability=_BOARD,
     )
+
+
+CHECK = Check("battery", "an uncharged or sagging pack, its failsafe, a weak board supply", READS, LIMITS, find)

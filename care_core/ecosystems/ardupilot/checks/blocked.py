@@ -15,14 +15,21 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
 from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 
 READS: Wanted = {"THR": ("ThrOut", "Speed"), "STER": ("TurnRate",)}
 
-THROTTLE_PERCENT, STANDING_MS, TURNING_DPS = 5.0, 0.08, float(np.degrees(0.08))
-_LASTS_S = 2.0
+LIMITS = Limits()
+_SOURCE = "Rover/crash_check.cpp"
+THROTTLE_PERCENT = LIMITS.add("least throttle", 5.0, "%", _SOURCE)
+STANDING_MS = LIMITS.add("speed of a rover that stands", 0.08, "m/s", _SOURCE)
+TURNING_DPS = LIMITS.add("turn rate of a rover that stands", float(np.degrees(0.08)), "deg/s", _SOURCE)
+_LASTS_S = LIMITS.add("shortest time blocked", 2.0, "s", _SOURCE)
+LIMITS.add("speed of a copter that is held", STANDS_MS, "m/s", "a choice: wind moves what is free by more")
+_HELD = LIMITS.add("probability of what holds a copter", 0.9, "", "a choice: what else leans, stands and was hit?")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -68,8 +75,11 @@ def _held(flight: Flight) -> Iterator[Finding]:
             onset_s=start,
             end_s=end,
             severity="critical",
-            evidence=f"for {lasted:.0f} s below {STANDS_MS:g} m/s at a lean of {lean:.0f} degrees, after a blow",
+            evidence=f"for {lasted:.0f} s below {STANDS_MS:g} m/s at a lean of {lean:.0f} deg, after an impact",
             source="ATT, GPS.Spd; blows by VIBE.Clip and IMU",
             suspect="world",
-            probability=0.9,
+            probability=_HELD,
         )
+
+
+CHECK = Check("blocked", "a vehicle that is driven and does not move", READS, LIMITS, find)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 
@@ -12,6 +13,9 @@ READS: Wanted = {}
 
 _RISKY = ("ATC_", "PSC_", "RATE_", "STB_", "INS_", "EK2_", "EK3_", "EKF_", "AHRS_", "COMPASS_", "MOT_", "FRAME", 
           "SERVO", "ARMING_", "FS_", "MIXMODE", "BRD_")  # fmt: skip
+LIMITS = Limits()
+_PROBABILITY = LIMITS.add("probability that a change in the air harms", 0.2, "", "a choice: few changes do")
+_NAMED = 5
 _LEARNED = ("MOT_THST_HOVER", "COMPASS_OFS", "COMPASS_DEC", "INS_GYR", "STAT_", "_CAL", "_ID")
 """What the firmware itself writes while it flies."""
 
@@ -32,9 +36,12 @@ def find(flight: Flight) -> Iterator[Finding]:
             onset_s=changed[0][0],
             end_s=changed[-1][0],
             severity="info",
-            evidence=", ".join(f"{name}={value}" for _, name, value in changed[:5])
-            + (", ..." if len(changed) > 5 else ""),
+            evidence=", ".join(f"{name}={value}" for _, name, value in changed[:_NAMED])
+            + (", ..." if len(changed) > _NAMED else ""),
             source="PARM",
             suspect="parameter",
-            probability=0.2,
+            probability=_PROBABILITY,
         )
+
+
+CHECK = Check("changes", "parameters changed in the air that act on control at once", READS, LIMITS, find)

@@ -15,13 +15,14 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
 from care_core.ecosystems.ardupilot.statistics import (
-    Calibration,
     aligned,
+    calibrated,
     calibrated_probability,
     lasting,
     length,
     smooth,
 )
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median, quantile
@@ -29,21 +30,40 @@ from care_core.numbers import known_median, median, quantile
 AXES = ("MagX", "MagY", "MagZ")
 READS: Wanted = {"MAG": (*AXES, "Health"), "XKF4": ("SM",), "PARM": ("Name", "Value")}
 
-APART = 200.0
-MOVED = 140.0
-"""mGauss by which the difference of two compasses may change in flight: 70 % of what arming allows, since turning alone
-moves it where their calibrations differ."""
-_LEANS_DEG = 60.0
-"""Further over, as in a flip, the calibrations' difference changes its sign and no longer cancels."""
-GREY, TOO_MUCH = 0.3, 0.6
-_SHORTEST, _LONGEST = 185.0, 875.0
-_LASTS_S, _SILENT_S = 3.0, 1.0
-_EKF_YAW_RESET = 62
-_CALIBRATION: Calibration = ((1.0, 0.8), (1.5, 0.95), (3.0, 0.98))
-"""By millligauss over the limit; on the training table all flights over it have a failing compass, and no other."""
-_LOST = 0.65
-"""6 of 8 training flights with a compass disturbed in flight failed, of those without a failed part 48 %: 0.5 by it
-(the 0.95 of a critical finding counts as four flights)."""
+LIMITS = Limits()
+APART = LIMITS.add("two compasses apart in the level plane", 200.0, "mGauss", "AP_COMPASS_MAX_XY_LENGTH_DIFF")
+MOVED = LIMITS.add(
+    "change of their difference in flight", 140.0, "mGauss",
+    "70 % of what arming allows, since turning alone moves it where their calibrations differ",
+)  # fmt: skip
+_LEANS_DEG = LIMITS.add(
+    "lean at which compasses are compared", 60.0, "deg", "a choice: further over calibrations no longer cancel"
+)
+GREY = LIMITS.add("share of the field from the motors", 0.3, "", "ArduPilot, Compass setup: a grey area above")
+TOO_MUCH = LIMITS.add("share that makes it unusable", 0.6, "", "ArduPilot, Compass setup")
+_FOLLOWS = LIMITS.add("correlation of field and throttle", 0.6, "", "a choice: turning moves the field as well")
+_SPREAD = LIMITS.add("spread of the throttle to compare with", 0.15, "", "a choice: less tells nothing")
+_SHORTEST = LIMITS.add("shortest field", 185.0, "mGauss", "AP_Arming's limits of the field")
+_LONGEST = LIMITS.add("longest field", 875.0, "mGauss", "AP_Arming's limits of the field")
+_LASTS_S = LIMITS.add("shortest disturbance", 3.0, "s", "a choice: passing steel is over sooner")
+_SILENT_S = LIMITS.add("shortest silence", 1.0, "s", "a choice")
+_NOTHING = LIMITS.add("field that is none", 1.0, "mGauss", "a choice: the Earth's is 250 to 650")
+_RATIO = LIMITS.add("test ratio of the estimator", 1.0, "", "AP_NavEKF3: above it the compass is rejected")
+_CALIBRATION = calibrated(
+    LIMITS,
+    ((1.0, 0.8), (1.5, 0.95), (3.0, 0.98)),
+    "all training flights over the limit have a failing compass, and no other",
+)
+_LOST = LIMITS.add(
+    "probability that it costs the mission", 0.65, "",
+    "6 of 8 such training flights failed, of those without a failed part 48 % (a critical finding counts as four)",
+)  # fmt: skip
+_DEAD = LIMITS.add("probability of a dead compass", 0.95, "", "its field is zero, or it says so itself")
+_REFUSED = LIMITS.add("probability where arming was refused for it", 0.7, "", "the firmware's own word")
+_MOTORS = LIMITS.add("probability of a field that follows the motors", 0.5, "", "a choice")
+_MOTORS_MUCH = LIMITS.add("probability of one that follows them much", 0.7, "", "a choice")
+_ODD = LIMITS.add("probability of a field that the Earth does not have", 0.5, "", "a choice: steel is near, or not")
+_DOUBTED = LIMITS.add("probability where the estimator alone doubts it", 0.2, "", "a choice: mostly others are wrong")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -87,12 +107,12 @@ def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
         + (f"; {broken} is not a number" if broken else ""),
         source="MAG",
         suspect="parameter" if broken else "hardware",
-        probability=0.95,
+        probability=_DEAD,
     )
 
 
 def _silent(compass: Table) -> Mask:
-    silent = ~(length(compass[axis] for axis in AXES) > 1.0)
+    silent = ~(length(compass[axis] for axis in AXES) > _NOTHING)
     return silent | (compass["Health"] == 0) if "Health" in compass.columns else silent
 
 
@@ -132,7 +152,7 @@ def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             title=f"compass {worse} is disturbed",
             onset_s=start,
             end_s=end,
-            severity=_gravity(flight, start, worse == 1),
+            severity=_severity(flight, start, worse == 1),
             evidence=(
                 f"the difference of compasses 1 and {n} changes by {size:.0f} mGauss in flight (limit {MOVED:.0f})"
                 if has_moved
@@ -160,14 +180,14 @@ def _odd_one(compasses: list[Table], other: int) -> int:
     return 1 if sd[0] >= sd[1] else other
 
 
-def _gravity(flight: Flight, start: float, is_used: bool) -> Severity:
+def _severity(flight: Flight, start: float, is_used: bool) -> Severity:
     """Critical where the compass in use is the bad one and the estimator's yaw suffered."""
     return "critical" if is_used and (_rejected(flight, start) or flight.was_refused) else "warning"
 
 
 def _rejected(flight: Flight, start: float) -> bool:
     return any(
-        bool(lasting(one.t, (one["SM"] > 1.0) & (one.t >= start - 1) & flight.watch(one.t), 1.0))
+        bool(lasting(one.t, (one["SM"] > _RATIO) & (one.t >= start - 1) & flight.watch(one.t), 1.0))
         for one in flight.all("XKF4", "SM")
     )
 
@@ -186,7 +206,7 @@ def _refused(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
             severity="critical",
             evidence=said,
             source="MSG; AP_Arming's compass checks",
-            probability=0.7,
+            probability=_REFUSED,
         )
 
 
@@ -199,14 +219,14 @@ def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     strength = length(first[axis] for axis in AXES)
     throttle = np.interp(first.t, *driven)
     usable: Mask = np.isfinite(strength) & (strength > 1.0)
-    if usable.sum() < 20 or np.ptp(throttle[usable]) < 0.15:
+    if usable.sum() < 20 or np.ptp(throttle[usable]) < _SPREAD:
         return
     x, y = throttle[usable], strength[usable]
     base, slope = _line(x, y)
     with np.errstate(invalid="ignore"):
         match = float(np.corrcoef(x, y)[0, 1])
     share = abs(slope) * quantile(x, 0.95) / max(base, 1.0)
-    if share > GREY and abs(match) > 0.6:
+    if share > GREY and abs(match) > _FOLLOWS:
         yield Finding(
             kind="compass",
             title="the motors' currents disturb the compass",
@@ -218,7 +238,7 @@ def _by_motors(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
                 "above 60 % it is unusable)"
             ),
             source="MAG against CTUN.ThO; ArduPilot, Compass setup",
-            probability=0.7 if share > TOO_MUCH else 0.5,
+            probability=_MOTORS_MUCH if share > TOO_MUCH else _MOTORS,
         )
 
 
@@ -246,14 +266,14 @@ def _implausible(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
                 f"{_LONGEST:.0f})"
             ),
             source="MAG; AP_Arming's limits of the field",
-            probability=0.5,
+            probability=_ODD,
         )
 
 
 def _doubted(flight: Flight) -> Iterator[Finding]:
     """The estimator found the compass wrong in the air, though the compass alone shows nothing."""
     for one in flight.all("XKF4", "SM"):
-        spans = lasting(one.t, (one["SM"] > 1.0) & during(flight.flown, one.t), 3.0)
+        spans = lasting(one.t, (one["SM"] > _RATIO) & during(flight.flown, one.t), _LASTS_S)
         if spans:
             yield Finding(
                 kind="compass",
@@ -263,6 +283,9 @@ def _doubted(flight: Flight) -> Iterator[Finding]:
                 severity="warning",
                 evidence=f"test ratio {np.max(one['SM'][flight.watch(one.t)]):.1f} (limit 1)",
                 source="XKF4.SM; 1 is the limit of its innovation test",
-                probability=0.2,
+                probability=_DOUBTED,
             )
             return
+
+
+CHECK = Check("compass", "dead, disturbed or implausible compasses", READS, LIMITS, find)

@@ -14,12 +14,20 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"PM": ("NLon", "NL", "Load")}
 
-LONG_SHARE, FULL_LOAD = 0.15, 950.0
+LIMITS = Limits()
+LONG_SHARE = LIMITS.add(
+    "share of long loops", 0.15, "", "a choice: no healthy training flight has one long loop in a hundred"
+)
+FULL_LOAD = LIMITS.add("load of the scheduler", 950.0, "tenths of a per cent", "AP_Scheduler: PM.Load is 1000 at most")
+_LASTS_S = LIMITS.add("shortest overload", 5.0, "s", "a choice: a slow loop now and then harms nothing")
+_STUCK = LIMITS.add("probability where the CPU failsafe acted", 0.8, "", "the firmware's own word")
+_OVERLOADED = LIMITS.add("probability of an overload", 0.4, "", "a choice")
 _FAILSAFE_CPU = 19
 
 
@@ -35,7 +43,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             severity="critical",
             evidence="CPU failsafe",
             source="ERR 19",
-            probability=0.8,
+            probability=_STUCK,
         )
         return
     table = flight.one("PM")
@@ -54,7 +62,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     if "Load" in table.columns and (table["Load"][armed] > FULL_LOAD).any():
         slow |= table["Load"] > FULL_LOAD
         said.append(f"load {float(np.max(table['Load'][armed])) / 10:.0f} %")
-    spans = lasting(table.t, slow & armed, 5.0, gap_s=15.0, records=2)
+    spans = lasting(table.t, slow & armed, _LASTS_S, gap_s=15.0, records=2)
     if spans and said:
         yield Finding(
             kind="cpu",
@@ -64,5 +72,8 @@ def find(flight: Flight) -> Iterator[Finding]:
             severity="warning",
             evidence="; ".join(said),
             source="PM.NLon, NL, Load",
-            probability=0.4,
+            probability=_OVERLOADED,
         )
+
+
+CHECK = Check("cpu", "long loops, a full load, a stuck main loop", READS, LIMITS, find)

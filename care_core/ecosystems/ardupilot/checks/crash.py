@@ -7,15 +7,22 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"RCIN": ("C3",)}
 
 _ERR_CRASH = 12
-_LOW_M = 1.5
-_TAKEOFF_S = 15.0
-_STICK_LOW = 1150.0
+LIMITS = Limits()
+_LOW_M = LIMITS.add("height of a tip-over", 1.5, "m", "a choice: lower than a person's chest")
+_TAKEOFF_S = LIMITS.add("tip-over after the first throttle", 15.0, "s", "a choice: a take-off takes no longer")
+_FIRST_THROTTLE = LIMITS.add("first throttle", 0.15, "", "a choice: MOT_SPIN_MIN as shipped")
+_STICK_LOW = LIMITS.add("throttle stick at its bottom", 1150.0, "us", "a choice: sticks end between 1000 and 1100")
+_STICK_LEAST = LIMITS.add("pulse of a stick", 800.0, "us", "receivers send 800 to 2200; less is no signal")
+_TIPPED = LIMITS.add("probability of a tip-over's usual reasons", 0.5, "", "a choice: order, direction or propellers")
+_CRASHED = LIMITS.add("probability that a part broke", 0.1, "", "a choice: a crash says that it failed, hardly why")
+_STRANDED = LIMITS.add("probability of what could not rise", 0.0, "", "it says that the run failed, and nothing of why")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -39,7 +46,7 @@ def find(flight: Flight) -> Iterator[Finding]:
                 "show like this"
             ),
             source="ATT, height, ERR 12; 30 degrees: ArduCopter's crash check",
-            probability=0.5,
+            probability=_TIPPED,
             suspect="operation",
         )
     elif told is not None or said is not None or impact is not None:
@@ -64,7 +71,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             ),
             source="ERR 12, MSG, ATT, IMU",
             suspect="operation" if steered else "hardware",
-            probability=0.1,
+            probability=_CRASHED,
         )
 
 
@@ -81,7 +88,7 @@ def _stranded(flight: Flight) -> Iterator[Finding]:
                 f"on the ground for {end - start:.0f} s with the motors up, below the height that it is told to reach"
             ),
             source="CTUN",
-            probability=0.0,
+            probability=_STRANDED,
         )
 
 
@@ -99,7 +106,7 @@ def _tipped(flight: Flight, at: float) -> bool:
     if driven is None:
         return known is not None
     t, throttle = driven
-    up = t[(t >= span[0]) & (t <= at) & (throttle > 0.15)]
+    up = t[(t >= span[0]) & (t <= at) & (throttle > _FIRST_THROTTLE)]
     return bool(len(up)) and at - float(up[0]) < _TAKEOFF_S
 
 
@@ -114,5 +121,8 @@ def _steered(flight: Flight, at: float) -> str:
     if sticks is None:
         return ""
     stick = sticks["C3"][(sticks.t > at - 8.0) & (sticks.t <= at - 1.0)]
-    low = len(stick) > 2 and float(np.max(stick)) < _STICK_LOW and float(np.min(stick)) > 800
+    low = len(stick) > 2 and float(np.max(stick)) < _STICK_LOW and float(np.min(stick)) > _STICK_LEAST
     return "the throttle stick was at its bottom and the attitude followed its demand" if low else ""
+
+
+CHECK = Check("crash", "a crash, or a tip-over at take-off", READS, LIMITS, find)

@@ -14,13 +14,17 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"XKF4": ("SV", "SP", "SH", "SM", "FS")}
 
-RATIO = 1.0
-_LASTS_S = 2.0
+LIMITS = Limits()
+RATIO = LIMITS.add("innovation test ratio", 1.0, "", "AP_NavEKF3: above it a measurement is rejected")
+_LASTS_S = LIMITS.add("shortest rejection", 2.0, "s", "a choice: single outliers are what the test is for")
+_REJECTED = LIMITS.add("probability that the estimator is at fault", 0.2, "", "a choice: mostly its sensors are")
+_SWITCHED = LIMITS.add("probability of a changed lane", 0.3, "", "a choice: it switches to the better sensor")
 _EKF_CHECK, _FAILSAFE_EKF, _PRIMARY = 16, 17, 24
 _WORDS = {"SV": "velocity", "SP": "position", "SH": "height", "SM": "magnetic field"}
 _LANE = re.compile(r"(lane switch|EKF primary changed|switching to (compass|IMU|GPS)|EKF Failsafe|EKF variance)", re.I)
@@ -51,7 +55,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             severity="info",
             evidence="; ".join(dict.fromkeys(text for t, text in flight.messages if t in switched)),
             source="MSG",
-            probability=0.3,
+            probability=_SWITCHED,
         )
         return
     start = min([span[0] for span in worst.values()] + failed)
@@ -69,9 +73,12 @@ def find(flight: Flight) -> Iterator[Finding]:
         severity=severity,
         evidence=evidence,
         source="XKF4.SV, SP, SH, SM, ERR; limit 1 of AP_NavEKF3, 0.8 of FS_EKF_THRESH",
-        probability=0.2,
+        probability=_REJECTED,
     )
 
 
 def _inside(flight: Flight, times: list[float]) -> list[float]:
     return sorted(t for t in times if any(start <= t <= end for start, end in flight.flown))
+
+
+CHECK = Check("estimator", "test ratios over their limit, failsafes, changes of lane", READS, LIMITS, find)

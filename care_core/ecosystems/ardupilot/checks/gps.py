@@ -14,7 +14,8 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Span, during
-from care_core.ecosystems.ardupilot.statistics import Calibration, calibrated_probability, lasting
+from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import quantile
@@ -26,39 +27,61 @@ READS: Wanted = {
     "POS": ("Lat", "Lng"),
 }
 
-FROZEN_RECORDS, MOVED_M = 20, 20.0
-"""A receiver says the same position in so many records only if it is dead: while the estimate goes so far, 4 times the
-glitch radius, it must change."""
-
-JUMP_M, ACCELERATION = 5.0, 10.0
-FEWEST, FALL = 6, 3
-_TIMES_USUAL = 5.0
-POOR_HDOP, BAD_HDOP = 2.0, 2.5
-_SPEED_MS = 1.0
+LIMITS = Limits()
+FROZEN_RECORDS = LIMITS.add("records of one position", 20, "", "a choice: a live receiver's last digit moves")
+MOVED_M = LIMITS.add("way of the estimate meanwhile", 20.0, "m", "4 times the glitch radius")
+JUMP_M = LIMITS.add("jump that the velocity does not explain", 5.0, "m", "AP_GPS_Glitch: GPSGLITCH_RADIUS")
+ACCELERATION = LIMITS.add("acceleration that explains more", 10.0, "m/s^2", "AP_GPS_Glitch: GPSGLITCH_ACCEL")
+_TIMES_USUAL = LIMITS.add("jump over the usual ones", 5.0, "", "a choice: a velocity that never fits tells nothing")
+_LARGE = LIMITS.add("critical jump, in limits", 3.0, "", "a choice: the vehicle follows it")
+_SPEED_MS = LIMITS.add("speed that explains a step", 1.0, "m/s", "a choice: one at rest has a speed, too")
+_STEP_S = LIMITS.add("longest step", 3.0, "s", "a choice: over a longer one anything may have happened")
+FEWEST = LIMITS.add("fewest satellites", 6, "", "AP_NavEKF3_VehicleStatus.cpp")
+FALL = LIMITS.add("satellites lost at once", 3, "", "a choice: of those that there were")
+_FEW_S = LIMITS.add("shortest time of few satellites", 2.0, "s", "a choice: a bank hides some for a second")
+POOR_HDOP = LIMITS.add("poor HDop", 2.0, "", "ArduPilot, Diagnosing problems using logs")
+BAD_HDOP = LIMITS.add("bad HDop", 2.5, "", "AP_NavEKF3_VehicleStatus.cpp")
+_NO_HDOP = LIMITS.add("HDop that is none", 90.0, "", "receivers without a fix say 99.99")
+_POOR_S = LIMITS.add("shortest time of a poor geometry", 5.0, "s", "a choice")
+_NO_FIX_S = LIMITS.add("shortest loss of the fix", 0.5, "s", "a choice: two records")
+_LONG_S = LIMITS.add("critical loss of the fix", 5.0, "s", "a choice: the estimator drifts by metres then")
+_RATIO = LIMITS.add("test ratio of the estimator", 1.0, "", "AP_NavEKF3: above it the position is rejected")
+_HACC_M = LIMITS.add("accuracy of the position", 10.0, "m", "twice what the firmware's checks want")
+_SACC_MS = LIMITS.add("accuracy of the speed", 3.0, "m/s", "three times what the firmware's checks want")
 _METRES = 111319.5
 _FIX = 3
 _ERR_GPS, _ERR_GPS_LOST, _GLITCH = 11, 7, 2
-_JUMP: Calibration = ((1.0, 0.7), (1.5, 0.95), (3.0, 0.98))
-"""By metres over the limit; on the training table every flight with a jump over 5 m has a glitch."""
-_FEW: Calibration = ((1.0, 0.85), (1.5, 0.95))
-"""By 6 over the satellites there were; on the training table only flights with a failing receiver have 6 or fewer."""
-_LOST = 0.15
-"""Of 11 training flights with few satellites and no further harm 4 failed, of those without a failed part 48 %: none by
-it (the 0.6 of a warning counts as four flights)."""
+_JUMP = calibrated(
+    LIMITS, ((1.0, 0.7), (1.5, 0.95), (3.0, 0.98)), "every training flight with a jump over 5 m has a glitch", "a jump"
+)
+_FEW = calibrated(
+    LIMITS,
+    ((1.0, 0.85), (1.5, 0.95)),
+    "only training flights with a failing receiver have 6 satellites or fewer",
+    "too few satellites",
+)
+_LOST = LIMITS.add(
+    "probability that few satellites cost the mission", 0.15, "",
+    "4 of 11 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
+)  # fmt: skip
+_FROZEN = LIMITS.add("probability of a dead receiver", 0.9, "", "a choice: nothing else repeats a position")
+_NO_FIX = LIMITS.add("probability of a lost fix", 0.9, "", "the receiver's own word")
+_GLITCHED = LIMITS.add("probability of a reported glitch", 0.6, "", "a choice: the firmware's word, without the size")
+_DOUBTS = LIMITS.add("probability where it is only inaccurate", 0.4, "", "a choice: buildings and trees do that")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
     """What is wrong with the first receiver while it matters."""
     table = flight.one("GPS", "Status", "NSats")
     if table is None:
-        yield from _told(flight)
+        yield from _reported(flight)
         return
     own = table.where(flight.watch(table.t))
     yield from _frozen(flight, own)
     jumped = list(_jumps(flight, own))
     yield from jumped
     if not jumped:
-        yield from _told(flight)
+        yield from _reported(flight)
     lost = list(_lost(flight, own))
     yield from lost
     if not lost:
@@ -90,7 +113,7 @@ def _frozen(flight: Flight, table: Table) -> Iterator[Finding]:
             severity="warning",
             evidence=f"the same in {len(fixed)} records with a fix, while the estimate went {moved_m:.0f} m",
             source="GPS.Lat, Lng against POS.Lat, Lng",
-            probability=0.9,
+            probability=_FROZEN,
         )
 
 
@@ -109,7 +132,7 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
     off, dt = _unexplained(fixed)
     limit = JUMP_M + 0.25 * ACCELERATION * np.minimum(dt, 1.5) ** 2 * (fixed["Spd"][1:] > _SPEED_MS)
     limit = np.maximum(limit, _TIMES_USUAL * quantile(off, 0.9))  # a velocity that never fits tells nothing
-    beyond = np.flatnonzero((off > limit) & (dt < 3.0) & (dt > 0.01))
+    beyond = np.flatnonzero((off > limit) & (dt < _STEP_S) & (dt > 0.01))
     if not len(beyond):
         return
     start, size = float(t[1:][beyond[0]]), float(off[beyond].max())
@@ -120,7 +143,7 @@ def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:
         title=f"the GPS position jumps by {size:.0f} m",
         onset_s=start,
         end_s=float(t[1:][beyond[-1]]),
-        severity=_gravity(flight, start, size > 3 * JUMP_M or bool(estimate)),
+        severity=_severity(flight, start, size > _LARGE * JUMP_M or bool(estimate)),
         evidence=(
             f"{len(beyond)} jump{'s' * (len(beyond) > 1)} of up to {size:.1f} m that its own velocity does not explain "
             f"(limit {JUMP_M:g} m and 10 m/s^2){estimate}"
@@ -145,14 +168,14 @@ def _unexplained(table: Table) -> tuple[Floats, Floats]:
 
 
 def _upset(flight: Flight, start: float) -> bool:
-    return any(bool(np.any((one["SP"] > 1.0) & (one.t >= start - 1))) for one in flight.all("XKF4", "SP"))
+    return any(bool(np.any((one["SP"] > _RATIO) & (one.t >= start - 1))) for one in flight.all("XKF4", "SP"))
 
 
-def _gravity(flight: Flight, start: float, is_large: bool) -> Severity:
+def _severity(flight: Flight, start: float, is_large: bool) -> Severity:
     return "critical" if is_large and flight.airborne and start >= flight.airborne[0][0] - 5 else "warning"
 
 
-def _told(flight: Flight) -> Iterator[Finding]:
+def _reported(flight: Flight) -> Iterator[Finding]:
     """Glitches and losses as the firmware counted them."""
     inside = [(t, code) for t, code in flight.errors(_ERR_GPS) if code == _GLITCH and _in(flight.flown, t)]
     if inside:
@@ -165,7 +188,7 @@ def _told(flight: Flight) -> Iterator[Finding]:
             severity="warning",
             evidence=f"{len(inside)} GPS glitch{'es' * (len(inside) > 1)} reported in flight",
             source="ERR 11-2 (GPS glitch)",
-            probability=0.6,
+            probability=_GLITCHED,
         )
 
 
@@ -176,11 +199,11 @@ def _in(spans: tuple[Span, ...], t: float) -> bool:
 def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
     """A fix that went away in the air."""
     had = np.cumsum(table["Status"] >= _FIX) > 0
-    out = lasting(table.t, had & (table["Status"] < _FIX) & during(flight.flown, table.t), 0.5, records=2)
+    out = lasting(table.t, had & (table["Status"] < _FIX) & during(flight.flown, table.t), _NO_FIX_S, records=2)
     if out:
         start = out[0][0]
         total = sum(b - a for a, b in out)
-        severity: Severity = "critical" if total > 5 and not flight.all("GPS")[1:] else "warning"
+        severity: Severity = "critical" if total > _LONG_S and not flight.all("GPS")[1:] else "warning"
         yield Finding(
             kind="gps",
             title="the GPS fix was lost in the air",
@@ -189,7 +212,7 @@ def _lost(flight: Flight, table: Table) -> Iterator[Finding]:
             severity=severity,
             evidence=f"no 3D fix for {total:.0f} s",
             source="GPS.Status below 3",
-            probability=0.9,
+            probability=_NO_FIX,
         )
 
 
@@ -201,7 +224,7 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
     if len(t) < 3 or not (table["Status"] >= _FIX).any():
         return
     usual = quantile(flight.one("GPS", "NSats")["NSats"], 0.9)  # type: ignore[index]
-    few = lasting(t, sats < FEWEST, 2.0) or lasting(t, (sats <= FEWEST) & (sats <= usual - FALL), 2.0)
+    few = lasting(t, sats < FEWEST, _FEW_S) or lasting(t, (sats <= FEWEST) & (sats <= usual - FALL), _FEW_S)
     if few:
         start, end = few[0][0], few[-1][1]
         least = float(np.min(sats[(t >= start) & (t <= end)]))
@@ -212,7 +235,7 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
             onset_s=start,
             end_s=end,
             severity="critical" if harmed else "warning",
-            evidence=f"{least:.0f} satellites (the estimator wants {FEWEST}, {usual:.0f} were there)",
+            evidence=f"{least:.0f} satellites (the estimator wants {FEWEST:.0f}, {usual:.0f} were there)",
             source="GPS.NSats; 6: AP_NavEKF3_VehicleStatus.cpp",
             probability=calibrated_probability(FEWEST / max(least, 1.0), _FEW),
             mission_lost=None if harmed else _LOST,
@@ -220,7 +243,7 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
         return
     if "HDop" not in table.columns:
         return
-    poor = lasting(t, (table["HDop"] > BAD_HDOP) & (table["HDop"] < 90) & during(flight.flown, t), 5.0)
+    poor = lasting(t, (table["HDop"] > BAD_HDOP) & (table["HDop"] < _NO_HDOP) & during(flight.flown, t), _POOR_S)
     if poor:
         worst = float(np.max(table["HDop"][(t >= poor[0][0]) & (t <= poor[-1][1])]))
         yield Finding(
@@ -232,7 +255,7 @@ def _few(flight: Flight, table: Table) -> Iterator[Finding]:
             evidence=f"HDop up to {worst:.1f} (good below 1.5, poor above {POOR_HDOP:g})",
             source="GPS.HDop; ArduPilot, Diagnosing problems using logs",
             suspect="world",
-            probability=0.4,
+            probability=_DOUBTS,
         )
 
 
@@ -249,7 +272,9 @@ def _inaccurate(flight: Flight) -> Iterator[Finding]:
     table = flight.one("GPA", "HAcc", "SAcc")
     if table is None:
         return
-    bad = lasting(table.t, ((table["HAcc"] > 10) | (table["SAcc"] > 3)) & during(flight.flown, table.t), 5.0)
+    bad = lasting(
+        table.t, ((table["HAcc"] > _HACC_M) | (table["SAcc"] > _SACC_MS)) & during(flight.flown, table.t), _POOR_S
+    )
     if bad:
         part = table.between(bad[0][0], bad[-1][1])
         yield Finding(
@@ -258,8 +283,11 @@ def _inaccurate(flight: Flight) -> Iterator[Finding]:
             onset_s=bad[0][0],
             end_s=bad[-1][1],
             severity="warning",
-            evidence=f"accuracy down to {np.max(part['HAcc']):.1f} m and {np.max(part['SAcc']):.1f} m/s",
+            evidence=f"it expects errors of up to {np.max(part['HAcc']):.1f} m and {np.max(part['SAcc']):.1f} m/s",
             source="GPA.HAcc, SAcc; the firmware's checks want 5 m and 1 m/s",
             suspect="world",
-            probability=0.4,
+            probability=_DOUBTS,
         )
+
+
+CHECK = Check("gps", "jumps, glitches, lost fixes, few satellites, a poor geometry", READS, LIMITS, find)

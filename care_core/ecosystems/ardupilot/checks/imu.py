@@ -16,13 +16,14 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import (
-    Calibration,
     aligned,
+    calibrated,
     calibrated_probability,
     lasting,
     length,
     smooth,
 )
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median, quantile
@@ -34,26 +35,34 @@ READS: Wanted = {
     "XKF1": ("GX", "GY", "GZ"),
 }
 
-NOISE_DPS, OFFSET_DPS = 0.3, 5.0
-OFFSET_ACC = 3.0
-"""m/s^2: four times what arming allows, since arms flex and rotation moves sensors apart."""
-_DPS_PER_VIBE = 0.15
-"""What vibration may add, degrees/s a m/s^2."""
-_OF_RATE, _FAST_DPS = 0.06, 30.0
-"""Two gyros of 3 % scale each differ by this share of a rate (MPU-6000 datasheet: sensitivity tolerance +-3 %); below
-this mean rate that is nothing beside their noise."""
-_TURNS_OVER_S = 3.0
-"""Before it is lost a vehicle turns faster than two sensors can be compared for so long."""
-_USUAL_VIBE = 15.0
-_SHAKEN_DPS = 20.0
-_OFFSET_OVER_S = 15.0
-_LASTS_S = 3.0
-_CALIBRATION: Calibration = ((1.0, 0.7), (2.0, 0.93), (10.0, 0.97))
-"""By times over the limit; on the training table 12 of 13 flights with failing gyros exceed it, and no other: the
-noisiest healthy one has 0.07 degrees/s on its quietest axis."""
-_LOST = 0.15
-"""Of 10 training flights whose gyros were noisy while the attitude was held 4 failed, of those without a failed part
-48 %: none by it (the 0.6 of a warning counts as four flights)."""
+LIMITS = Limits()
+NOISE_DPS = LIMITS.add("noise on the quietest axis", 0.3, "deg/s", "the noisiest healthy training flight has 0.07")
+OFFSET_DPS = LIMITS.add("two gyros apart", 5.0, "deg/s", "AP_Arming: gyros inconsistent")
+OFFSET_ACC = LIMITS.add(
+    "two accelerometers apart", 3.0, "m/s^2", "four times ARMING_ACCTHRESH: arms flex, rotation moves sensors apart"
+)
+_DPS_PER_VIBE = LIMITS.add("noise that vibration adds, for each m/s^2", 0.15, "deg/s", "a choice")
+_ACC_PER_VIBE = LIMITS.add("difference that vibration adds, for each m/s^2", 0.3, "m/s^2", "a choice")
+_OF_RATE = LIMITS.add("share of a rate that two gyros differ by", 0.06, "", "MPU-6000: sensitivity +-3 % each")
+_FAST_DPS = LIMITS.add("rate below which that is nothing", 30.0, "deg/s", "a choice: noise is more")
+_TURNS_OVER_S = LIMITS.add("left out before control was lost", 3.0, "s", "a choice: it turns too fast to compare")
+_USUAL_VIBE = LIMITS.add("vibration where none is recorded", 15.0, "m/s^2", "a choice: half of what is acceptable")
+_SHAKEN_DPS = LIMITS.add("shaking that hides an offset", 20.0, "deg/s", "a choice: gyros are not sampled at once")
+_OFFSET_OVER_S = LIMITS.add("window of an offset", 15.0, "s", "a choice")
+_LASTS_S = LIMITS.add("shortest noise or offset", 3.0, "s", "a choice: a blow is over sooner")
+_UNHEALTHY_S = LIMITS.add("shortest time marked unhealthy", 0.5, "s", "a choice: more than one record")
+_HELD_DEG = LIMITS.add("attitude error of what no longer holds it", 10.0, "deg", "a choice")
+_HELD_SHARE = LIMITS.add("share of the flight with such an error", 0.02, "", "a choice")
+_WORSE = LIMITS.add("times the limit that cost the attitude", 1.5, "", "a choice")
+_CALIBRATION = calibrated(
+    LIMITS, ((1.0, 0.7), (2.0, 0.93), (10.0, 0.97)), "12 of 13 training flights with failing gyros exceed it, no other"
+)
+_LOST = LIMITS.add(
+    "probability that noise costs the mission", 0.15, "",
+    "4 of 10 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
+)  # fmt: skip
+_FAILED = LIMITS.add("probability of a sensor marked unhealthy", 0.9, "", "the firmware's own word")
+_APART = LIMITS.add("probability of accelerometers apart", 0.7, "", "a choice: one of two is wrong")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -74,7 +83,7 @@ def _unhealthy(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
         for flag, name in (("GH", "gyro"), ("AH", "accelerometer")):
             if flag not in table.columns or not (table[flag] == 1).any():
                 continue
-            spans = lasting(table.t, table[flag] == 0, 0.5)
+            spans = lasting(table.t, table[flag] == 0, _UNHEALTHY_S)
             if spans:
                 yield Finding(
                     kind="imu",
@@ -84,7 +93,7 @@ def _unhealthy(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
                     severity="critical",
                     evidence=f"{name} {n} is marked unhealthy for {sum(b - a for a, b in spans):.1f} s",
                     source=f"IMU.{flag}",
-                    probability=0.9,
+                    probability=_FAILED,
                 )
 
 
@@ -159,8 +168,8 @@ def _severity(flight: Flight, ratio: float, start: float) -> Severity:
     error = flight.lean_error
     if flight.lost_control_s is not None or error is None:
         return "critical" if flight.lost_control_s is not None else "warning"
-    bad = (error[1] > 10.0) & (error[0] >= start) & during(flight.flown, error[0])
-    return "critical" if bad.mean() > 0.02 and ratio > 1.5 else "warning"
+    bad = (error[1] > _HELD_DEG) & (error[0] >= start) & during(flight.flown, error[0])
+    return "critical" if bad.mean() > _HELD_SHARE and ratio > _WORSE else "warning"
 
 
 def _accelerometers(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
@@ -169,7 +178,7 @@ def _accelerometers(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
     t = sensors[0].t
     steady = [smooth(t, sensors[0][a] - aligned(t, sensors[1].t, sensors[1][a]), 10.0) for a in ACCELEROMETERS]
     apart = length(steady)
-    limit = OFFSET_ACC + 0.3 * _vibration(flight, t)
+    limit = OFFSET_ACC + _ACC_PER_VIBE * _vibration(flight, t)
     spans = lasting(t, apart > limit, _LASTS_S)
     if spans:
         inside = (t >= spans[0][0]) & (t <= spans[-1][1])
@@ -184,5 +193,8 @@ def _accelerometers(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:
                 "vibration explains)"
             ),
             source="IMU.AccX, AccY, AccZ of both; ARMING_ACCTHRESH 0.75 m/s^2 at rest",
-            probability=0.7,
+            probability=_APART,
         )
+
+
+CHECK = Check("imu", "noisy, unhealthy or inconsistent gyros and accelerometers", READS, LIMITS, find)

@@ -8,6 +8,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
 from care_core.numbers import median, pauses
@@ -15,11 +16,19 @@ from care_core.numbers import median, pauses
 READS: Wanted = {"ATT": ("Roll",), "RCOU": ("C1",), "POWR": ("Vcc",)}
 
 _STEADY = ("ATT", "RCOU", "CTUN", "IMU")
-_HOLE_S, _TIMES = 2.0, 20.0
-_SWITCHED_S = 1.0
-_HIGH_M = 2.0
-_FALLS_V = 0.3
-"""Twice the swing that ArduPilot's page on brown-outs calls normal."""
+LIMITS = Limits()
+_HOLE_S = LIMITS.add("shortest hole", 2.0, "s", "a choice: a busy card may keep a logger waiting for a second")
+_TIMES = LIMITS.add("shortest hole, in usual steps", 20.0, "", "a choice: of logs that are thinned")
+_SWITCHED_S = LIMITS.add("around arming and disarming", 1.0, "s", "a choice: loggers are opened and closed there")
+_HIGH_M = LIMITS.add("height of an end in the air", 2.0, "m", "a choice: more than any estimate drifts in a flight")
+_LIFTING = LIMITS.add("throttle of an end in the air", 0.2, "", "a choice: armed motors idle below it")
+_FALLS_V = LIMITS.add(
+    "fall of the board's supply", 0.3, "V", "ArduPilot, Power module and brown-outs: twice the swing that is normal"
+)
+_LEAST_V = LIMITS.add("supply that is recorded", 1.0, "V", "a choice: below it nothing measures")
+_HOLE = LIMITS.add("probability of a hole", 0.3, "", "a choice: most are the card's")
+_POWER_LOST = LIMITS.add("probability of lost power", 0.7, "", "a choice: the supply fell before")
+_ENDS = LIMITS.add("probability of an end in the air", 0.4, "", "a choice: recordings are stopped, too")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -48,7 +57,7 @@ def _holes(flight: Flight) -> Iterator[Finding]:
                 evidence=f"{len(low)} times, {total:.1f} s in all; the vehicle's own log has no such holes",
                 source="times of the telemetry",
                 suspect="world",
-                probability=0.3,
+                probability=_HOLE,
             )
             return
         yield Finding(
@@ -59,7 +68,7 @@ def _holes(flight: Flight) -> Iterator[Finding]:
             severity="warning",
             evidence=f"{total:.1f} s without any record (limit {limit:.0f} s)",
             source="times of ATT, RCOU, CTUN, IMU",
-            probability=0.3,
+            probability=_HOLE,
         )
 
 
@@ -82,7 +91,7 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
     if not flight.is_copter or height is None:
         return
     last_m = float(median(height[1][-3:]))
-    if not last_m > _HIGH_M or not (throttle is None or float(median(throttle[1][-3:])) > 0.2):
+    if not last_m > _HIGH_M or not (throttle is None or float(median(throttle[1][-3:])) > _LIFTING):
         return
     sagging = _supply_falls(flight)
     yield Finding(
@@ -94,7 +103,7 @@ def _ends_in_the_air(flight: Flight) -> Iterator[Finding]:
         evidence=f"armed {last_m:.0f} m up at the last record: "
         + (sagging or "power was lost or the recording was stopped"),
         source="EV, ARM, CTUN, POS, POWR",
-        probability=0.7 if sagging else 0.4,
+        probability=_POWER_LOST if sagging else _ENDS,
     )
 
 
@@ -105,4 +114,7 @@ def _supply_falls(flight: Flight) -> str:
         return ""
     volts = np.where(table["Vcc"] > 100, table["Vcc"] / 1000, table["Vcc"])
     usual, last = float(median(volts)), float(np.min(volts[-3:]))
-    return f"Vcc fell from {usual:.2f} to {last:.2f} V" if usual - last > _FALLS_V and last > 1.0 else ""
+    return f"Vcc fell from {usual:.2f} to {last:.2f} V" if usual - last > _FALLS_V and last > _LEAST_V else ""
+
+
+CHECK = Check("log", "holes in the log, and an end in the air", READS, LIMITS, find)

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
-from care_core.ecosystems.ardupilot.statistics import Calibration, calibrated_probability, lasting, means, records
+from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, means, records
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.vehicles import Motor, motors_of
 from care_core.logs.base import Table, Wanted
@@ -29,31 +30,54 @@ READS: Wanted = {
     "ESC": ("RPM",),
 }
 
-ALONE = 0.08
-"""Share of an output's range by which one motor alone stands above the middle of its peers. In nine of ten healthy
-training flights none does by 0.02, and the rest swing; a twisted arm or a battery off the middle moves motors in pairs.
-"""
-_NEXT = 0.6
-"""The next motor must stand below this share of that."""
-_ROOM, _ROOM_FLYING = 0.7, 0.85
-"""Peers above this share are near their limit themselves: then there is too little thrust, not one weak motor."""
-_STEADY = 2.0
-"""Least ratio of the excess to its own swings: all motors of a vehicle that oscillates are up in turn."""
-_WINDOW_S = 4.0
-_STAYS = 0.7
-"""A weak motor stays weak: for so much of the flight that is left."""
-_LASTS_S = 4.0
-_TRYING_S = 12.0
-_LIFTING = 0.2
-_CALM_DEG, _CLEARLY = 12.0, 0.15
-_FALL_S = 1.2
-"""So long after control was lost the vehicle falls to the side that lost it, before it tumbles."""
-_AT_LIMIT = 0.97
-_CALIBRATION: Calibration = ((1.0, 0.7), (2.0, 0.85))
-"""By the excess over ALONE; on the training table 9 of 12 flights with one motor so far above the others, to stay, have
-a weak one, and the other three fail for another part's sake."""
-_ALWAYS: Calibration = ((1.0, 0.3), (2.0, 0.5))
-"""Of one that stood above the others from the start: a twisted arm or an uneven load looks the same."""
+LIMITS = Limits()
+ALONE = LIMITS.add(
+    "output of one motor above its peers", 0.08, "of the range",
+    "in nine of ten healthy training flights none is 0.02 above; a twisted arm or an uneven load moves motors in pairs",
+)  # fmt: skip
+_NEXT = LIMITS.add("share of that which the next motor may have", 0.6, "", "a choice: one motor, not a pair")
+_ROOM = LIMITS.add(
+    "output of the peers on the ground", 0.7, "of the range", "a choice: above it all are at their limit"
+)
+_ROOM_FLYING = LIMITS.add(
+    "output of the peers in the air", 0.85, "of the range", "a choice: above it all have too little"
+)
+_STEADY = LIMITS.add("excess over its swings", 2.0, "", "a choice: what oscillates has all motors up in turn")
+_WINDOW_S = LIMITS.add("window of an excess", 4.0, "s", "a choice: a turn is over sooner")
+_STAYS = LIMITS.add("share of the rest of the flight", 0.7, "", "a choice: a weak motor stays weak")
+_LASTS_S = LIMITS.add("shortest excess", 4.0, "s", "a choice: a turn is over sooner")
+_TRYING_S = LIMITS.add("first seconds of trying to lift", 12.0, "s", "a choice: then integrators wind up")
+_LIFTING = LIMITS.add("output that lifts", 0.2, "of the range", "a choice: armed motors idle below it")
+_UPRIGHT_DEG = LIMITS.add("lean of what still flies", 60.0, "deg", "a choice: beyond it motors are told to right it")
+_CALM_DEG = LIMITS.add("attitude error before control was lost", 12.0, "deg", "a choice: what drifts off lost no motor")
+_TIPS_DEG = LIMITS.add("lean off the demand towards a motor", 10.0, "deg", "a choice: less points nowhere")
+_TOWARDS = LIMITS.add("share of a motor in that direction", 0.15, "", "a choice: it lies on that side")
+_ASKED = LIMITS.add("output of a motor that gave nothing", 0.6, "of the range", "a choice: asked for much, and clearly")
+_CLEARLY = LIMITS.add("that output above its peers", 0.15, "of the range", "a choice")
+_MOSTLY = LIMITS.add("share of records in which it is the highest", 0.6, "", "a choice: else motors take turns")
+_FALL_S = LIMITS.add("fall to the side that lost it", 1.2, "s", "a choice: then it tumbles")
+_AT_LIMIT = LIMITS.add("output at its limit", 0.97, "of the range", "a choice: outputs are rounded")
+_LIMITED = LIMITS.add("critical share of the time at its limit", 0.2, "", "a choice: nothing is left to give")
+_FAR = LIMITS.add("critical excess, in limits", 4.0, "", "a choice")
+_CHANGED = LIMITS.add("share of an excess that it had before", 1 / 3, "", "a choice: then it was even")
+_TURNS = LIMITS.add("share of the others' speed at which it stopped", 0.3, "", "a choice: idling is more")
+_TURNING_RPM = LIMITS.add("speed of motors that turn", 1000.0, "1/min", "a choice: idling is more")
+_CALIBRATION = calibrated(
+    LIMITS,
+    ((1.0, 0.7), (2.0, 0.85)),
+    "9 of 12 training flights with such a motor have a weak one, the other three fail for another part's sake",
+    "the excess",
+)
+_ALWAYS = calibrated(
+    LIMITS,
+    ((1.0, 0.3), (2.0, 0.5)),
+    "a choice: a twisted arm or an uneven load looks the same",
+    "an excess from the start on",
+)
+_GAVE_NOTHING = LIMITS.add("probability where it fell towards a motor", 0.85, "", "a choice: outputs are told often")
+_PERHAPS = LIMITS.add("probability where it fell, of few records", 0.6, "", "a choice")
+_REPORTED = LIMITS.add("probability of a reported thrust loss", 0.2, "", "a choice: it names who is asked for most")
+_STOPPED = LIMITS.add("probability of a motor that stopped", 0.95, "", "its controller's own word")
 _THRUST_LOSS = re.compile(r"Potential Thrust Loss \((\d+)\)")
 _SOURCE = "RCOU of each motor against the middle of the others"
 
@@ -84,7 +108,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     outputs = _outputs(flight)
     if outputs is None:
         return
-    for test in (_stopped, _fell_towards, _weak, _told):
+    for test in (_stopped, _fell_towards, _weak, _reported):
         found = next(iter(test(flight, outputs)), None)
         if found is not None:
             yield found
@@ -134,7 +158,7 @@ def _lifting(flight: Flight, outputs: _Outputs) -> Mask:
         lifting[rows] &= median(outputs.share(rows), axis=0) > _LIFTING
     lifting &= ~during(flight.held, t)
     if (tilt := flight.tilt) is not None:
-        lifting &= np.interp(t, *tilt) < 60.0
+        lifting &= np.interp(t, *tilt) < _UPRIGHT_DEG
     if flight.flown:
         return lifting & during(flight.flown, t)
     return lifting & (t < t[lifting][0] + _TRYING_S) if lifting.any() else lifting
@@ -191,7 +215,7 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     share = outputs.share(lifting & (outputs.t >= start))
     limit = float((share[n] > _AT_LIMIT).mean())
     before = _of_one(means(_excess(outputs, lifting), window), n)[t < start - 2.0]
-    changed = len(before) >= 5 and float(median(before)) < size / 3
+    changed = len(before) >= 5 and float(median(before)) < size * _CHANGED
     over = size / ALONE
     yield _finding(
         outputs.motors[n], "lost thrust" if changed or over > 2 else "works harder than the others", start, end,
@@ -207,7 +231,7 @@ def _weak(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
 def _severity(flight: Flight, limit: float, size: float) -> Severity:
     """Critical where it has nothing left to give, or where control was lost after it."""
     lost = flight.lost_control_s is not None or flight.impact_s is not None
-    return "critical" if lost or limit > 0.2 or size > 4 * ALONE else "warning"
+    return "critical" if lost or limit > _LIMITED or size > _FAR * ALONE else "warning"
 
 
 def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
@@ -221,7 +245,7 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         return
     roll = float(np.mean((table["Roll"] - table["DesRoll"])[rows]))
     pitch = float(np.mean((table["Pitch"] - table["DesPitch"])[rows]))
-    if np.hypot(roll, pitch) < 10.0:
+    if np.hypot(roll, pitch) < _TIPS_DEG:
         return
     down = flight.impact_s if flight.impact_s is not None else lost + 2.0
     windows = ((lost - 0.2, lost + 0.8), (lost - 1.0, max(lost, min(lost + 2.0, down))), (lost - 3.0, lost + 2.0))
@@ -233,13 +257,13 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     share = median(asked_of, axis=1)
     # A motor pushes its own corner up: where it gives nothing, that corner goes down.
     towards = np.array([-(motor.roll * roll + motor.pitch * pitch) for motor in outputs.motors]) / np.hypot(roll, pitch)
-    score = np.where(towards > 0.15, share, -1.0)
+    score = np.where(towards > _TOWARDS, share, -1.0)
     n = int(np.argmax(score + 0.2 * towards))
     others = np.delete(share, n)
-    if score[n] < 0.6 or share[n] - float(median(others)) < _CLEARLY:
+    if score[n] < _ASKED or share[n] - float(median(others)) < _CLEARLY:
         return
     most = np.argmax(asked_of, axis=0) == n
-    if most.mean() < 0.6:  # asked for in turn with others: an oscillation
+    if most.mean() < _MOSTLY:  # asked for in turn with others: an oscillation
         return
     around = (outputs.t > lost - 2.0) & (outputs.t <= lost + 1.0)
     begin = outputs.t[around][outputs.share(around)[n] > _AT_LIMIT]
@@ -247,7 +271,7 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         outputs.motors[n], "gave no thrust", min(float(begin[0]) if len(begin) else lost, lost), lost + 1.0, "critical",
         f"asked for {100 * share[n]:.0f} % (others {100 * median(others):.0f} %), yet the vehicle fell towards it: "
         f"{roll:+.0f} degrees of roll and {pitch:+.0f} of pitch off the demand",
-        f"{_SOURCE}, and ATT", 0.85 if near[0].sum() > 3 else 0.6,
+        f"{_SOURCE}, and ATT", _GAVE_NOTHING if near[0].sum() > 3 else _PERHAPS,
     )  # fmt: skip
 
 
@@ -260,7 +284,7 @@ def _was_calm(flight: Flight, lost: float) -> bool:
     return len(before) < 2 or quantile(before, 0.8) < _CALM_DEG
 
 
-def _told(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+def _reported(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     """The firmware's thrust loss check, which names the motor that is asked for most. Where another is asked for as
     much, as when it turns against its will, neither is weak."""
     for t, text in flight.messages:
@@ -275,7 +299,7 @@ def _told(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
             if motor is not None and not crowded and is_alone:
                 severity: Severity = "critical" if flight.impact_s is not None else "warning"
                 yield _finding(motor, "lost thrust", t, flight.end_s, severity, f"the firmware says: {text}",
-                               "MSG; thrust_loss_check of ArduCopter", 0.2)  # fmt: skip
+                               "MSG; thrust_loss_check of ArduCopter", _REPORTED)  # fmt: skip
                 return
 
 
@@ -288,11 +312,11 @@ def _stopped(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
     rpm = np.stack([np.interp(t, one.t, one["RPM"]) for one in speeds])
     usual = median(rpm, axis=0)
     for n, row in enumerate(rpm):
-        spans = lasting(t, (row < 0.3 * usual) & (usual > 1000) & flight.watch(t), 0.5)
+        spans = lasting(t, (row < _TURNS * usual) & (usual > _TURNING_RPM) & flight.watch(t), 0.5)
         if spans and n < len(outputs.motors):
             yield _finding(outputs.motors[n], "stopped", spans[0][0], spans[-1][1], "critical",
                            f"its controller reports {median(row[t >= spans[0][0]]):.0f} turns a minute, the others "
-                           f"{median(usual):.0f}", "ESC.RPM", 0.95)  # fmt: skip
+                           f"{median(usual):.0f}", "ESC.RPM", _STOPPED)  # fmt: skip
             return
 
 
@@ -312,3 +336,6 @@ def _finding(
         source=source,
         probability=probability,
     )
+
+
+CHECK = Check("motor", "a motor, controller or propeller that gives too little thrust", READS, LIMITS, find)

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity, Suspect
 from care_core.logs.base import Wanted
 
@@ -24,10 +25,14 @@ _BY_OPERATOR = re.compile(
 )
 """Complaints of what the pilot has to do or somebody to set up before a start: sticks, switches, mode, calibration.
 None of them reads a parameter that a flight is tuned by (AP_Arming.cpp, AP_Arming_Copter.cpp, RC_Channel.cpp)."""
-_SURE = 0.95
-"""The firmware says itself that this kept it from arming."""
-_STARTING_S = 30.0
-"""Complaints that end within this time of the start are those of sensors that warm up."""
+LIMITS = Limits()
+_SURE = LIMITS.add(
+    "probability of what the pilot has to do", 0.95, "", "the firmware says itself that this kept it from arming"
+)
+_BY_SETTING = LIMITS.add("probability of a parameter", 0.3, "", "a choice: a sensor may be the reason as well")
+_STARTING_S = LIMITS.add(
+    "how long before the last a refusal counts", 30.0, "s", "AP_Arming repeats complaints every 30 s"
+)
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -55,10 +60,13 @@ def find(flight: Flight) -> Iterator[Finding]:
         evidence="; ".join(dict.fromkeys(_plain(one) for _, one, _ in lasting)),
         source="MSG",
         suspect=suspect,
-        probability=_SURE if by_operator else 0.3,
+        probability=_SURE if by_operator else _BY_SETTING,
     )
 
 
 def _plain(why: str) -> str:
     """A complaint without the numbers that change from one to the next."""
     return re.sub(r"\s*\([^)]*\d[^)]*\)", "", why)
+
+
+CHECK = Check("prearm", "arming that was refused to the end of the log", READS, LIMITS, find)

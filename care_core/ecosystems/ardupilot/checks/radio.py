@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Wanted
 
 READS: Wanted = {}
 
-_LINKS = {5: "the radio link was lost", 8: "the ground station link was lost"}
-_WORDS = {5: ("radio failsafe", "throttle failsafe"), 8: ("gcs failsafe",)}
-_BRIEF_S = 1.0
+_RADIO, _GROUND_STATION = 5, 8
+_LINKS = {_RADIO: "the radio link was lost", _GROUND_STATION: "the ground station link was lost"}
+_WORDS = {_RADIO: ("radio failsafe", "throttle failsafe"), _GROUND_STATION: ("gcs failsafe",)}
+LIMITS = Limits()
+_BRIEF_S = LIMITS.add("loss that explains no crash", 1.0, "s", "a choice")
+_LOST = LIMITS.add("probability of a lost link", 0.8, "", "the firmware's own word")
+_BRIEF = LIMITS.add("probability of a brief loss", 0.3, "", "a choice: links drop frames now and then")
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -28,7 +33,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         back = [t for t, code in told if code == 0 and t > gone[0]]
         end = back[0] if back else flight.watched[-1][1]
         away = end - gone[0]
-        severity: Severity = "warning" if away < _BRIEF_S or subsystem == 8 else "critical"
+        severity: Severity = "warning" if away < _BRIEF_S or subsystem == _GROUND_STATION else "critical"
         if not flight.armed:
             severity = "info"  # a transmitter that is switched off on the ground
         yield Finding(
@@ -40,5 +45,8 @@ def find(flight: Flight) -> Iterator[Finding]:
             evidence=f"failsafe at {gone[0]:.1f} s, " + (f"back after {away:.1f} s" if back else "not back"),
             source=f"ERR {subsystem}",
             suspect="world",
-            probability=0.3 if away < _BRIEF_S else 0.8,
+            probability=_BRIEF if away < _BRIEF_S else _LOST,
         )
+
+
+CHECK = Check("radio", "a lost radio or ground station link", READS, LIMITS, find)

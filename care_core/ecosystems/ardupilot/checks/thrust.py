@@ -13,22 +13,30 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity, Suspect
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 
 READS: Wanted = {"CTUN": ("ThO", "Alt", "DAlt", "CRt", "DCRt"), "MOTB": ("ThLimit", "LiftMax")}
 
-HOVER_MOST = 0.6875
-FULL = 0.95
-_LASTS_S, _FULL_LASTS_S = 10.0, 3.0
-_BELOW_M = 2.0
-_GROUNDED_S = 5.0
-SPIN_MOST = 0.9
+LIMITS = Limits()
+HOVER_MOST = LIMITS.add("hover throttle", 0.6875, "", "AP_MotorsMulticopter.h: AP_MOTORS_THST_HOVER_MAX")
+_LASTS_S = LIMITS.add("shortest hover at a high throttle", 10.0, "s", "a choice: a climb is over sooner")
+_SHARE = LIMITS.add("share of the flight at a high throttle", 0.3, "", "a choice: gusts take less")
+FULL = LIMITS.add("throttle of all that the motors have", 0.95, "", "a choice: MOT_SPIN_MAX as shipped")
+_FULL_LASTS_S = LIMITS.add("shortest time at full throttle", 3.0, "s", "a choice: a gust is over sooner")
+_BELOW_M = LIMITS.add("height below the one wanted", 2.0, "m", "a choice: height control is within a metre")
+_GROUNDED_S = LIMITS.add("full throttle on the ground", 5.0, "s", "a choice: a take-off takes less")
+SPIN_MOST = LIMITS.add("MOT_SPIN_MAX that keeps motors down", 0.9, "", "AP_MotorsMulticopter: 0.95 as shipped")
+_FLYING = LIMITS.add("least throttle in the air", 0.05, "", "a choice: above it motors turn")
+_PROBABILITY: Mapping[Suspect, float] = {
+    "hardware": LIMITS.add(
+        "probability of a weak part", 0.3, "", "7 of 83 such training flights have one, and those vary little in weight"
+    ),
+    "parameter": LIMITS.add("probability of a weak part where MOT_SPIN_MAX is low", 0.1, "", "the same 83 flights"),
+}
 _FAILSAFE_BATT = 6
-_PROBABILITY: Mapping[Suspect, float] = {"hardware": 0.3, "parameter": 0.1}
-"""On the training table 7 of 83 such flights have a weak motor, pack or worse; what a vehicle weighs it varies little,
-hence more than that where no option keeps the motors down."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -37,7 +45,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     if not flight.is_copter or flight.kind == "heli" or driven is None:
         return  # what a helicopter records as throttle is its collective pitch
     t, throttle = driven
-    flown = during(flight.flown or flight.watched, t) & (throttle > 0.05)
+    flown = during(flight.flown or flight.watched, t) & (throttle > _FLYING)
     if flown.sum() < 5:
         return
     level = smooth(t, throttle, 4.0)
@@ -69,7 +77,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             suspect=suspect,
             probability=_PROBABILITY[suspect],
         )
-    elif high and sum(b - a for a, b in high) > 0.3 * float(flown.sum()) * float(median(np.diff(t))):
+    elif high and sum(b - a for a, b in high) > _SHARE * float(flown.sum()) * float(median(np.diff(t))):
         share = float(median(level[flown]))
         suspect, why = _by_option(flight)
         yield Finding(
@@ -111,3 +119,6 @@ def _below(flight: Flight, start: float, end: float) -> float:
     part = table.between(start, end)
     gap = float(median(part["DAlt"] - part["Alt"])) if len(part) else 0.0
     return gap if gap > _BELOW_M else 0.0
+
+
+CHECK = Check("thrust", "motors at their limit, or a high hover throttle", READS, LIMITS, find)

@@ -14,7 +14,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import (
-    Calibration,
+    calibrated,
     calibrated_probability,
     lasting,
     length,
@@ -23,6 +23,7 @@ from care_core.ecosystems.ardupilot.statistics import (
     steady,
     top,
 )
+from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import quantile
@@ -33,17 +34,33 @@ READS: Wanted = {
     "XKF4": ("SV", "SH"),
 }
 
-FELT, HIGH, SEVERE = 15.0, 30.0, 60.0
-ROSE = 10.0
-"""m/s^2: the least that counts where it rose to five times what it was: within the acceptable, yet something came
-loose. No healthy flight of the training table reaches 2.2."""
-_TIMES = 5.0
-_CLIPS = 100
-_LASTS_S = 2.0
-_SPIN_UP_S = 4.0
+LIMITS = Limits()
+_PAGE = "ArduPilot, Measuring Vibration"
+FELT = LIMITS.add("vibration worth a word", 15.0, "m/s^2", "half of what is acceptable")
+HIGH = LIMITS.add("acceptable vibration", 30.0, "m/s^2", _PAGE)
+SEVERE = LIMITS.add("severe vibration", 60.0, "m/s^2", _PAGE)
+ROSE = LIMITS.add(
+    "vibration that rose", 10.0, "m/s^2",
+    "a choice: acceptable, yet something came loose; no healthy training flight reaches 2.2",
+)  # fmt: skip
+_TIMES = LIMITS.add("times of what it was before", 5.0, "", "a choice")
+_CLIPS = LIMITS.add("clips of an accelerometer's range", 100, "", _PAGE)
+_MANY = LIMITS.add("critical clips, in limits", 10, "", "a choice")
+_LASTS_S = LIMITS.add("shortest vibration", 2.0, "s", "a choice: a blow fades within a second")
+_SPIN_UP_S = LIMITS.add("left out after arming", 4.0, "s", "a choice: motors that start shake")
+_RATIO = LIMITS.add("test ratio of the estimator", 1.0, "", "AP_NavEKF3: above it a measurement is rejected")
+_UPSET_S = LIMITS.add("shortest rejection by the estimator", 1.0, "s", "a choice: single outliers are usual")
+_RAW = LIMITS.add("leap of an acceleration, without VIBE", 5.0, "m/s^2", "ArduPilot's advice for logs without VIBE")
+_RAW_SEVERE = LIMITS.add("critical leap of an acceleration", 15.0, "m/s^2", "a choice: three times that")
+_LEVEL_DEG = LIMITS.add("lean at which accelerations are looked at", 15.0, "deg", "a choice: a lean changes them")
+_CALIBRATION = calibrated(
+    LIMITS,
+    ((0.5, 0.5), (1.0, 0.9), (2.0, 0.97)),
+    "every training flight above 10 m/s^2 has failing accelerometers (15 of 15)",
+    "acceptable vibration",
+)
+_RAW_PROBABILITY = LIMITS.add("probability without VIBE", 0.6, "", "a choice: accelerations alone tell less")
 _FAILSAFE_VIBE = 29
-_CALIBRATION: Calibration = ((0.5, 0.5), (1.0, 0.9), (2.0, 0.97))
-"""By level over HIGH; on the training table every flight above ROSE has failing accelerometers (15 of 15)."""
 _SOURCE = "VIBE; limits 30 and 60 m/s^2: ArduPilot, Measuring Vibration"
 
 
@@ -113,7 +130,7 @@ def _clipping(table: Table, calm: np.ndarray) -> tuple[float, float]:
 
 def _severity(flight: Flight, peak: float, clips: float, is_upset: bool, has_risen: bool) -> Severity:
     """Critical where it is severe, made the firmware go over to its vibration failsafe, or upset the estimator."""
-    if peak > SEVERE or clips >= 10 * _CLIPS or any(code for _, code in flight.errors(_FAILSAFE_VIBE)) or is_upset:
+    if peak > SEVERE or clips >= _MANY * _CLIPS or any(code for _, code in flight.errors(_FAILSAFE_VIBE)) or is_upset:
         return "critical"
     return "warning" if peak > HIGH or clips >= _CLIPS or has_risen else "info"
 
@@ -123,7 +140,9 @@ def _upset(flight: Flight) -> list[float]:
     return [
         start
         for core in flight.all("XKF4", "SV", "SH")
-        for start, _ in lasting(core.t, ((core["SV"] > 1.0) | (core["SH"] > 1.0)) & flight.watch(core.t), 1.0)
+        for start, _ in lasting(
+            core.t, ((core["SV"] > _RATIO) | (core["SH"] > _RATIO)) & flight.watch(core.t), _UPSET_S
+        )
     ]
 
 
@@ -136,21 +155,24 @@ def _raw(flight: Flight) -> Finding | None:
     t = table.t
     calm = during(flight.flown, t)
     if flight.tilt is not None:
-        calm &= np.interp(t, *flight.tilt) < 15
+        calm &= np.interp(t, *flight.tilt) < _LEVEL_DEG
     rough = smooth(t, length(roughness(table[axis]) for axis in ("AccX", "AccY", "AccZ")), 2.0)
-    spans = lasting(t, calm & (rough > 5.0), _LASTS_S)
+    spans = lasting(t, calm & (rough > _RAW), _LASTS_S)
     if not spans:
         return None
     start, end = spans[0][0], spans[-1][1]
     peak = top(rough[calm & (t >= start) & (t <= end)], 0.9)
-    severity: Severity = "critical" if peak > 15 else "warning"
+    severity: Severity = "critical" if peak > _RAW_SEVERE else "warning"
     return Finding(
         kind="vibration",
         title=f"strong vibration ({peak:.0f} m/s^2)",
         onset_s=start,
         end_s=end,
         severity=severity,
-        evidence=f"accelerations leap by {peak:.0f} m/s^2 from record to record for {end - start:.0f} s (limit 5)",
+        evidence=f"accelerations jump by {peak:.0f} m/s^2 between records for {end - start:.0f} s (limit {_RAW:g})",
         source="IMU; limits of 3 and 5 m/s^2 for logs without VIBE: ArduPilot, Measuring Vibration",
-        probability=0.6,
+        probability=_RAW_PROBABILITY,
     )
+
+
+CHECK = Check("vibration", "vibration of the inertial sensors, and clipping of their range", READS, LIMITS, find)
