@@ -13,6 +13,7 @@ from typing import Any
 
 from typer.main import get_command
 
+from care_core.lint.rules import RULES
 from care_core.logs.formats import FORMATS
 from care_core.profile.store import load_profile
 from care_tui.cli import command_line
@@ -74,6 +75,11 @@ def log_formats() -> str:
     return table(("name", "log", "files"), rows)
 
 
+def lint_rules() -> str:
+    """What `care lint` looks for."""
+    return table(("rule", "finds", "known from"), ((f"`{rule.id}`", rule.about, rule.source) for rule in RULES))
+
+
 def profiles() -> str:
     """The profiles that come with the program, with their skill on runs that were left out of training."""
     header = ("profile", "platform", "runs", "parameters", "AUC", "calibration error")
@@ -94,6 +100,7 @@ def _profile(folder: Path) -> Iterator[str]:
 TABLES: dict[str, Callable[[], str]] = {
     "commands": commands,
     "exit codes": exit_codes,
+    "lint rules": lint_rules,
     "log formats": log_formats,
     "profiles": profiles,
 }

@@ -42,7 +42,7 @@ WALK = (
         "Distribution",
         "The log is read, and the app stands at the first objective outside its threshold.",
     ),
-    Step(("1",), "took off", "What happened? Findings, had there been any, then the account of the flight."),
+    Step(("1",), "took off", "What happened? Findings, had there been any, then the timeline of the flight."),
     Step(("G", "p"), "(wanted)", "The plots, at the moment under the cursor: dotted what was wanted."),
     Step(("2",), "Distribution", "A digit leaves the plots, back to the objectives."),
     Step(
