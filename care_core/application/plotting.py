@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from care_core.application.case import Case
 from care_core.application.sharing import EVERYTHING, Sharing
-from care_core.application.signal_words import meanings_of
 from care_core.application.signals import Line as Values
 from care_core.application.signals import Signal, Source, lines_of, signals_of, whole_of
 from care_core.application.viewing import log_of
+from care_core.ecosystems.dictionary import Field
+from care_core.ecosystems.registry import ecosystem_of
 from care_core.numbers import median
 from care_core.records import replace
 from care_core.report.marks import Mark, marks_of
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from care_core.ecosystems.findings import Finding
+    from care_core.logs.base import Log
 
 MOST_PLOTS, FEWEST, MOST_OTHERS = 8, 6, 10
 """Plots that matter at most and, with others, at least; and how many more."""
@@ -30,6 +32,8 @@ MOST_POINTS = 400
 MOST_MARKS = 16
 _SAME = 12
 """Letters that two marks of one second share where they say the same."""
+_POSITION = re.compile(r"position\.|(^|\.)(latitude|longitude|altitude)$")
+"""Fields of ROS messages that say where a robot was, of whatever type."""
 _LONGEST_GAP, _LEAST_GAP = 5.0, 0.01
 """A line is broken where it has no value for so many of its usual intervals, and for this share of the span."""
 
@@ -127,10 +131,21 @@ def ranked(case: Case, sharing: Sharing = EVERYTHING) -> tuple[list[list[Signal]
 
     groups = list(_groups(signals_of(case)))
     if not sharing.positions:
-        meaning = meanings_of(log_of(case))
+        meaning = _meanings(log_of(case))
         groups = [group for group in groups if not any(meaning(one.channel, one.field).is_position for one in group)]
     ordered = sorted(groups, key=rank)
     return ordered, sum(rank(group)[0] < 2 for group in ordered)
+
+
+def _meanings(log: Log) -> Callable[[str, str], Field]:
+    """What a signal of a log means, by channel and field; what a dictionary lacks is judged by its name."""
+    ecosystem, channels = ecosystem_of(log.format), {channel.name: channel for channel in log.channels()}
+
+    def meaning(name: str, field: str) -> Field:
+        found = (ecosystem.field(channels[name], field) if name in channels else None) or Field()
+        return replace(found, is_position=found.is_position or _POSITION.search(field) is not None)
+
+    return meaning
 
 
 def _channels(finding: Finding) -> list[str]:
@@ -148,7 +163,7 @@ def _plot(
 ) -> Plot | None:
     """The plot of a group, None where the log has no number for it in the span."""
     channel = group[0].channel
-    meaning = meanings_of(log_of(case))(channel, group[0].field)
+    meaning = _meanings(log_of(case))(channel, group[0].field)
     unit, words = meaning.unit, meaning.label
     lines, drawn = [], []
     for one in group:

@@ -58,7 +58,9 @@ class ArduPilot(Ecosystem):
         yield {"kind": "ardupilot_flight"}
 
     def messages(self) -> Dictionary:
-        return {}
+        from care_core.ecosystems.ardupilot.dictionary import DICTIONARY
+
+        return DICTIONARY
 
     def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:
         return ARDUPILOT_PARAM

@@ -31,13 +31,13 @@ MESSAGES: Mapping[str, tuple[str, ...]] = {
 }
 """Today's message -> the messages that carry it or carried it, one an instance. All others keep their name."""
 
-_INSTANCE: Mapping[str, tuple[str, ...]] = {
+INSTANCE: Mapping[str, tuple[str, ...]] = {
     "IMU": ("I",), "MAG": ("I",), "BARO": ("I",), "GPS": ("I",), "GPA": ("I",), "BAT": ("Inst", "Instance"),
     "VIBE": ("IMU",), "XKF1": ("C",), "XKF3": ("C",), "XKF4": ("C",), "RFND": ("Instance",), "ESC": ("Instance",),
 }  # fmt: skip
 """The field that numbers the instances of a message, where one message holds them all."""
 
-_FORMER: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+FORMER: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "ATT": {"DesRoll": ("RollIn",), "DesPitch": ("PitchIn",), "DesYaw": ("NavYaw",)},
     "CTUN": {"ThO": ("ThrOut",), "ThI": ("ThrIn",), "BAlt": ("BarAlt",), "DAlt": ("WPAlt",), "CRt": ("CRate",),
              "DCRt": ("DCRate",), "SAlt": ("SonAlt",)},
@@ -63,10 +63,10 @@ def expanded(reads: Wanted) -> dict[str, tuple[str, ...]]:
     """The channels and fields by every name that they may have in a log."""
     wanted: dict[str, tuple[str, ...]] = {}
     for name, fields in reads.items():
-        former = _FORMER.get(name, {})
+        former = FORMER.get(name, {})
         known = [old for field in fields for old in (field, *former.get(field, ()))]
         for message in MESSAGES.get(name, (name,)):
-            wanted[message] = tuple(dict.fromkeys([*wanted.get(message, ()), *known, *_INSTANCE.get(name, ())]))
+            wanted[message] = tuple(dict.fromkeys([*wanted.get(message, ()), *known, *INSTANCE.get(name, ())]))
     return wanted
 
 
@@ -112,7 +112,7 @@ class _Today(LazyColumns):
 
 def _renamed(name: str, table: Table) -> Table:
     sources = {field: (field, 1.0) for field in table.columns}
-    for field, olds in _FORMER.get(name, {}).items():
+    for field, olds in FORMER.get(name, {}).items():
         old = next((old for old in olds if old in sources), None)
         if field not in sources and old is not None:
             sources[field] = sources[old]
@@ -137,7 +137,7 @@ def _top(column: NDArray[Any]) -> float:
 
 def split(name: str, table: Table) -> list[Table]:
     """The instances that one message holds, in order of their number."""
-    field = next((field for field in _INSTANCE.get(name, ()) if field in table.columns), None)
+    field = next((field for field in INSTANCE.get(name, ()) if field in table.columns), None)
     if field is None:
         return [table]
     number = table[field]

@@ -1,17 +1,14 @@
-"""Units of the signals that logs hold, and what they are in words, where that is documented.
+"""What DataFlash and MAVLink messages mean: units, words, former names, and what says where a vehicle was.
 
-ArduPilot: docs "Log messages" and the FMTU records of its logs; MAVLink: common.xml. Those of PX4 and ROS stand in the
-dictionaries of their ecosystems.
+ArduPilot: docs "Log messages" and the FMTU records of its logs; MAVLink: common.xml.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
-from care_core.ecosystems.dictionary import Field
-from care_core.ecosystems.registry import ecosystem_of
-from care_core.logs.base import Log
-from care_core.records import replace
+from care_core.ecosystems.ardupilot.messages import FORMER, INSTANCE
+from care_core.ecosystems.dictionary import Dictionary, Field, Message
 
 Words = tuple[str, str]
 """Unit and words."""
@@ -114,26 +111,19 @@ _POSITIONS = {
     "LOCAL_POSITION_NED": {"x", "y"},
     "VFR_HUD": {"alt"},
 }
+"""Fields that say where on earth, or on the map of its site, the vehicle was."""
 
 
-def meanings_of(log: Log) -> Callable[[str, str], Field]:
-    """What a signal of a log means, by channel and field: its unit, its words, and whether it says where it was."""
-    ecosystem, channels = ecosystem_of(log.format), {channel.name: channel for channel in log.channels()}
-
-    def meaning(name: str, field: str) -> Field:
-        channel = channels.get(name)
-        known = (ecosystem.field(channel, field) if channel is not None else None) or _worded(name, field)
-        return replace(known, is_position=known.is_position or _is_position(name, field))
-
-    return meaning
+def _field(message: str, name: str) -> Field:
+    unit, label = _WORDS.get(message, {}).get(name, ("", ""))
+    former = FORMER.get(message, {}).get(name, ())
+    return Field(unit, label, former, is_position=name in _POSITIONS.get(message, ()))
 
 
-def _worded(channel: str, field: str) -> Field:
-    return Field(*_WORDS.get(channel, {}).get(field, ("", "")))
+def _message(name: str) -> Message:
+    fields = dict.fromkeys((*_WORDS.get(name, ()), *_POSITIONS.get(name, ()), *FORMER.get(name, ())))
+    return Message({field: _field(name, field) for field in fields}, instance=next(iter(INSTANCE.get(name, ())), ""))
 
 
-def _is_position(channel: str, field: str) -> bool:
-    """On the earth, or on the map of its site."""
-    if channel.startswith("/"):
-        return "position." in field or field.rsplit(".", maxsplit=1)[-1] in ("latitude", "longitude", "altitude")
-    return field in _POSITIONS.get(channel, ())
+DICTIONARY: Dictionary = {name: _message(name) for name in dict.fromkeys((*_WORDS, *_POSITIONS, *FORMER, *INSTANCE))}
+"""By today's names; messages of older firmware stand under their own."""
