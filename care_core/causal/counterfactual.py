@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
@@ -32,7 +31,8 @@ from care_core.run import is_known
 from care_core.variables import Threshold, Variable
 
 INTERVAL = (0.1, 0.9)
-UPPER_Z = NormalDist().inv_cdf(INTERVAL[1])
+UPPER_Z = 1.2815515655446004
+"""The standard normal quantile of the upper end."""
 _HALVINGS = 30
 
 Config = Mapping[str, float]

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from care_core import plain_yaml
 from care_core.records import Record, field, replace
 from care_core.run import Setting
 
@@ -123,6 +122,8 @@ def _value(given: Any) -> float | str | None:
 
 def _load(text: str) -> Any:
     """The plain data of a YAML text, None where it is none, or goes beyond a limit."""
+    from care_core import plain_yaml  # a log without notes needs no YAML
+
     try:
         return plain_yaml.load(text)
     except plain_yaml.PlainYamlError:

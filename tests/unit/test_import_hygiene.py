@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 HEAVY = {"mcap", "numpy", "pandas", "pydantic", "pymavlink", "rich", "rosbags", "ruamel", "textual"}
-LEARNING = {"ananke", "causallearn", "joblib", "pyarrow", "scipy", "sklearn"}
+LEARNING = {"ananke", "causallearn", "joblib", "pandas", "pyarrow", "scipy", "sklearn"}
 TERMINAL = {"care_tui", "rich", "textual", "typer"}
 DIAGNOSIS = "care_core.diagnose.triage, care_core.report.html, care_core.extract.select, care_core.application.api"
 
@@ -38,6 +38,15 @@ def test_help_and_version_import_nothing_heavy(word: str) -> None:
 
 def test_diagnosis_imports_neither_learning_nor_a_terminal_nor_what_checks_files_of_people() -> None:
     assert not imported_by(f"import {DIAGNOSIS}") & (LEARNING | TERMINAL | {"pydantic", "ruamel"})
+
+
+def test_a_triage_imports_what_its_own_log_needs() -> None:
+    """A DataFlash log and profiles that were checked before: readers of other logs and of YAML stay outside."""
+    sample = ROOT / "samples" / "arducopter_failed.BIN"
+    code = f"import care_core; care_core.triage({str(sample)!r})"
+    imported_by(code)  # the cache of profiles is filled
+    others = {"lz4", "mcap", "pydantic", "pymavlink", "rosbags", "ruamel", "zstandard"}
+    assert not imported_by(code) & (others | LEARNING | TERMINAL)
 
 
 def test_the_core_is_light_until_it_is_used() -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -20,9 +20,11 @@ from care_core.ecosystems.ros.node_messages import LogMessage, Report, log_messa
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
 from care_core.logs.base import Channel, Table, Wanted, merge_needs
 from care_core.logs.plausible import STAMP
-from care_core.logs.ros_log import RosLog
 from care_core.numbers import Floats, median, quantile
 from care_core.run import Damage, Setting
+
+if TYPE_CHECKING:
+    from care_core.logs.ros_log import RosLog
 
 OPEN_S = 30.0
 """A goal without an answer for longer than this at the end of a recording was not being reached."""
