@@ -7,13 +7,13 @@ looks like: commands to stand or to turn on the spot, reversals of the turn comm
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from typing import TypeVar
 
 import numpy as np
 
-from care_core.ecosystems.measures import Args, Mission, extractor, missing, numeric, one_of
+from care_core.ecosystems.measures import Args, Compute, Mission, extractor, missing, numeric, one_of
 from care_core.ecosystems.ros.drive import LOG_FIELDS
 from care_core.ecosystems.ros.goals import Goal, Status
 from care_core.ecosystems.ros.measures.goals import log_messages
@@ -127,21 +127,30 @@ def _arrivals(drive: DriveWindow) -> _Ends | Unavailable:
     return _ends(drive, only_reached=True)
 
 
-def of_drive(
+def measured(
+    name: str,
     part: Callable[[DriveWindow], T | Unavailable],
-) -> Callable[[Callable[[DriveWindow, T, Args], Value]], Callable[[Mission, Args], Value]]:
-    """Make an extractor of what is measured on a part of the drive; where the part is missing, that is the answer."""
+    *,
+    unit: str = "",
+    args: Mapping[str, str] | None = None,
+    parts: tuple[str, ...] = ("goals", "odometry"),
+) -> Callable[[Callable[[DriveWindow, T, Args], Value]], Compute]:
+    """Register an extractor of what is measured on a part of the drive; where the part is missing, that is the answer.
 
-    def wrap(measure: Callable[[DriveWindow, T, Args], Value]) -> Callable[[Mission, Args], Value]:
+    A measure with the argument `per` is a sum over the mission, see `divided`.
+    """
+
+    def register(measure: Callable[[DriveWindow, T, Args], Value]) -> Compute:
         @wraps(measure)
-        def extract(mission: Mission, args: Args) -> Value:
+        def compute(mission: Mission, args: Args) -> Value:
             drive = mission.shared(window)
             found = part(drive)
             return found if isinstance(found, Unavailable) else measure(drive, found, args)
 
-        return extract
+        answer = divided(compute) if args and "per" in args else compute
+        return extractor(name, needs={}, unit=unit, parts=parts, args=args)(answer)
 
-    return wrap
+    return register
 
 
 # Goals and time
@@ -233,8 +242,7 @@ def goal_time(mission: Mission, args: Args) -> Value:
     return max(times) if args.get("of") == "longest" else sum(times) / len(times)
 
 
-@extractor("time_per_metre", needs={}, parts=("goals", "odometry"), unit="s/m")
-@of_drive(_placed)
+@measured("time_per_metre", _placed, unit="s/m")
 def time_per_metre(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Time with a goal per metre of way made towards the goals."""
     made_m = sum(_progress(odometry, drive.goals))
@@ -243,31 +251,21 @@ def time_per_metre(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> 
     return drive.active_s / made_m
 
 
-@extractor(
-    "goals_approached",
-    needs={},
-    parts=("goals", "odometry"),
-    unit="",
-    args={"within_m": numeric("how near counts, 0.6 m unless given")},
-)
-@of_drive(_ends)
+@measured("goals_approached", _ends, args={"within_m": numeric("how near counts, 0.6 m unless given")})
 def goals_approached(drive: DriveWindow, left: _Ends, args: Args) -> Value:
     """Share of the mission's goals that the robot was near to when they ended, reached or not."""
     within_m = float(args.get("within_m", 0.6))
     return sum(distance <= within_m for distance, _ in left) / (len(drive.listed) or len(drive.goals))
 
 
-@extractor(
+@measured(
     "first_failure",
-    needs={},
-    parts=("goals", "odometry"),
-    unit="",
+    _placed,
     args={
         "how": one_of("given_up, unsettled, crawling or stuck", "given_up", "unsettled", "crawling", "stuck"),
         "within_m": numeric("how near to the goal, 0.6 m unless given"),
     },
 )
-@of_drive(_placed)
 def first_failure(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """1 when the first goal that was not reached failed in this way, else 0: `given_up` by the stack; out of time
     `unsettled` near the goal, `crawling` (it still came nearer, a share of the way too slow), or `stuck` on the way."""
@@ -309,24 +307,19 @@ def passages_passed(mission: Mission, args: Args) -> Value:
 # Path
 
 
-@extractor("path_length", needs={}, parts=("goals", "odometry"), unit="m", args=PER_METRE)
-@divided
-@of_drive(_odometry)
+@measured("path_length", _odometry, unit="m", args=PER_METRE)
 def path_length(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Length of the odometry's path."""
     return float(odometry.step_m.sum())
 
 
-@extractor("detour", needs={}, parts=("goals", "odometry"), unit="m", args=PER_METRE)
-@divided
-@of_drive(_placed)
+@measured("detour", _placed, unit="m", args=PER_METRE)
 def detour(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Path driven beyond the way made towards the goals."""
     return float(odometry.step_m.sum()) - sum(_progress(odometry, drive.goals))
 
 
-@extractor("lateral_error", needs={}, parts=("goals", "odometry"), unit="m")
-@of_drive(_placed)
+@measured("lateral_error", _placed, unit="m")
 def lateral_error(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Mean distance from the straight line between where a goal was sent and where it lies."""
     offsets = [_lateral(odometry, number, goal) for number, goal in enumerate(drive.goals)]
@@ -334,35 +327,25 @@ def lateral_error(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> V
     return float(joined.mean()) if len(joined) else _TOO_SHORT
 
 
-@extractor("distance_left", needs={}, parts=("goals", "odometry"), unit="m")
-@of_drive(_ends)
+@measured("distance_left", _ends, unit="m")
 def distance_left(drive: DriveWindow, left: _Ends, args: Args) -> Value:
     """Largest distance to a goal when it ended: the goal tolerance where all were reached, else where it got stuck."""
     return max(distance for distance, _ in left)
 
 
-@extractor("arrival_error", needs={}, parts=("goals", "odometry"), unit="m")
-@of_drive(_arrivals)
+@measured("arrival_error", _arrivals, unit="m")
 def arrival_error(drive: DriveWindow, left: _Ends, args: Args) -> Value:
     """Mean distance to the reached goals on arrival."""
     return float(np.mean([distance for distance, _ in left]))
 
 
-@extractor("heading_error", needs={}, parts=("goals", "odometry"), unit="rad")
-@of_drive(_arrivals)
+@measured("heading_error", _arrivals, unit="rad")
 def heading_error(drive: DriveWindow, left: _Ends, args: Args) -> Value:
     """Mean error of the heading on arrival at the reached goals."""
     return float(np.mean([angle for _, angle in left]))
 
 
-@extractor(
-    "settling_time",
-    needs={},
-    parts=("goals", "odometry"),
-    unit="s",
-    args={"within_m": numeric("how near to the goal, 0.5 m unless given")},
-)
-@of_drive(_placed)
+@measured("settling_time", _placed, unit="s", args={"within_m": numeric("how near to the goal, 0.5 m unless given")})
 def settling_time(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Mean time near a goal before it ended: hunting for position and heading."""
     near = _goal_distance(odometry, drive.goals) <= float(args.get("within_m", 0.5))
@@ -372,30 +355,26 @@ def settling_time(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> V
 # Motion
 
 
-@extractor("drive_speed", needs={}, parts=("goals", "odometry"), unit="m/s")
-@of_drive(_moving)
+@measured("drive_speed", _moving, unit="m/s")
 def drive_speed(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Mean forward speed while driving."""
     driving = np.abs(odometry.speed) >= STANDS_MPS
     return float(np.abs(odometry.speed[driving]).mean()) if driving.any() else 0.0
 
 
-@extractor("top_speed", needs={}, parts=("goals", "odometry"), unit="m/s")
-@of_drive(_moving)
+@measured("top_speed", _moving, unit="m/s")
 def top_speed(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """95th percentile of the forward speed."""
     return quantile(np.abs(odometry.speed), 0.95)
 
 
-@extractor("top_turn_rate", needs={}, parts=("goals", "odometry"), unit="rad/s")
-@of_drive(_moving)
+@measured("top_turn_rate", _moving, unit="rad/s")
 def top_turn_rate(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """95th percentile of the turn rate."""
     return quantile(np.abs(odometry.turn), 0.95)
 
 
-@extractor("drive_acceleration", needs={}, parts=("goals", "odometry"), unit="m/s^2")
-@of_drive(_moving)
+@measured("drive_acceleration", _moving, unit="m/s^2")
 def drive_acceleration(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """99th percentile of the change of forward speed."""
     step_s = np.diff(odometry.t)
@@ -405,14 +384,11 @@ def drive_acceleration(drive: DriveWindow, odometry: ActiveOdometry, args: Args)
     return quantile(np.abs(np.diff(odometry.speed)[usable] / step_s[usable]), 0.99)
 
 
-@extractor(
+@measured(
     "standstill",
-    needs={},
-    parts=("goals", "odometry"),
-    unit="",
+    _moving,
     args={"of": one_of("share of the time, or longest in s; share unless given", "share", "longest")},
 )
-@of_drive(_moving)
 def standstill(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Not moving while a goal is active: share of that time, or the longest stretch of it."""
     if args.get("of") == "longest":
@@ -420,23 +396,19 @@ def standstill(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Valu
     return share(odometry.stands, odometry.dt)
 
 
-@extractor("no_way_time", needs={}, parts=("goals", "odometry"), unit="s")
-@of_drive(_moving)
+@measured("no_way_time", _moving, unit="s")
 def no_way_time(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Longest time without forward motion while a goal is active, turning on the spot included."""
     return longest(np.abs(odometry.speed) < STANDS_MPS, odometry.dt)
 
 
-@extractor("total_turn", needs={}, parts=("goals", "odometry"), unit="rad", args=PER_METRE)
-@divided
-@of_drive(_moving)
+@measured("total_turn", _moving, unit="rad", args=PER_METRE)
 def total_turn(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Sum of all turning, left and right alike."""
     return float((np.abs(odometry.turn) * odometry.dt).sum())
 
 
-@extractor("start_delay", needs={}, parts=("goals", "odometry"), unit="s")
-@of_drive(_moving)
+@measured("start_delay", _moving, unit="s")
 def start_delay(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Mean time from sending a goal to the first motion."""
     moving = ~odometry.stands
@@ -450,22 +422,19 @@ def start_delay(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Val
 # Commands
 
 
-@extractor("commanded_speed", needs={}, parts=("goals", "commands"), unit="m/s")
-@of_drive(_commands)
+@measured("commanded_speed", _commands, parts=("goals", "commands"), unit="m/s")
 def commanded_speed(drive: DriveWindow, commands: ActiveCommands, args: Args) -> Value:
     """Mean commanded forward speed among commands to drive."""
     driving = np.abs(commands.speed) >= STANDS_MPS
     return float(commands.speed[driving].mean()) if driving.any() else 0.0
 
 
-@extractor(
+@measured(
     "commanded_share",
-    needs={},
+    _commands,
     parts=("goals", "commands"),
-    unit="",
     args={"order": one_of("stand, spot_turn or reverse; stand unless given", "stand", "spot_turn", "reverse")},
 )
-@of_drive(_commands)
 def commanded_share(drive: DriveWindow, commands: ActiveCommands, args: Args) -> Value:
     """Share of the time with a goal that the robot was commanded to stand, to turn on the spot, or to back up."""
     order = args.get("order", "stand")
@@ -476,8 +445,7 @@ def commanded_share(drive: DriveWindow, commands: ActiveCommands, args: Args) ->
     return share(commands.stands, commands.dt)
 
 
-@extractor("blocked_share", needs={}, parts=("goals", "odometry", "commands"), unit="")
-@of_drive(_moving)
+@measured("blocked_share", _moving, parts=("goals", "odometry", "commands"))
 def blocked_share(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Share of the time with a goal that forward motion was commanded and none came: contact, slip, a dead drive."""
     commands = _commands(drive)
@@ -488,8 +456,7 @@ def blocked_share(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> V
     return share(np.asarray(ordered & (np.abs(odometry.speed) < STANDS_MPS)), odometry.dt)
 
 
-@extractor("turn_reversals", needs={}, parts=("goals", "commands"), unit="1/min")
-@of_drive(_commands)
+@measured("turn_reversals", _commands, parts=("goals", "commands"), unit="1/min")
 def turn_reversals(drive: DriveWindow, commands: ActiveCommands, args: Args) -> Value:
     """How often per minute the commanded turn changes side: a planner that cannot decide."""
     sides = np.sign(commands.turn[np.abs(commands.turn) >= STANDS_RADPS])
@@ -497,14 +464,13 @@ def turn_reversals(drive: DriveWindow, commands: ActiveCommands, args: Args) -> 
     return float(np.count_nonzero(np.diff(sides))) / total_s * 60 if total_s > 0 else _TOO_SHORT
 
 
-@extractor(
+@measured(
     "command_interval",
-    needs={},
+    _commands,
     parts=("goals", "commands"),
     unit="s",
     args={"percentile": numeric("0 to 100, 50 unless given")},
 )
-@of_drive(_commands)
 def command_interval(drive: DriveWindow, commands: ActiveCommands, args: Args) -> Value:
     """Time between commands while a goal is active: the controller's real period and, at the top, its stalls."""
     inside = [np.diff(commands.t[(commands.t >= goal.sent_s) & (commands.t <= goal.end_s)]) for goal in drive.goals]
