@@ -10,7 +10,7 @@ from typing import Any
 
 from ruamel.yaml import YAML
 
-from care_core.collect.limits import parse_limit
+from care_core.collect.constraints import parse_constraint
 from care_core.collect.space import Axis, Space
 from care_core.variables import Role, Variable
 from care_samples.robot.mission import DEFAULTS, Robot
@@ -56,4 +56,4 @@ def space(ranges: Mapping[str, tuple[float, float]], *limits: str, kinds: Mappin
         kind: Any = (kinds or {}).get(name, "float")
         axes.append(Axis(Variable(name, Role.OPTION, kind, range=(low, high), parameters=(f"/{name}",)), low, high))
     reference = {axis.name: axis.at(0.5) for axis in axes}
-    return Space(axes, reference, [parse_limit(text, reference) for text in limits])
+    return Space(axes, reference, [parse_constraint(text, reference) for text in limits])

@@ -16,7 +16,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from care_core import plain_yaml
-from care_core.collect.limits import parse_limit
+from care_core.collect.constraints import parse_constraint
 from care_core.collect.sampling import Method
 from care_core.collect.space import Axis, Space
 from care_core.configs.driven import option_value, readable
@@ -192,7 +192,7 @@ def _space(data: _Campaign, schema: Schema, parameters: Sequence[str]) -> Space:
     axes = [Axis(schema.variables[name], *bounds) for name, bounds in ranges.items()]
     if not axes:
         raise UsageError("No option varies.", hint="Give one a range under 'options'.", where="options")
-    return Space(axes, reference, [parse_limit(text, reference) for text in data.limits], left_out)
+    return Space(axes, reference, [parse_constraint(text, reference) for text in data.limits], left_out)
 
 
 def reference_of(schema: Schema, parameters: Sequence[str]) -> dict[str, float]:

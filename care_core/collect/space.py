@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.collect.limits import Limit
+from care_core.collect.constraints import Constraint
 from care_core.errors import UsageError
 from care_core.records import Record
 from care_core.variables import Variable
@@ -86,7 +86,7 @@ class Space(Record, eq=False):
     axes: Sequence[Axis]
     reference: Config
     """Of every option that has a known value, those that never vary too."""
-    limits: Sequence[Limit]
+    limits: Sequence[Constraint]
     left_out: Sequence[tuple[str, str]] = ()
     """Options that do not vary, and why."""
 

@@ -246,7 +246,7 @@ def test_a_journal_that_was_cut_off_goes_on(care: Care, tmp_path: Path) -> None:
         ({"options": {"max_speed": [0.1, 5.0]}}, "goes beyond the profile's 0.2 to 1.2"),
         ({"options": {"max_speed": [0.7, 1.0]}}, "The reference of max_speed is 0.6, outside 0.7 to 1."),
         ({"limits": ["max_speed <= 0.5"]}, "The reference breaks the limit 'max_speed <= 0.5'."),
-        ({"limits": ["max_speed = 0.5"]}, "'max_speed = 0.5' is no limit."),
+        ({"limits": ["max_speed = 0.5"]}, "'max_speed = 0.5' is not a limit."),
         ({"parameters": "missing.yaml"}, "Cannot read the configuration"),
         ({"profile": "corier"}, "There is no profile 'corier'."),
         ({"sampling": "sobel"}, "'sampling': Input should be"),

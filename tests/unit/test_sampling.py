@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from care_core.collect.limits import parse_limit
+from care_core.collect.constraints import parse_constraint
 from care_core.collect.sampling import Method, one_at_a_time, points, repeats_among, with_repeats
 from care_core.collect.space import Axis, Space
 from care_core.errors import UsageError
@@ -53,7 +53,7 @@ def spaces(draw: Any) -> Space:
     if len(made) > 1:
         total = reference[made[0].name] + reference[made[1].name]
         limits.append(f"{made[0].name} + {made[1].name} <= {total + draw(st.floats(0.1, 100))!r}")
-    return Space(made, reference, [parse_limit(one, reference) for one in limits])
+    return Space(made, reference, [parse_constraint(one, reference) for one in limits])
 
 
 @settings(max_examples=60)
@@ -149,20 +149,20 @@ def test_a_reference_outside_the_limits_is_refused() -> None:
      "a <= 2 ** 9", "a <= 1 and b <= 1", "a <=", "", "a <= True", "(" * 300 + "a", "a <= 1j"],
 )  # fmt: skip
 def test_what_is_no_inequality_is_refused(text: str) -> None:
-    with pytest.raises(UsageError, match="is no limit"):
-        parse_limit(text, {"a": 0, "b": 0})
+    with pytest.raises(UsageError, match="is not a limit"):
+        parse_constraint(text, {"a": 0, "b": 0})
 
 
 def test_limits_are_computed() -> None:
     known = {"speed": 0.0, "time": 0.0}
-    limit = parse_limit("0 < -(-speed) * time / 2 <= 1.5 - 0.5", known)
+    limit = parse_constraint("0 < -(-speed) * time / 2 <= 1.5 - 0.5", known)
     assert limit.holds({"speed": 1.0, "time": 2.0})
     assert not limit.holds({"speed": 1.0, "time": 2.1})
     assert not limit.holds({"speed": 0.0, "time": 2.0})
-    assert not parse_limit("1 / speed <= 9", known).holds({"speed": 0.0, "time": 1.0})
-    assert not parse_limit("speed <= 9", known).holds({"speed": math.nan, "time": 1.0})
-    with pytest.raises(UsageError, match=r"'sped', which is no option.*Did you mean 'speed'"):
-        parse_limit("sped <= 1", known)
+    assert not parse_constraint("1 / speed <= 9", known).holds({"speed": 0.0, "time": 1.0})
+    assert not parse_constraint("speed <= 9", known).holds({"speed": math.nan, "time": 1.0})
+    with pytest.raises(UsageError, match=r"'sped', which is not a parameter.*Did you mean 'speed'"):
+        parse_constraint("sped <= 1", known)
 
 
 def test_without_scipy_planning_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:

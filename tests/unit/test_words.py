@@ -22,6 +22,11 @@ REPLACED_NAMES = {
     "witnesses": "correlated_metrics",
     "ignorance": "epistemic_ratio",
     "Sought": "ObjectiveQuestions",
+    "_bury": "_reap",
+    "_deaf": "_ignore_signal",
+    "_gravity": "severity",
+    "Said": "LogMessage",
+    "attend": "wait",
 }
 """Names of classes, functions and variables that may not be defined, with what to write."""
 

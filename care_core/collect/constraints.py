@@ -1,4 +1,4 @@
-"""Safety limits: inequalities between options, written as an operator writes them and never executed.
+"""Constraints of a campaign: inequalities between options, written as an operator writes them and never executed.
 
 `max_vel_x <= 0.8`, `0.2 <= inflation_radius`, `max_vel_x * sim_time <= inflation_radius + 1.5`: names of options,
 numbers, `+ - * /`, brackets, and `< <= > >=`. Whatever else a text holds is refused.
@@ -29,7 +29,7 @@ _COMPARISONS: Mapping[type, Callable[[float, float], bool]] = {
 _LONGEST = 500
 
 
-class Limit(Record, eq=False):
+class Constraint(Record, eq=False):
     """One inequality; `holds` says whether a configuration keeps it."""
 
     text: str
@@ -52,11 +52,11 @@ class Limit(Record, eq=False):
         return frozenset(node.id for node in ast.walk(self._tree) if isinstance(node, ast.Name))
 
 
-def parse_limit(text: str, options: Mapping[str, object]) -> Limit:
+def parse_constraint(text: str, options: Mapping[str, object]) -> Constraint:
     """A limit from its text.
 
     Raises:
-        UsageError: it is no inequality, or names what is no option.
+        UsageError: it is not an inequality, or names what is not an option.
     """
     hint = "Write an inequality of options and numbers, such as 'max_vel_x * sim_time <= 1.5'."
     try:
@@ -64,16 +64,16 @@ def parse_limit(text: str, options: Mapping[str, object]) -> Limit:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         tree = None
     if not isinstance(tree, ast.Compare) or not all(map(_is_allowed, _parts(tree))):
-        raise UsageError(f"'{text[:80]}' is no limit.", hint=hint, where="limits")
-    limit = Limit(text.strip(), tree)
-    for name in sorted(limit.options):
+        raise UsageError(f"'{text[:80]}' is not a limit.", hint=hint, where="limits")
+    constraint = Constraint(text.strip(), tree)
+    for name in sorted(constraint.options):
         if name not in options:
             raise UsageError(
-                f"'{limit.text}' names '{name}', which is no option that has a value here.",
+                f"'{constraint.text}' names '{name}', which is not a parameter that has a value here.",
                 hint=nearest(name, options),
                 where="limits",
             )
-    return limit
+    return constraint
 
 
 def _parts(tree: ast.Compare) -> Iterator[ast.AST]:
@@ -98,4 +98,4 @@ def _value(node: ast.expr, config: Mapping[str, float]) -> float:
         return -value if isinstance(node.op, ast.USub) else value
     if isinstance(node, ast.BinOp):
         return _ARITHMETIC[type(node.op)](_value(node.left, config), _value(node.right, config))
-    raise ValueError(f"{type(node).__name__} is no part of a limit")
+    raise ValueError(f"{type(node).__name__} does not belong in a limit")
