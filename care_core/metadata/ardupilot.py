@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 
-from care_core.metadata.fact import Fact, number
-from care_core.metadata.families import expanded
+from care_core.metadata.fact import Fact, expanded, number
 from care_core.metadata.words import word_of
 from care_core.records import Record
 

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from care_core.metadata.families import expanded
+from care_core.metadata.fact import expanded
 
 TABLE = Path(__file__).with_name("words.tsv")
 

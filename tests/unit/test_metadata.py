@@ -9,7 +9,7 @@ import pytest
 from care_core.application.describing import known_of
 from care_core.ecosystems.vehicles import is_self_written
 from care_core.metadata import ardupilot, navigation
-from care_core.metadata.families import expanded
+from care_core.metadata.fact import expanded
 from care_core.metadata.words import word_of
 from care_core.run import Setting
 from care_core.variables import Role, Variable
