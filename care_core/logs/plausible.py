@@ -7,7 +7,6 @@ times too fast turns a failed flight into one of 0 s and 0 Wh. What is merely ba
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -66,12 +65,8 @@ _PACE, _GPS_STEP_S = 1.2, 60.0
 APART, _STAMPED_S, _QUARTERS, _MOSTLY = 1.25, 10.0, 4, 0.9
 """By what factor stamps that a robot makes may run from the recording's clock, over so many seconds. A real clock is
 right to 0.01 %; one that was set is off in one quarter of the time, one that runs wrong in each."""
-_RATES = re.compile(r"missed its desired rate of ([\d.]+\d) ?Hz.*current loop rate is ([\d.]+\d) ?Hz", re.IGNORECASE)
-_RATE_KEPT = 0.95
 _SIMULATED_S = 1e9
 """A simulation's time begins at 0: stamps so far behind the recording's have a pace of their own."""
-_WAY_M, _STOOD = 1.0, 0.05
-"""Who reaches goals over such a way has moved, and by more than this share of it."""
 _ENOUGH = 20
 """Samples that must agree before a source is called dead or a clock wrong."""
 
@@ -165,16 +160,6 @@ def is_simulated(t: Floats, stamp: Floats) -> bool:
     return len(known) > 0 and float(median(known)) > _SIMULATED_S
 
 
-def kept_its_rate(text: str) -> bool:
-    """Whether a message that a loop missed its rate says itself that it did not.
-
-    Nav2 sleeps by the computer's clock and measures by the node's: in a simulation that runs ahead of real time every
-    cycle is late by the one and in time by the other.
-    """
-    found = _RATES.search(text)
-    return found is not None and float(found[2]) >= _RATE_KEPT * float(found[1])
-
-
 def stamps_pace(t: Floats, stamp: Floats) -> float | None:
     """Seconds of stamps, shape (n,), in one of the recording, whose times are `t`; None where nothing tells."""
     told = np.isfinite(stamp)
@@ -185,11 +170,6 @@ def stamps_pace(t: Floats, stamp: Floats) -> float | None:
     took, passed = np.diff(stamp[edges]), np.diff(t[edges])
     is_slow, is_fast = np.all((took > 0) & (took < passed / APART)), np.all((passed > 0) & (took > passed * APART))
     return float((stamp[-1] - stamp[0]) / (t[-1] - t[0])) if is_slow or is_fast else 1.0
-
-
-def never_moved(path_m: float, samples: int, way_m: float) -> bool:
-    """Whether odometry whose path is so long says that a robot stood which reached goals over a way of `way_m`."""
-    return samples >= _ENOUGH and way_m >= _WAY_M and path_m < _STOOD * way_m
 
 
 def _longest_stand(t: Floats) -> int:

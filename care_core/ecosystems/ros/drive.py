@@ -12,9 +12,23 @@ import numpy as np
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Severity
-from care_core.ecosystems.ros import messages
 from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, actionlib_goals, nav2_goals
-from care_core.ecosystems.ros.messages import FRAME, MESSAGES, topics, type_of
+from care_core.ecosystems.ros.messages import (
+    ACTION_GOAL,
+    ACTION_RESULT,
+    BATTERY,
+    DIAGNOSTICS,
+    FRAME,
+    MESSAGES,
+    ODOMETRY,
+    ROSOUT,
+    SCAN,
+    STATUS,
+    TWIST,
+    TWIST_STAMPED,
+    topics,
+    type_of,
+)
 from care_core.ecosystems.ros.motion import Commands, Following, Odometry, commands_of, following, odometry_of
 from care_core.ecosystems.ros.node_messages import LogMessage, Report, log_messages, reports
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
@@ -35,10 +49,10 @@ SILENT_S, SILENT_PERIODS = 5.0, 10.0
 COMMANDS = 3
 """Fewer commands tell of no drive."""
 
-ODOMETRY_FIELDS = (*MESSAGES[messages.ODOMETRY].reads, FRAME)
-COMMAND_FIELDS = (*MESSAGES[messages.TWIST].reads, *MESSAGES[messages.TWIST_STAMPED].reads)
-BATTERY_FIELDS = (*MESSAGES[messages.BATTERY].reads, STAMP)
-LOG_FIELDS = MESSAGES[messages.ROSOUT[0]].reads
+ODOMETRY_FIELDS = (*MESSAGES[ODOMETRY].reads, FRAME)
+COMMAND_FIELDS = (*MESSAGES[TWIST].reads, *MESSAGES[TWIST_STAMPED].reads)
+BATTERY_FIELDS = (*MESSAGES[BATTERY].reads, STAMP)
+LOG_FIELDS = MESSAGES[ROSOUT[0]].reads
 """What is read of a topic that a profile names."""
 
 T = TypeVar("T")
@@ -158,14 +172,14 @@ class Drive(RunModel):
     @cached_property
     def odometry(self) -> Odometry | None:
         """The odometry of the base: of several the one named so, which others are made from."""
-        read = (odometry_of(topic, table) for topic, table in self.of(messages.ODOMETRY))
+        read = (odometry_of(topic, table) for topic, table in self.of(ODOMETRY))
         found = [steady for one in read if one is not None and (steady := one.advancing()) is not None]
         return min(found, key=lambda one: (not one.tells_speed, *_plainness(one.topic, "odom")), default=None)
 
     @cached_property
     def commands(self) -> Commands | None:
         """The commands to the base: the topic named `cmd_vel`, else the only one; None where it cannot be told."""
-        found = (commands_of(topic, table) for topic, table in self.of(messages.TWIST, messages.TWIST_STAMPED))
+        found = (commands_of(topic, table) for topic, table in self.of(TWIST, TWIST_STAMPED))
         known = [one for one in found if one is not None]
         named = [one for one in known if one.topic.rpartition("/")[2] == "cmd_vel"] or known
         ranked = sorted((_plainness(one.topic, "cmd_vel"), number) for number, one in enumerate(named))
@@ -196,12 +210,12 @@ class Drive(RunModel):
 
     @cached_property
     def scans(self) -> tuple[Scans, ...]:
-        return tuple(one for topic, table in self.of(messages.SCAN) if (one := scans_of(topic, table)) is not None)
+        return tuple(one for topic, table in self.of(SCAN) if (one := scans_of(topic, table)) is not None)
 
     @cached_property
     def batteries(self) -> tuple[Battery, ...]:
         """Those whose voltage is one."""
-        found = (battery_of(topic, table) for topic, table in self.of(messages.BATTERY))
+        found = (battery_of(topic, table) for topic, table in self.of(BATTERY))
         return tuple(one for one in found if one is not None and one.is_alive)
 
     def battery_on(self, topic: str) -> Battery | None:
@@ -213,9 +227,9 @@ class Drive(RunModel):
     @cached_property
     def goals(self) -> tuple[Goal, ...]:
         """Every goal of the recording's driving actions, in the order sent; of all its actions where none drives."""
-        results = {topic.rpartition("/")[0]: table for topic, table in self.of(messages.ACTION_RESULT)}
-        sent = {topic.rpartition("/")[0]: table for topic, table in self.of(messages.ACTION_GOAL)}
-        tables = {topic: table for topic, table in self.of(messages.STATUS) if topic.endswith(STATUS_TOPIC)}
+        results = {topic.rpartition("/")[0]: table for topic, table in self.of(ACTION_RESULT)}
+        sent = {topic.rpartition("/")[0]: table for topic, table in self.of(ACTION_GOAL)}
+        tables = {topic: table for topic, table in self.of(STATUS) if topic.endswith(STATUS_TOPIC)}
         found = [
             goal
             for action, table in sent.items()
@@ -240,7 +254,7 @@ class Drive(RunModel):
     @cached_property
     def log_messages(self) -> tuple[LogMessage, ...]:
         """What nodes said, in order of time; where it was recorded twice (`/rosout_agg`), once."""
-        spoken = [log_messages(table, type) for type in messages.ROSOUT for _, table in self.of(type)]
+        spoken = [log_messages(table, type) for type in ROSOUT for _, table in self.of(type)]
         return max(spoken, key=len, default=())
 
     def log_messages_on(self, topics: Iterable[str]) -> tuple[LogMessage, ...] | None:
@@ -251,7 +265,7 @@ class Drive(RunModel):
     @cached_property
     def reports(self) -> tuple[Report, ...]:
         """What diagnostics said, changes of level only."""
-        return tuple(reports(self.of(messages.DIAGNOSTICS)))
+        return tuple(reports(self.of(DIAGNOSTICS)))
 
 
 def way_through(goals: Iterable[Goal], commands: Commands | None) -> float:

@@ -28,6 +28,10 @@ _THIN = 2.5
 
 PUNCTUAL_S, MOSTLY = 0.25, 0.6
 """Where this share of messages is recorded so soon after it was made, both clocks run alike."""
+_WAY_M, _STOOD = 1.0, 0.05
+"""Who reaches goals over such a way has moved, and by more than this share of it."""
+_ENOUGH = 20
+"""Samples that must agree before odometry is called dead."""
 _FEWEST = 3
 """Samples without which there is no movement to speak of."""
 
@@ -164,6 +168,11 @@ def commands_of(topic: str, table: Table) -> Commands | None:
     speed, sideways, turn = (believable(table, type, name) for name in names)
     good = np.isfinite(speed + turn + sideways)
     return Commands(topic, table.t[good], speed[good], sideways[good], turn[good]) if good.any() else None
+
+
+def never_moved(path_m: float, samples: int, way_m: float) -> bool:
+    """Whether odometry whose path is so long says that a robot stood which reached goals over a way of `way_m`."""
+    return samples >= _ENOUGH and way_m >= _WAY_M and path_m < _STOOD * way_m
 
 
 class Following(Record, eq=False):

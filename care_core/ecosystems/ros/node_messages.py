@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from enum import IntEnum
 
@@ -35,6 +36,10 @@ _VIEWER = {0: Level.INFO, 1: Level.DEBUG, 2: Level.INFO, 3: Level.WARN, 4: Level
 ROSOUT_TOPICS = ("/rosout", "/rosout_agg")
 PARTS = {0: "OK", 1: "WARN", 2: "ERROR", 3: "STALE"}
 """Levels of diagnostic_msgs/DiagnosticStatus."""
+
+_RATES = re.compile(r"missed its desired rate of ([\d.]+\d) ?Hz.*current loop rate is ([\d.]+\d) ?Hz", re.IGNORECASE)
+_RATE_KEPT = 0.95
+"""What Nav2 says of a loop that missed its rate, and from which share of it on it kept it."""
 
 
 class LogMessage(Record):
@@ -70,6 +75,16 @@ def level_of(code: float, type: str = "") -> int:
 def level_word(level: int) -> str:
     """A level as a list of messages shows it."""
     return Level(level).word if level in Level.__members__.values() else str(level)
+
+
+def kept_its_rate(text: str) -> bool:
+    """Whether a message that a loop missed its rate says itself that it did not.
+
+    Nav2 sleeps by the computer's clock and measures by the node's: in a simulation that runs ahead of real time every
+    cycle is late by the one and in time by the other.
+    """
+    found = _RATES.search(text)
+    return found is not None and float(found[2]) >= _RATE_KEPT * float(found[1])
 
 
 def log_messages(table: Table, type: str = "") -> tuple[LogMessage, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
-from care_core.ecosystems.ros.checks import laser
+from care_core.ecosystems.ros.checks.laser import faults
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import GOALS, ODOMETRY, SCAN, reading
 from care_core.ecosystems.ros.motion import Odometry
@@ -38,7 +38,7 @@ def find(drive: Drive) -> Iterator[Finding]:
     if odometry is None or not any(goal.failed for goal in drive.goals):
         return
     for scans in drive.scans:
-        doubted_s = min((finding.onset_s for finding in laser.faults(drive, scans)), default=np.inf)
+        doubted_s = min((finding.onset_s for finding in faults(drive, scans)), default=np.inf)
         if scans.ranges.shape[1] < FEWEST_RAYS or scans.angles[0] == scans.angles[1]:
             continue
         for row, points in _appeared(scans, _poses(odometry, scans.t)):

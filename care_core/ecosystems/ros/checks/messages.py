@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
-from care_core.ecosystems.ros.checks import planner, timing
+from care_core.ecosystems.ros.checks.planner import FAILS
+from care_core.ecosystems.ros.checks.timing import is_late
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import DIAGNOSTICS, GOALS, ROSOUT, reading
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, Report
@@ -71,7 +72,7 @@ def _errors(drive: Drive) -> Iterator[Finding]:
     kinds: dict[tuple[str, str], list[LogMessage]] = {}
     for message in drive.log_messages:
         text = message.text
-        is_known = planner.FAILS.search(text) or timing.is_known(text) or _HARMLESS.search(text)
+        is_known = FAILS.search(text) or is_late(text) or _HARMLESS.search(text)
         if message.level >= Level.ERROR and not is_known:
             kinds.setdefault((message.node, _NUMBER.sub("#", text)), []).append(message)
     fatal_s = max((message.time_s for message in drive.log_messages if message.level >= Level.FATAL), default=None)

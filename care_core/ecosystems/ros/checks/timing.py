@@ -11,9 +11,9 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import GOALS, ROSOUT, STAMPED, reading
-from care_core.ecosystems.ros.node_messages import Level, LogMessage
+from care_core.ecosystems.ros.node_messages import Level, LogMessage, kept_its_rate
 from care_core.ecosystems.timeline import counted
-from care_core.logs.plausible import APART, STAMP, is_simulated, kept_its_rate, stamps_pace
+from care_core.logs.plausible import APART, STAMP, is_simulated, stamps_pace
 from care_core.numbers import median
 
 LIMITS = Limits()
@@ -41,8 +41,8 @@ _FAMILIES: tuple[tuple[re.Pattern[str], FindingKind, str], ...] = (
 )
 
 
-def is_known(text: str) -> bool:
-    """Whether a message is one of those that this check reads."""
+def is_late(text: str) -> bool:
+    """Whether a message says that something came late: this check reads it."""
     return any(pattern.search(text) for pattern, *_ in _FAMILIES)
 
 
@@ -68,8 +68,8 @@ def find(drive: Drive) -> Iterator[Finding]:
 
 
 def _counts(message: LogMessage, pattern: re.Pattern[str]) -> bool:
-    is_late = message.level >= Level.WARN and pattern.search(message.text) is not None
-    return is_late and not kept_its_rate(message.text)
+    is_bad = message.level >= Level.WARN and pattern.search(message.text) is not None
+    return is_bad and not kept_its_rate(message.text)
 
 
 def _at_most_warning(drive: Drive, at: float) -> Severity:

@@ -31,9 +31,8 @@ from care_core.ecosystems.ros.measures.window import (
     window,
 )
 from care_core.ecosystems.ros.motion import STANDS_MPS
-from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS, Level, LogMessage
+from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS, Level, LogMessage, kept_its_rate
 from care_core.logs.base import Table, Wanted
-from care_core.logs.plausible import kept_its_rate
 from care_core.run import Check, Evidence, Unavailable, Value
 
 _IDLE_S = 120.0
