@@ -58,13 +58,6 @@ _PARAMETER_LIMITS: Mapping[Source, tuple[tuple[str, float], ...]] = {
     ("RCOU", "C1"): (("MOT_PWM_MAX", 1.0), ("MOT_PWM_MIN", 1.0)),
 }
 """Parameters that are a limit of a signal, and the factor to its unit; 0 switches such a limit off."""
-_KNOWN_LIMITS: Mapping[Source, tuple[Limit, ...]] = {
-    ("VIBE", "VibeX"): (Limit(30.0, "acceptable below"), Limit(60.0, "trouble nearly always above")),
-    ("VIBRATION", "vibration_x"): (Limit(30.0, "acceptable below"), Limit(60.0, "trouble nearly always above")),
-    ("XKF4", "SV"): (Limit(1.0, "rejected above"),),
-    ("NKF4", "SV"): (Limit(1.0, "rejected above"),),
-}
-"""Limits of ArduPilot's documentation: "Measuring Vibration", "Log messages" (XKF4)."""
 _COUNTERS: Mapping[Source, str] = {("BAT", "EnrgTot"): "energy"}
 """Counters that an objective is the growth of."""
 
@@ -230,10 +223,10 @@ def thinned(
 
 def _limits(case: Case, group: Sequence[Signal], values: Mapping[Source, Values | None]) -> Iterator[Limit]:
     """What the signals of a plot were to keep: documented limits, parameters as driven, limits of objectives."""
-    settings = case.diagnosis.run.settings
+    settings, known = case.diagnosis.run.settings, _limits_of_checks()
     for one in group:
         source = one.channel, one.field
-        yield from _KNOWN_LIMITS.get(source, ())
+        yield from known.get(source, ())
         for name, factor in _PARAMETER_LIMITS.get(source, ()):
             setting = settings.get(name)
             if setting is not None and isinstance(setting.value, float) and setting.value > 0:
@@ -242,6 +235,20 @@ def _limits(case: Case, group: Sequence[Signal], values: Mapping[Source, Values 
         for result in case.diagnosis.objectives:
             if result.name == _COUNTERS.get(source) and result.threshold is not None and found is not None:
                 yield Limit(float(found[1][0]) + result.threshold.bound, f"limit of {result.name}")
+
+
+def _limits_of_checks() -> Mapping[Source, tuple[Limit, ...]]:
+    """What the health checks hold against a signal that is drawn."""
+    from care_core.ecosystems.ardupilot.checks import estimator, vibration
+
+    shaken = Limit(vibration.HIGH, "acceptable below"), Limit(vibration.SEVERE, "trouble nearly always above")
+    rejected = (Limit(estimator.RATIO, "rejected above"),)
+    return {
+        ("VIBE", "VibeX"): shaken,
+        ("VIBRATION", "vibration_x"): shaken,
+        ("XKF4", "SV"): rejected,
+        ("NKF4", "SV"): rejected,
+    }
 
 
 def _bands(findings: Collection[Finding], channel: str, span: tuple[float, float]) -> Iterator[Band]:
