@@ -137,8 +137,9 @@ class _Source(Record, eq=False):
         if not missions:
             reader = f"profile '{schema.name}'" if schema.name else "care"
             nothing = f"The log holds no mission that {reader} can read."
+            has_stamps = not tables or any(math.isfinite(t) for table in tables.values() for t in table.t)
             raise NoMissionError(
-                "No message of the log has a time stamp, so nothing of a mission can be judged." if found else nothing,
+                nothing if has_stamps else "No message of the log has a time stamp, so no mission of it can be judged.",
                 hint="Look at what was recorded with 'care inspect'.",
                 where=str(log.path),
             )
