@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 
 from benchmarks.tools.documents import DOCUMENTS, ROOT, played, prepare, sessions
 from benchmarks.tools.tables import with_tables
+from care_core.collect.campaign import _Campaign
+from care_core.profile.schema_file import _Profile, _Variable
+from care_tui.settings import Settings
 
 _LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)")
 
@@ -31,6 +35,21 @@ def test_the_commands_print_what_the_document_says(document: Path, tmp_path: Pat
 def test_tables_are_what_the_code_knows(document: Path) -> None:
     page = document.read_text(encoding="utf-8")
     assert with_tables(page) == page, "make docs renews it"
+
+
+@pytest.mark.parametrize(
+    ("page", "keys"),
+    [
+        ("formats.md", _Variable.model_fields),
+        ("formats.md", _Profile.model_fields),
+        ("new-robot.md", _Campaign.model_fields),
+        ("app.md", Settings.__struct_fields__),
+    ],
+    ids=("variable", "profile", "campaign", "settings"),
+)
+def test_every_key_of_a_file_is_explained(page: str, keys: Iterable[str]) -> None:
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    assert [key for key in keys if not re.search(rf"`{key}\b|^\s*{key}:", text, re.MULTILINE)] == []
 
 
 @pytest.mark.parametrize("document", [*DOCUMENTS, ROOT / "ARCHITECTURE.md"], ids=lambda path: path.name)
