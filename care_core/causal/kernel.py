@@ -7,9 +7,6 @@ It is the sum of an additive part (each option acts alone) and a joint part (opt
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,8 +17,6 @@ BLOCK = 300_000
 """Largest number of floats in one block of pairwise distances, which then stays in the processor's cache: changes no
 number."""
 SLICE = 64
-FEW = 256
-"""Values of an input of which each pair's exponential is worked out once."""
 
 
 class UniqueValues(Record, eq=False):
@@ -49,12 +44,6 @@ class UniqueValues(Record, eq=False):
         np.put_along_axis(place, order, (is_new.cumsum() - 1).reshape(columns.shape), axis=1)
         return cls(ascending[is_new], is_new.nonzero()[0], place)
 
-    def columns(self) -> Iterator[tuple[FloatArray, NDArray[np.intp]]]:
-        """Of each column its values, and where among them each point's stands."""
-        starts = np.searchsorted(self.column, np.arange(len(self.place) + 1)).tolist()
-        for place, (i, j) in zip(self.place, pairwise(starts), strict=True):
-            yield self.values[i:j], place - i
-
 
 def _unique(points: FloatArray | UniqueValues) -> UniqueValues:
     return points if isinstance(points, UniqueValues) else UniqueValues.of(points)
@@ -66,29 +55,6 @@ def _alike(a: FloatArray, b: FloatArray) -> FloatArray:
     np.multiply(exponents, exponents, out=exponents)
     np.negative(exponents, out=exponents)
     return np.asarray(np.exp(exponents, out=exponents))
-
-
-class _Column(Record, eq=False):
-    """One scaled input of n points. `table`: e_j of its values with each other, None where they are so many that it
-    saves nothing; `values` are then the points' own, shape (n,)."""
-
-    values: FloatArray
-    place: NDArray[np.intp]
-    table: FloatArray | None
-
-    @classmethod
-    def of(cls, values: FloatArray, place: NDArray[np.intp], scale: float) -> _Column:
-        values = values * scale
-        if len(values) > FEW:
-            return cls(values[place], place, None)
-        return cls(values, place, _alike(values[:, None], values))
-
-    def alike(self, i: int, rows: slice, out: FloatArray) -> None:
-        """e_j of the points from the i-th on with some, into an array of that shape."""
-        if self.table is None:
-            out[:] = _alike(self.values[i:, None], self.values[rows])
-        else:
-            self.table.take(self.place[rows], axis=1).take(self.place[i:], axis=0, out=out, mode="clip")
 
 
 class Kernel(Record, eq=False):
@@ -114,14 +80,14 @@ class Kernel(Record, eq=False):
         """Covariance of n points with each other, shape (n, n): half the work of calling it, and the same numbers."""
         points = _unique(points)
         n = points.place.shape[1]
-        columns = [_Column.of(*one, scale) for one, scale in zip(points.columns(), self._scale, strict=True)]
+        columns = (points.values * self._scale[points.column])[points.place]
         covariance = np.empty((n, n))
         for i in range(0, n, SLICE):
             rows = slice(i, i + SLICE)
             shape = covariance[i:, rows].shape
-            joint, each, e = np.ones(shape), np.full(shape, float(self.idle)), np.empty(shape)
+            joint, each = np.ones(shape), np.full(shape, float(self.idle))
             for column in columns:
-                column.alike(i, rows, out=e)
+                e = _alike(column[i:, None], column[rows])
                 each += e
                 joint *= e
             covariance[i:, rows] = self._sum(joint, each)
