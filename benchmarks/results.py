@@ -107,7 +107,9 @@ BENCHMARKS = (
     Benchmark("many_logs", "benchmarks.many_logs", "1.8 times by the second core, memory flat", "triage in a loop"),
     Benchmark("growth", "benchmarks.growth --picture docs/growth.svg", "2 GB", "none"),
     Benchmark("slow_link", "benchmarks.slow_link", "no key lost, still 1 s after the release", "none"),
-    Benchmark("own_code", "benchmarks.own_code", "3 x the library, or what it loses of a damaged file", "the libraries"),
+    Benchmark(
+        "own_code", "benchmarks.own_code", "3 x the library, or what it loses of a damaged file", "the libraries"
+    ),
     Benchmark("tui", "benchmarks.tui", "0.5 s to the first frame, 50 ms a key, 2 kB", "none"),
     Benchmark("fuzz", "benchmarks.tools.fuzzing --seconds 60", "no finding in any target", "none"),
     Benchmark(
