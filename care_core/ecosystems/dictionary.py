@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from care_core.records import Record
 
@@ -17,6 +17,8 @@ class Field(Record):
     """What older firmware calls it, the youngest name first."""
     plausible: tuple[float, float] | None = None
     """Least and greatest value, in `unit`, that a working sensor can give."""
+    step: float | None = None
+    """Further than this no vehicle gets from one sample to the next and, by the one after, back to within half."""
     is_position: bool = False
     """Whether it says where on earth, or on the map of its site, the robot was: nothing to share unasked."""
 
@@ -29,14 +31,36 @@ class Message(Record):
     """What older firmware calls it, the youngest name first."""
     instance: str = ""
     """The field that tells sensors of one kind apart; empty where each has a message of its own."""
+    moving: tuple[str, ...] = ()
+    """Fields of which at least one changes in any run, by the estimator's noise alone."""
+    fastest_hz: float | None = None
+    """Most messages of a sensor in a second."""
+    slowest_s: float | None = None
+    """Longest usual time between two messages of a sensor, also in thinned logs."""
+    in_bursts: bool = False
+    """Whether a vehicle writes them as fast as they come: parameters, mission items."""
+    how_to_record: str = ""
+    """What to do to have it in the next log: "set 'GPS' (4) in LOG_BITMASK"."""
 
 
 Dictionary = Mapping[str, Message]
 
 
+def find_message(dictionary: Dictionary, name: str) -> Message | None:
+    """What a message means, by today's name or a former one; None where that is not known."""
+    return dictionary.get(name) or next((one for one in dictionary.values() if name in one.former), None)
+
+
 def find_field(dictionary: Dictionary, message: str, name: str) -> Field | None:
     """What a field means, by today's names or former ones; None where that is not known."""
-    known = dictionary.get(message) or next((one for one in dictionary.values() if message in one.former), None)
+    known = find_message(dictionary, message)
     if known is None:
         return None
     return known.fields.get(name) or next((one for one in known.fields.values() if name in one.former), None)
+
+
+def instance_field(known: Message, columns: Collection[str]) -> str | None:
+    """Which of these columns numbers the sensors of a message, by today's or a former name; None where none does."""
+    instance = known.fields.get(known.instance)
+    names = (known.instance, *(instance.former if instance is not None else ()))
+    return next((name for name in names if name in columns), None)

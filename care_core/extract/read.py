@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from care_core.configs.driven import changes_between, configuration, in_force
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor
-from care_core.ecosystems.registry import register_measures
+from care_core.ecosystems.plausible import clock_doubt, dead_sources
+from care_core.ecosystems.registry import ecosystem_of, register_measures
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
 from care_core.logs.base import Log, merge_needs
 from care_core.logs.digest import Sha256, hashing
 from care_core.logs.formats import format_named
-from care_core.logs.plausible import clock_doubt, dead_sources
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.run import Check, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
@@ -143,8 +143,9 @@ class _Source(Record, eq=False):
                 hint="Look at what was recorded with 'care inspect'.",
                 where=str(log.path),
             )
-        doubts = tuple(clock_doubt(tables, one.start_s, one.end_s) for one in missions)
-        return cls(schema, kind, log_info(log, sha256()), settings, missions, dead_sources(tables), doubts)
+        dictionary = ecosystem_of(log.format).messages()
+        doubts = tuple(clock_doubt(dictionary, tables, one.start_s, one.end_s) for one in missions)
+        return cls(schema, kind, log_info(log, sha256()), settings, missions, dead_sources(dictionary, tables), doubts)
 
     def run(self, index: int, overrides: Mapping[str, Setting]) -> Run:
         found = self.missions[index]

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.examining import find
-from care_core.ecosystems.ardupilot.messages import expanded, instances
+from care_core.ecosystems.ardupilot.instances import instances
+from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.ardupilot.spans import runs
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Table

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.messages import MESSAGES
+from care_core.ecosystems.plausible import clock_doubt, sound
 from care_core.logs.base import Table
-from care_core.logs.plausible import clock_doubt, plausible
 
 
 def battery(volts: list[float], **more: list[float]) -> dict[str, Table]:
     columns = {"Volt": np.array(volts), **{name: np.array(values) for name, values in more.items()}}
     return {"BAT": Table(np.arange(len(volts), dtype=float), columns)}
+
+
+def plausible(tables: dict[str, Table]) -> dict[str, Table]:
+    kept = {name: sound(MESSAGES, name, table) for name, table in tables.items()}
+    return {name: table for name, table in kept.items() if table is not None}
 
 
 def test_a_voltage_beyond_all_limits_is_left_out() -> None:
@@ -52,19 +58,21 @@ def test_stamps_tell_a_recording_whose_clock_runs_wrong() -> None:
     def stamped(*paces: float) -> dict[str, Table]:
         return {f"/{n}": Table(t, {"header.stamp": 5 + pace * t}) for n, pace in enumerate(paces)}
 
-    assert clock_doubt(stamped(0.99, 1.0), 0, 60) == ""
-    assert clock_doubt(stamped(2.0, 1.0), 0, 60) == ""  # one topic alone is wrong by itself
-    assert "2 s pass in each" in clock_doubt(stamped(2.0, 2.0), 0, 60)
-    assert "0.5 s pass in each" in clock_doubt(stamped(0.5), 0, 60)
-    assert clock_doubt({"/odom": Table(t, {"header.stamp": t / 2 - 1.7e9})}, 0, 60) == ""  # a simulation's own time
+    assert clock_doubt(MESSAGES, stamped(0.99, 1.0), 0, 60) == ""
+    assert clock_doubt(MESSAGES, stamped(2.0, 1.0), 0, 60) == ""  # one topic alone is wrong by itself
+    assert "2 s pass in each" in clock_doubt(MESSAGES, stamped(2.0, 2.0), 0, 60)
+    assert "0.5 s pass in each" in clock_doubt(MESSAGES, stamped(0.5), 0, 60)
+    assert (
+        clock_doubt(MESSAGES, {"/odom": Table(t, {"header.stamp": t / 2 - 1.7e9})}, 0, 60) == ""
+    )  # a simulation's own time
     was_set = {"/odom": Table(t, {"header.stamp": t + 100 * (t > 20)})}
-    assert clock_doubt(was_set, 0, 60) == ""
+    assert clock_doubt(MESSAGES, was_set, 0, 60) == ""
 
 
 def test_what_a_vehicle_writes_at_once_says_nothing_of_its_clock() -> None:
     burst = Table(np.full(900, 0.5), {"Value": np.arange(900.0)})
-    assert clock_doubt({"PARM": burst}, 0.0, 60.0) == ""
-    assert "too slow or stands still" in clock_doubt({"ATT": burst}, 0.0, 60.0)
+    assert clock_doubt(MESSAGES, {"PARM": burst}, 0.0, 60.0) == ""
+    assert "too slow or stands still" in clock_doubt(MESSAGES, {"ATT": burst}, 0.0, 60.0)
 
 
 def test_a_rate_and_an_acceleration_that_no_sensor_measures_are_left_out() -> None:

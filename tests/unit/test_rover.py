@@ -112,7 +112,7 @@ def test_a_steering_that_swings_to_and_fro_is_set_wrong() -> None:
     (finding,) = attitude.find(steering())
     assert (finding.title, finding.severity, finding.suspect) == ("the steering oscillates", "critical", "parameter")
     assert finding.onset_s == pytest.approx(20.0, abs=2.0)
-    assert finding.evidence.endswith("the vehicle does not get on")
+    assert finding.evidence.endswith("the vehicle makes no progress")
     (mild,) = attitude.find(steering(speed_ms=2.0))
     assert (mild.severity, mild.probability) == ("warning", 0.2)
 

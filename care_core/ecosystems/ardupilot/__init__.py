@@ -8,7 +8,7 @@ from typing import Any
 from care_core.ecosystems.ardupilot.dialect import ARDUPILOT_PARAM
 from care_core.ecosystems.base import Check, Ecosystem, RunModel
 from care_core.ecosystems.dialect import Dialect
-from care_core.ecosystems.dictionary import Dictionary
+from care_core.ecosystems.dictionary import Dictionary, find_message
 from care_core.ecosystems.findings import Event, Health
 from care_core.logs.base import Channel, Log
 from care_core.logs.formats import LogFormat
@@ -58,9 +58,9 @@ class ArduPilot(Ecosystem):
         yield {"kind": "ardupilot_flight"}
 
     def messages(self) -> Dictionary:
-        from care_core.ecosystems.ardupilot.dictionary import DICTIONARY
+        from care_core.ecosystems.ardupilot.messages import MESSAGES
 
-        return DICTIONARY
+        return MESSAGES
 
     def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:
         return ARDUPILOT_PARAM
@@ -71,9 +71,8 @@ class ArduPilot(Ecosystem):
         return robots(log)
 
     def how_to_record(self, channel: str) -> str:
-        from care_core.ecosystems.ardupilot.recording import how_to_record
-
-        return how_to_record(channel)
+        known = find_message(self.messages(), channel.partition(" ")[0])
+        return f"{known.how_to_record}, so that the vehicle writes {channel}" if known and known.how_to_record else ""
 
 
 ECOSYSTEM = ArduPilot()

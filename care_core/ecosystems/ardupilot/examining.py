@@ -9,11 +9,11 @@ from care_core.ecosystems.ardupilot import timeline
 from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.explains import EXPLAINS
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.messages import expanded
+from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, Health
+from care_core.ecosystems.plausible import clock_doubt
 from care_core.ecosystems.ranking import rank_findings
 from care_core.logs.base import Wanted, merge_needs
-from care_core.logs.plausible import clock_doubt
 
 _TOO_SHORT_S = 2.0
 _TELLING = ("MODE", "MSG", "ATT", "IMU")
@@ -40,5 +40,5 @@ def examine(flight: Flight) -> Health:
     too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
     if not too_little and not findings:
         # Times that cannot be are no reason to keep quiet about what was found, but none to call the rest fine.
-        too_little = clock_doubt(tables, 0.0, flight.end_s)
+        too_little = clock_doubt(MESSAGES, tables, 0.0, flight.end_s)
     return Health(flight.vehicle.title, timeline.timeline(flight, tables.values()), findings, too_little)

@@ -1,144 +1,257 @@
-"""What a vehicle recorded, under one set of names: those of today's firmware, whatever the log's age calls them.
+"""What the messages of ArduPilot mean, under today's names: the one table that model, checks, measures and plots read.
 
-Firmware before 4.1 writes a sensor's second instance as a message of its own (MAG2), before 3.3 the battery is CURR and
-the outputs are Chan1 or Mot1. Checks see instances of a message with today's fields and units.
+DataFlash: docs "Log messages" and the FMTU records of its logs; telemetry: MAVLink's common.xml. Plausible ranges are
+what any vehicle could record, not what is healthy. Gyros measure up to 70 rad/s (ICM-45686: 4000 degrees/s),
+accelerometers up to 400 m/s^2 (ADIS16507: 40 g), a record of a field is of 16 bits. ArduPilot reads batteries at 10 Hz
+and receivers at up to 20 Hz, its main loop runs at 400 Hz, its gyros at 8 kHz.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
 
-import numpy as np
-from numpy.typing import NDArray
+from care_core.ecosystems.dictionary import Dictionary, Field, Message
+from care_core.logs.base import Wanted
 
-from care_core.logs.base import Kind, LazyColumns, Table, Wanted
-from care_core.numbers import distinct
+_LATITUDE, _LONGITUDE = (-90.0, 90.0), (-180.0, 180.0)
+_HEIGHT_M = (-1e4, 1e5)
+_COPTER_HEIGHT_M = (-1.2e4, 1e5)
+_STEP_DEG, _STEP_M = 5e-4, 50.0
+"""50 m in a sample."""
+_GYROS_HZ = 2e4
 
-Floats = NDArray[np.float64]
 
-MESSAGES: Mapping[str, tuple[str, ...]] = {
-    "IMU": ("IMU", "IMU2", "IMU3"),
-    "MAG": ("MAG", "MAG2", "MAG3"),
-    "BARO": ("BARO", "BAR2", "BAR3"),
-    "GPS": ("GPS", "GPS2", "GPSB"),
-    "GPA": ("GPA", "GPA2"),
-    "BAT": ("BAT", "CURR", "BAT2", "CUR2", "CURR2"),
-    "RCOU": ("RCOU", "MOT"),
-    "XKF1": ("XKF1", "NKF1", "EKF1", "NKF6"),
-    "XKF3": ("XKF3", "NKF3", "EKF3", "NKF8"),
-    "XKF4": ("XKF4", "NKF4", "EKF4", "NKF9"),
+def _placed(unit: str, label: str, plausible: tuple[float, float] | None = None, step: float | None = None) -> Field:
+    return Field(unit, label, plausible=plausible, step=step, is_position=True)
+
+
+def _axes(
+    name: str, unit: str, label: str, axes: str = "XYZ", most: tuple[float, float] | None = None
+) -> dict[str, Field]:
+    return {f"{name}{axis}": Field(unit, label, plausible=most) for axis in axes}
+
+
+def _set(bits: int, name: str) -> str:
+    """How to have messages written that bits of ArduCopter's LOG_BITMASK stand for."""
+    return f"set '{name}' ({bits}) in LOG_BITMASK"
+
+
+_ATTITUDE, _NAVIGATION, _PID = _set(1 | 2, "attitude"), _set(32, "navigation tuning"), _set(4096, "PID")
+
+_BATTERY_FIELDS: Mapping[str, Field] = {
+    "Inst": Field(former=("Instance",)),
+    "Volt": Field("V", "battery voltage", plausible=(0, 1e3), step=5.0),
+    "Curr": Field("A", "battery current", plausible=(-1e3, 1e4)),
+    "EnrgTot": Field("Wh", "energy drawn", plausible=(0, 1e6), step=5.0),
+    "CurrTot": Field("mAh", "charge drawn"),
+    "Res": Field("ohm", "estimated resistance of the battery"),
 }
-"""Today's message -> the messages that carry it or carried it, one an instance. All others keep their name."""
+_OLD_BATTERY_FIELDS = {"Volt": Field(label="battery voltage"), "Curr": Field(label="battery current")}
+"""Before 3.3, in hundredths of a volt and of an ampere: no range of today's holds."""
+_TEST_RATIOS = {
+    f"S{letter}": Field(label=f"{what} test ratio of the estimator")
+    for letter, what in (("V", "velocity"), ("P", "position"), ("H", "height"), ("M", "compass"))
+}
+_PLACE = {"Lat": _placed("deg", "latitude"), "Lng": _placed("deg", "longitude"), "Alt": _placed("m", "height")}
 
-INSTANCE: Mapping[str, tuple[str, ...]] = {
-    "IMU": ("I",), "MAG": ("I",), "BARO": ("I",), "GPS": ("I",), "GPA": ("I",), "BAT": ("Inst", "Instance"),
-    "VIBE": ("IMU",), "XKF1": ("C",), "XKF3": ("C",), "XKF4": ("C",), "RFND": ("Instance",), "ESC": ("Instance",),
+
+def _along(axis: str, end: str, *, is_position: bool) -> Message:
+    """Position, velocity and acceleration controller of one axis, with its fields' last letter."""
+    return Message(
+        {
+            f"P{end}": Field("m", f"position {axis}", is_position=is_position),
+            f"TP{end}": Field("m", f"position {axis} wanted", is_position=is_position),
+            f"DP{end}": Field("m", f"position {axis} planned", is_position=is_position),
+            f"V{end}": Field("m/s", f"speed {axis}"),
+            f"A{end}": Field("m/s2", f"acceleration {axis}"),
+            f"TA{end}": Field("m/s2", f"acceleration {axis} wanted"),
+            f"DA{end}": Field("m/s2", f"acceleration {axis} planned"),
+        },
+        how_to_record=_NAVIGATION,
+    )
+
+
+_FLIGHT: Dictionary = {
+    "ATT": Message(
+        {
+            "Roll": Field("deg", "roll", plausible=(-360, 360)),
+            "Pitch": Field("deg", "pitch", plausible=(-360, 360)),
+            "Yaw": Field("deg", "heading", plausible=(-360, 720)),
+            "DesRoll": Field("deg", former=("RollIn",)),
+            "DesPitch": Field("deg", former=("PitchIn",)),
+            "DesYaw": Field("deg", former=("NavYaw",)),
+        },
+        moving=("Roll", "Pitch"), fastest_hz=1_000.0, slowest_s=30.0, how_to_record=_ATTITUDE,
+    ),
+    "RATE": Message(
+        {
+            "R": Field("deg/s", "roll rate"),
+            "P": Field("deg/s", "pitch rate"),
+            "Y": Field("deg/s", "yaw rate"),
+            "ROut": Field(label="roll output, -1 to 1"),
+            "POut": Field(label="pitch output, -1 to 1"),
+            "YOut": Field(label="yaw output, -1 to 1"),
+        },
+        fastest_hz=_GYROS_HZ, how_to_record=_ATTITUDE,
+    ),
+    "POS": Message(
+        {
+            "Lat": _placed("deg", "latitude", _LATITUDE, _STEP_DEG),
+            "Lng": _placed("deg", "longitude", _LONGITUDE, _STEP_DEG),
+            "Alt": _placed("m", "height above the sea"),
+            "RelHomeAlt": Field("m", "height above home", plausible=_HEIGHT_M, step=_STEP_M),
+        },
+        moving=("Lat", "Lng"), fastest_hz=1_000.0, slowest_s=30.0, how_to_record=_ATTITUDE,
+    ),
+    "CTUN": Message(
+        {
+            "Alt": Field("m", "height", plausible=_COPTER_HEIGHT_M),
+            "BAlt": Field("m", "height by the barometer", ("BarAlt",), _COPTER_HEIGHT_M),
+            "DAlt": Field("m", former=("WPAlt",), plausible=_COPTER_HEIGHT_M),
+            "SAlt": Field("m", former=("SonAlt",)),
+            "CRt": Field("cm/s", "climb rate", ("CRate",)),
+            "DCRt": Field("cm/s", former=("DCRate",)),
+            "ThO": Field(label="throttle, 0 to 1", former=("ThrOut",)),
+            "ThI": Field(former=("ThrIn",)),
+            "ThrOut": Field(label="throttle"),
+        },
+        how_to_record=_set(16, "control tuning"),
+    ),
+    "PSCN": _along("north", "N", is_position=True),
+    "PSCE": _along("east", "E", is_position=True),
+    "PSCD": _along("down", "D", is_position=False),
+    "STER": Message({
+        "TurnRate": Field("deg/s", "turn rate"),
+        "SteerOut": Field(label="steering output"),
+        "LatAcc": Field("m/s2", "lateral acceleration"),
+    }),
+    "THR": Message({"Speed": Field("m/s", "speed"), "ThrOut": Field("%", "throttle output")}),
+    "NTUN": Message({name: _placed("", "") for name in ("DPosX", "DPosY", "PosX", "PosY")}),
+    "AHR2": Message(_PLACE),
+    "ORGN": Message(
+        {"Lat": _placed("deg", "latitude", _LATITUDE), "Lng": _placed("deg", "longitude", _LONGITUDE)}, in_bursts=True
+    ),
+    "CMD": Message(
+        {
+            "Lat": Field("deg", plausible=_LATITUDE),
+            "Lng": Field("deg", plausible=_LONGITUDE),
+            "Alt": Field("m", plausible=_HEIGHT_M),
+        },
+        in_bursts=True, how_to_record=_set(256, "mission commands"),
+    ),
+    "MODE": Message({"ModeNum": Field(former=("Mode",))}),
+    "PM": Message({"NL": Field(former=("NLoop",))}),
+    **{name: Message({}, in_bursts=True) for name in ("PARM", "MSG", "RALY", "FNCE")},
+    **{name: Message({}, fastest_hz=_GYROS_HZ, how_to_record=_PID) for name in ("PIDR", "PIDP", "PIDY")},
+    "MOTB": Message({}, how_to_record=_set(131072, "motors")),
 }  # fmt: skip
-"""The field that numbers the instances of a message, where one message holds them all."""
-
-FORMER: Mapping[str, Mapping[str, tuple[str, ...]]] = {
-    "ATT": {"DesRoll": ("RollIn",), "DesPitch": ("PitchIn",), "DesYaw": ("NavYaw",)},
-    "CTUN": {"ThO": ("ThrOut",), "ThI": ("ThrIn",), "BAlt": ("BarAlt",), "DAlt": ("WPAlt",), "CRt": ("CRate",),
-             "DCRt": ("DCRate",), "SAlt": ("SonAlt",)},
-    "RCOU": {f"C{n}": (f"Ch{n}", f"Chan{n}", f"Mot{n}") for n in range(1, 15)},
-    "RCIN": {f"C{n}": (f"Ch{n}", f"Chan{n}") for n in range(1, 15)},
-    "XKF3": {"IYAW": ("IYAW",)},
-    "PM": {"NL": ("NLoop",), "NLon": ("NLon",)},
-    "MODE": {"ModeNum": ("Mode",)},
-    "VIBE": {"Clip": ("Clip0",)},
-    "RFND": {"Dist": ("Dist1",), "Instance": ()},
+_SENSORS: Dictionary = {
+    "IMU": Message(
+        _axes("Gyr", "rad/s", "rotation", most=(-100, 100)) | _axes("Acc", "m/s2", "acceleration", most=(-1e3, 1e3)),
+        ("IMU2", "IMU3"), "I", fastest_hz=_GYROS_HZ, how_to_record=_set(128, "IMU"),
+    ),
+    "GYR": Message({}, fastest_hz=_GYROS_HZ),
+    "ACC": Message({}, fastest_hz=_GYROS_HZ),
+    "VIBE": Message(
+        _axes("Vibe", "m/s2", "vibration", most=(0, 1e3)) | {"Clip": Field(former=("Clip0",))},
+        instance="IMU", how_to_record=_set(128, "IMU"),
+    ),
+    "MAG": Message(
+        _axes("Mag", "mGauss", "magnetic field", most=(-32768, 32767)), ("MAG2", "MAG3"), "I",
+        how_to_record=_set(8192, "compass"),
+    ),
+    "BARO": Message(
+        {"Alt": Field("m", "height by the barometer"), "Press": Field("Pa", "air pressure")}, ("BAR2", "BAR3"), "I"
+    ),
+    "GPS": Message(
+        {
+            **_PLACE,
+            "NSats": Field(label="satellites"),
+            "HDop": Field(label="horizontal dilution", plausible=(0, 655.35)),
+            "Spd": Field("m/s", "speed over ground"),
+        },
+        ("GPS2", "GPSB"), "I", fastest_hz=100.0, how_to_record=_set(4, "GPS"),
+    ),
+    "GPA": Message({}, ("GPA2",), "I"),
+    "BAT": Message(
+        _BATTERY_FIELDS, ("CURR", "BAT2", "CUR2", "CURR2"), "Inst", fastest_hz=100.0, slowest_s=60.0,
+        how_to_record=_set(512, "battery monitor"),
+    ),
+    **{name: Message(_OLD_BATTERY_FIELDS) for name in ("CURR", "CUR2", "CURR2")},
+    "RCOU": Message(
+        {
+            f"C{n}": Field("us", "motor and servo outputs", (f"Ch{n}", f"Chan{n}", f"Mot{n}"))
+            for n in range(1, 15)
+        },
+        ("MOT",), how_to_record=_set(1024, "RC output"),
+    ),
+    "RCIN": Message(
+        {f"C{n}": Field("us", former=(f"Ch{n}", f"Chan{n}")) for n in range(1, 15)}, how_to_record=_set(64, "RC input")
+    ),
+    "RFND": Message({"Dist": Field("m", former=("Dist1",))}, instance="Instance"),
+    "ESC": Message({"RPM": Field("1/min")}, instance="Instance"),
+    "XKF1": Message({}, ("NKF1", "EKF1", "NKF6"), "C"),
+    "XKF3": Message(
+        {
+            "IVN": Field("m/s", "velocity innovation north"),
+            "IVE": Field("m/s", "velocity innovation east"),
+            "IPN": Field("m", "position innovation north"),
+            "IPE": Field("m", "position innovation east"),
+        },
+        ("NKF3", "EKF3", "NKF8"), "C",
+    ),
+    "XKF4": Message(_TEST_RATIOS, ("NKF4", "EKF4", "NKF9"), "C"),
 }  # fmt: skip
-"""Today's field -> what it was called."""
+_TELEMETRY: Dictionary = {
+    "ATTITUDE": Message({
+        "roll": Field("rad", "roll"), "pitch": Field("rad", "pitch"), "yaw": Field("rad", "heading")
+    }),
+    "VFR_HUD": Message({
+        "alt": _placed("m", "height"),
+        "groundspeed": Field("m/s", "speed over ground"),
+        "throttle": Field("%", "throttle"),
+        "climb": Field("m/s", "climb rate"),
+    }),
+    "SYS_STATUS": Message({
+        "voltage_battery": Field("mV", "battery voltage"), "current_battery": Field("cA", "battery current"),
+    }),
+    "GPS_RAW_INT": Message({
+        **{name: _placed("", "") for name in ("lat", "lon", "alt")},
+        "satellites_visible": Field(label="satellites"),
+        "eph": Field(label="horizontal dilution, times 100"),
+    }),
+    "GLOBAL_POSITION_INT": Message({name: _placed("", "") for name in ("lat", "lon", "alt")}),
+    "LOCAL_POSITION_NED": Message({name: _placed("m", "") for name in ("x", "y")}),
+    "VIBRATION": Message(_axes("vibration_", "m/s2", "vibration", "xyz")),
+    "SERVO_OUTPUT_RAW": Message({f"servo{n}_raw": Field("us", "motor and servo outputs") for n in range(1, 17)}),
+}  # fmt: skip
 
-_CENTIVOLTS = 200.0
-"""A pack reads more than this only where it is recorded in hundredths of a volt (CURR before 3.3)."""
-_FULL_SCALE = 2.0
-"""Throttle of a copter is in thousandths before 3.4, at most 1 since."""
-_PERCENT = 100.0
-"""A plane's throttle is in percent (ArduPlane/Log.cpp: CTUN.ThO), so more than `_FULL_SCALE` under today's name is."""
+MESSAGES: Dictionary = {**_FLIGHT, **_SENSORS, **_TELEMETRY}
+
+
+def recorded_as(name: str) -> tuple[str, ...]:
+    """The messages that carry a message of today's name or carried it, one an instance."""
+    known = MESSAGES.get(name)
+    return (name,) if known is None else (name, *known.former)
+
+
+def former_fields(name: str) -> dict[str, tuple[str, ...]]:
+    """Per field of a message what it was called, where that was otherwise."""
+    known = MESSAGES.get(name)
+    return {} if known is None else {field: spec.former for field, spec in known.fields.items() if spec.former}
 
 
 def expanded(reads: Wanted) -> dict[str, tuple[str, ...]]:
     """The channels and fields by every name that they may have in a log."""
     wanted: dict[str, tuple[str, ...]] = {}
     for name, fields in reads.items():
-        former = FORMER.get(name, {})
-        known = [old for field in fields for old in (field, *former.get(field, ()))]
-        for message in MESSAGES.get(name, (name,)):
-            wanted[message] = tuple(dict.fromkeys([*wanted.get(message, ()), *known, *INSTANCE.get(name, ())]))
+        former, known = former_fields(name), MESSAGES.get(name)
+        instance = () if known is None or not known.instance else (known.instance, *former.get(known.instance, ()))
+        names = _all_names(fields, former)
+        for message in recorded_as(name):
+            wanted[message] = tuple(dict.fromkeys((*wanted.get(message, ()), *names, *instance)))
     return wanted
 
 
-def instances(tables: Mapping[str, Table], name: str) -> tuple[Table, ...]:
-    """The instances of a message in order of their number, under today's names; none where the log has none."""
-    found: list[Table] = []
-    for message in MESSAGES.get(name, (name,)):
-        table = tables.get(message)
-        if table is not None and len(table):
-            found += split(name, _renamed(name, table))
-    return tuple(found)
-
-
-class _Today(LazyColumns):
-    """A table's columns under today's names and in today's units, made when they are asked for.
-
-    `sources` says of each name the column that it is and what that is divided by.
-    """
-
-    def __init__(self, table: Table, sources: Mapping[str, tuple[str, float]]) -> None:
-        super().__init__(tuple(sources))
-        self._table, self._sources = table, sources
-
-    def __getitem__(self, name: str) -> NDArray[Any]:
-        source, divisor = self._sources[name]
-        column = self._table[source]
-        return column if divisor == 1 else column / divisor
-
-    @property
-    def count(self) -> int:
-        return len(self._table)
-
-    @property
-    def t(self) -> Floats:
-        return self._table.t
-
-    def kind(self, name: str) -> Kind:
-        return self._table.kind(self._sources[name][0])
-
-    def where(self, mask: NDArray[np.bool_] | slice) -> _Today:
-        return _Today(self._table.where(mask), self._sources)
-
-
-def _renamed(name: str, table: Table) -> Table:
-    sources = {field: (field, 1.0) for field in table.columns}
-    for field, olds in FORMER.get(name, {}).items():
-        old = next((old for old in olds if old in sources), None)
-        if field not in sources and old is not None:
-            sources[field] = sources[old]
-    if name == "BAT" and "Volt" in sources and _top(table[sources["Volt"][0]]) > _CENTIVOLTS:
-        for field in sources.keys() & {"Volt", "Curr"}:
-            sources[field] = (sources[field][0], 100.0)
-    if name == "CTUN":
-        for field in sources.keys() & {"ThO", "ThI"}:
-            if _top(table[sources[field][0]]) > _FULL_SCALE:
-                sources[field] = (sources[field][0], _PERCENT if field in table.columns else 1000.0)
-        if "Alt" not in sources and "BAlt" in sources:
-            sources["Alt"] = sources["BAlt"]
-    found = Table(None, _Today(table, sources))
-    keep = np.isfinite(table.t)
-    return found if keep.all() else found.where(keep)
-
-
-def _top(column: NDArray[Any]) -> float:
-    known = column[np.isfinite(column)]
-    return float(known.max()) if len(known) else 0.0
-
-
-def split(name: str, table: Table) -> list[Table]:
-    """The instances that one message holds, in order of their number."""
-    field = next((field for field in INSTANCE.get(name, ()) if field in table.columns), None)
-    if field is None:
-        return [table]
-    number = table[field]
-    return [table.where(number == own) for own in distinct(number[np.isfinite(number)])]
+def _all_names(fields: Iterable[str], former: Mapping[str, tuple[str, ...]]) -> list[str]:
+    return [name for field in fields for name in (field, *former.get(field, ()))]

@@ -13,15 +13,16 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded, instances
+from care_core.ecosystems.ardupilot.instances import instances
+from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded, recorded_as
 from care_core.ecosystems.ardupilot.texts import Refusal, refusal_of
 from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.plausible import sound as without_nonsense
 from care_core.ecosystems.vehicles import Kind, Vehicle, Way, mode_name, mode_number, vehicle_of, way_of
 from care_core.ecosystems.vehicles.modes import px4_mode
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX
 from care_core.logs import formats
 from care_core.logs.base import Log, Table, Wanted
-from care_core.logs.plausible import plausible
 from care_core.run import Setting
 
 READS: Wanted = {
@@ -79,7 +80,7 @@ class Recorded(RunModel):
     def all(self, name: str, *fields: str) -> tuple[Table, ...]:
         """The instances of a message that have these fields, by today's names."""
         self.tables(expanded({name: (*fields, *self.reads.get(name, ()))}))
-        names = [message for message in MESSAGES.get(name, (name,)) if message in self._tables]
+        names = [message for message in recorded_as(name) if message in self._tables]
         recorded = [self._tables[message] for message in names]
         known = self._instances.get(name)
         if known is None or list(map(id, known[0])) != list(map(id, recorded)):  # not yet, or with fewer fields
@@ -96,7 +97,7 @@ class Recorded(RunModel):
         """A recorded table without the rows that cannot be; None where its source is dead."""
         known = self._sound.get(name)
         if known is None or known[0] is not table:
-            known = self._sound[name] = table, plausible({name: table}).get(name)
+            known = self._sound[name] = table, without_nonsense(MESSAGES, name, table)
         return known[1]
 
     # --- the log and its vehicle -------------------------------------------------------------------------------

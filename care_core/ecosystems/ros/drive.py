@@ -12,6 +12,7 @@ import numpy as np
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Severity
+from care_core.ecosystems.plausible import STAMP
 from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, actionlib_goals, nav2_goals
 from care_core.ecosystems.ros.messages import (
     ACTION_GOAL,
@@ -33,7 +34,6 @@ from care_core.ecosystems.ros.motion import Commands, Following, Odometry, comma
 from care_core.ecosystems.ros.node_messages import LogMessage, Report, log_messages, reports
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
 from care_core.logs.base import Channel, Table, Wanted, merge_needs
-from care_core.logs.plausible import STAMP
 from care_core.numbers import Floats, median, quantile
 from care_core.run import Damage, Setting
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.dictionary import Field, Message
+from care_core.ecosystems.plausible import STAMP
 from care_core.logs.base import Channel, Table, Wanted
-from care_core.logs.plausible import STAMP
 from care_core.logs.ros_message import short_name
 from care_core.numbers import Floats
 

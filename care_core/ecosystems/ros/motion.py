@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from care_core.ecosystems.plausible import STAMP
 from care_core.ecosystems.ros.messages import FRAME, ODOMETRY, TWIST, TWIST_STAMPED, believable, yaw_of
 from care_core.logs.base import Table
-from care_core.logs.plausible import STAMP
 from care_core.numbers import Bools, Floats, median, quantile
 from care_core.records import Record, replace
 

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN, is_armed
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, span_of_phase
 from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, series, statistic
-from care_core.ecosystems.ardupilot.messages import split
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing
+from care_core.ecosystems.plausible import is_alive
 from care_core.logs.base import Table, Wanted, merge_needs
-from care_core.logs.plausible import is_alive
 from care_core.run import Unavailable, Value, is_known
 
 _BATTERY: Wanted = {"BAT": ("Inst", "Instance", "Volt", "Curr", "EnrgTot")}

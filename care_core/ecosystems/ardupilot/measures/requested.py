@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.messages import split
+from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission, span_of_phase
-from care_core.ecosystems.ardupilot.messages import split
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.numbers import quantile

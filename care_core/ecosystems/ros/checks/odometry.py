@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.plausible import STAMP
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive, way_through
 from care_core.ecosystems.ros.messages import COMMANDS, GOALS, MESSAGES, ODOMETRY, TF, holds, reading
 from care_core.ecosystems.ros.motion import STALE_S, Odometry, never_moved
 from care_core.logs.base import Table
-from care_core.logs.plausible import STAMP
 from care_core.numbers import Floats, median, quantile
 
 LIMITS = Limits()

@@ -9,11 +9,11 @@ import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
+from care_core.ecosystems.plausible import APART, STAMP, is_simulated, stamps_pace
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import GOALS, ROSOUT, STAMPED, reading
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, kept_its_rate
 from care_core.ecosystems.timeline import counted
-from care_core.logs.plausible import APART, STAMP, is_simulated, stamps_pace
 from care_core.numbers import median
 
 LIMITS = Limits()

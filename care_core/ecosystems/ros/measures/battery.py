@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
+from care_core.ecosystems.plausible import is_alive
 from care_core.ecosystems.ros.measures.window import drive_of, topics
 from care_core.ecosystems.ros.sensors import LEAST_V, MOST_V, Battery
-from care_core.logs.plausible import is_alive
 from care_core.numbers import Floats
 from care_core.run import Unavailable, Value
 

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.measures import Args, Mission, missing
+from care_core.ecosystems.plausible import APART, STAMP, is_simulated, stamps_pace
 from care_core.ecosystems.ros.drive import Drive, way_through
 from care_core.ecosystems.ros.goals import Goal
 from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS, Commands, Odometry, never_moved
 from care_core.ecosystems.ros.recoveries import Recoveries
 from care_core.logs.base import Wanted
-from care_core.logs.plausible import APART, STAMP, is_simulated, stamps_pace
 from care_core.numbers import Bools, Floats
 from care_core.records import Record, replace
 from care_core.run import Unavailable

@@ -12,54 +12,18 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems.dictionary import Dictionary, Message, find_message, instance_field
 from care_core.logs.base import Table
 from care_core.numbers import distinct, median
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-LIMITS: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "POS": {"Lat": (-90, 90), "Lng": (-180, 180), "RelHomeAlt": (-1e4, 1e5)},
-    "ORGN": {"Lat": (-90, 90), "Lng": (-180, 180)},
-    "CMD": {"Lat": (-90, 90), "Lng": (-180, 180), "Alt": (-1e4, 1e5)},
-    "BAT": {"Volt": (0, 1e3), "Curr": (-1e3, 1e4), "EnrgTot": (0, 1e6)},
-    "ATT": {"Roll": (-360, 360), "Pitch": (-360, 360), "Yaw": (-360, 720)},
-    "GPS": {"HDop": (0, 655.35)},
-    **{name: {
-        **{f"Gyr{axis}": (-100, 100) for axis in "XYZ"}, **{f"Acc{axis}": (-1e3, 1e3) for axis in "XYZ"},
-    } for name in ("IMU", "IMU2", "IMU3")},
-    **{name: {f"Mag{axis}": (-32768, 32767) for axis in "XYZ"} for name in ("MAG", "MAG2", "MAG3")},
-    "VIBE": {f"Vibe{axis}": (0, 1e3) for axis in "XYZ"},
-    "CTUN": {"Alt": (-1.2e4, 1e5), "DAlt": (-1.2e4, 1e5), "BAlt": (-1.2e4, 1e5)},
-}  # fmt: skip
-"""Lowest and highest value of a field that any vehicle could record. Gyros measure up to 70 rad/s (ICM-45686: 4000
-degrees/s), accelerometers up to 400 m/s^2 (ADIS16507: 40 g), a record of a field is of 16 bits."""
-
-JUMPS: Mapping[str, Mapping[str, float]] = {
-    "POS": {"Lat": 5e-4, "Lng": 5e-4, "RelHomeAlt": 50.0},  # 50 m in a sample
-    "BAT": {"Volt": 5.0, "EnrgTot": 5.0},
-}
-"""A step that no vehicle makes from one sample to the next and back again: away by more, and back to within half."""
-
 STAMP = "header.stamp"
 """The time at which a ROS robot made a message, by its own clock."""
 
-MOVING: Mapping[str, tuple[str, ...]] = {"POS": ("Lat", "Lng"), "ATT": ("Roll", "Pitch")}
-"""Fields of which at least one changes in any flight, by the estimator's noise alone."""
-
-FASTEST_HZ: Mapping[str, float] = {
-    "BAT": 100.0, "GPS": 100.0, "POS": 1_000.0, "ATT": 1_000.0,
-    "RATE": 2e4, "IMU": 2e4, "GYR": 2e4, "ACC": 2e4, "PIDR": 2e4, "PIDP": 2e4, "PIDY": 2e4,
-}  # fmt: skip
-"""Most messages of a sensor in a second. ArduPilot reads batteries at 10 Hz and receivers at up to 20 Hz, its main loop
-runs at 400 Hz, its gyros at 8 kHz."""
 ANY_FASTEST_HZ = 2_000.0
 """Of a message without an entry: robots publish odometry and lasers at up to some 100 Hz, joints at 1 kHz."""
-AT_ONCE = frozenset(("PARM", "CMD", "MSG", "RALY", "FNCE", "ORGN"))
-"""What a vehicle writes in a burst: parameters and items as fast as they come."""
-SLOWEST_S: Mapping[str, float] = {"BAT": 60.0, "POS": 30.0, "ATT": 30.0}
-"""Longest usual time between two messages of a sensor, also in thinned logs."""
-
 _PACE, _GPS_STEP_S = 1.2, 60.0
 """How far the log's clock may run from the satellites': in 24 logs of four firmwares they agree to 0.3 %."""
 APART, _STAMPED_S, _QUARTERS, _MOSTLY = 1.25, 10.0, 4, 0.9
@@ -67,29 +31,32 @@ APART, _STAMPED_S, _QUARTERS, _MOSTLY = 1.25, 10.0, 4, 0.9
 right to 0.01 %; one that was set is off in one quarter of the time, one that runs wrong in each."""
 _SIMULATED_S = 1e9
 """A simulation's time begins at 0: stamps so far behind the recording's have a pace of their own."""
+_ANY = Message({})
 _ENOUGH = 20
 """Samples that must agree before a source is called dead or a clock wrong."""
 
 
-def plausible(tables: Mapping[str, Table]) -> dict[str, Table]:
-    """The tables without dead ones, and without the rows in which a field is beyond its limits, steps back in time, or
-    leaps away for one sample."""
-    return {name: _cleaned(name, table) for name, table in tables.items() if not _is_dead(name, table)}
+def sound(dictionary: Dictionary, name: str, table: Table) -> Table | None:
+    """A table without the rows in which a field is beyond its range, steps back in time, or leaps away for one sample;
+    None where its source is dead."""
+    known = find_message(dictionary, name)
+    if known is None:
+        return table
+    return None if _is_dead(known, table) else _cleaned(known, table)
 
 
-def dead_sources(tables: Mapping[str, Table]) -> dict[str, str]:
+def dead_sources(dictionary: Dictionary, tables: Mapping[str, Table]) -> dict[str, str]:
     """Tables of something that moves, but whose values never change, each with the reason in words."""
     return {
         name: f"{name} says the same throughout the log, so it measures nothing"
-        for name in MOVING
-        if name in tables and _is_dead(name, tables[name])
+        for name, known in dictionary.items()
+        if name in tables and _is_dead(known, tables[name])
     }
 
 
-def _is_dead(name: str, table: Table) -> bool:
-    fields = MOVING.get(name, ())
-    is_told = len(fields) > 0 and len(table) >= _ENOUGH and set(fields) <= table.columns.keys()
-    return is_told and not any(is_alive(table[field]) for field in fields)
+def _is_dead(known: Message, table: Table) -> bool:
+    are_recorded = known.moving and len(table) >= _ENOUGH and set(known.moving) <= table.columns.keys()
+    return bool(are_recorded) and not any(is_alive(table[field]) for field in known.moving)
 
 
 def is_alive(values: Floats) -> bool:
@@ -98,7 +65,7 @@ def is_alive(values: Floats) -> bool:
     return len(known) > 0 and (len(known) < _ENOUGH or bool(np.ptp(known) > 0))
 
 
-def clock_doubt(tables: Mapping[str, Table], start_s: float, end_s: float) -> str:
+def clock_doubt(dictionary: Dictionary, tables: Mapping[str, Table], start_s: float, end_s: float) -> str:
     """Why the times of a mission cannot be right, in words; empty where they can.
 
     Time must go on, and no sensor may say more, or less, in a second than any does.
@@ -106,32 +73,34 @@ def clock_doubt(tables: Mapping[str, Table], start_s: float, end_s: float) -> st
     if not end_s > start_s:
         return "the log's clock does not advance during the mission"
     for name, table in tables.items():
+        known = dictionary.get(name, _ANY)
         inside = table.t[(table.t >= start_s) & (table.t <= end_s)]
-        if len(inside) < _ENOUGH or name in AT_ONCE:
+        if len(inside) < _ENOUGH or known.in_bursts:
             continue
-        sensors = len(_instances(table)) if name in FASTEST_HZ else 1
+        sensors = len(_instances(known, table)) if known.fastest_hz else 1
         rate_hz = (len(inside) - 1) / max(float(inside[-1] - inside[0]), 1e-9) / sensors
-        if rate_hz > FASTEST_HZ.get(name, ANY_FASTEST_HZ):
+        if rate_hz > (known.fastest_hz or ANY_FASTEST_HZ):
             return f"the log's clock is too slow or stands still: it has {name} {rate_hz:.3g} times a second"
-        if name in SLOWEST_S and 1 / rate_hz > SLOWEST_S[name]:
+        if known.slowest_s and 1 / rate_hz > known.slowest_s:
             return f"the log's clock is too fast: it has {name} only every {1 / rate_hz:.3g} s"
-        stands = _longest_stand(inside) if name in MOVING else 0
+        stands = _longest_stand(inside) if known.moving else 0
         if stands >= _ENOUGH:
             return f"the log's clock stands still: {stands} {name} messages in a row have the same time"
-    pace = _satellites_pace(tables.get("GPS"), start_s, end_s)
+    pace = _satellites_pace(dictionary, tables.get("GPS"), start_s, end_s)
     if not 1 / _PACE < pace < _PACE:
         return f"the log's clock goes wrong: by the satellites' time {pace:.3g} s pass in each of its seconds"
     return _stamps_doubt(tables, start_s, end_s)
 
 
-def _satellites_pace(gps: Table | None, start_s: float, end_s: float) -> float:
+def _satellites_pace(dictionary: Dictionary, gps: Table | None, start_s: float, end_s: float) -> float:
     """Seconds by the satellites' time (`GMS`, ms of the week) in one of the log's; 1 where nothing tells."""
     if gps is None or "GMS" not in gps.columns:
         return 1.0
     inside = gps.between(start_s, end_s)
-    first = inside.where(_instances(inside)[0]) if len(inside) else inside
-    known = first.where(first["GMS"] > 0)
-    true_s, said_s = np.diff(known["GMS"]) / 1e3, np.diff(known.t)
+    known = dictionary.get("GPS", _ANY)
+    first = inside.where(_instances(known, inside)[0]) if len(inside) else inside
+    timed = first.where(first["GMS"] > 0)
+    true_s, said_s = np.diff(timed["GMS"]) / 1e3, np.diff(timed.t)
     steady = (true_s > 0) & (true_s < _GPS_STEP_S)  # a new week, a receiver that found the time
     if steady.sum() < _ENOUGH or said_s[steady].sum() <= 0:
         return 1.0
@@ -178,28 +147,29 @@ def _longest_stand(t: Floats) -> int:
     return int(np.diff(np.concatenate(([-1], changes, [len(t) - 1]))).max())
 
 
-def _cleaned(name: str, table: Table) -> Table:
-    limits, jumps = LIMITS.get(name, {}), JUMPS.get(name, {})
+def _cleaned(known: Message, table: Table) -> Table:
+    ranges = {name: field.plausible for name, field in known.fields.items() if field.plausible is not None}
     keep = np.ones(len(table), dtype=bool)
-    if limits and (np.diff(table.t) < 0).any():
+    if ranges and (np.diff(table.t) < 0).any():
         keep = table.t >= np.maximum.accumulate(table.t)
-    for field, (low, high) in limits.items():
+    for field, (low, high) in ranges.items():
         if field in table.columns:
             column = table[field]
             keep &= np.isnan(column) | ((column >= low) & (column <= high))
     if not keep.all():
         table = table.where(keep)
+    steps = {name: field.step for name, field in known.fields.items() if field.step is not None}
     keep = np.ones(len(table), dtype=bool)
-    for own in _instances(table):
-        for field, step in jumps.items():
+    for rows in _instances(known, table) if steps else ():
+        for field, step in steps.items():
             if field in table.columns:
-                keep[own] &= ~_leaps(table[field][own], step)
+                keep[rows] &= ~_leaps(table[field][rows], step)
     return table if keep.all() else table.where(keep)
 
 
-def _instances(table: Table) -> list[Mask]:
+def _instances(known: Message, table: Table) -> list[Mask]:
     """The rows of each sensor: samples of two batteries alternate without leaping."""
-    name = next((name for name in ("Inst", "Instance", "I") if name in table.columns), None)
+    name = instance_field(known, table.columns)
     if name is None:
         return [np.ones(len(table), dtype=bool)]
     return [np.asarray(table[name] == number) for number in distinct(table[name])]
