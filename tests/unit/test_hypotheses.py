@@ -63,7 +63,7 @@ def test_a_part_that_surely_failed_and_that_missions_survive_does_not_lead_over_
 
 
 def test_a_part_that_failed_after_the_run_was_failing_explains_little() -> None:
-    stuck = Finding("planner", "the planner makes no way", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
+    stuck = Finding("planner", "the controller is stuck", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
     assert lead(weigh({"occdist_scale": 0.6}, 0.3, [stuck, finding(0.98)], "fits")) == ("parameter", "occdist_scale")
     sooner = replace(stuck, onset_s=60.0)
     assert lead(weigh({"occdist_scale": 0.6}, 0.3, [sooner, finding(0.98)], "fits"))[0] == "hardware"
@@ -83,7 +83,7 @@ def test_a_doubtful_sign_of_how_it_was_set_takes_nothing_from_a_part_that_surely
 
 
 def test_a_finding_that_speaks_of_how_it_was_set_raises_the_options() -> None:
-    stuck = Finding("planner", "the planner makes no way", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
+    stuck = Finding("planner", "the controller is stuck", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
     assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, [], "fits"))[0] == "chance"
     assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, [stuck], "fits")) == ("parameter", "a")
     assert lead(weigh({"a": 0.01}, 0.3, [stuck], "fits"))[0] == "chance"

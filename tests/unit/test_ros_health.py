@@ -92,11 +92,11 @@ def always_the_same(message: Any) -> None:
     ("kind", "change", "title"),
     [
         (ODOMETRY, frozen, "never moved, but goals were reached"),
-        (ODOMETRY, without_position, "tells no position"),
+        (ODOMETRY, without_position, "has no position"),
         (ODOMETRY, not_a_number, "no numbers"),
         (ODOMETRY, without_time, "no time"),
         (ODOMETRY, half_as_fast, "stamps of /wheels/odom run at 0.5 of the recording's clock"),
-        (BATTERY, always_the_same, "says the same throughout"),
+        (BATTERY, always_the_same, "reports the same values throughout"),
     ],
 )
 def test_a_source_that_cannot_be_is_a_finding(

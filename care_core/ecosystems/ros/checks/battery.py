@@ -48,7 +48,7 @@ def _frozen(drive: Drive) -> Iterator[Finding]:
         if all(not np.isfinite(column).any() or np.ptp(column) == 0 for column in columns):
             yield Finding(
                 kind="battery",
-                title="the battery says the same throughout: it measures nothing",
+                title="the battery reports the same values throughout: it measures nothing",
                 onset_s=0.0,
                 end_s=drive.duration_s,
                 severity="info",

@@ -170,7 +170,7 @@ def _stopping(drive: Drive, motion: Following, still: list[tuple[float, float]])
         if np.count_nonzero(near) >= STOPS and float(stood_s[near].sum()) >= STOPPED_S:
             later = starts >= start
             yield _finding(
-                drive, "commands reach the drive only now and then", (start, still[-1][1]),
+                drive, "commands reach the drive only intermittently", (start, still[-1][1]),
                 f"{np.count_nonzero(later)} standstills of {median(stood_s[later]):.1f} s while commands to move go on",
                 kind="commands",
             )  # fmt: skip

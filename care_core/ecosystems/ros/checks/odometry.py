@@ -68,13 +68,13 @@ def _doubts(drive: Drive) -> Iterator[tuple[str, str, str]]:
         rows = {topic: len(table) for topic, table in tables.items() if len(table) >= STREAM_MESSAGES}
         if rows and all(_is_nothing(tables[topic]) for topic in rows):
             topic = min(rows)
-            yield topic, "odometry says no numbers", f"{rows[topic]} messages without a position"
+            yield topic, "odometry has no numbers", f"{rows[topic]} messages without a position"
         return
     topic, count, path_m = odometry.topic, len(odometry.t), odometry.path_m()
     way_m = way_through(drive.goals, drive.commands)
     if odometry.stands_still:
         evidence = f"the same in all {count} messages, while its own speed makes {odometry.way_by_speed_m:.1f} m"
-        yield topic, "odometry tells no position", evidence
+        yield topic, "odometry has no position", evidence
     elif never_moved(path_m, count, way_m):
         evidence = f"{path_m:.2g} m in {count} messages, goals and commands over {way_m:.1f} m"
         yield topic, "odometry never moved, but goals were reached", evidence
@@ -82,7 +82,7 @@ def _doubts(drive: Drive) -> Iterator[tuple[str, str, str]]:
     known = stamp[np.isfinite(stamp)]
     if len(stamp) >= STREAM_MESSAGES and (not len(known) or (len(known) == len(stamp) and np.ptp(known) == 0)):
         stamps = "are the same" if len(known) else "were never set"
-        yield topic, "odometry carries no time", f"its {len(stamp)} stamps {stamps}; transforms need them"
+        yield topic, "odometry has no time stamps", f"its {len(stamp)} stamps {stamps}; transforms need them"
 
 
 def _is_nothing(table: Table) -> bool:

@@ -42,7 +42,7 @@ def battery_energy(mission: Mission, args: Args) -> Value:
         start, end = np.interp([mission.start_s, mission.end_s], battery.t, battery.charge)
         return float(start - end) * float(battery.voltage[inside].mean())
     if np.isfinite(battery.current).any() or np.isfinite(battery.charge).any():
-        return Unavailable("the battery says the same current and charge throughout", "check its sensor and driver")
+        return Unavailable("the battery reports the same current and charge throughout", "check its sensor and driver")
     return Unavailable("the battery reports neither current nor charge", "have its driver fill in one of them")
 
 
@@ -58,7 +58,7 @@ def _unless_absurd(joule: float, time_s: float) -> Value:
     power_w = joule / time_s if time_s > 0 else 0.0
     if power_w >= _LEAST_W:
         return joule / 3600
-    return Unavailable(f"the battery says {power_w:.3g} W, on which no robot runs", "is its current in amperes?")
+    return Unavailable(f"the battery reports {power_w:.3g} W, on which no robot runs", "is its current in amperes?")
 
 
 @extractor("battery_power", needs={}, parts=("battery",), unit="W")
@@ -97,5 +97,7 @@ def _battery(mission: Mission) -> Battery | Unavailable:
         return Unavailable(f"{channel} does not cover the mission", "record it from the first goal to the last")
     volts = float(battery.voltage.max())
     if not LEAST_V <= volts <= MOST_V:
-        return Unavailable(f"the battery says {volts:.3g} V, which none has", "check its sensor, and the driver's unit")
+        return Unavailable(
+            f"the battery reports {volts:.3g} V, which no battery has", "check its sensor, and the driver's unit"
+        )
     return battery

@@ -55,7 +55,8 @@ def _moving(drive: DriveWindow) -> ActiveOdometry | Unavailable:
     """Odometry that says how fast the robot is."""
     if drive.odometry is not None and not drive.odometry.tells_speed:
         return Unavailable(
-            f"by its twist {drive.topics.odometry} stood, by its position it went", "have the driver fill in its twist"
+            f"the twist of {drive.topics.odometry} stays zero while its position moves",
+            "have its driver fill in the twist",
         )
     return _odometry(drive)
 
@@ -198,7 +199,7 @@ def goals_ended(mission: Mission, args: Args) -> Value:
     """Number of goals that the goal server answered with a status: aborted means that it gave up by itself."""
     status = str(args.get("status", "aborted")).upper()
     if status not in Status.__members__:
-        return Unavailable(f"'{status.lower()}' is no goal status", "use one of those that its arguments name")
+        return Unavailable(f"'{status.lower()}' is not a goal status", "use one of those that its arguments name")
     return float(sum(goal.status == Status[status] for goal in mission.shared(window).goals))
 
 
@@ -238,7 +239,7 @@ def goal_time(mission: Mission, args: Args) -> Value:
         return times[number - 1]
     if args.get("of") == "variation":
         positive = np.log([time for time in times if time > 0])
-        return float(np.std(positive, ddof=1)) if len(positive) > 1 else Unavailable("one goal varies from no other")
+        return float(np.std(positive, ddof=1)) if len(positive) > 1 else Unavailable("a single goal has no variation")
     return max(times) if args.get("of") == "longest" else sum(times) / len(times)
 
 
@@ -247,7 +248,7 @@ def time_per_metre(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> 
     """Time with a goal per metre of way made towards the goals."""
     made_m = sum(_progress(odometry, drive.goals))
     if made_m < 0.1:
-        return Unavailable("the robot made no way towards its goals", "see what it was commanded")
+        return Unavailable("the robot came no closer to its goals", "see what it was commanded")
     return drive.active_s / made_m
 
 

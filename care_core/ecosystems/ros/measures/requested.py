@@ -131,7 +131,7 @@ def _length_m(mission: Mission) -> float | Unavailable:
     if isinstance(way, Unavailable):
         return way
     length_m = float(way.lengths.sum())
-    return length_m if length_m > 0 else Unavailable("the goals ask for no way", "judge a mission that leads somewhere")
+    return length_m if length_m > 0 else Unavailable("the goals ask for no distance", "judge one that leads somewhere")
 
 
 PER_GOAL = {"per": one_of("goal: for each goal that the mission asks for; in all unless given", "goal")}

@@ -267,7 +267,7 @@ def _doubt(
         way_m: how far the robot must have gone.
     """
     if len(_active(whole.recorded_s, mission, goals)[0]) < len(_active(whole.numberless_s, mission, goals)[0]):
-        return f"{whole.topic} says no numbers in most of its messages"
+        return f"{whole.topic} has no numbers in most of its messages"
     if odometry is not None and never_moved(float(odometry.step_m.sum()), len(odometry.t), way_m):
         return f"{whole.topic} says that the robot never moved, but it reached its goals"
     table = mission.table(whole.topic)
