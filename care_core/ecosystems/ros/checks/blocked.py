@@ -27,8 +27,8 @@ RAYS = LIMITS.add("rays that see it", 8, "", "fewer are stray returns")
 FEWEST_RAYS = LIMITS.add("rays of a scan", 30, "", "fewer do not show a thing's width")
 BESIDE = int(LIMITS.add("rays beside each that must have seen further", 2, "", "edges of what stood there before"))
 TURN_RAD = LIMITS.add("turn between the scans", 0.1, "rad", "where the laser sits on the robot is not known")
-STUCK_S = LIMITS.add("time without getting further", 10.0, "s", "move_base's oscillation_timeout")
-STUCK_M = LIMITS.add("way in that time", 0.5, "m", "Nav2's progress checker: required_movement_radius")
+STUCK_S = LIMITS.add("time without getting further", 10.0, "s", "as Nav2's progress checker: movement_time_allowance")
+STUCK_M = LIMITS.add("way in that time", 0.5, "m", "as Nav2's progress checker: required_movement_radius")
 SOON_S = LIMITS.add("how soon the robot is stuck", 60.0, "s", "later something else has stopped it")
 
 
