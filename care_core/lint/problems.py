@@ -37,7 +37,7 @@ class Entry(Record):
 
     @property
     def number(self) -> float | None:
-        """The value, None where it is no number."""
+        """The value, None where it is not a number."""
         return None if isinstance(self.value, str) else float(self.value)
 
 
