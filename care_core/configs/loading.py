@@ -109,23 +109,22 @@ def resolve(files: Sequence[ConfigFile], parameters: Iterable[str]) -> dict[str,
     for file in files:
         loaded.setdefault(file.format, []).append(file.settings)
     finders: list[Find] = [format.functions.finder(settings) for format, settings in loaded.items()]
-    found: dict[str, Setting] = {}
+    resolved: dict[str, Setting] = {}
     for parameter in parameters:
         for find in finders:
             setting = find(parameter)
             if setting is not None:
-                found[parameter] = setting
-    return found
+                resolved[parameter] = setting
+    return resolved
 
 
-def guesses(files: Sequence[ConfigFile], found: Mapping[str, Setting]) -> dict[str, list[str]]:
+def guesses(files: Sequence[ConfigFile], resolved: Mapping[str, Setting]) -> dict[str, list[str]]:
     """Per file, the parameters whose value is a bare name of a ROS 1 file that was loaded into no namespace."""
-    named: dict[str, list[str]] = {}
+    guessed: dict[str, list[str]] = {}
     for file in files:
         if file.format is ROS1_YAML:
-            from care_core.ecosystems.ros import ros1_yaml
-
-            own = [p for p, s in found.items() if file.settings.get(s.name) is s and ros1_yaml.is_guess(s.name, p)]
-            if own:
-                named[file.path] = own
-    return named
+            is_guess = file.format.functions.is_guess
+            used = (name for name, setting in resolved.items() if file.settings.get(setting.name) is setting)
+            if names := [name for name in used if is_guess(resolved[name].name, name)]:
+                guessed[file.path] = names
+    return guessed
