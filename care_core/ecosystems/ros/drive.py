@@ -46,7 +46,7 @@ STREAM_MESSAGES, STEADY = 10, 3.0
 """A stream has so many messages, and nine in ten of its pauses are below so many times the usual one."""
 SILENT_S, SILENT_PERIODS = 5.0, 10.0
 """A stream has ended when it is silent for so long and for so many of its periods."""
-COMMANDS = 3
+FEWEST_COMMANDS = 3
 """Fewer commands tell of no drive."""
 
 ODOMETRY_FIELDS = (*MESSAGES[ODOMETRY].reads, FRAME)
@@ -63,7 +63,7 @@ class Drive(RunModel):
     """A recording as a robot's drive.
 
     Health looks at samples of what sends often (`of`, and all that has no topic in its name), measures at every message
-    of the topics that a profile names (`odometry_on`, `commands_on`, `battery_on`, `messages_on`).
+    of the topics that a profile names (`odometry_on`, `commands_on`, `battery_on`, `log_messages_on`).
     """
 
     log: RosLog
@@ -198,7 +198,7 @@ class Drive(RunModel):
     def following(self) -> Following | None:
         """Odometry beside commands, None where either is missing or odometry tells no speed."""
         odometry, commands = self.odometry, self.commands
-        if odometry is None or commands is None or len(commands.t) < COMMANDS or not odometry.tells_speed:
+        if odometry is None or commands is None or len(commands.t) < FEWEST_COMMANDS or not odometry.tells_speed:
             return None
         return following(odometry, commands)
 
