@@ -67,15 +67,18 @@ def test_every_section_is_tried() -> None:
 
 
 @pytest.fixture(autouse=True)
-def _known_ecosystems() -> Iterator[None]:
+def _registries_as_they_were() -> Iterator[None]:
+    registry.register_measures()
+    known = dict(EXTRACTORS)
     registry.ecosystems.cache_clear()
     yield
     registry.ecosystems.cache_clear()
+    EXTRACTORS.clear()
+    EXTRACTORS.update(known)
 
 
 @pytest.mark.parametrize("section", ROWS)
 def test_the_example_works(section: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("care_core.ecosystems.measures.EXTRACTORS", EXTRACTORS.copy())
     *blocks, test = _BLOCK.finditer(_sections()[section])
     for block in blocks:
         module = _module(block["path"].replace("/", "."), block["code"], monkeypatch)
