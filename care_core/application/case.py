@@ -203,8 +203,8 @@ def opened(path: Path, progress: Progress | None = None) -> Iterator[tuple[Log, 
 
 
 def choose(log: Log, name: str | None = None) -> tuple[Profile | None, ProfileChoice]:
-    """The installed profile that fits a log best, in the log's own spelling, None where none fits; or how the one that
-    was named does. Raises CareError."""
+    """The installed profile that fits a log best, by the names that the log has, None where none fits; or how
+    the one that was named does. Raises CareError."""
     from care_core.extract.select import choose_profile
 
     profiles, left_out = _candidates(log, name)
@@ -220,14 +220,14 @@ def fitting(log: Log, name: str | None = None) -> tuple[Profile, ProfileChoice]:
 
 
 def _candidates(log: Log, name: str | None) -> tuple[list[Profile], str]:
-    """Profiles to choose from, in the log's own spelling, and what is to be said of those that are not sound."""
+    """Profiles to choose from, by the names that the log has, and what is to be said of those that are not sound."""
+    from care_core.extract.parameter_aliases import with_logged_names
     from care_core.extract.select import sound_profiles
-    from care_core.extract.spelling import spelled
     from care_core.profile.store import load_profile
 
     profiles, problems = ([load_profile(name)], ()) if name is not None else sound_profiles()
     left_out = "".join(f"; left out as it is not sound: {problem}" for problem in problems)
-    return [replace(profile, schema=spelled(profile.schema, log)) for profile in profiles], left_out
+    return [replace(profile, schema=with_logged_names(profile.schema, log)) for profile in profiles], left_out
 
 
 def _plainly(model: RunModel, choice: ProfileChoice, health: Health, request: Request, sha256: Sha256) -> Diagnosis:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 
-from care_core.ecosystems.vehicles.parameters import spellings
+from care_core.ecosystems.vehicles.parameters import aliases_of
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Kind
 from care_core.lint.generic import problem_at
@@ -125,7 +125,7 @@ def _elsewhere(file: ConfigFile, entry: Entry, releases: Sequence[Release], is_t
 
 def _renamed(name: str, releases: Sequence[Release]) -> tuple[str, str] | None:
     for release in releases:
-        for one in spellings(name, _KINDS[release.vehicle]):
+        for one in aliases_of(name, _KINDS[release.vehicle]):
             if one.name != name and release in ardupilot.known_in(one.name):
                 scale = "" if one.scale == 1 else f", and its value times {one.scale:g}"
                 return one.name, f"Write {one.name}{scale}."

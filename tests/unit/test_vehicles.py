@@ -8,6 +8,8 @@ from itertools import pairwise
 import pytest
 
 from care_core.ecosystems.vehicles import (
+    alias_in,
+    aliases_of,
     error_kind,
     error_words,
     event_words,
@@ -15,8 +17,6 @@ from care_core.ecosystems.vehicles import (
     mode_number,
     motors_of,
     renamed,
-    spelled_in,
-    spellings,
     vehicle_of,
     way_of,
 )
@@ -180,9 +180,9 @@ def test_no_two_motors_share_a_place_unless_the_tables_do_not_say_which_is_above
     ],
 )  # fmt: skip
 def test_renamed(name: str, version: tuple[int, ...], now: str, scale: float) -> None:
-    spelling = renamed(name, version)
-    assert spelling.name == now
-    assert spelling.scale == pytest.approx(scale)
+    alias = renamed(name, version)
+    assert alias.name == now
+    assert alias.scale == pytest.approx(scale)
 
 
 def test_rovers_and_planes_keep_their_own_names() -> None:
@@ -193,17 +193,17 @@ def test_rovers_and_planes_keep_their_own_names() -> None:
 
 def test_a_log_is_asked_which_name_it_holds() -> None:
     """A development version has the next number before it has the next names."""
-    held = spelled_in("WP_SPD", {"WPNAV_SPEED", "RTL_ALT"})
+    held = alias_in("WP_SPD", {"WPNAV_SPEED", "RTL_ALT"})
     assert held is not None
     assert held.name == "WPNAV_SPEED"
     assert held.scale == pytest.approx(100.0)
-    assert spelled_in("WP_SPD", {"RTL_ALT"}) is None
+    assert alias_in("WP_SPD", {"RTL_ALT"}) is None
 
 
 @pytest.mark.parametrize("kind", ["copter", "quadplane", "rover"])
 def test_every_name_belongs_to_one_parameter(kind: Kind) -> None:
     for name, chain in _chains(kind).items():
-        assert name in {spelling.name for spelling in chain}
+        assert name in {alias.name for alias in chain}
         assert all(earlier.since < later.since for earlier, later in pairwise(chain))
-        assert all(len(spelling.name) <= 16 for spelling in chain)  # AP_MAX_NAME_SIZE
-        assert spellings(name, kind)[0].name == chain[0].name
+        assert all(len(alias.name) <= 16 for alias in chain)  # AP_MAX_NAME_SIZE
+        assert aliases_of(name, kind)[0].name == chain[0].name

@@ -45,9 +45,10 @@ class ArduPilot(Ecosystem):
         return examine(as_flight(model))
 
     def log_messages(self, model: RunModel) -> Iterator[Event]:
+        from care_core.ecosystems.ardupilot.flight import as_flight
         from care_core.ecosystems.ardupilot.log_messages import log_messages
 
-        return log_messages(model)
+        return log_messages(as_flight(model))
 
     def checks(self) -> tuple[Check[Any], ...]:
         from care_core.ecosystems.ardupilot.checks import CHECKS

@@ -190,8 +190,9 @@ class Recorded(RunModel):
         table = self.one("ERR", "Subsys", "ECode")
         if table is None:
             return ()
-        columns = (table["Subsys"].astype(int).tolist(), table["ECode"].astype(int).tolist())
-        return tuple(map(ErrorRecord, table.t.tolist(), *columns))
+        known = table.where(np.isfinite(table["Subsys"]) & np.isfinite(table["ECode"]))
+        columns = (known["Subsys"].astype(int).tolist(), known["ECode"].astype(int).tolist())
+        return tuple(map(ErrorRecord, known.t.tolist(), *columns))
 
     def errors(self, subsystem: int) -> list[tuple[float, int]]:
         """Times and codes of the ERR records of a subsystem."""
@@ -201,7 +202,10 @@ class Recorded(RunModel):
     def event_records(self) -> tuple[tuple[float, int], ...]:
         """Times and numbers of the EV records."""
         table = self.one("EV", "Id")
-        return () if table is None else tuple(zip(table.t.tolist(), table["Id"].astype(int).tolist(), strict=True))
+        if table is None:
+            return ()
+        known = table.where(np.isfinite(table["Id"]))
+        return tuple(zip(known.t.tolist(), known["Id"].astype(int).tolist(), strict=True))
 
     def events(self, *ids: int) -> list[float]:
         """Times of the EV records with one of these numbers."""

@@ -8,7 +8,7 @@ from care_core.ecosystems.vehicles.errors import FAILSAFE, error_kind, error_wor
 from care_core.ecosystems.vehicles.events import event_words
 from care_core.ecosystems.vehicles.modes import Way, mode_name, mode_number, reason_words, way_of
 from care_core.ecosystems.vehicles.motors import Motor, is_skid_steered, motor_outputs, motors_of
-from care_core.ecosystems.vehicles.parameters import Spelling, renamed, spelled_in, spellings
+from care_core.ecosystems.vehicles.parameters import ParameterAlias, alias_in, aliases_of, renamed
 from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.ecosystems.vehicles.vehicle import UNLIKE_ROVERS, Kind, Vehicle, flies, vehicle_of
 
@@ -17,9 +17,11 @@ __all__ = [
     "UNLIKE_ROVERS",
     "Kind",
     "Motor",
-    "Spelling",
+    "ParameterAlias",
     "Vehicle",
     "Way",
+    "alias_in",
+    "aliases_of",
     "error_kind",
     "error_words",
     "event_words",
@@ -34,8 +36,6 @@ __all__ = [
     "motors_of",
     "reason_words",
     "renamed",
-    "spelled_in",
-    "spellings",
     "unrecorded_changes",
     "vehicle_of",
     "way_of",

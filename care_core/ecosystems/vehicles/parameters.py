@@ -20,7 +20,7 @@ _47, _471 = (4, 7), (4, 7, 1)
 _36, _34, _33, _35, _42, _46 = (3, 6), (3, 4), (3, 3), (3, 5), (4, 2), (4, 6)
 
 
-class Spelling(Record):
+class ParameterAlias(Record):
     """A parameter as one firmware names it. A value under this name is `scale` times the value under the first."""
 
     name: str
@@ -28,11 +28,11 @@ class Spelling(Record):
     scale: float = 1.0
 
 
-Chain = tuple[Spelling, ...]
+Chain = tuple[ParameterAlias, ...]
 
 
 def _chain(first: str, *later: tuple[Version, str, float]) -> Chain:
-    return (Spelling(first, _FIRST), *(Spelling(name, since, scale) for since, name, scale in later))
+    return (ParameterAlias(first, _FIRST), *(ParameterAlias(name, since, scale) for since, name, scale in later))
 
 
 def _of_position(old: str) -> Iterator[Chain]:
@@ -164,35 +164,35 @@ _FAMILIES: Mapping[Kind, tuple[str, ...]] = {
 def _chains(kind: Kind) -> Mapping[str, Chain]:
     made = {"copter": _of_copter, "quadplane": _of_quadplane, "all": _of_all}
     found = [chain for family in _FAMILIES.get(kind, ("all",)) for chain in made[family]()]
-    return {spelling.name: chain for chain in found for spelling in chain}
+    return {alias.name: chain for chain in found for alias in chain}
 
 
-def spellings(name: str, kind: Kind = "copter") -> Sequence[Spelling]:
+def aliases_of(name: str, kind: Kind = "copter") -> Sequence[ParameterAlias]:
     """Every name that a parameter has had, oldest first; only its own where it never had another.
 
-    `scale` of each is relative to `name`: a value under that spelling is `scale` times the value under `name`.
+    `scale` of each is relative to `name`: a value under that alias is `scale` times the value under `name`.
     """
     chain = _chains(kind).get(name)
     if chain is None:
-        return (Spelling(name, _FIRST),)
-    own = next(spelling.scale for spelling in chain if spelling.name == name)
-    return tuple(Spelling(one.name, one.since, one.scale / own) for one in chain)
+        return (ParameterAlias(name, _FIRST),)
+    own = next(alias.scale for alias in chain if alias.name == name)
+    return tuple(ParameterAlias(one.name, one.since, one.scale / own) for one in chain)
 
 
-def renamed(name: str, version: Version, kind: Kind = "copter") -> Spelling:
+def renamed(name: str, version: Version, kind: Kind = "copter") -> ParameterAlias:
     """The name by which firmware of this version knows a parameter, given under any of its names.
 
     Development versions carry the next release's number before they carry its names: where there is a log, ask
-    `spelled_in` instead.
+    `alias_in` instead.
     """
-    known = spellings(name, kind)
-    return next((spelling for spelling in reversed(known) if spelling.since <= tuple(version)), known[0])
+    known = aliases_of(name, kind)
+    return next((alias for alias in reversed(known) if alias.since <= tuple(version)), known[0])
 
 
-def spelled_in(name: str, held: Container[str], kind: Kind = "copter") -> Spelling | None:
+def alias_in(name: str, held: Container[str], kind: Kind = "copter") -> ParameterAlias | None:
     """The name by which a log or a file holds a parameter, given under any of its names; None where it holds none."""
-    known = spellings(name, kind)
-    own = next((spelling for spelling in known if spelling.name == name), None)
+    known = aliases_of(name, kind)
+    own = next((alias for alias in known if alias.name == name), None)
     if name in held:
         return own
-    return next((spelling for spelling in reversed(known) if spelling.name in held), None)
+    return next((alias for alias in reversed(known) if alias.name in held), None)

@@ -10,7 +10,7 @@ import pytest
 from care_core.configs.changes import apply_commands
 from care_core.configs.driven import configuration
 from care_core.ecosystems.ardupilot.dialect import ARDUPILOT_PARAM
-from care_core.extract.spelling import spelled
+from care_core.extract.parameter_aliases import with_logged_names
 from care_core.logs import formats
 from care_core.logs.base import Log
 from care_core.logs.formats import LogFormat
@@ -37,7 +37,7 @@ class Flown(Struct, eq=False):
 
 def option_in(**held: float) -> tuple[Variable, dict[str, float]]:
     log = Flown(held)
-    option = spelled(SCHEMA, cast(Log, log)).variables["WPNAV_SPEED"]
+    option = with_logged_names(SCHEMA, cast(Log, log)).variables["WPNAV_SPEED"]
     driven = {name: history[0] for name, history in log.settings().items()}
     return option, configuration([option], driven, {})[0]
 
@@ -85,8 +85,8 @@ def test_every_option_of_the_copter_is_read_from_firmware_4_7_and_from_4_0() -> 
         new, scale = RENAMED_47.get(name, (name, 1))
         held[new] = default * scale
     assert len(held) == len(defaults) == 33
-    read = spelled(schema, cast(Log, Flown(held)))
+    read = with_logged_names(schema, cast(Log, Flown(held)))
     driven = {name: history[0] for name, history in Flown(held).settings().items()}
     assert configuration(read.options, driven, {})[0] == pytest.approx(defaults)
     old = Flown({name: value for name, value in defaults.items() if value is not None}, {"firmware": "ArduCopter V4.0"})
-    assert spelled(schema, cast(Log, old)) is schema
+    assert with_logged_names(schema, cast(Log, old)) is schema

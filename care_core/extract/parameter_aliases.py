@@ -1,0 +1,40 @@
+"""A profile by the parameter names of the firmware that flew: its options under the names and units of the log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from care_core.ecosystems.vehicles import Kind, alias_in, vehicle_of
+from care_core.logs.base import Log
+from care_core.profile.schema import Schema
+from care_core.records import replace
+from care_core.variables import Role, Variable
+
+
+def with_logged_names(schema: Schema, log: Log) -> Schema:
+    """The schema with each option's parameter as the log names it, and how its unit changed with the name.
+
+    A log that holds a parameter under none of its names leaves the option as it is.
+    """
+    if log.format.name not in schema.logs:
+        return schema
+    logged = log.settings()
+    kind = vehicle_of(log.facts, logged).kind
+    if kind in ("unknown", "px4") or all(name in logged for option in schema.options for name in option.parameters):
+        return schema
+    variables = {
+        name: _with_logged_names(variable, logged, kind) if variable.role is Role.OPTION else variable
+        for name, variable in schema.variables.items()
+    }
+    return replace(schema, variables=variables)
+
+
+def _with_logged_names(option: Variable, logged: Mapping[str, object], kind: Kind) -> Variable:
+    aliases = [alias_in(name, logged, kind) for name in option.parameters]
+    if not aliases or any(alias is None for alias in aliases):
+        return option
+    names = tuple(alias.name for alias in aliases if alias is not None)
+    scales = {alias.scale for alias in aliases if alias is not None}
+    if len(scales) > 1 or (names == option.parameters and scales == {option.scale}):
+        return option
+    return replace(option, parameters=names, scale=scales.pop())
