@@ -17,9 +17,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import care_core.extract.read  # noqa: F401  registers every extractor
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, find_extractor
-from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.registry import register_measures, run_model
 from care_core.logs.base import merge_needs
 from care_core.logs.opening import open_log
 from care_core.profile.reading import read_schema
@@ -123,6 +122,7 @@ def mission_values(path: Path, schema: Schema) -> dict[str, Value]:
     """Metrics and objectives of the last mission of a log, and no value withheld."""
     log = open_log(path)
     model = run_model(log)
+    register_measures(schema.logs)
     kind = MISSION_KINDS[str(schema.mission["kind"])]
     extracts = {name: one.extract for name, one in schema.variables.items() if one.extract is not None}
     found = {name: find_extractor(extract.kind) for name, extract in extracts.items()}

@@ -19,8 +19,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 import pytest
 from hypothesis import settings
 
+from care_core.ecosystems.registry import register_measures
+
 if TYPE_CHECKING:
     from care_core.profile.store import Profile
+
+register_measures()
 
 
 class Outcome(NamedTuple):

@@ -225,7 +225,7 @@ def _candidates(log: Log, name: str | None) -> tuple[list[Profile], str]:
     from care_core.extract.select import sound_profiles
     from care_core.profile.store import load_profile
 
-    profiles, problems = ([load_profile(name)], ()) if name is not None else sound_profiles()
+    profiles, problems = ([load_profile(name)], ()) if name is not None else sound_profiles(log.format.name)
     left_out = "".join(f"; left out as it is not sound: {problem}" for problem in problems)
     return [replace(profile, schema=with_logged_names(profile.schema, log)) for profile in profiles], left_out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import cache
 from importlib import import_module
 
@@ -35,9 +36,15 @@ def how_to_record(channel: str) -> str:
     return next(filter(None, hints), f"record {channel}")
 
 
-def register_measures() -> None:
-    """Imports every module that registers mission kinds and extractors."""
-    for module in (*(name for ecosystem in ecosystems() for name in ecosystem.measures), *_ANY_ROBOT):
+def register_measures(formats: Collection[str] | None = None) -> None:
+    """Imports the modules that register mission kinds and extractors: of any robot, and of the ecosystems that write
+    logs of formats with these names; of every ecosystem where None is given."""
+    chosen = [
+        ecosystem
+        for ecosystem in ecosystems()
+        if formats is None or any(format.name in formats for format in ecosystem.formats)
+    ]
+    for module in (*(name for ecosystem in chosen for name in ecosystem.measures), *_ANY_ROBOT):
         import_module(module)
 
 

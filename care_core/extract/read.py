@@ -22,8 +22,6 @@ from care_core.records import Record, replace
 from care_core.run import Check, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Variable
 
-register_measures()
-
 
 def read_run(
     model: RunModel,
@@ -73,6 +71,7 @@ def mission_kind(schema: Schema) -> MissionKind:
             hint="Name the profile of the robot with --profile.",
             where=schema.name,
         )
+    register_measures(schema.logs)
     if kind not in MISSION_KINDS:
         raise ProfileError(f"There is no mission kind '{kind}'.", hint=nearest(str(kind), MISSION_KINDS))
     found = MISSION_KINDS[str(kind)]

@@ -29,13 +29,17 @@ class HasSchema(Protocol):
 P = TypeVar("P", bound=HasSchema)
 
 
-def sound_profiles() -> tuple[list[Profile], list[ProfileError]]:
-    """The installed profiles, and what is wrong with those that cannot be used: one never keeps the others from use."""
+def sound_profiles(format: str = "") -> tuple[list[Profile], list[ProfileError]]:
+    """The installed profiles, and what is wrong with those that cannot be used: one never keeps the others from use.
+
+    Args:
+        format: look only at what those measure that read such logs: it takes time to load what the others do.
+    """
     sound, problems = [], []
     for path in available_profiles():
         try:
             profile = load_profile(path)
-            if profile.schema.logs:
+            if format in profile.schema.logs or (not format and profile.schema.logs):
                 reading_plan(profile.schema)
             sound.append(profile)
         except ProfileError as err:

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 
-import care_core.extract.read  # noqa: F401  (registers every extractor)
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS, Extractor
+from care_core.ecosystems.registry import register_measures
 from care_core.files import write_atomically
 from care_core.logs.base import Wanted
 
@@ -32,6 +32,7 @@ such as *odometry* stand for the channels that the mission section names."""
 
 def document() -> str:
     """The page, in Markdown."""
+    register_measures()
     return "\n".join(_lines()) + "\n"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from care_core.ecosystems.measures import EXTRACTORS, MISSION_KINDS
-from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.registry import register_measures, run_model
 from care_core.ecosystems.vehicles import vehicle_of
 from care_core.errors import CareError
 from care_core.extract.read import read_runs
@@ -78,6 +78,7 @@ class Measures(Struct, eq=False):
 
 def find_measures(logs: Sequence[InputLog], spec: Mapping[str, Any], bundled: Sequence[Schema]) -> Measures:
     """Try on the logs what the bundled profiles of the same kind of mission measure, and signals of their channels."""
+    register_measures()
     vehicle = vehicle_of(logs[0].opened.facts, logs[0].settings).kind
     candidates = [*_bundled_measures(str(spec["kind"]), vehicle, bundled), *_objectives_of(str(spec["kind"]))]
     types = {name: kind for log in logs for name, kind in log.channels.items()}

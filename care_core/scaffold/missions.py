@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from care_core.ecosystems.measures import MISSION_KINDS
-from care_core.ecosystems.registry import ecosystem_of, run_model
+from care_core.ecosystems.registry import ecosystem_of, register_measures, run_model
 from care_core.ecosystems.ros.goals import Goal, Status
 from care_core.ecosystems.ros.measures.window import GOAL_TIMEOUT_S, TOLERANCE_M, window
 from care_core.ecosystems.vehicles import vehicle_of
@@ -65,6 +65,7 @@ def _vehicle_kind(first: InputLog, bundled: Sequence[Schema]) -> str:
 
 
 def _found(log: InputLog, spec: Mapping[str, Any]) -> tuple[Any, ...]:
+    register_measures()
     kind, model = MISSION_KINDS[str(spec["kind"])], run_model(log.opened)
     return kind.missions(model, model.tables(kind.needs(spec)), spec)
 
