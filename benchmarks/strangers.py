@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import care_core
-from care_core.application.case import exit_code
+from care_core.diagnose.verdict import verdict_of
 from care_core.errors import CareError, ExitCode
 from care_core.records import Record
 
@@ -90,7 +90,7 @@ def asked_care(path: Path) -> Answer:
     changes = [] if diagnosis.fix is None else [change.option.name for change in diagnosis.fix.changes]
     return Answer(
         f"{diagnosis.profile.name} {diagnosis.profile.fit.verdict}".strip(),
-        _VERDICTS[exit_code(diagnosis)],
+        _VERDICTS[verdict_of(diagnosis).exit_code],
         first,
         any(one.severity == "critical" for one in findings),
         ", ".join(changes),

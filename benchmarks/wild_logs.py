@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import care_core
-from care_core.application.case import exit_code
+from care_core.diagnose.verdict import verdict_of
 from care_core.errors import CareError
 from care_core.logs.finding import is_recorder_folder as is_recording
 from care_core.records import Record
@@ -62,7 +62,7 @@ def _inspected(path: Path) -> tuple[str, str]:
 
 def _triaged(path: Path) -> int:
     try:
-        return int(exit_code(care_core.triage(path).diagnosis))
+        return int(verdict_of(care_core.triage(path).diagnosis).exit_code)
     except CareError as err:
         return int(err.exit_code)
 

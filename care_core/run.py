@@ -116,7 +116,7 @@ class LogInfo(Record):
 
 
 FitVerdict = Literal["fits", "partly", "no"]
-FIT_WORDS: Mapping[FitVerdict, str] = {"fits": "fits", "partly": "fits in part", "no": "does not fit"}
+FIT_WORDS: Mapping[FitVerdict, str] = {"fits": "fits", "partly": "partly fits", "no": "does not fit"}
 
 
 class Fit(Record):
@@ -126,7 +126,7 @@ class Fit(Record):
     reasons: tuple[str, ...] = ()
     """What is missing or differs, one clause each; empty where it fits."""
 
-    def but(self, *reasons: str) -> Fit:
+    def with_objection(self, *reasons: str) -> Fit:
         """The fit with more found that differs: in part at best."""
         if not reasons:
             return self

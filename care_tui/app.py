@@ -19,7 +19,8 @@ from textual.reactive import Reactive
 from textual.screen import Screen
 from textual.scrollbar import ScrollBar, ScrollBarRender
 
-from care_core.application.case import Case, Request, exit_code
+from care_core.application.case import Case, Request
+from care_core.diagnose.verdict import verdict_of
 from care_core.errors import CareError, ExitCode, UsageError, nearest
 from care_tui.hangup import on_hangup
 from care_tui.jobs import Engine
@@ -110,7 +111,7 @@ class CareApp(App[int], inherit_bindings=False):
 
     def note(self, answer: Case | CareError) -> None:
         """Remember what the last diagnosis means for the exit code."""
-        self.code = answer.exit_code if isinstance(answer, CareError) else exit_code(answer.diagnosis)
+        self.code = answer.exit_code if isinstance(answer, CareError) else verdict_of(answer.diagnosis).exit_code
 
     def write_control(self, sequence: str) -> None:
         """Send a control sequence to the terminal."""

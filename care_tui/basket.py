@@ -86,7 +86,7 @@ def parsed(option: Variable, text: str) -> float:
     """
     value = option.typed(text)
     if value is None:
-        raise ValueError(f"'{text}' is no number. {possible(option)}")
+        raise ValueError(f"'{text}' is not a number. {possible(option)}")
     # snap() also rounds floats, which is no reason to refuse what was typed.
     whole = option.type not in ("int", "bool") or value == round(value)
     if not option.accepts(value) or not whole:
@@ -97,8 +97,8 @@ def parsed(option: Variable, text: str) -> float:
 def possible(option: Variable) -> str:
     """What may be typed for an option, in a sentence."""
     if option.labels:
-        return f"Possible are {option.acceptable}."
+        return f"Allowed: {option.acceptable}."
     if option.type == "bool":
-        return "Possible are true and false."
+        return "Allowed: true and false."
     kind = "whole numbers" if option.type == "int" else "numbers"
-    return f"Possible are {kind}." if option.range is None else f"Possible are {kind} from {option.acceptable}."
+    return f"Allowed: {kind}." if option.range is None else f"Allowed: {kind} from {option.acceptable}."

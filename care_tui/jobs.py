@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from care_core.application.case import Case, Progress, ReportFormat, Request, open_case, predict, report_of
+from care_core.application.case import Case, Progress, Request, open_case, predict
 from care_core.application.configuring import DiffSide, commands_of, diff_of
 from care_core.application.remembering import remember_triage
+from care_core.application.reporting import report_of
 from care_core.errors import CareError
 from care_core.records import Record
 
@@ -79,7 +80,7 @@ class Engine(Record):
     diagnose: Callable[[Request, Progress], Case] = open_and_warm
     predict: Callable[[Case, Mapping[str, float]], Fix] = predict
     diff: Callable[[Case, Fix, DiffSide], str] = diff_of
-    report: Callable[[Case, ReportFormat], str] = report_of
+    report: Callable[[Case, str], str] = report_of
     commands: Callable[[Diagnosis], list[str]] = commands_of
     save: Callable[[Path, str], None] = save_text
     remember: Callable[[Diagnosis], CareError | None] = remember_triage

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from care_core.application.case import Case, ReportFormat, changes_of, decided, fixes
+from care_core.application.case import Case, changes_of, decided, fixes
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult
 from care_core.errors import CareError
 from care_core.records import Struct, field, replace
+from care_core.report.formats import FILE_FORMATS, Format
 from care_core.variables import Variable
 from care_tui.basket import Basket
 
-FORMATS: tuple[ReportFormat, ...] = ("yaml", "markdown", "html", "json", "junit", "patch")
 State = Literal["empty", "loading", "data", "error"]
 
 
@@ -39,7 +39,7 @@ class Session(Struct, eq=False):
     """Causes set aside: option to reason."""
     _left_fix: set[str] = field(default_factory=set)
     """Options that left the fix when they were set aside."""
-    format: ReportFormat = "yaml"
+    format: Format = FILE_FORMATS[0]
 
     @property
     def state(self) -> State:

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from care_core.application.case import Case, report_of
+from care_core.application.open_run import OpenRun, log_of
 from care_core.application.plotting import ranked, sources_of, thinned
+from care_core.application.reporting import report_of
 from care_core.application.sharing import Sharing
 from care_core.application.signals import Line, Source, lines_of
-from care_core.application.viewing import log_of, messages_of
+from care_core.application.viewing import messages_of
 from care_core.errors import CareError
 from care_core.files import BUNDLE_FOLDER
 from care_core.records import Record, replace
@@ -56,7 +57,7 @@ class Bundle(Record):
     missing: tuple[str, ...]
 
 
-def bundle_of(case: Case, sharing: Sharing, version: str) -> Bundle:
+def bundle_of(case: OpenRun, sharing: Sharing, version: str) -> Bundle:
     """Pack a case, as far as it goes to others, below `LARGEST` bytes."""
     named = _without_folders(case)
     told = list(_missing(sharing.of(named)))
@@ -84,7 +85,7 @@ def bundle_of(case: Case, sharing: Sharing, version: str) -> Bundle:
     return Bundle(content, sizes, tuple(told))
 
 
-def _without_folders(case: Case) -> Case:
+def _without_folders(case: OpenRun) -> OpenRun:
     """The case without the folders that its log lay in."""
     run = case.diagnosis.run
     log = replace(run.log, path=Path(run.log.path).name)
@@ -101,8 +102,8 @@ def _packed(files: Mapping[str, str]) -> bytes:
     return stream.getvalue()
 
 
-def _versions(case: Case, version: str) -> Iterator[str]:
-    from care_core.report.wording import fit_text
+def _versions(case: OpenRun, version: str) -> Iterator[str]:
+    from care_core.diagnose.verdict import fit_text
 
     run, profile = case.diagnosis.run, case.diagnosis.profile
     yield f"care {version}"
@@ -112,7 +113,7 @@ def _versions(case: Case, version: str) -> Iterator[str]:
     yield from (clean(f"{name} {value}") for name, value in sorted(run.log.facts.items()))
 
 
-def _missing(case: Case) -> Iterator[str]:
+def _missing(case: OpenRun) -> Iterator[str]:
     """What the log does not hold, or could not be judged by."""
     diagnosis = case.diagnosis
     run = diagnosis.run
@@ -131,7 +132,7 @@ def _missing(case: Case) -> Iterator[str]:
     yield from (clean(f"profile: {reason}") for reason in diagnosis.profile.fit.reasons)
 
 
-def _parameters(case: Case, sharing: Sharing) -> tuple[str, str, int]:
+def _parameters(case: OpenRun, sharing: Sharing) -> tuple[str, str, int]:
     """Name and text of the configuration as driven, and how many parameters do not go to others."""
     from care_core.configs.formats import format_for, write_params
 
@@ -150,7 +151,7 @@ def _is_shared(one: Setting, sharing: Sharing) -> bool:
     return not (sharing.anonymous and _IDENTITIES.search(one.name))
 
 
-def _anonymous(case: Case, settings: Mapping[str, Setting], sharing: Sharing) -> dict[str, Setting]:
+def _anonymous(case: OpenRun, settings: Mapping[str, Setting], sharing: Sharing) -> dict[str, Setting]:
     """Settings that name nobody. The names of firmware's parameters are its own; those of ROS have namespaces."""
     text = sharing.text(case)
     named = {(text(name) if "/" in name else name): one for name, one in settings.items()}
@@ -161,7 +162,7 @@ def _anonymous(case: Case, settings: Mapping[str, Setting], sharing: Sharing) ->
     }
 
 
-def _messages(case: Case, sharing: Sharing) -> str:
+def _messages(case: OpenRun, sharing: Sharing) -> str:
     """What the robot's software said, in order of time, as CSV."""
     import csv
 
@@ -179,7 +180,7 @@ def _messages(case: Case, sharing: Sharing) -> str:
     return stream.getvalue()
 
 
-def _signals(case: Case, sharing: Sharing, room: int) -> tuple[dict[str, str], list[str]]:
+def _signals(case: OpenRun, sharing: Sharing, room: int) -> tuple[dict[str, str], list[str]]:
     """A CSV a channel with its signals over the whole log, in at most `room` bytes; and what was left out for that."""
     groups, _ = ranked(case, sharing)
     sources = list(dict.fromkeys(source for group in groups for source in sources_of(group)))
@@ -245,7 +246,7 @@ def _file_name(channel: str) -> str:
     return re.sub(r"[^\w-]+", "_", channel).strip("_") or "channel"
 
 
-def _readme(case: Case, sharing: Sharing, names: Sequence[str], told: Iterable[str]) -> str:
+def _readme(case: OpenRun, sharing: Sharing, names: Sequence[str], told: Iterable[str]) -> str:
     """What lies here, and what does not."""
     log = case.diagnosis.run.log
     name = "a log" if sharing.anonymous else clean(log.path)

@@ -7,47 +7,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from care_core.errors import CareError, ExitCode
+from care_core.application.open_run import OpenRun, Reading
+from care_core.errors import CareError
 from care_core.records import Record, field, replace
 
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
-    from care_core.causal.model import Model
     from care_core.configs.loading import ConfigFile
-    from care_core.diagnose.judging import Judged
     from care_core.diagnose.records import Diagnosis, Fix
     from care_core.diagnose.reference import Good
-    from care_core.diagnose.whatif import Question
     from care_core.ecosystems.base import RunModel
     from care_core.ecosystems.findings import Health
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
-    from care_core.profile.schema import Schema
     from care_core.profile.store import Profile
     from care_core.run import ProfileChoice
-    from care_core.variables import Variable
 
 Progress = Callable[[str, float], None]
 """Is told the step and the share that is done, 0 to 1."""
-
-ReportFormat = Literal["text", "yaml", "markdown", "html", "json", "junit", "patch"]
-
-SUFFIXES: Mapping[str, ReportFormat] = {
-    ".yaml": "yaml",
-    ".yml": "yaml",
-    ".md": "markdown",
-    ".html": "html",
-    ".htm": "html",
-    ".json": "json",
-    ".xml": "junit",
-    ".patch": "patch",
-    ".diff": "patch",
-}
-"""Suffix of a file to the format of the report in it; the first suffix of a format is its usual one."""
 
 
 class Request(Record):
@@ -78,46 +58,14 @@ class Request(Record):
     """What the operator calls the robot; by what the log says when None."""
 
 
-class Reading(Record, eq=False, dict=True):
-    """A log read by a profile and judged: what every question about a run begins with."""
+class Case(OpenRun, eq=False):
+    """An open run that can be reported."""
 
-    profile: Profile
-    choice: ProfileChoice
-    configs: tuple[ConfigFile, ...]
-    judged: Judged
-    health: Health
-
-    @cached_property
-    def question(self) -> Question:
-        """The run ready to be asked what other options would have done."""
-        from care_core.diagnose.whatif import question
-
-        return question(self.judged, self.profile, self.choice, self.health)
-
-
-class Case(Record, eq=False):
-    """A diagnosis with what is needed to ask more about it. The log was opened and digested once, and stays open."""
-
-    diagnosis: Diagnosis
-    options: tuple[Variable, ...] = ()
-    """Every option of the profile, in its order."""
-    log: Log | None = None
-    reading: Reading | None = None
-    """None where no profile fits the log."""
-    configs: tuple[str | Path, ...] = ()
-    """Configuration files that the operator named."""
-
-    @property
-    def schema(self) -> Schema | None:
-        return None if self.reading is None else self.reading.profile.schema
-
-    @property
-    def model(self) -> Model | None:
-        return None if self.reading is None else self.reading.profile.model
-
-    def report(self, format: ReportFormat = "text", sharing: Sharing | None = None) -> str:
+    def report(self, format: str = "text", sharing: Sharing | None = None) -> str:
         """The fix report in one of its formats; `sharing` is what of the run goes into it, by default what suits the
-        format."""
+        format. Raises UsageError where there is no such format."""
+        from care_core.application.reporting import report_of
+
         return report_of(self, format, sharing)
 
 
@@ -330,51 +278,6 @@ def _diagnose(reading: Reading, request: Request, progress: Progress) -> Diagnos
         top=request.top,
         progress=progress,
     )
-
-
-SENT: frozenset[ReportFormat] = frozenset({"markdown", "html", "junit"})
-"""Formats that are made to be sent: without positions, unless they are asked for."""
-
-
-def report_of(case: Case, format: ReportFormat, sharing: Sharing | None = None) -> str:
-    """The fix report in one of its formats; a page draws the signals of the case's log."""
-    shared = case
-    if sharing is not None or format in SENT:
-        from care_core.application.sharing import Sharing
-
-        sharing = sharing or Sharing(positions=False)
-        shared = sharing.of(case)
-    if format == "text":
-        from care_core.report.terminal import to_text
-
-        return to_text(shared.diagnosis)
-    from care_core.report.document import build_document
-
-    document = build_document(shared.diagnosis)
-    if format == "patch":
-        return document.diff
-    if format == "html":
-        from care_core.application.plotting import drawn_of
-        from care_core.report.html import to_html
-
-        return to_html(document, drawn_of(shared, sharing or Sharing(positions=False)))
-    if format == "junit":
-        from care_core.report.junit import suite_of, to_junit
-
-        return to_junit([suite_of(document)])
-    if format == "markdown":
-        from care_core.report.markdown import to_markdown
-
-        return to_markdown(document)
-    from care_core.report.writers import to_json, to_yaml
-
-    return {"yaml": to_yaml, "json": to_json}[format](document)
-
-
-def exit_code(diagnosis: Diagnosis) -> ExitCode:
-    """What the diagnosis means for the process that asked for it."""
-    codes = {"fault": ExitCode.FAULT, "not_evaluated": ExitCode.NOT_EVALUATED, "ok": ExitCode.OK}
-    return codes[diagnosis.status]
 
 
 def fixes(diagnosis: Diagnosis) -> tuple[Fix, ...]:

@@ -6,17 +6,16 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case
+from care_core.application.open_run import OpenRun, log_of
 from care_core.application.sharing import EVERYTHING, Sharing
 from care_core.application.signals import Line as Values
 from care_core.application.signals import Signal, Source, lines_of, signals_of, whole_of
-from care_core.application.viewing import log_of
 from care_core.ecosystems.dictionary import Field
 from care_core.ecosystems.registry import ecosystem_of
 from care_core.numbers import median
 from care_core.records import replace
 from care_core.report.marks import Mark, marks_of
-from care_core.report.plots import Band, Drawn, Limit, Line, Plot, Point
+from care_core.report.plots import Band, Drawing, Limit, Line, Plot, Point
 
 if TYPE_CHECKING:
     import numpy as np
@@ -62,11 +61,11 @@ _COUNTERS: Mapping[Source, str] = {("BAT", "EnrgTot"): "energy"}
 """Counters that an objective is the growth of."""
 
 
-def drawn_of(case: Case, sharing: Sharing = EVERYTHING) -> Drawn:
+def drawn_of(case: OpenRun, sharing: Sharing = EVERYTHING) -> Drawing:
     """What there is to draw of a case, as far as it goes to others."""
     diagnosis = case.diagnosis
     if case.log is None:
-        return Drawn(faults=diagnosis.faults)
+        return Drawing(faults=diagnosis.faults)
     span = whole_of(case)
     groups, telling = ranked(case, sharing)
     first = max(min(telling, MOST_PLOTS), FEWEST)
@@ -75,7 +74,7 @@ def drawn_of(case: Case, sharing: Sharing = EVERYTHING) -> Drawn:
     values = lines_of(case, sources, span)
     plots = [_plot(case, group, values, span, matters=matters) for group, matters in chosen]
     text = sharing.text(case)
-    return Drawn(
+    return Drawing(
         faults=diagnosis.faults,
         plots=tuple(replace(plot, source=text(plot.source), lines=_named(plot.lines, text)) for plot in plots if plot),
         marks=_marks(case, span),
@@ -104,7 +103,7 @@ def _groups(signals: Sequence[Signal]) -> list[list[Signal]]:
     return [group[:MOST_TOGETHER] for group in groups.values()]
 
 
-def ranked(case: Case, sharing: Sharing = EVERYTHING) -> tuple[list[list[Signal]], int]:
+def ranked(case: OpenRun, sharing: Sharing = EVERYTHING) -> tuple[list[list[Signal]], int]:
     """The signals of a case that share a plot, those first that a finding, a fault or a causal path speaks of, and how
     many groups that are; as far as they go to others."""
     diagnosis = case.diagnosis
@@ -147,7 +146,7 @@ def _channels(finding: Finding) -> list[str]:
 
 
 def _plot(
-    case: Case,
+    case: OpenRun,
     group: Sequence[Signal],
     values: Mapping[Source, Values | None],
     span: tuple[float, float],
@@ -221,7 +220,7 @@ def thinned(
     return np.unique(np.array([0, *least, *greatest, len(t) - 1]))
 
 
-def _limits(case: Case, group: Sequence[Signal], values: Mapping[Source, Values | None]) -> Iterator[Limit]:
+def _limits(case: OpenRun, group: Sequence[Signal], values: Mapping[Source, Values | None]) -> Iterator[Limit]:
     """What the signals of a plot were to keep: documented limits, parameters as driven, limits of objectives."""
     settings, known = case.diagnosis.run.settings, _limits_of_checks()
     for one in group:
@@ -259,7 +258,7 @@ def _bands(findings: Collection[Finding], channel: str, span: tuple[float, float
             yield Band(one.onset_s, one.end_s, one.severity, one.title)
 
 
-def _marks(case: Case, span: tuple[float, float]) -> tuple[Mark, ...]:
+def _marks(case: OpenRun, span: tuple[float, float]) -> tuple[Mark, ...]:
     """The gravest of what happened in the span, in order of time; what two sources say at one time once."""
     inside = {
         (round(mark.time_s), mark.words.casefold()[:_SAME]): mark
@@ -270,7 +269,7 @@ def _marks(case: Case, span: tuple[float, float]) -> tuple[Mark, ...]:
     return tuple(sorted(gravest, key=lambda mark: mark.time_s))
 
 
-def _deadlines(case: Case, span: tuple[float, float]) -> Iterator[Limit]:
+def _deadlines(case: OpenRun, span: tuple[float, float]) -> Iterator[Limit]:
     """Limits of objectives that are the time of the mission itself, as times of the log."""
     for result in case.diagnosis.objectives:
         is_time = result.variable.unit == "s" and result.threshold is not None and result.value is not None

@@ -12,9 +12,9 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from enum import Enum
 from pathlib import Path
-from typing import cast
+from typing import TypeVar, cast
 
-from care_core.application.case import Case
+from care_core.application.open_run import OpenRun
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import Event
 from care_core.records import Record, replace
@@ -58,6 +58,8 @@ _IDENTITIES = re.compile(
     """,
     re.VERBOSE | re.IGNORECASE,
 )
+R = TypeVar("R", bound=OpenRun)
+
 _WORD = re.compile(r"[^\W\d_]+")
 _TEXTUAL = {"message", "error", "warning", "event", "arming", "failsafe", "crash", "recovery", "mission", "vehicle"}
 """Kinds of moments that may hold what the robot's software wrote."""
@@ -69,7 +71,7 @@ class Sharing(Record):
     positions: bool = True
     anonymous: bool = False
 
-    def of(self, case: Case) -> Case:
+    def of(self, case: R) -> R:
         """The case with the rest left out of its diagnosis. Its log stays what it is."""
         if self.anonymous:
             return replace(case, diagnosis=self.hider(case).diagnosis(case.diagnosis))
@@ -77,11 +79,11 @@ class Sharing(Record):
             return replace(case, diagnosis=cast("Diagnosis", mapped(case.diagnosis, without_places)))
         return case
 
-    def hider(self, case: Case) -> Hider:
+    def hider(self, case: OpenRun) -> Hider:
         """What hides the words of this case's log."""
         return Hider(public_words(case), positions=self.positions)
 
-    def text(self, case: Case) -> Callable[[str], str]:
+    def text(self, case: OpenRun) -> Callable[[str], str]:
         """How a text of the case is to be written."""
         if self.anonymous:
             return self.hider(case).text
@@ -157,7 +159,7 @@ def mapped(value: object, change: Callable[[str], str]) -> object:
     return value
 
 
-def public_words(case: Case) -> frozenset[str]:
+def public_words(case: OpenRun) -> frozenset[str]:
     """Words of firmware, navigation stacks, this program and the case's profile."""
     listed = Path(__file__).with_name("public_words.txt").read_text(encoding="utf-8").split()
     known = case.schema.variables.values() if case.schema else case.options

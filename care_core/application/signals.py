@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case
-from care_core.application.viewing import log_of
+from care_core.application.open_run import OpenRun, log_of
 from care_core.errors import CareError
 from care_core.records import Record, replace
 
@@ -127,7 +126,7 @@ class Trace(Record):
     count: int
 
 
-def signals_of(case: Case) -> list[Signal]:
+def signals_of(case: OpenRun) -> list[Signal]:
     """The signals of a log: those that were to follow something first; of these and of the others first what the
     profile reads for objectives and causal paths, then what it reads else, then what tells most of a log of its kind.
 
@@ -148,7 +147,7 @@ def signals_of(case: Case) -> list[Signal]:
     return sorted(left, key=lambda one: one.wanted is None)
 
 
-def _read_by_profile(case: Case, present: Collection[str]) -> dict[Source, tuple[str, ...]]:
+def _read_by_profile(case: OpenRun, present: Collection[str]) -> dict[Source, tuple[str, ...]]:
     """What the profile's extractors read, with the variables it is read for, those that matter most first."""
     from care_core.ecosystems.measures import find_extractor
 
@@ -203,7 +202,7 @@ def type_name(type: str) -> str:
     return type.rsplit("/", 1)[-1]
 
 
-def whole_of(case: Case) -> tuple[float, float]:
+def whole_of(case: OpenRun) -> tuple[float, float]:
     """The span of the log that is drawn at first: the mission, or all of the log where it has none."""
     mission = case.diagnosis.run.mission
     if mission.end_s > mission.start_s:
@@ -211,7 +210,7 @@ def whole_of(case: Case) -> tuple[float, float]:
     return 0.0, max(log_of(case).duration_s, 1e-9)
 
 
-def trace_of(case: Case, signal: Signal, span: tuple[float, float], columns: int) -> Trace:
+def trace_of(case: OpenRun, signal: Signal, span: tuple[float, float], columns: int) -> Trace:
     """The signal, and what was wanted of it, over a span of the log in so many columns.
 
     Raises:
@@ -236,7 +235,7 @@ Line = tuple["NDArray[np.float64]", "NDArray[np.float64]"]
 """Times in seconds of the log and values, both of shape (n,)."""
 
 
-def lines_of(case: Case, sources: Iterable[Source], span: tuple[float, float]) -> dict[Source, Line | None]:
+def lines_of(case: OpenRun, sources: Iterable[Source], span: tuple[float, float]) -> dict[Source, Line | None]:
     """Signals over a span of the log, read in one pass, of the first sensor where there are several; None where the
     log holds no numbers of that name."""
     asked: dict[str, list[str]] = {}

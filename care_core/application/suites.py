@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, exit_code, open_case
-from care_core.errors import ExitCode, LogError
+from care_core.application.case import Case, Progress, Request, open_case
+from care_core.diagnose.verdict import RunStatus
+from care_core.errors import LogError
 from care_core.records import Record
 
 if TYPE_CHECKING:
@@ -14,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class LogSuite(Record, eq=False):
-    """A log as a suite, what it means for the process, and its case, None where it could not be read."""
+    """A log as a suite, what became of it, and its case, None where it could not be read."""
 
     suite: Suite
-    code: ExitCode
+    status: RunStatus
     case: Case | None = None
 
 
@@ -32,6 +33,6 @@ def suite_of_log(request: Request, sharing: Sharing | None, progress: Progress) 
         case = open_case(request, progress)
     except LogError as err:
         name = f"log{request.log.suffix}" if sharing.anonymous else request.log.name
-        return LogSuite(unreadable(name, err.message), err.exit_code)
+        return LogSuite(unreadable(name, err.message), "unreadable")
     document = build_document(sharing.of(case).diagnosis)
-    return LogSuite(suite_of(document), exit_code(case.diagnosis), case)
+    return LogSuite(suite_of(document), document.verdict.status, case)

@@ -6,25 +6,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case
+from care_core.application.open_run import OpenRun, log_of
 from care_core.errors import CareError
 from care_core.records import Record
 
 if TYPE_CHECKING:
     from care_core.ecosystems.findings import Event
     from care_core.history.store import Triaged
-    from care_core.logs.base import Log
     from care_core.run import FitVerdict
 
 
-def log_of(case: Case) -> Log:
-    """The log of a case, which is open. Raises CareError where there is none."""
-    if case.log is None:
-        raise CareError("There is no log to look into.", hint="Open one.")
-    return case.log
-
-
-def messages_of(case: Case) -> list[Event]:
+def messages_of(case: OpenRun) -> list[Event]:
     """Everything that the log holds in words, and what was found in its numbers, in time order."""
     from care_core.ecosystems.findings import Event
     from care_core.ecosystems.registry import ecosystem_of
@@ -38,7 +30,7 @@ def messages_of(case: Case) -> list[Event]:
     return sorted([*messages, *found], key=lambda message: message.time_s)
 
 
-def what_would_fit(case: Case) -> list[str]:
+def what_would_fit(case: OpenRun) -> list[str]:
     """What would make a profile fit the log of a case that none fits: by the one for this kind of log and vehicle that
     misses least, else a profile of its own."""
     from care_core.ecosystems.vehicles import vehicle_of
@@ -118,18 +110,19 @@ def past_runs() -> list[Past]:
 
 
 def _past(triaged: Triaged) -> Past:
-    from care_core.report.history import fit_of, profile_of, verdict_of
+    from care_core.report.document import remembered_verdict
+    from care_core.report.reading import document_of
 
-    document = triaged.document
-    causes = [cause["option"] for fault in document["faults"] for cause in fault["causes"]]
+    document = document_of(triaged.document)
+    causes = [cause.option for fault in document.faults for cause in fault.causes]
     return Past(
         at=triaged.at,
         log=triaged.log_path,
         mission=triaged.mission,
-        profile=profile_of(document),
-        fit=fit_of(document),
-        verdict=verdict_of(document),
+        profile=document.profile.name if document.profile else "",
+        fit=document.fit.verdict,
+        verdict=remembered_verdict(document).headline,
         cause=causes[0] if causes else "",
-        values={entry["name"]: entry["value"] for entry in document["objectives"]},
-        config=document["config"],
+        values={entry.name: entry.value for entry in document.objectives},
+        config=document.config,
     )

@@ -16,7 +16,8 @@ from typing import Any
 
 from care_core.application.case import Request, open_case
 from care_core.application.remembering import about_run
-from care_core.errors import CareError
+from care_core.diagnose.verdict import exit_code
+from care_core.errors import CareError, ExitCode
 from care_core.history.store import About, History, HistoryError
 from care_core.history.watched import Ledger
 from care_core.logs.digest import log_digest
@@ -203,12 +204,10 @@ def triage_one(path: Path, *, task: Task) -> Triage:
     return published(build_document(diagnosis)), diagnosis.run.mission.index, about_run(diagnosis.run)
 
 
-def overall_code(entries: Sequence[WatchEntry], waiting: int) -> int:
-    """The exit code of a whole look: 1 a fault, 4 a log that could not be read, 3 one that could not be judged or is
-    not finished, 0 none of these."""
+def overall_code(entries: Sequence[WatchEntry], waiting: int) -> ExitCode:
+    """The exit code of a whole look; a log that is not finished counts as one that could not be judged."""
     verdicts = {entry.verdict for entry in entries}
-    codes = (("fault", 1), ("unreadable", 4), ("not_evaluated", 3))
-    return next((code for verdict, code in codes if verdict in verdicts), 3 if waiting else 0)
+    return exit_code(*verdicts, "not_evaluated") if waiting else exit_code(*verdicts)
 
 
 def _now() -> str:

@@ -20,7 +20,7 @@ from care_core.text import figures
 from care_core.variables import Role, Variable
 
 BEYOND = 0.1
-"""Share of the range that training saw by which a context may leave it before the profile fits in part only."""
+"""Share of the range that training saw by which a context may leave it before the profile fits only in part."""
 NEAR = 0.02
 """Share of its value by which a context that hardly varied in training may differ."""
 RARE = 0.025

@@ -6,7 +6,7 @@ Each weighs the probability that it is there and would fail such a mission by it
 - a part, or what was met: the probability that it really failed, seeing this run's signals and that the run failed,
   times the probability that a mission fails with it;
 - chance: the probability that the reference configuration fails as well;
-- what no signal shows: a rest, larger where the profile fits in part.
+- what no signal shows: a rest, larger where the profile partly fits.
 
 Where two would each have done alone, both are told; the weights are brought to add up to 1.
 """

@@ -27,7 +27,7 @@ _FEW = 10
 """As many names can be listed in a sentence."""
 UNLIKE = 4.0
 """A length that the mission asks for may be so many times larger or smaller than any that training saw: as far as that
-what physics says of the rest is believed, where the profile fits in part only."""
+what physics says of the rest is believed, where the profile fits only in part."""
 
 
 class Judged(Record, eq=False):
@@ -293,7 +293,7 @@ def meaningful(
         elif not is_known(found.get(name)):
             continue
         elif not accomplished:
-            found[name] = Unavailable("the mission was not accomplished, so its value means nothing")
+            found[name] = Unavailable("not judged: the mission was not completed")
         elif name not in judged_anyway and (mismatch := _of_another_mission(objective, run, schema)):
             hint = f"give this mission's bound with --threshold {name}=VALUE"
             found[name] = Unavailable(mismatch, hint)

@@ -1,16 +1,16 @@
-"""What a diagnosis is made of. Plain values: the report writer and the terminal app read these and nothing else."""
+"""What a diagnosis is made of. Plain values: reports and the terminal app read these and nothing else."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Literal
 
-from care_core.ecosystems.findings import NOTHING_SEEN, Health, Severity
+from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.ecosystems.ranking import lost_by
 from care_core.records import Record, field
-from care_core.run import FitVerdict, MissionInfo, ProfileChoice, Run, shown
+from care_core.run import MissionInfo, ProfileChoice, Run, shown
 from care_core.text import figures
-from care_core.variables import Change, Threshold, Variable
+from care_core.variables import Change, Kind, Threshold, Variable
 
 Status = Literal["ok", "fault", "not_evaluated"]
 Confidence = Literal["high", "medium", "low"]
@@ -42,6 +42,11 @@ class ObjectiveResult(Record):
     @property
     def name(self) -> str:
         return self.variable.name
+
+    @property
+    def sentence(self) -> str:
+        """What it came to, where it was missed."""
+        return outcome(self.name, self.variable.kind, self.value, self.variable.unit, str(self.threshold or ""))
 
     @property
     def is_sure(self) -> bool:
@@ -77,11 +82,13 @@ class ObjectiveResult(Record):
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"
 
 
-def overall(objectives: Collection[Status], severities: Collection[Severity], fit: FitVerdict) -> Status:
-    """What a whole run came to. Not evaluated is not OK; without a profile nobody knows a limit of time or energy."""
-    if "fault" in objectives or "critical" in severities:
-        return "fault"
-    return "not_evaluated" if "not_evaluated" in objectives or not objectives or fit == "no" else "ok"
+def outcome(name: str, kind: Kind | None, value: float | None, unit: str, threshold: str) -> str:
+    """An objective that was missed, in a clause: what it came to, and what was wanted."""
+    if kind == "functional":
+        return f"{name} not met"
+    measured = "unknown" if value is None else f"{value:.4g} {unit}".rstrip()
+    wanted = f", wanted {threshold} {unit}".rstrip() if threshold else ""
+    return f"{name} {measured}{wanted}"
 
 
 class MissionVerdict(Record):
@@ -257,6 +264,8 @@ class Diagnosis(Record):
     faults: tuple[Fault, ...]
     fix: Fix | None
     alternatives: tuple[Fix, ...] = ()
+    odds_as_driven: float | None = None
+    """Probability that all objectives are met by the configuration as driven; None where nothing is advised."""
     abstained: str | None = None
     notes: tuple[str, ...] = field(default=())
     since: Since | None = None
@@ -264,7 +273,7 @@ class Diagnosis(Record):
     rivals: tuple[Circumstance, ...] = ()
     """What the run met that may explain the fault instead; only where no cause is sure."""
     tell_more: tuple[str, ...] = ()
-    """What would tell more: a metric to record, an experiment; only where no cause is sure."""
+    """How to find out more: a metric to record, an experiment; only where no cause is sure."""
     dismissed: tuple[Dismissal, ...] = ()
     missions: tuple[MissionVerdict, ...] = ()
     """Every mission of the log, this one among them."""
@@ -276,9 +285,3 @@ class Diagnosis(Record):
     def lost_by(self) -> tuple[str, ...]:
         """What lost the run and no prediction knows of."""
         return lost_by(self.health.findings, is_judged=bool(self.faults))
-
-    @property
-    def status(self) -> Status:
-        """What the whole run came to."""
-        statuses = {objective.status for objective in self.objectives}
-        return overall(statuses, {one.severity for one in self.health.findings}, self.profile.fit.verdict)

@@ -104,11 +104,13 @@ def _options(schema: Schema, settings: Mapping[str, Setting]) -> dict[str, float
 def _whose(named: Collection[str], recorded: Collection[str], good: Good | None) -> str:
     """Whose the reference is, in one phrase."""
     if good is None:
-        return "the defaults that the log records" if recorded else "the profile's reference"
+        return "the firmware defaults stored in the log" if recorded else "the profile's reference"
     if not named:
         return f"{_whose((), recorded, None)}, as {good.source} holds no option"
     lacking = len(set(recorded) - set(named))
-    return f"{good.source}" + (f" and, for what it lacks ({lacking}), the defaults of the log" if lacking else "")
+    if not lacking:
+        return good.source
+    return f"{good.source} and, for what it lacks ({lacking}), the firmware defaults stored in the log"
 
 
 def _by_default(setting: Setting) -> Setting | None:

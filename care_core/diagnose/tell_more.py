@@ -1,4 +1,4 @@
-"""What would tell more, where no cause is sure: metrics that were not recorded, and the experiment that separates."""
+"""How to find out more, where no cause is sure: metrics that were not recorded, and the experiment that separates."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ MIN_CONTRIBUTION = 0.02
 """Probability an option must cost before it is called a cause of this run."""
 MIN_PROBABILITY = 0.2
 """Best probability below which the engine abstains: a confident wrong answer costs a field day."""
-CONVINCING, EXPLAINS = 0.5, 3
+CONVINCING, MOST_LEADS = 0.5, 3
 """A cause that costs less than this leaves room for others: up to so many options are then named in all."""
 SURE, UNSURE = 0.4, 0.1
 """Contributions from which a cause may be called high confidence, and below which it is low."""
@@ -121,7 +121,7 @@ def diagnose(
     said = speaking(health.findings, schema, judged.run.config)
     run = replace(judged.run, evidence=(*judged.run.evidence, *said.values()))
     objectives = (*judged.results, *judged.checks)
-    choice = replace(choice, fit=choice.fit.but(*unusual(run, profile)))
+    choice = replace(choice, fit=choice.fit.with_objection(*unusual(run, profile)))
     if not broken:
         missed = any(result.status == "fault" for result in judged.checks)
         explained = unasked(health.findings, failed=missed, shown=said, verdict=choice.fit.verdict)
@@ -168,6 +168,7 @@ def diagnose(
         faults=faults,
         fix=None if abstained else fixes[0],
         alternatives=() if abstained else tuple(fixes[1:]),
+        odds_as_driven=None if abstained else _as_driven(case, hypotheses),
         abstained=abstained,
         notes=_notes(case, broken, None if abstained else fixes[0]),
         missions=judged.missions,
@@ -178,6 +179,12 @@ def diagnose(
         health=health,
         hypotheses=hypotheses,
     )
+
+
+def _as_driven(case: _Case, hypotheses: Sequence[Hypothesis]) -> float:
+    """Probability that the same configuration meets every limit in the next run, as the fixes promise theirs."""
+    (again,) = believed([Fix((), float(case.query.probability([case.query.config])[0]), {})], hypotheses)
+    return again.p_fixed
 
 
 def _set_wrong(judged: Judged, explained: Sequence[Hypothesis], said: Mapping[str, Evidence]) -> Iterator[str]:
@@ -225,9 +232,9 @@ def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], to
     named = [suspect for suspect in found if suspect.contribution >= MIN_CONTRIBUTION]
     if not first and (not named or named[0].contribution < CONVINCING):
         weak = [suspect for suspect in found if suspect.contribution < MIN_CONTRIBUTION <= suspect.weight]
-        named = [suspect for suspect in found if suspect in named or suspect in weak[: max(0, EXPLAINS - len(named))]]
+        named = [suspect for suspect in found if suspect in named or suspect in weak[: max(0, MOST_LEADS - len(named))]]
         weak = [suspect for suspect in found if 0 <= suspect.contribution < MIN_CONTRIBUTION > suspect.weight]
-        named += [*weak, *others][: max(0, EXPLAINS - len(named))]
+        named += [*weak, *others][: max(0, MOST_LEADS - len(named))]
     named = first + [suspect for suspect in named if suspect not in first]
     return tuple(_cause(case, result, suspect, rank) for rank, suspect in enumerate(named[:top], start=1))
 
@@ -455,18 +462,18 @@ def _promise(query: CounterfactualQuery, broken: Sequence[str]) -> str:
     """Which next run the probabilities are for, and what is known of how it resembles this one."""
     known = [query.model.training.carry_over[name] for name in broken if name in query.model.training.carry_over]
     same, another = (max((carry_over.pairs[i] for carry_over in known), default=0) for i in (0, 1))
-    measured = f"measured on {same} pairs of training runs" if same else "not measured, no training run was repeated"
+    measured = f"measured on {same} pairs of training runs" if same else "not measured"
     if another and not same:
-        measured = f"not measured, training repeated runs on other days only ({another} pairs)"
+        measured = f"measured only between days ({another} pairs of training runs)"
     seen = f", seen in {1 + len(query.repeats)} runs" if query.repeats else ""
-    return f"probabilities are for the next run under the same conditions{seen}; how alike such runs are was {measured}"
+    return f"these odds assume similar conditions{seen}; run-to-run variation was {measured}"
 
 
 def _reference(judged: Judged) -> str:
     """Whose configuration the run was judged against, and how far from it it was driven."""
     off = len(deviating(judged.run.config, judged.reference.config))
-    count = f"{off} option{' of this run is' if off == 1 else 's of this run are'} off it"
-    return f"judged against {judged.reference.source}: {count}"
+    count = f"{off} parameter differs" if off == 1 else f"{off} parameters differ"
+    return f"compared with {judged.reference.source}; {count}"
 
 
 def _odds(query: CounterfactualQuery) -> float:

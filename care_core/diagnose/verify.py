@@ -23,7 +23,7 @@ from care_core.variables import Threshold, Variable
 
 Made = Literal["made", "not_made", "other_value", "unknown"]
 Outcome = Literal["recovered", "kept", "unchanged", "better", "worse", "broken", "unknown"]
-Verdict = Literal["fixed_as_promised", "fixed_although", "not_fixed", "change_not_made", "cannot_tell"]
+VerifyVerdict = Literal["fixed_as_promised", "fixed_although", "not_fixed", "change_not_made", "cannot_tell"]
 
 
 class Before(Record):
@@ -93,7 +93,7 @@ class ObjectiveCheck(Record):
 class Verification(Record):
     """The whole comparison. `chosen` is 0 where the suggested set was made, else the number of the alternative."""
 
-    verdict: Verdict
+    verdict: VerifyVerdict
     sentence: str
     chosen: int
     p_fixed: float
@@ -248,7 +248,7 @@ def _outcome(
 
 def _verdict(
     changes: Sequence[MadeChange], others: Sequence[OtherChange], checks: Sequence[ObjectiveCheck], doubt: str
-) -> tuple[Verdict, str]:
+) -> tuple[VerifyVerdict, str]:
     broken = [check.variable.name for check in checks if check.after.status == "fault"]
     unknown = [check for check in checks if check.outcome == "unknown"]
     unmade = [change.option.name for change in changes if change.made in ("not_made", "other_value")]

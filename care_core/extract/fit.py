@@ -28,7 +28,7 @@ def fit_of(log: Log, coverage: Coverage) -> Fit:
     obstacles = tuple(_obstacles(log, coverage, vehicle))
     if obstacles:
         return Fit("no", obstacles)
-    return FITS.but(*_differences(log, schema, vehicle), *_lacks(coverage))
+    return FITS.with_objection(*_differences(log, schema, vehicle), *_lacks(coverage))
 
 
 def is_other_vehicle(schema: Schema, vehicle: Vehicle) -> bool:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
 
 from care_core.causal.counterfactual import CounterfactualQuery, known_value
 from care_core.causal.model import Model
 from care_core.diagnose.ranking import deviating
-from care_core.diagnose.records import Confidence, Diagnosis, Status, What
+from care_core.diagnose.records import Confidence, Diagnosis, What
+from care_core.diagnose.verdict import RunStatus, verdict_of
 from care_core.ecosystems.findings import FindingKind, Severity
 from care_core.records import Record, field, replace
 from care_core.run import FitVerdict, is_known
@@ -66,7 +66,7 @@ class Row(Record):
     """What became of one run. A log that cannot be read is a row too: `status` "unreadable", and `reason` says why."""
 
     log: str
-    status: Status | Literal["unreadable"]
+    status: RunStatus
     reason: str = ""
     robot: str | None = None
     """What tells it from all others; None where the log does not."""
@@ -134,7 +134,7 @@ def row_of(log: str, diagnosis: Diagnosis, query: CounterfactualQuery | None = N
     unknown = next((one.reason for one in diagnosis.objectives if one.status == "not_evaluated"), "")
     return Row(
         log=clean(log),
-        status=diagnosis.status,
+        status=verdict_of(diagnosis).status,
         reason=clean(unknown or diagnosis.health.too_little or "; ".join(profile.fit.reasons[:1])),
         robot=robot.id if robot is not None and robot.is_sure else None,
         called=robot.name if robot is not None and robot.is_sure else "",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from care_core.diagnose.verdict import exit_code
 from care_core.errors import ExitCode
 from care_core.fleet.rows import Row
 from care_core.fleet.shared import Pattern, shared
@@ -22,11 +23,9 @@ class Fleet(Record):
     def exit_code(self) -> ExitCode:
         """What one log's code would be: a fault anywhere, else something not evaluated; unreadable where all are."""
         statuses = {row.status for row in self.rows}
-        if statuses == {"unreadable"}:
-            return ExitCode.UNREADABLE
-        if "fault" in statuses:
-            return ExitCode.FAULT
-        return ExitCode.OK if statuses == {"ok"} else ExitCode.NOT_EVALUATED
+        if statuses != {"unreadable"}:  # a log that cannot be read was not evaluated, beside others that were
+            statuses = {"not_evaluated" if status == "unreadable" else status for status in statuses}
+        return exit_code(*statuses)
 
 
 def together(rows: Sequence[Row]) -> Fleet:

@@ -8,11 +8,11 @@ from typing import Any, Final, Literal
 
 from care_core.diagnose.baseline import Baseline, Proposal, Refused, over
 from care_core.diagnose.tolerance import CONFIDENCE, CONTENT
+from care_core.diagnose.verdict import fit_text
 from care_core.records import field
-from care_core.report.document import ProfileEntry, profile_entry
-from care_core.report.happened import FitEntry, fit_entry
-from care_core.report.published import Document
-from care_core.report.wording import fit_text
+from care_core.report.document import ProfileEntry
+from care_core.report.published import Document, publish
+from care_core.run import Fit
 from care_core.text import clean, wrapped
 from care_core.variables import Op
 
@@ -74,7 +74,7 @@ class BaselineDocument(Document, kw_only=True):
 
     schema_: Literal["care.baseline/1"] = field(default=SCHEMA_ID, name="schema")
     profile: ProfileEntry
-    fit: FitEntry
+    fit: Fit
     logs: int
     runs: int
     missions: int
@@ -94,8 +94,8 @@ def baseline_schema() -> dict[str, Any]:
 def baseline_document(found: Baseline) -> BaselineDocument:
     """The proposals as a document."""
     return BaselineDocument(
-        profile=profile_entry(found.choice),
-        fit=fit_entry(found.choice.fit),
+        profile=publish(ProfileEntry, found.choice),
+        fit=publish(Fit, found.choice.fit),
         logs=found.logs,
         runs=len(found.runs),
         missions=found.missions,

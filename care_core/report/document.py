@@ -1,6 +1,6 @@
 """The published triage document, `care.triage/1`: what other programs read. Its keys and types are an interface.
 
-`Report` is the document with what people want beside it: the diff and the commands.
+`Report` is the document with what people want beside it: the verdict, the diff and the commands.
 """
 
 from __future__ import annotations
@@ -17,27 +17,30 @@ from care_core.diagnose.records import (
     Circumstance,
     Confidence,
     Diagnosis,
+    Dismissal,
     Fix,
+    Hypothesis,
     MissionVerdict,
+    Need,
     ObjectiveResult,
     Prediction,
     Since,
     Status,
+    outcome,
 )
+from care_core.diagnose.verdict import Advice, Verdict, chance, compose, verdict_of
 from care_core.numbers import six_digits
 from care_core.records import field
-from care_core.report.happened import (
+from care_core.report.entries import (
+    DamageEntry,
+    EventEntry,
     FindingEntry,
-    FitEntry,
-    HypothesisEntry,
-    MomentEntry,
-    account_entries,
+    damage_entries,
+    event_entries,
     finding_entries,
-    fit_entry,
-    hypothesis_entries,
 )
-from care_core.report.published import Document
-from care_core.run import Evidence, ProfileChoice, Value, is_known
+from care_core.report.published import Document, publish, publishable
+from care_core.run import FITS, Fit, Value, is_known
 from care_core.text import clean
 from care_core.variables import ASSUMED, Change, Kind, Op, Threshold
 
@@ -48,12 +51,6 @@ class ProfileEntry(Document, kw_only=True):
     name: str
     version: str
     platform: str
-
-
-class DamageEntry(Document, kw_only=True):
-    what: str
-    byte: int | None
-    time_s: float | None
 
 
 class LogEntry(Document, kw_only=True):
@@ -69,13 +66,8 @@ class ThresholdEntry(Document, kw_only=True):
     op: Op
     value: float
 
-
-class NeedEntry(Document, kw_only=True):
-    """What the reference configuration would need for this mission, with its 80 % interval."""
-
-    value: float
-    low: float
-    high: float
+    def __str__(self) -> str:
+        return f"{self.op} {self.value:g}"
 
 
 class ObjectiveEntry(Document, kw_only=True):
@@ -84,11 +76,36 @@ class ObjectiveEntry(Document, kw_only=True):
     unit: str
     kind: Kind
     threshold: ThresholdEntry | None
-    needs: NeedEntry | None = None
+    needs: Need | None = None
+    """What the reference configuration would need for this mission, with its 80 % interval."""
     basis: str = ""
     """What the threshold was made of, empty where it is a fixed one."""
     status: Status
     reason: str | None
+
+    @property
+    def sentence(self) -> str:
+        """What it came to, where it was missed."""
+        return outcome(self.name, self.kind, self.value, self.unit, str(self.threshold or ""))
+
+    @property
+    def measured(self) -> str:
+        """The value with its unit, empty where there is none."""
+        return "" if self.value is None else f"{self.value:.4g} {self.unit}".rstrip()
+
+    def prediction(self, predicted: PredictedValue, is_guess: bool) -> str:
+        """A predicted value with its interval; a yes-or-no objective has a probability instead."""
+        if self.kind == "functional":
+            return chance(predicted.value, is_guess)
+        return f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {self.unit}".rstrip()
+
+    @property
+    def wanted(self) -> str:
+        """The threshold with its unit and what it was made of, empty where it has none."""
+        if self.threshold is None or (self.basis and self.value is None):
+            return ""  # one made for this mission says nothing where it was not flown to its end
+        bound = f"{self.threshold} {self.unit}".rstrip()
+        return f"{bound} ({self.basis})" if self.basis else bound
 
 
 class PredictedValue(Document, kw_only=True):
@@ -118,6 +135,19 @@ class CauseEntry(Document, kw_only=True):
     in_support: bool
     notes: list[str]
 
+    @property
+    def change(self) -> str:
+        """From what was driven to what is suggested."""
+        suggested = "" if self.suggested is None else f" → {self.suggested:g}"
+        return f"{self.current:g}{ASSUMED if self.assumed else ''}{suggested}"
+
+    @property
+    def worth(self) -> str:
+        """What is to be thought of it, in clauses."""
+        alone = "" if self.p_fixed is None else f"{self.p_fixed:.0%} if only this is changed, "
+        outside = "" if self.in_support else ", outside the training runs"
+        return f"{alone}{self.confidence} confidence{outside}"
+
 
 class FaultEntry(Document, kw_only=True):
     objective: str
@@ -138,6 +168,9 @@ class ChangeEntry(Document, kw_only=True):
         """From what to what."""
         return f"from {self.from_:g}{ASSUMED if self.assumed else ''} to {self.to:g}"
 
+    def __str__(self) -> str:
+        return f"{self.option} {self.from_:g}{ASSUMED if self.assumed else ''} -> {self.to:g}"
+
 
 class FixSet(Document, kw_only=True):
     changes: list[ChangeEntry]
@@ -145,6 +178,9 @@ class FixSet(Document, kw_only=True):
     guess: bool = False
     """Whether a value is one that no training run came near."""
     predicted: dict[str, PredictedObjective]
+
+    def __str__(self) -> str:
+        return f"{', '.join(map(str, self.changes))}: {chance(self.p_fixed, self.guess)}"
 
 
 class FixEntry(FixSet, kw_only=True):
@@ -188,13 +224,6 @@ class CircumstanceEntry(Document, kw_only=True):
     text: str
 
 
-class DismissedEntry(Document, kw_only=True):
-    """A cause that the operator has set aside."""
-
-    option: str
-    reason: str
-
-
 class MissionEntry(Document, kw_only=True):
     """A mission of the log with what became of it; `judged` is the one that the document is about."""
 
@@ -211,7 +240,7 @@ class TriageDocument(Document, kw_only=True):
     """The answer for one run, as `care triage --json` prints it."""
 
     schema_: Literal["care.triage/1"] = field(default=SCHEMA_ID, name="schema")
-    fit: FitEntry = field(default_factory=lambda: FitEntry(verdict="fits", reasons=[]))
+    fit: Fit = field(default=FITS)
     profile: ProfileEntry | None
     """None where no profile fits the log."""
     log: LogEntry
@@ -222,11 +251,11 @@ class TriageDocument(Document, kw_only=True):
     faults: list[FaultEntry]
     fix: FixEntry | None
     abstained: str | None
-    account: list[MomentEntry] = field(default_factory=list)
+    account: list[EventEntry] = field(default_factory=list)
     """What happened, in order of time."""
     findings: list[FindingEntry] = field(default_factory=list)
     """In the order told, the first cause first."""
-    hypotheses: list[HypothesisEntry] = field(default_factory=list)
+    hypotheses: list[Hypothesis] = field(default_factory=list)
     """What explains the failure, the likeliest first; empty where nothing failed."""
     notes: list[str] = field(default_factory=list)
     """What the operator should know of the log, the configuration and the profile."""
@@ -239,12 +268,13 @@ class TriageDocument(Document, kw_only=True):
     evidence: list[EvidenceEntry] = field(default_factory=list)
     rivals: list[CircumstanceEntry] = field(default_factory=list)
     tell_more: list[str] = field(default_factory=list)
-    dismissed: list[DismissedEntry] = field(default_factory=list)
+    dismissed: list[Dismissal] = field(default_factory=list)
 
 
 class Report(TriageDocument, kw_only=True):
-    """The document with the diff and the commands that apply it."""
+    """The document with the verdict, the diff, and the commands that apply it."""
 
+    verdict: Verdict
     diff: str
     apply: list[str]
 
@@ -256,74 +286,77 @@ def json_schema() -> dict[str, Any]:
 
 def build_document(diagnosis: Diagnosis) -> Report:
     """The document of a diagnosis. Text is cleaned; what is not a finite number becomes null."""
-    run, log = diagnosis.run, diagnosis.run.log
-    warnings = tuple(clean(warning) for warning in diagnosis.profile.fit.reasons)
+    run, log, fix = diagnosis.run, diagnosis.run.log, diagnosis.fix
+    warnings = [clean(warning) for warning in diagnosis.profile.fit.reasons]
     return Report(
-        profile=profile_entry(diagnosis.profile) if diagnosis.profile.name else None,
-        fit=fit_entry(diagnosis.profile.fit),
-        log=LogEntry(
-            path=clean(log.path),
-            format=log.format,
-            start=log.start,
-            duration_s=log.duration_s,
-            damage=[
-                DamageEntry(what=clean(damage.what), byte=damage.byte, time_s=_finite(damage.time_s))
-                for damage in log.damage
-            ],
-            sha256=log.sha256,
-        ),
+        profile=publish(ProfileEntry, diagnosis.profile) if diagnosis.profile.name else None,
+        fit=publish(Fit, diagnosis.profile.fit),
+        log=publish(LogEntry, log, damage=damage_entries(log.damage)),
         config={name: plain_number(value) for name, value in run.config.items() if math.isfinite(value)},
         context=_values(run.context),
         metrics=_values(run.metrics),
         objectives=[objective_entry(objective) for objective in diagnosis.objectives],
         faults=[
-            FaultEntry(
-                objective=fault.objective.variable.name, causes=[_cause(cause, warnings) for cause in fault.causes]
-            )
+            FaultEntry(objective=fault.objective.name, causes=[_cause(cause, warnings) for cause in fault.causes])
             for fault in diagnosis.faults
         ],
-        fix=None if diagnosis.fix is None else _fix(diagnosis.fix, diagnosis.alternatives),
-        abstained=None if diagnosis.abstained is None else clean(diagnosis.abstained),
-        notes=list(dict.fromkeys((*warnings, *(clean(note) for note in diagnosis.notes)))),
-        sources={name: clean(source) for name, source in run.sources.items()},
+        fix=None if fix is None else _fix(fix, diagnosis.alternatives),
+        abstained=publishable(diagnosis.abstained),
+        notes=list(dict.fromkeys((*warnings, *map(clean, diagnosis.notes)))),
+        sources=publishable(run.sources),
         since=None if diagnosis.since is None else _since(diagnosis.since),
         missions=[_mission(verdict, run.mission.index) for verdict in diagnosis.missions],
-        evidence=[_evidence(evidence) for evidence in run.evidence],
+        evidence=[publish(EvidenceEntry, evidence) for evidence in run.evidence],
         rivals=[_circumstance(rival) for rival in diagnosis.rivals],
-        tell_more=[clean(advice) for advice in diagnosis.tell_more],
-        dismissed=[DismissedEntry(option=d.option, reason=clean(d.reason)) for d in diagnosis.dismissed],
-        account=account_entries(diagnosis.health),
+        tell_more=publishable(diagnosis.tell_more),
+        dismissed=[publish(Dismissal, one) for one in diagnosis.dismissed],
+        account=event_entries(diagnosis.health),
         findings=finding_entries(diagnosis.health),
-        hypotheses=hypothesis_entries(diagnosis.hypotheses),
-        diff=unified_diff(run, diagnosis.fix.changes) if diagnosis.fix is not None else "",
-        apply=apply_commands(diagnosis.fix.changes, format_for(log.format, run.settings))
-        if diagnosis.fix is not None
-        else [],
+        hypotheses=[publish(Hypothesis, h, probability=six_digits(h.probability)) for h in diagnosis.hypotheses],
+        verdict=verdict_of(diagnosis),
+        diff="" if fix is None else unified_diff(run, fix.changes),
+        apply=[] if fix is None else apply_commands(fix.changes, format_for(log.format, run.settings)),
+    )
+
+
+def remembered_verdict(document: TriageDocument) -> Verdict:
+    """The verdict of a document that was read back."""
+    return compose(
+        document.profile.name if document.profile else "",
+        document.fit,
+        document.objectives,
+        document.findings,
+        document.hypotheses,
+        _advice(document),
+        document.tell_more,
+    )
+
+
+def _advice(document: TriageDocument) -> Advice:
+    fix = document.fix
+    if fix is None:
+        return Advice(refusal=document.abstained or "")
+    changed = {change.option for change in fix.changes}
+    causes = (cause for fault in document.faults for cause in fault.causes)
+    return Advice(
+        change=", ".join(map(str, fix.changes)),
+        odds=fix.p_fixed,
+        is_guess=fix.guess,
+        confidence=next((cause.confidence for cause in causes if cause.option in changed), None),
     )
 
 
 def _since(since: Since) -> SinceEntry:
-    return SinceEntry(
-        log=clean(since.log),
-        warnings=[clean(warning) for warning in since.warnings],
-        changes=[
-            ParameterChangeEntry(
-                parameter=clean(change.parameter),
-                option=None if change.option is None else change.option.name,
-                from_=_setting_value(change.before),
-                to=_setting_value(change.after),
-            )
-            for change in since.changes
-        ],
-    )
-
-
-def _setting_value(value: float | str | None) -> float | str | None:
-    return clean(value) if isinstance(value, str) else _finite(value)
-
-
-def _finite(value: float | None) -> float | None:
-    return float(value) if value is not None and math.isfinite(value) else None
+    changes = [
+        ParameterChangeEntry(
+            parameter=clean(change.parameter),
+            option=None if change.option is None else change.option.name,
+            from_=publishable(change.before),
+            to=publishable(change.after),
+        )
+        for change in since.changes
+    ]
+    return publish(SinceEntry, since, changes=changes)
 
 
 def estimate(value: float | None) -> float | None:
@@ -337,35 +370,19 @@ def plain_number(value: float) -> int | float:
 
 
 def _values(values: Mapping[str, Value]) -> dict[str, float | None]:
-    return {name: _finite(value) if is_known(value) else None for name, value in values.items()}
-
-
-def profile_entry(choice: ProfileChoice) -> ProfileEntry:
-    """The profile that was used."""
-    return ProfileEntry(name=choice.name, version=choice.version, platform=choice.platform)
-
-
-def wanted_text(entry: ObjectiveEntry) -> str:
-    """The threshold of an objective with its unit and what it was made of, empty where it has none."""
-    if entry.threshold is None or (entry.basis and entry.value is None):
-        return ""  # one made for this mission says nothing where it was not flown to its end
-    bound = f"{entry.threshold.op} {entry.threshold.value:g} {entry.unit}".rstrip()
-    return f"{bound} ({entry.basis})" if entry.basis else bound
+    return {name: publishable(float(value)) if is_known(value) else None for name, value in values.items()}
 
 
 def objective_entry(result: ObjectiveResult) -> ObjectiveEntry:
     """An objective of a run against its threshold."""
-    variable = result.variable
-    threshold, need = result.threshold, result.need
+    variable, threshold, need = result.variable, result.threshold, result.need
     return ObjectiveEntry(
         name=variable.name,
-        value=_finite(result.value),
+        value=publishable(result.value),
         unit=variable.unit,
         kind=variable.kind or "non-functional",
         threshold=None if threshold is None else _threshold(threshold, is_estimate=bool(result.basis)),
-        needs=None
-        if need is None
-        else NeedEntry(value=six_digits(need.value), low=six_digits(need.low), high=six_digits(need.high)),
+        needs=need and Need(six_digits(need.value), six_digits(need.low), six_digits(need.high)),
         basis=result.basis,
         status=result.status,
         reason=clean(result.reason) or None,
@@ -378,43 +395,20 @@ def _threshold(threshold: Threshold, *, is_estimate: bool) -> ThresholdEntry:
 
 def _mission(verdict: MissionVerdict, judged: int) -> MissionEntry:
     mission = verdict.mission
-    return MissionEntry(
-        index=mission.index,
-        start_s=_finite(mission.start_s),
-        end_s=_finite(mission.end_s),
-        ended=mission.ended,
-        status=verdict.status,
-        reason=clean(verdict.reason),
-        judged=mission.index == judged,
-    )
-
-
-def _evidence(evidence: Evidence) -> EvidenceEntry:
-    return EvidenceEntry(
-        time_s=_finite(evidence.time_s),
-        kind=evidence.kind,
-        text=clean(evidence.text),
-        options=list(evidence.options),
-        says=clean(evidence.says),
+    return publish(
+        MissionEntry, mission, status=verdict.status, reason=clean(verdict.reason), judged=mission.index == judged
     )
 
 
 def _circumstance(one: Circumstance) -> CircumstanceEntry:
-    return CircumstanceEntry(
-        circumstance=one.name,
-        variable=one.variable or None,
-        value=_finite(one.value),
-        unit=one.unit,
-        low=_finite(one.low),
-        high=_finite(one.high),
-        text=clean(one.text),
-    )
+    return publish(CircumstanceEntry, one, circumstance=one.name, variable=one.variable or None)
 
 
-def _cause(cause: Cause, warnings: tuple[str, ...]) -> CauseEntry:
+def _cause(cause: Cause, warnings: list[str]) -> CauseEntry:
     notes = [clean(note.text) for note in cause.notes]
-    return CauseEntry(
-        rank=cause.rank,
+    return publish(
+        CauseEntry,
+        cause,
         option=cause.option.name,
         path=[node.name for node in cause.path],
         path_ace=estimate(cause.path_ace),
@@ -424,9 +418,7 @@ def _cause(cause: Cause, warnings: tuple[str, ...]) -> CauseEntry:
         suggested=None if cause.suggested is None else plain_number(cause.suggested),
         predicted=None if cause.predicted is None else _predicted(cause.predicted),
         p_fixed=estimate(cause.p_fixed),
-        confidence=cause.confidence,
-        edge_support=[_finite(node.support) for node in cause.path[:-1]],
-        in_support=cause.in_support,
+        edge_support=[publishable(node.support) for node in cause.path[:-1]],
         notes=list(dict.fromkeys((*notes, *warnings))),
     )
 
@@ -441,22 +433,11 @@ def _predicted(prediction: Prediction) -> PredictedValue | None:
 def predicted_objective(prediction: Prediction) -> PredictedObjective | None:
     """A prediction with what it means for the threshold, None where it has no finite value."""
     value = _predicted(prediction)
-    return (
-        None
-        if value is None
-        else PredictedObjective(value=value.value, low=value.low, high=value.high, status=prediction.status())
-    )
+    return None if value is None else publish(PredictedObjective, value, status=prediction.status())
 
 
 def _fix(fix: Fix, alternatives: tuple[Fix, ...]) -> FixEntry:
-    chosen = _fix_set(fix)
-    return FixEntry(
-        changes=chosen.changes,
-        p_fixed=chosen.p_fixed,
-        guess=chosen.guess,
-        predicted=chosen.predicted,
-        alternatives=[_fix_set(alternative) for alternative in alternatives],
-    )
+    return publish(FixEntry, _fix_set(fix), alternatives=[_fix_set(alternative) for alternative in alternatives])
 
 
 def _fix_set(fix: Fix) -> FixSet:
@@ -469,11 +450,15 @@ def _fix_set(fix: Fix) -> FixSet:
     )
 
 
+def parameter_names(parameters: tuple[str, ...]) -> str | list[str]:
+    """Where an option lives: a string, or a list where it sets several."""
+    return parameters[0] if len(parameters) == 1 else list(parameters)
+
+
 def _change(change: Change) -> ChangeEntry:
-    parameters = change.option.parameters
     return ChangeEntry(
         option=change.option.name,
-        parameter=parameters[0] if len(parameters) == 1 else list(parameters),
+        parameter=parameter_names(change.option.parameters),
         from_=plain_number(parameter_value(change.option, change.current)),
         to=plain_number(parameter_value(change.option, change.suggested)),
         assumed=change.is_assumed,

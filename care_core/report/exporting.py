@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from care_core.history.store import Triaged
-from care_core.report.history import profile_of, status_of
+from care_core.report.document import remembered_verdict
+from care_core.report.reading import document_of
 from care_core.tables.rows import TableRow, write_rows
 from care_core.text import cell
 
@@ -33,31 +34,30 @@ def export_history(path: Path, triages: Sequence[Triaged]) -> int:
 
 
 def _row(one: Triaged) -> TableRow:
-    document = one.document
-    profile = document["profile"] or {"name": "", "version": ""}
-    causes = [cause["option"] for fault in document["faults"] for cause in fault["causes"]]
-    fix = document["fix"]
+    document = document_of(one.document)
+    causes = [cause.option for fault in document.faults for cause in fault.causes]
+    profile, fix = document.profile, document.fix
     row: TableRow = {
         "at": one.at,
-        "start": document["log"].get("start"),
+        "start": document.log.start,
         "robot": None if one.robot is None else cell(one.robot.id),
         "robot_name": None if one.robot is None else cell(one.robot.name),
         "log": cell(one.log_path),
-        "sha256": document["log"]["sha256"],
+        "sha256": document.log.sha256,
         "mission": one.mission,
-        "profile": profile_of(document) or None,
-        "profile_version": profile["version"] or None,
+        "profile": profile.name if profile else None,
+        "profile_version": profile.version if profile else None,
         "firmware": cell(one.firmware) or None,
-        "status": status_of(document),
+        "status": remembered_verdict(document).status,
         "cause": causes[0] if causes else None,
-        "changes": ", ".join(f"{c['option']} {c['from']:g} -> {c['to']:g}" for c in fix["changes"]) if fix else None,
-        "p_fixed": fix["p_fixed"] if fix else None,
+        "changes": ", ".join(map(str, fix.changes)) if fix else None,
+        "p_fixed": fix.p_fixed if fix else None,
     }
-    for entry in document["objectives"]:
-        name = f"objective.{entry['name']}"
-        row[name] = entry["value"]
-        row[f"{name}.limit"] = entry["threshold"]["value"] if entry.get("threshold") else None
-        row[f"{name}.status"] = entry["status"]
-    for kind, key in (("context", "context"), ("metric", "metrics"), ("option", "config")):
-        row.update({f"{kind}.{name}": value for name, value in document[key].items() if not isinstance(value, str)})
+    for entry in document.objectives:
+        name = f"objective.{entry.name}"
+        row[name] = entry.value
+        row[f"{name}.limit"] = entry.threshold.value if entry.threshold else None
+        row[f"{name}.status"] = entry.status
+    for kind, values in (("context", document.context), ("metric", document.metrics), ("option", document.config)):
+        row.update({f"{kind}.{name}": value for name, value in values.items()})
     return row

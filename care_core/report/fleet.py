@@ -7,7 +7,8 @@ from datetime import datetime
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, Literal
 
-from care_core.diagnose.records import Confidence, Status, What
+from care_core.diagnose.records import Confidence, What
+from care_core.diagnose.verdict import RunStatus
 from care_core.ecosystems.findings import FindingKind, Severity
 from care_core.errors import UsageError
 from care_core.fleet.rows import Explained, Row, distinct
@@ -60,7 +61,7 @@ class RowEntry(Document, kw_only=True):
     log: str
     robot: str | None
     called: str
-    status: Status | Literal["unreadable"]
+    status: RunStatus
     reason: str
     copy_of: str | None
     start: str | None

@@ -1,117 +1,22 @@
-"""What happened, in documents and in text: the account, the findings, the fit of the profile, and the hypotheses.
-
-The entries are parts of `care.triage/1` and `care.inspect/1`, alike in both.
-"""
+"""What happened, as text: the events, the findings, and what explains the failure."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
-from care_core.diagnose.records import Hypothesis, What
-from care_core.ecosystems.findings import Event, Finding, FindingKind, Health, Severity
-from care_core.numbers import six_digits
-from care_core.report.published import Document
-from care_core.report.wording import SEVERITY_WORDS, hypothesis_text, noted
-from care_core.run import Fit, FitVerdict
-from care_core.text import clean, seconds, wrapped
+from care_core.diagnose.verdict import Reason
+from care_core.ecosystems.findings import Event, Finding
+from care_core.report.entries import EventEntry, FindingEntry
+from care_core.report.wording import SEVERITY_WORDS, noted
+from care_core.text import seconds, wrapped
 
-MOMENTS_SHOWN = 24
+EVENTS_SHOWN = 24
 """Lines of the account in text; the document holds all."""
 LED_TO_SHOWN = 4
-HYPOTHESES_SHOWN = 4
+REASONS_SHOWN = 4
 
-
-M = TypeVar("M", bound="Event | MomentEntry")
-
-
-class FitEntry(Document, kw_only=True):
-    """How well the profile fits the log; `reasons` say what is missing or differs."""
-
-    verdict: FitVerdict
-    reasons: list[str]
-
-
-class MomentEntry(Document, kw_only=True):
-    """A line of the account; `time_s` counts from the start of the log, null where its source has no time."""
-
-    time_s: float | None
-    kind: str
-    text: str
-    source: str
-
-
-class ConsequenceEntry(Document, kw_only=True):
-    """A later finding that an earlier one explains."""
-
-    kind: FindingKind
-    title: str
-    onset_s: float | None
-    severity: Severity
-
-
-class FindingEntry(Document, kw_only=True):
-    """Something that was not as it should be; what it explains is folded under it."""
-
-    kind: FindingKind
-    title: str
-    onset_s: float | None
-    end_s: float | None
-    severity: Severity
-    after_impact: bool
-    evidence: str
-    source: str
-    consequences: list[ConsequenceEntry]
-
-
-class HypothesisEntry(Document, kw_only=True):
-    """One explanation of the failure; their probabilities add up to 1. A parameter is named by its option."""
-
-    what: What
-    name: str
-    probability: float
-
-
-def fit_entry(fit: Fit) -> FitEntry:
-    return FitEntry(verdict=fit.verdict, reasons=[clean(reason) for reason in fit.reasons])
-
-
-def account_entries(health: Health) -> list[MomentEntry]:
-    return [
-        MomentEntry(time_s=_finite(one.time_s), kind=one.kind, text=clean(one.text), source=clean(one.source))
-        for one in health.timeline
-    ]
-
-
-def finding_entries(health: Health) -> list[FindingEntry]:
-    return [
-        FindingEntry(
-            kind=one.kind,
-            title=clean(one.title),
-            onset_s=_finite(one.onset_s),
-            end_s=_finite(one.end_s),
-            severity=one.severity,
-            after_impact=one.after_impact,
-            evidence=clean(one.evidence),
-            source=clean(one.source),
-            consequences=[_consequence(below) for below in one.consequences],
-        )
-        for one in health.findings
-    ]
-
-
-def hypothesis_entries(hypotheses: Sequence[Hypothesis]) -> list[HypothesisEntry]:
-    return [HypothesisEntry(what=h.what, name=clean(h.name), probability=six_digits(h.probability)) for h in hypotheses]
-
-
-def _consequence(finding: Finding) -> ConsequenceEntry:
-    onset_s = _finite(finding.onset_s)
-    return ConsequenceEntry(kind=finding.kind, title=clean(finding.title), onset_s=onset_s, severity=finding.severity)
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+E = TypeVar("E", bound="Event | EventEntry")
 
 
 def finding_sentence(finding: FindingEntry) -> str:
@@ -121,11 +26,7 @@ def finding_sentence(finding: FindingEntry) -> str:
     return f"{finding.title}, at {seconds(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
 
 
-def finding_text(finding: Finding) -> str:
-    return f"{finding.title} at {seconds(finding.onset_s)}"
-
-
-def account_lines(account: Sequence[Event | MomentEntry], robot: str = "", most: int = MOMENTS_SHOWN) -> Iterator[str]:
+def account_lines(account: Sequence[Event | EventEntry], robot: str = "", most: int = EVENTS_SHOWN) -> Iterator[str]:
     """The account as text; of a long one the lines that say most about a failure."""
     if not account:
         return
@@ -141,7 +42,7 @@ def account_lines(account: Sequence[Event | MomentEntry], robot: str = "", most:
 _TELLING = ("crash", "failsafe", "error", "arming", "goal", "damage", "mode", "recovery", "message")
 
 
-def telling(account: Sequence[M], most: int) -> list[M]:
+def telling(account: Sequence[E], most: int) -> list[E]:
     """At most so many moments, in order of time: those of the kinds that say most about a failure stay."""
     if len(account) <= most:
         return list(account)
@@ -156,7 +57,7 @@ def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
     if findings and not shown:
         return
     if not shown:
-        yield "Findings: nothing out of the ordinary, as far as this log lets itself be checked"
+        yield "Findings: no health problems found in what this log records"
         return
     yield "Findings" if len(shown) == 1 else "Findings, the first cause first"
     for finding in shown:
@@ -175,10 +76,9 @@ def _led_to(finding: Finding | FindingEntry, indent: str) -> Iterator[str]:
         yield from wrapped(f"led to: {'; '.join(titles[:LED_TO_SHOWN])}{more}", indent)
 
 
-def hypothesis_lines(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding]) -> Iterator[str]:
+def reason_lines(reasons: Sequence[Reason]) -> Iterator[str]:
     """What explains the failure, the likeliest first."""
-    if not hypotheses:
-        return
-    yield "What explains it"
-    for one in hypotheses[:HYPOTHESES_SHOWN]:
-        yield from wrapped(hypothesis_text(one, findings), f"  {one.probability:>4.0%}  ")
+    if reasons:
+        yield "What explains it"
+    for one in reasons[:REASONS_SHOWN]:
+        yield from wrapped(one.text, f"  {one.probability:>4.0%}  ")

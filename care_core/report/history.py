@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from care_core.diagnose.records import Status, overall
+from care_core.diagnose.verdict import fit_words
 from care_core.history.store import HistoryError, Triaged, Verified
-from care_core.history.track_record import TrackRecord, sparkline, track_record, trends
-from care_core.history.trends import LEAST_RUNS, Direction, RobotRuns, Trend, by_robot
+from care_core.history.track_record import Bin, sparkline, track_record, trends
+from care_core.history.trends import LEAST_RUNS, Direction, RobotRuns, Since, Trend, by_robot
 from care_core.records import field
-from care_core.report.published import Document
-from care_core.report.wording import fit_words
+from care_core.report.document import remembered_verdict
+from care_core.report.published import Document, publish, publishable
+from care_core.report.reading import document_of
 from care_core.run import FitVerdict, Robot
 from care_core.text import clean, wrapped
 
@@ -21,15 +22,6 @@ _SPARKS = 24
 """Newest values that a trend shows."""
 _CHANGES = 4
 """Most parameters that are named of those that changed at a run."""
-
-
-class RobotEntry(Document, kw_only=True):
-    """`is_sure`: it tells this robot from others of its kind."""
-
-    id: str
-    name: str
-    source: str
-    is_sure: bool
 
 
 class PastTriage(Document, kw_only=True):
@@ -48,21 +40,13 @@ class PastTriage(Document, kw_only=True):
     p_fixed: float | None
 
 
-class PromiseBin(Document, kw_only=True):
-    low: float
-    high: float
-    count: int
-    promised: float
-    worked: int
-
-
 class PromiseRecord(Document, kw_only=True):
     """Of `count` fixes that were made and verified, `worked` did; by the promises `expected` should have."""
 
     count: int
     worked: int
     expected: float
-    bins: list[PromiseBin]
+    bins: list[Bin]
 
 
 class ChangedEntry(Document, kw_only=True):
@@ -108,7 +92,7 @@ class MissionRunsEntry(Document, kw_only=True):
 class RobotRunsEntry(Document, kw_only=True):
     """`robot` is None for runs of which nothing says whose they are; `faults` is the trend of having a fault."""
 
-    robot: RobotEntry | None
+    robot: Robot | None
     runs: int
     faulty: int
     faults: TrendEntry
@@ -140,50 +124,39 @@ def history_document(
             triages=[_past(one) for one in triages[:limit]],
             trends={name: list(values) for name, values in trends(triages[:limit]).items()},
             robots=[_robot(one) for one in robots_of(triages)],
-            verified=_record(track_record(verified)),
+            verified=publish(PromiseRecord, track_record(verified)),
         )
     except (AttributeError, KeyError, TypeError, ValueError) as err:
         raise HistoryError("The history holds a record that is no triage.", hint="Move its file away.") from err
 
 
 def _past(triaged: Triaged) -> PastTriage:
-    document = triaged.document
-    causes = [cause["option"] for fault in document["faults"] for cause in fault["causes"]]
-    fix: Mapping[str, Any] | None = document["fix"]
+    document = document_of(triaged.document)
+    causes = [cause.option for fault in document.faults for cause in fault.causes]
+    fix = document.fix
     return PastTriage(
         at=triaged.at,
         log=clean(triaged.log_path),
         mission=triaged.mission,
-        fit=fit_of(document),
-        profile=profile_of(document),
-        faults=[fault["objective"] for fault in document["faults"]],
-        verdict=verdict_of(document),
+        fit=document.fit.verdict,
+        profile=document.profile.name if document.profile else "",
+        faults=[fault.objective for fault in document.faults],
+        verdict=remembered_verdict(document).headline,
         cause=causes[0] if causes else None,
-        options=[change["option"] for change in fix["changes"]] if fix else [],
-        p_fixed=fix["p_fixed"] if fix else None,
+        options=[change.option for change in fix.changes] if fix else [],
+        p_fixed=fix.p_fixed if fix else None,
     )
 
 
 def robots_of(triages: Sequence[Triaged]) -> tuple[RobotRuns, ...]:
     """The past by robot and mission, with its trends."""
-    return by_robot(triages, {place: status_of(one.document) == "fault" for place, one in enumerate(triages)})
-
-
-def status_of(document: Mapping[str, Any]) -> Status:
-    """What a triage came to, by its document."""
-    objectives = [entry["status"] for entry in document["objectives"]]
-    severities = [finding["severity"] for finding in document.get("findings", ())]
-    return overall(objectives, severities, fit_of(document))
-
-
-def robot_entry(robot: Robot) -> RobotEntry:
-    """A robot as documents have it."""
-    return RobotEntry(id=clean(robot.id), name=clean(robot.name), source=clean(robot.source), is_sure=robot.is_sure)
+    verdicts = (remembered_verdict(document_of(one.document)) for one in triages)
+    return by_robot(triages, {place: verdict.status == "fault" for place, verdict in enumerate(verdicts)})
 
 
 def _robot(one: RobotRuns) -> RobotRunsEntry:
     return RobotRunsEntry(
-        robot=None if one.robot is None else robot_entry(one.robot),
+        robot=None if one.robot is None else publish(Robot, one.robot),
         runs=len(one.runs),
         faulty=one.faulty,
         faults=_trend(one.faults),
@@ -195,60 +168,18 @@ def _robot(one: RobotRuns) -> RobotRunsEntry:
 
 
 def _trend(trend: Trend) -> TrendEntry:
-    since = None
-    if trend.since is not None:
-        run = trend.since.run
-        since = SinceEntry(
-            at=run.document["log"].get("start") or run.at,
-            log=clean(run.log_path),
-            before=trend.since.before,
-            after=trend.since.after,
-            p=trend.since.p,
-            changed=[
-                ChangedEntry(name=clean(one.name), from_=_plain(one.before), to=_plain(one.after))
-                for one in trend.since.changed
-            ],
-        )
-    return TrendEntry(
-        objective=trend.objective, unit=trend.unit, values=list(trend.values), direction=trend.direction,
-        tau=trend.tau, p=trend.p, since=since,
-    )  # fmt: skip
+    since = trend.since
+    return publish(TrendEntry, trend, since=since and _since(since))
 
 
-def _plain(value: float | str) -> float | str:
-    return clean(value) if isinstance(value, str) else value
-
-
-def profile_of(document: Mapping[str, Any]) -> str:
-    """The profile of a remembered run, empty where none fitted."""
-    return document["profile"]["name"] if document["profile"] else ""
-
-
-def fit_of(document: Mapping[str, Any]) -> FitVerdict:
-    """How well it fitted; the oldest records say nothing of that."""
-    verdict: FitVerdict = document.get("fit", {}).get("verdict", "fits")
-    return verdict
-
-
-def verdict_of(document: Mapping[str, Any]) -> str:
-    """How a remembered run went, in a clause: the first critical finding, the objectives outside their thresholds, and
-    "no fault" only where everything was evaluated and nothing critical was found."""
-    critical = [finding["title"] for finding in document.get("findings", ()) if finding["severity"] == "critical"]
-    broken = [entry["name"] for entry in document["objectives"] if entry["status"] == "fault"]
-    statuses = {entry["status"] for entry in document["objectives"]}
-    said = [*critical[:1], *([f"FAULT {', '.join(broken)}"] if broken else [])]
-    if said:
-        return clean("; ".join(said))
-    if "ok" not in statuses:
-        return "not evaluated"
-    return "not all evaluated" if "not_evaluated" in statuses else "no fault"
-
-
-def _record(record: TrackRecord) -> PromiseRecord:
-    bins = [
-        PromiseBin(low=b.low, high=b.high, count=b.count, promised=b.promised, worked=b.worked) for b in record.bins
+def _since(since: Since) -> SinceEntry:
+    run = since.run
+    changed = [
+        ChangedEntry(name=clean(one.name), from_=publishable(one.before), to=publishable(one.after))
+        for one in since.changed
     ]
-    return PromiseRecord(count=record.count, worked=record.worked, expected=record.expected, bins=bins)
+    at = run.document["log"].get("start") or run.at
+    return publish(SinceEntry, since, at=at, log=clean(run.log_path), changed=changed)
 
 
 def history_json(document: HistoryDocument) -> str:
@@ -306,7 +237,7 @@ def _trend_lines(trend: TrendEntry, indent: str, width: int, ascii: bool) -> Ite
     values = trend.values
     span = "" if not values else f", {_span(min(values), max(values), trend.unit)}"
     said = {
-        "too few": f"{_count(len(values), 'value')}{span}: too few to tell ({LEAST_RUNS})",
+        "too few": f"{_count(len(values), 'value')}{span}: needs {LEAST_RUNS} runs to show a trend",
         "constant": f"always {_figure(values[0], trend.unit)}" if values else "",
         "none": f"no trend{span}",
         "worse": f"GETS WORSE{span}",

@@ -9,23 +9,22 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any, Final, Literal
 
+from care_core.diagnose.verdict import fit_text
 from care_core.ecosystems.findings import Health
 from care_core.extract.coverage import Missed, Trial
 from care_core.logs.base import Log
 from care_core.records import field
-from care_core.report.happened import (
+from care_core.report.entries import (
+    DamageEntry,
+    EventEntry,
     FindingEntry,
-    FitEntry,
-    MomentEntry,
-    account_entries,
-    account_lines,
+    damage_entries,
+    event_entries,
     finding_entries,
-    finding_lines,
-    fit_entry,
 )
-from care_core.report.published import Document
-from care_core.report.wording import fit_text
-from care_core.run import Damage, MissionInfo, ProfileChoice
+from care_core.report.happened import account_lines, finding_lines
+from care_core.report.published import Document, publish
+from care_core.run import Damage, Fit, MissionInfo, ProfileChoice
 from care_core.text import WIDTH, clean, clock, wrapped
 
 INSPECT_ID: Final = "care.inspect/1"
@@ -34,12 +33,6 @@ MOST_DAMAGE, MOST_CHANGED = 8, 10
 """Damaged places, and changed parameters, that are listed one by one."""
 
 _NUMBER = re.compile(r"\d+")
-
-
-class DamageEntry(Document, kw_only=True):
-    what: str
-    byte: int | None
-    time_s: float | None
 
 
 class ReadShare(Document, kw_only=True):
@@ -118,9 +111,9 @@ class ProfileEntry(Document, kw_only=True):
 
 class InspectDocument(Document, kw_only=True):
     schema_: Literal["care.inspect/1"] = field(default=INSPECT_ID, name="schema")
-    fit: FitEntry
+    fit: Fit
     """How well the profile fits that fits best."""
-    account: list[MomentEntry]
+    account: list[EventEntry]
     """What happened, in order of time."""
     findings: list[FindingEntry]
     """In the order told, the first cause first."""
@@ -150,8 +143,8 @@ def build_inspection(log: Log, trials: Sequence[Trial], choice: ProfileChoice, h
     parameters = _parameters(log)
     # Last, since a reader tells what it could not decode only after it was asked to.
     return InspectDocument(
-        fit=fit_entry(choice.fit),
-        account=account_entries(health),
+        fit=publish(Fit, choice.fit),
+        account=event_entries(health),
         findings=finding_entries(health),
         log=_log(log),
         channels=channels,
@@ -180,7 +173,7 @@ def _log(log: Log) -> LogEntry:
         duration_s=log.duration_s,
         bytes=size,
         facts={clean(name): clean(text) for name, text in log.facts.items()},
-        damage=[DamageEntry(what=clean(d.what), byte=d.byte, time_s=_finite(d.time_s)) for d in log.damage],
+        damage=damage_entries(log.damage),
         read=ReadShare(to_s=log.duration_s, about_s=_about_s(log.damage, log.duration_s, size)),
     )
 

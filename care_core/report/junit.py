@@ -14,10 +14,9 @@ from typing import Literal
 from xml.etree import ElementTree
 
 from care_core.records import Record
-from care_core.report.document import FaultEntry, ObjectiveEntry, Report, wanted_text
+from care_core.report.document import FaultEntry, ObjectiveEntry, Report
 from care_core.report.happened import finding_sentence
-from care_core.report.wording import chance, fit_text, hypothesis_text, noted
-from care_core.report.writers import plain_verdict
+from care_core.report.wording import noted
 from care_core.text import clean, seconds
 
 Outcome = Literal["passed", "failure", "error", "skipped"]
@@ -60,14 +59,15 @@ def suite_of(report: Report) -> Suite:
         told = "\n".join(finding_sentence(one) for one in worst)
         cases.append(Case("findings", "failure", "; ".join(one.title for one in worst), told))
     if not cases:
-        cases.append(Case("run", "skipped", plain_verdict(report)[1]))
+        cases.append(Case("run", "skipped", report.verdict.failed))
     robot = next((one.text for one in report.account if one.kind == "vehicle"), "")
     firmware = (("robot", robot),) if robot else ()
     return Suite(
         name=Path(log.path).name,
         cases=tuple(cases),
         properties=(
-            ("profile", fit_text(report.profile.name if report.profile else "", report.fit)),
+            ("profile", report.verdict.fit),
+            ("verdict", report.verdict.headline),
             ("log format", log.format),
             *((("log sha256", log.sha256),) if log.sha256 else ()),
             *firmware,
@@ -88,10 +88,8 @@ def _case(one: ObjectiveEntry, report: Report) -> Case:
         return Case(one.name)
     if one.status == "not_evaluated":
         return Case(one.name, "skipped", one.reason or "not evaluated")
-    value = "not met" if one.value is None else f"{one.value:.4g} {one.unit}".rstrip()
-    message = f"{one.name} {value}, wanted {wanted_text(one)}".removesuffix(", wanted ")
     fault = next((fault for fault in report.faults if fault.objective == one.name), None)
-    return Case(one.name, "failure", message, "\n".join(_why(one, fault, report)))
+    return Case(one.name, "failure", one.sentence, "\n".join(_why(one, fault, report)))
 
 
 def _why(one: ObjectiveEntry, fault: FaultEntry | None, report: Report) -> list[str]:
@@ -101,13 +99,9 @@ def _why(one: ObjectiveEntry, fault: FaultEntry | None, report: Report) -> list[
         to = "" if cause.suggested is None else f", suggested {cause.suggested:g}"
         path = " -> ".join(cause.path)
         lines.append(f"cause {cause.rank}: {path} (driven {cause.current:g}{to}; {cause.confidence} confidence)")
-    if report.fix is not None:
-        changes = ", ".join(f"{change.option} {change.values}" for change in report.fix.changes)
-        lines.append(f"suggestion: change {changes}: {chance(report.fix.p_fixed, report.fix.guess)}")
-        lines += report.apply
-    elif report.abstained:
-        lines.append(f"no change advised: {report.abstained}")
-    lines += [f"{h.probability:.0%} {hypothesis_text(h, report.findings)}" for h in report.hypotheses]
+    verdict = report.verdict
+    lines += [str(verdict.advice)] if str(verdict.advice) else []
+    lines += [*report.apply, *map(str, verdict.reasons)]
     return [line.replace("\u00a0", " ") for line in lines]
 
 

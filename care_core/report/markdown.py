@@ -10,23 +10,19 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.report.document import (
     CauseEntry,
     FixEntry,
-    FixSet,
     ObjectiveEntry,
-    PredictedValue,
     Report,
     SinceEntry,
-    wanted_text,
 )
 from care_core.report.happened import finding_sentence
 from care_core.report.together import together
-from care_core.report.wording import SEVERITY_WORDS, chance, fit_text, hypothesis_text, noted
-from care_core.report.writers import STATUS_WORDS, plain_verdict
+from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.run import shown
 from care_core.text import listed, seconds
-from care_core.variables import ASSUMED
 
 LONGEST = 30_000
 """Characters of a post."""
@@ -57,9 +53,7 @@ def to_markdown(report: Report) -> str:
 def _sections(report: Report) -> Iterator[Iterable[str]]:
     """The parts in their order; the first and the last are always there."""
     yield _head(report)
-    yield _listed(
-        "What explains it", (f"{h.probability:.0%}: {hypothesis_text(h, report.findings)}" for h in report.hypotheses)
-    )
+    yield _listed("What explains it", map(str, report.verdict.reasons))
     told = (f"{SEVERITY_WORDS[one.severity]}: {finding_sentence(one)}" for one in noted(report.findings))
     yield _listed("Findings, the first cause first", told)
     yield _objectives(report.objectives)
@@ -69,8 +63,8 @@ def _sections(report: Report) -> Iterator[Iterable[str]]:
         yield _fix(report, report.fix)
     if report.since is not None:
         yield _since(report.since)
-    yield _listed("It may be no parameter", (f"{one.circumstance}: {one.text}" for one in report.rivals))
-    yield _listed("What would tell more", report.tell_more)
+    yield _listed("It may not be a parameter", (f"{one.circumstance}: {one.text}" for one in report.rivals))
+    yield _listed("How to find out more", report.tell_more)
     yield _listed("Set aside by the operator", (f"{one.option}: {one.reason}" for one in report.dismissed))
     yield _listed("Notes", report.notes)
     yield _account(report)
@@ -79,36 +73,10 @@ def _sections(report: Report) -> Iterator[Iterable[str]]:
 
 def _head(report: Report) -> Iterator[str]:
     yield f"# Triage of {_escape(Path(report.log.path).name)}"
-    yield ""
-    yield _escape(fit_text(report.profile.name if report.profile else "", report.fit)) + "."
-    yield ""
-    yield _verdict(report)
-
-
-def _verdict(report: Report) -> str:
-    if report.fit.verdict == "no":
-        status, said = plain_verdict(report)
-        return f"**{STATUS_WORDS[status].capitalize()}**: {_escape(said)}."
-    broken = [objective.name for objective in report.objectives if objective.status == "fault"]
-    names = ", ".join(f"`{name}`" for name in broken)
-    if report.abstained:
-        found = f"**Fault**: {names}. " if broken else ""
-        return f"{found}**No change advised**: {_escape(report.abstained)}"
-    worst = [_escape(one.title) for one in report.findings if one.severity == "critical" and not one.after_impact]
-    if not broken and worst:
-        return f"**Fault**: {'; '.join(worst)}."
-    if not broken:
-        unknown = any(objective.status == "not_evaluated" for objective in report.objectives)
-        return "**No fault found**, but not everything could be evaluated." if unknown else "**No fault found.**"
-    if report.fix is None:
-        return f"**Fault**: {names}."
-    fix = report.fix
-    likely = f"{chance(fix.p_fixed, fix.guess)} that all objectives are met"
-    return f"**Fault**: {names}. Change {_changes(fix)}: {likely}."
-
-
-def _changes(fix: FixSet) -> str:
-    return ", ".join(f"`{change.option}` {change.values}" for change in fix.changes)
+    fit, headline, *others = report.verdict.lines
+    word, _, failed = headline.partition(": ")
+    for line in (_escape(fit), f"**{word}**: {_escape(failed)}", *map(_escape, others)):
+        yield from ("", f"{line}.")
 
 
 def _objectives(objectives: Iterable[ObjectiveEntry]) -> Iterator[str]:
@@ -119,9 +87,9 @@ def _objectives(objectives: Iterable[ObjectiveEntry]) -> Iterator[str]:
 
 def _objective(one: ObjectiveEntry) -> str:
     parts = [f"- {STATUS_WORDS[one.status]} `{one.name}`"]
-    if one.value is not None:
-        parts.append(f" {one.value:.4g} {one.unit}".rstrip())
-    wanted = wanted_text(one)
+    if one.measured:
+        parts.append(f" {one.measured}")
+    wanted = one.wanted
     parts += [f", wanted {_escape(wanted)}"] if wanted else []
     parts += [f": {_escape(one.reason)}"] if one.reason else []
     return "".join(parts)
@@ -134,11 +102,7 @@ def _causes(names: list[str], causes: Iterable[CauseEntry]) -> Iterator[str]:
 
 
 def _cause(cause: CauseEntry) -> Iterator[str]:
-    driven = f"{cause.current:g}{ASSUMED if cause.assumed else ''}"
-    suggested = "" if cause.suggested is None else f" → {cause.suggested:g}"
-    fixed = "" if cause.p_fixed is None else f"{cause.p_fixed:.0%} fixed by it alone, "
-    outside = "" if cause.in_support else ", outside the training runs"
-    yield f"{cause.rank}. **`{cause.option}`** {driven}{suggested} ({fixed}{cause.confidence} confidence{outside})"
+    yield f"{cause.rank}. **`{cause.option}`** {cause.change} ({cause.worth})"
     yield f"   {' → '.join(cause.path)}"
 
 
@@ -146,19 +110,12 @@ def _fix(report: Report, fix: FixEntry) -> Iterator[str]:
     objectives = {objective.name: objective for objective in report.objectives}
     yield from ("", "## Fix", "")
     for name, predicted in fix.predicted.items():
-        yield f"- {STATUS_WORDS[predicted.status]} `{name}` {_prediction(objectives[name], predicted, fix.guess)}"
+        yield f"- {STATUS_WORDS[predicted.status]} `{name}` {objectives[name].prediction(predicted, fix.guess)}"
     yield from _folded("The difference to the configuration as driven", report.diff.rstrip("\n"), "diff")
     yield from ("", *_fenced("\n".join(report.apply), "sh"))
     if fix.alternatives:
         yield from ("", "Or:", "")
-        yield from (f"- {_changes(other)}: {chance(other.p_fixed, other.guess)}" for other in fix.alternatives)
-
-
-def _prediction(objective: ObjectiveEntry, predicted: PredictedValue, is_guess: bool) -> str:
-    """A yes-or-no objective has a probability, not a value."""
-    if objective.kind == "functional":
-        return chance(predicted.value, is_guess)
-    return f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {objective.unit}".rstrip()
+        yield from (f"- {_escape(str(other))}" for other in fix.alternatives)
 
 
 def _since(since: SinceEntry) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """Signals of a run as plots in a page: lines in SVG that stretch with it, numbers and marks beside them in HTML.
 
-What is drawn are plain values (`Drawn`); `application.plotting` takes them from a log. Colours are the page's.
+What is drawn are plain values (`Drawing`); `application.plotting` takes them from a log. Colours are the page's.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ class Plot(Record):
         return self.words or self.source
 
 
-class Drawn(Record):
+class Drawing(Record):
     """What a page draws beside its text: the paths of the causes, and signals from `start_s` to `end_s` of the log."""
 
     faults: tuple[Fault, ...] = ()
@@ -111,22 +111,10 @@ class Drawn(Record):
         return "the start of the mission" if self.is_mission else "the start of the log"
 
 
-NOTHING_DRAWN = Drawn()
+NOTHING_DRAWN = Drawing()
 
 
-def mark_list(drawn: Drawn) -> Iterator[str]:
-    """The marks in words, with their numbers and times."""
-    yield '<ol class="marks">'
-    for number, mark in enumerate(drawn.marks, start=1):
-        time = f"{mark.time_s - drawn.start_s:.1f} s"
-        yield (
-            f'<li><span class="sign {mark.severity}">{number}</span> <span class="number">{time}</span> '
-            f"{escape(clean(mark.words))}</li>"
-        )
-    yield "</ol>"
-
-
-def plot_figure(plot: Plot, drawn: Drawn, name: str) -> Iterator[str]:
+def plot_figure(plot: Plot, drawn: Drawing, name: str) -> Iterator[str]:
     """A plot as a figure; `name` is unique in the page.
 
     The SVG stretches with the page, so only what may stretch is in it: lines of constant width and bands.
@@ -157,7 +145,7 @@ def plot_figure(plot: Plot, drawn: Drawn, name: str) -> Iterator[str]:
     yield "</div></div></figure>"
 
 
-def _signs(drawn: Drawn, frame: _Frame) -> Iterator[tuple[int, int, str, float]]:
+def _signs(drawn: Drawing, frame: _Frame) -> Iterator[tuple[int, int, str, float]]:
     """Marks that stand close to each other, as the numbers of the first and the last, the gravest, and a place."""
     groups: list[list[int]] = []
     places = [frame.x_share(mark.time_s) for mark in drawn.marks]
@@ -187,7 +175,7 @@ def _caption(plot: Plot) -> Iterator[str]:
     yield "</figcaption>"
 
 
-def _svg(plot: Plot, drawn: Drawn, frame: _Frame, name: str) -> Iterator[str]:
+def _svg(plot: Plot, drawn: Drawing, frame: _Frame, name: str) -> Iterator[str]:
     yield (
         f'<svg viewBox="0 0 {_WIDE} {_HIGH}" preserveAspectRatio="none" role="img" '
         f'aria-labelledby="{name}-title {name}-text">'
@@ -224,7 +212,7 @@ def _styles(lines: Sequence[Line]) -> list[str]:
     return ["wanted" if line.is_wanted else f"line{next(numbers, 8)}" for line in lines]
 
 
-def _told(plot: Plot, drawn: Drawn) -> str:
+def _told(plot: Plot, drawn: Drawing) -> str:
     """The plot in words, for who does not see it."""
     parts = []
     for line in plot.lines:
@@ -249,7 +237,7 @@ class _Frame(Record):
     values: tuple[float, ...]
 
     @classmethod
-    def of(cls, plot: Plot, drawn: Drawn) -> _Frame:
+    def of(cls, plot: Plot, drawn: Drawing) -> _Frame:
         values = [value for line in plot.lines for segment in line.segments for _, value in segment]
         low, high = min(values), max(values)
         span = high - low or max(abs(high), 1.0)

@@ -6,9 +6,14 @@ Each document names its format in `schema_`. Its JSON Schema is made from the sa
 from __future__ import annotations
 
 import json
-from typing import Any
+import math
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
 from care_core.records import Record, plain
+from care_core.text import clean
+
+R = TypeVar("R", bound=Record)
 
 
 class Document(Record):
@@ -31,6 +36,28 @@ class Document(Record):
 
         names = [field.default for field in fields(cls) if field.encode_name == "schema"]
         return schema(cls) | {"title": names[0] if names else cls.__name__}
+
+
+def publish(kind: type[R], record: Record, **others: Any) -> R:
+    """The published form of a record: the fields that both have under one name, and `others`.
+
+    Texts are cleaned, tuples become lists, and a number that JSON does not have becomes None.
+    """
+    shared = set(kind.__struct_fields__) & set(record.__struct_fields__) - set(others)
+    return kind(**{name: publishable(getattr(record, name)) for name in shared}, **others)
+
+
+def publishable(value: Any) -> Any:
+    """A text, a number, or what holds them, fit to be written."""
+    if isinstance(value, str):
+        return clean(value)
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, (tuple, list)):
+        return [publishable(part) for part in value]
+    if isinstance(value, Mapping):
+        return {name: publishable(part) for name, part in value.items()}
+    return value
 
 
 def to_json(values: Any, indent: int | None = 2) -> str:

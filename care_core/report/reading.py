@@ -29,13 +29,20 @@ def read_report(path: str | Path) -> TriageDocument:
             hint="Write one with 'care triage LOG --yaml --out FILE'.",
             where=str(path),
         )
-    known = set(TriageDocument.__struct_encode_fields__)
     try:
-        # A later version of this program may add keys; what this one knows must be sound.
-        return read(TriageDocument, {key: value for key, value in data.items() if key in known})
+        return document_of(data)
     except UnfitError as err:
         hint = "Write it again from the log."
         raise ConfigError(f"The report is damaged: {err}.", hint=hint, where=str(path)) from err
+
+
+def document_of(values: Mapping[str, Any]) -> TriageDocument:
+    """The document that plain values hold: of a report, or of what the history remembers.
+
+    A later version of this program may add keys; what this one knows must be sound. Raises UnfitError.
+    """
+    known = set(TriageDocument.__struct_encode_fields__)
+    return read(TriageDocument, {key: value for key, value in values.items() if key in known})
 
 
 def profile_of(report: TriageDocument) -> ProfileEntry:

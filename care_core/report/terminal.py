@@ -8,11 +8,10 @@ from pathlib import Path
 
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
-from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult, PathNode, Prediction
-from care_core.report.happened import account_lines, finding_lines, finding_text, hypothesis_lines
+from care_core.diagnose.records import Cause, Diagnosis, Fault, PathNode, Prediction
+from care_core.diagnose.verdict import STATUS_WORDS, Verdict, chance, verdict_of
+from care_core.report.happened import account_lines, finding_lines, reason_lines
 from care_core.report.together import together
-from care_core.report.wording import chance, critical, fit_text, said_without_profile
-from care_core.report.writers import STATUS_WORDS
 from care_core.text import clean, listed, wrapped
 from care_core.variables import Variable
 
@@ -24,10 +23,10 @@ CHANGES_SHOWN = 20
 
 def to_text(diagnosis: Diagnosis) -> str:
     """The diagnosis in lines of at most 80 columns (a diff or command may be longer: it is to be copied)."""
-    health = diagnosis.health
+    health, verdict = diagnosis.health, verdict_of(diagnosis)
     sections = [
-        _headline(diagnosis),
-        hypothesis_lines(diagnosis.hypotheses, diagnosis.health.findings),
+        _verdict(verdict),
+        reason_lines(verdict.reasons),
         finding_lines(health.findings) if health.timeline or health.findings else (),
         account_lines(health.timeline, health.robot),
         _origin(diagnosis),
@@ -44,50 +43,9 @@ def to_text(diagnosis: Diagnosis) -> str:
     return "\n\n".join(text for text in ("\n".join(section) for section in sections) if text) + "\n"
 
 
-def _headline(diagnosis: Diagnosis) -> Iterator[str]:
-    yield from wrapped(fit_text(diagnosis.profile.name, diagnosis.profile.fit))
-    faulty = [objective for objective in diagnosis.objectives if objective.status == "fault"]
-    missed = [objective.variable.name for objective in faulty if objective.variable.kind == "functional"]
-    broken = [f"{', '.join(missed)} not met"] if missed else []
-    broken += [_measured(objective) for objective in faulty if objective.variable.kind != "functional"]
-    unknown = [objective.variable.name for objective in diagnosis.objectives if objective.status == "not_evaluated"]
-    if diagnosis.profile.fit.verdict == "no":
-        yield from wrapped(_without_profile(diagnosis), f"{STATUS_WORDS[diagnosis.status]}: ")
-    elif broken:
-        yield from wrapped("; ".join(broken), "FAULT: ")
-    elif diagnosis.run.checks:
-        yield from wrapped("no mission was flown, and nothing failed in the flight itself", "NO MISSION: ")
-    elif unknown:
-        yield from wrapped(f"no fault found, but {', '.join(unknown)} could not be evaluated", "NOT EVALUATED: ")
-    else:
-        yield "OK: all objectives are within their thresholds"
-    if not broken and diagnosis.profile.fit.verdict != "no":
-        yield from (line for one in critical(diagnosis.health) for line in wrapped(finding_text(one), "BUT: "))
-    if diagnosis.abstained:
-        yield from wrapped(diagnosis.abstained, "No change advised: ")
-    if diagnosis.fix is not None:
-        yield from wrapped(_summary(diagnosis, diagnosis.fix))
-
-
-def _summary(diagnosis: Diagnosis, fix: Fix) -> str:
-    causes = [cause for fault in diagnosis.faults for cause in fault.causes]
-    changed = {change.option.name for change in fix.changes}
-    confidence = next((cause.confidence for cause in causes if cause.option.name in changed), None)
-    changes = ", ".join(map(str, fix.changes))
-    sure = f", {confidence} confidence in the cause" if confidence else ""
-    return f"Change {changes}: {chance(fix.p_fixed, fix.is_guess)} that all objectives are met{sure}"
-
-
-def _without_profile(diagnosis: Diagnosis) -> str:
-    """The headline of a run that no profile fits."""
-    worst = [finding_text(one) for one in critical(diagnosis.health)]
-    return said_without_profile(diagnosis.status, diagnosis.objectives, worst, diagnosis.health.findings)
-
-
-def _measured(objective: ObjectiveResult) -> str:
-    value = "unknown" if objective.value is None else f"{objective.value:.4g} {objective.variable.unit}".rstrip()
-    wanted = "" if objective.threshold is None else f", wanted {objective.wanted}"
-    return f"{objective.variable.name} {value}{wanted}"
+def _verdict(verdict: Verdict) -> Iterator[str]:
+    for line in verdict.lines:
+        yield from wrapped(line)
 
 
 def _origin(diagnosis: Diagnosis) -> Iterator[str]:
@@ -101,7 +59,7 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     if profile.name:
         yield from wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
     elif diagnosis.profile.fit.verdict == "no":
-        yield from wrapped("none fits; 'care inspect' tells what each would need", "Profile  ")
+        yield from wrapped("none fits", "Profile  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
         at = "" if damage.time_s is None else f" at {damage.time_s:.1f} s"
         yield from wrapped(f"{damage.what}{at}", "Damage   ")
@@ -169,7 +127,7 @@ def _cause(cause: Cause) -> Iterator[str]:
         change += f" -> {option.show(cause.suggested)}"
     facts = [f"{cause.confidence} confidence"]
     if cause.p_fixed is not None:
-        facts.insert(0, f"{cause.p_fixed:.0%} fixed by it alone")
+        facts.insert(0, f"{cause.p_fixed:.0%} if only this is changed")
     if not cause.in_support:
         facts.append("outside the training runs")
     yield from wrapped(f"{option.name}  {change} {option.unit}  ({', '.join(facts)})", f"  {cause.rank}. ")
@@ -237,14 +195,14 @@ def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _rivals(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.rivals:
-        yield "It may be no parameter"
+        yield "It may not be a parameter"
     for rival in diagnosis.rivals:
         yield from wrapped(f"{rival.name}: {rival.text}", "  - ")
 
 
 def _tell_more(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.tell_more:
-        yield "What would tell more"
+        yield "How to find out more"
     for advice in diagnosis.tell_more:
         yield from wrapped(advice, "  - ")
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.diagnose.verify import (
     Before,
     Made,
@@ -14,8 +15,8 @@ from care_core.diagnose.verify import (
     Outcome,
     Promise,
     PromisedSet,
-    Verdict,
     Verification,
+    VerifyVerdict,
 )
 from care_core.errors import ExitCode, UsageError
 from care_core.records import field
@@ -26,16 +27,15 @@ from care_core.report.document import (
     objective_entry,
     plain_number,
 )
-from care_core.report.published import Document
+from care_core.report.published import Document, publish, publishable
 from care_core.report.reading import profile_of
-from care_core.report.writers import STATUS_WORDS
 from care_core.run import Run
 from care_core.text import clean, wrapped
 from care_core.variables import Threshold
 
 SCHEMA_ID: Final = "care.verify/1"
 
-EXIT_CODES: Mapping[Verdict, ExitCode] = {
+EXIT_CODES: Mapping[VerifyVerdict, ExitCode] = {
     "fixed_as_promised": ExitCode.OK,
     "fixed_although": ExitCode.OK,
     "not_fixed": ExitCode.FAULT,
@@ -96,7 +96,7 @@ class VerifyDocument(Document, kw_only=True):
     profile: ProfileEntry
     report_log: VerifiedLog
     log: VerifiedLog
-    verdict: Verdict
+    verdict: VerifyVerdict
     sentence: str
     alternative: int
     """0: the suggested set of changes; else the number of the alternative that was made instead."""
@@ -149,8 +149,8 @@ def verify_document(report: TriageDocument, run: Run, found: Verification) -> Ve
     before = {one.name: one for one in report.objectives}
     return VerifyDocument(
         profile=profile_of(report),
-        report_log=VerifiedLog(path=report.log.path, sha256=report.log.sha256, start=report.log.start),
-        log=VerifiedLog(path=clean(run.log.path), sha256=run.log.sha256, start=run.log.start),
+        report_log=publish(VerifiedLog, report.log),
+        log=publish(VerifiedLog, run.log),
         verdict=found.verdict,
         sentence=clean(found.sentence),
         alternative=found.chosen,
@@ -162,7 +162,7 @@ def verify_document(report: TriageDocument, run: Run, found: Verification) -> Ve
             for o in found.others
         ],
         objectives=[_objective(check, before[check.variable.name]) for check in found.objectives],
-        notes=[clean(note) for note in found.notes],
+        notes=publishable(found.notes),
     )
 
 

@@ -7,17 +7,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from care_core.diagnose.records import Hypothesis
+from care_core.diagnose.verdict import STATUS_WORDS, RunStatus
 from care_core.records import field
-from care_core.report.happened import HypothesisEntry
-from care_core.report.history import RobotEntry, profile_of, robot_entry, status_of, verdict_of
-from care_core.report.published import Document
-from care_core.report.wording import hypothesis_text
-from care_core.report.writers import STATUS_WORDS
+from care_core.report.document import remembered_verdict
+from care_core.report.published import Document, publish
+from care_core.report.reading import document_of
 from care_core.run import FitVerdict, Robot
 from care_core.text import clean
 
 SCHEMA_ID: Final = "care.watch/1"
-UNREADABLE = "UNREADABLE"
 NO_ROBOT = "-"
 """Where a log does not say whose it is."""
 
@@ -35,10 +34,10 @@ class WatchEntry(Document, kw_only=True):
     at: str
     log: str
     sha256: str | None
-    robot: RobotEntry | None
-    verdict: Literal["ok", "fault", "not_evaluated", "unreadable"]
+    robot: Robot | None
+    verdict: RunStatus
     says: str
-    explanation: HypothesisEntry | None
+    explanation: Hypothesis | None
     faults: list[str]
     profile: str | None
     fit: FitVerdict | None
@@ -52,22 +51,29 @@ def watch_schema() -> dict[str, Any]:
 
 
 def judged_entry(
-    number: int, at: str, document: Mapping[str, Any], robot: Robot | None, *, unfinished: str = "", is_new: bool = True
+    number: int,
+    at: str,
+    past: Mapping[str, Any],
+    robot: Robot | None,
+    *,
+    unfinished: str = "",
+    is_new: bool = True,
 ) -> WatchEntry:
-    """The entry of a triage, by its document `care.triage/1`."""
-    likeliest = next(iter(document.get("hypotheses", ())), None)
+    """The entry of a triage, by its document `care.triage/1` as it is remembered."""
+    document = document_of(past)
+    verdict = remembered_verdict(document)
     return WatchEntry(
         number=number,
         at=at,
-        log=clean(document["log"]["path"]),
-        sha256=document["log"]["sha256"],
-        robot=None if robot is None else robot_entry(robot),
-        verdict=status_of(document),
-        says=_says(document),
-        explanation=None if likeliest is None else HypothesisEntry(**likeliest),
-        faults=[entry["name"] for entry in document["objectives"] if entry["status"] == "fault"],
-        profile=profile_of(document) or None,
-        fit=document.get("fit", {}).get("verdict"),
+        log=clean(document.log.path),
+        sha256=document.log.sha256,
+        robot=None if robot is None else publish(Robot, robot),
+        verdict=verdict.status,
+        says=verdict.in_short,
+        explanation=next(iter(document.hypotheses), None),
+        faults=[one.name for one in document.objectives if one.status == "fault"],
+        profile=document.profile.name if document.profile else None,
+        fit=document.fit.verdict,
         unfinished=unfinished or None,
         is_new=is_new,
     )
@@ -81,20 +87,6 @@ def unread_entry(number: int, at: str, log: Path, reason: str, *, sha256: str | 
     )  # fmt: skip
 
 
-def _says(document: Mapping[str, Any]) -> str:
-    likeliest = next(iter(document.get("hypotheses", ())), None)
-    status = status_of(document)
-    if status == "fault" and likeliest is not None and likeliest["name"]:
-        text = hypothesis_text(HypothesisEntry(**likeliest)).removeprefix("the parameter ")
-        return clean(f"{likeliest['probability']:.0%} {text}")
-    if status == "fault":
-        return f"{verdict_of(document).removeprefix('FAULT ')}; no cause stands out"
-    if status == "ok":
-        return ""
-    reasons = [entry["reason"] for entry in document["objectives"] if entry["status"] == "not_evaluated"]
-    return clean(next(filter(None, reasons), "no profile fits, so nobody knows its limits"))
-
-
 def entry_json(entry: WatchEntry) -> str:
     """The entry on one line."""
     return entry.to_json(indent=None)
@@ -103,7 +95,7 @@ def entry_json(entry: WatchEntry) -> str:
 def entry_line(entry: WatchEntry, clock: str, width: int | None, *, ascii: bool = False) -> str:
     """The entry on one line for people: time, number, verdict, robot, cause, log. `width` in columns, None: as long as
     it is."""
-    word = UNREADABLE if entry.verdict == "unreadable" else STATUS_WORDS[entry.verdict]
+    word = STATUS_WORDS[entry.verdict]
     robot = entry.robot.name if entry.robot else NO_ROBOT
     name = Path(entry.log).name
     remarks = [f"unfinished: {entry.unfinished}"] if entry.unfinished else []

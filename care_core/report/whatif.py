@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from care_core.diagnose.verdict import chance, fit_text
 from care_core.diagnose.whatif import Answer, Outlook, Question
 from care_core.numbers import six_digits
 from care_core.records import field
@@ -17,12 +18,9 @@ from care_core.report.document import (
     objective_entry,
     plain_number,
     predicted_objective,
-    profile_entry,
 )
-from care_core.report.happened import FitEntry, fit_entry
-from care_core.report.published import Document
-from care_core.report.wording import chance, fit_text
-from care_core.report.writers import STATUS_WORDS
+from care_core.report.published import Document, publish, publishable
+from care_core.run import Fit
 from care_core.text import clean, listed, wrapped
 
 SCHEMA_ID: Final = "care.whatif/1"
@@ -48,7 +46,7 @@ class WhatIfDocument(Document, kw_only=True):
     """The predicted outcome of this run under changed options, as `care whatif --json` prints it."""
 
     schema_: Literal["care.whatif/1"] = field(default=SCHEMA_ID, name="schema")
-    fit: FitEntry
+    fit: Fit
     profile: ProfileEntry
     log: str
     changes: list[AskedChange]
@@ -69,8 +67,8 @@ def whatif_schema() -> dict[str, Any]:
 def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
     """The answer as a document."""
     return WhatIfDocument(
-        fit=fit_entry(question.profile.fit),
-        profile=profile_entry(question.profile),
+        fit=publish(Fit, question.profile.fit),
+        profile=publish(ProfileEntry, question.profile),
         log=clean(question.run.log.path),
         changes=[
             AskedChange(
@@ -78,7 +76,7 @@ def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
                 from_=plain_number(change.current),
                 to=plain_number(change.suggested),
                 assumed=change.is_assumed,
-                notes=[clean(note) for note in change.notes],
+                notes=publishable(change.notes),
             )
             for change in answer.changes
         ],
@@ -94,7 +92,7 @@ def whatif_document(question: Question, answer: Answer) -> WhatIfDocument:
         p_ok=six_digits(answer.p_ok),
         guess=answer.is_guess,
         p_ok_unchanged=six_digits(answer.p_ok_now),
-        lost_by=[clean(title) for title in question.lost_by],
+        lost_by=publishable(question.lost_by),
     )
 
 
@@ -127,7 +125,7 @@ def _lines(question: Question, answer: Answer) -> Iterator[str]:
     yield ""
     yield from wrapped(
         f"{chance(answer.p_ok, answer.is_guess)} that all objectives are met with the change, "
-        f"{answer.p_ok_now:.0%} if the same configuration runs again"
+        f"{answer.p_ok_now:.0%} without it"
         + (f", unless it happens again: {clean(listed(question.lost_by))}" if question.lost_by else "")
     )
 
@@ -136,9 +134,10 @@ def _outlook(outlook: Outlook, is_guess: bool) -> str:
     result, predicted = outlook.objective, outlook.predicted
     unit = result.variable.unit
     probability = "" if predicted.p_ok is None else chance(predicted.p_ok, is_guess)
-    unchanged = "" if outlook.now.p_ok is None else f", {outlook.now.p_ok:.0%} unchanged"
+    unchanged = "" if outlook.now.p_ok is None else f" ({outlook.now.p_ok:.0%} without the change)"
     if result.variable.kind == "functional":
-        return f"{STATUS_WORDS[result.status]} in this run -> {probability}{unchanged}"
+        went = {"fault": "failed; would succeed", "ok": "succeeded; would again", "not_evaluated": "would succeed"}
+        return f"{went[result.status]} with {probability}{unchanged}"
     here = "not evaluated" if result.value is None else f"{result.value:.4g}"
     span = f"{predicted.value:.4g} ({predicted.low:.4g} to {predicted.high:.4g}) {unit}".rstrip()
     bound = "" if result.threshold is None else f", wanted {result.wanted}, "

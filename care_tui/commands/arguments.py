@@ -102,7 +102,7 @@ def sharing_for(positions: bool | None, *, anonymous: bool) -> Sharing | None:
 
 
 def bounds(texts: Iterable[str]) -> dict[str, float]:
-    """The operator's thresholds out of NAME=VALUE. Raises UsageError for a value that is no number."""
+    """The operator's thresholds out of NAME=VALUE. Raises UsageError for a value that is not a number."""
     found = {}
     for text in texts:
         name, _, value = text.partition("=")

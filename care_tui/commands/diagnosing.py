@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import care_core
-from care_core.application.case import SUFFIXES, Case, ReportFormat, Request, exit_code
+from care_core.application.case import Case, Request
 from care_core.application.remembering import remember_triage
+from care_core.diagnose.verdict import exit_code, verdict_of
 from care_core.errors import ExitCode, LogError, UsageError
 from care_core.records import replace
+from care_core.report.formats import format_of
 from care_tui.commands.arguments import (
     Anonymous,
     AsJson,
@@ -39,9 +41,6 @@ if TYPE_CHECKING:
 app = typer.Typer()
 
 SAMPLE = "arducopter_failed.BIN"
-
-_GRAVEST = (ExitCode.FAULT, ExitCode.UNREADABLE, ExitCode.NOT_EVALUATED, ExitCode.OK)
-"""Exit codes of several logs, the one that stands for all first."""
 
 
 @app.command()
@@ -72,9 +71,7 @@ def triage(
     no_history: NoHistory = False,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
-    flags: dict[ReportFormat, bool] = {
-        "json": json, "yaml": yaml, "markdown": markdown, "html": html, "junit": junit
-    }  # fmt: skip
+    flags = {"json": json, "yaml": yaml, "markdown": markdown, "html": html, "junit": junit}
     formats = [name for name, wanted in flags.items() if wanted]
     if len(formats) > 1:
         raise UsageError(f"Only one of --{' and --'.join(formats)} can be printed.", hint="Leave the others out.")
@@ -101,7 +98,7 @@ def triage(
     if not no_history:
         mention(remember_triage(case.diagnosis))
     emit(_written(case, format, sharing, to_file=out is not None), out, force=force)
-    raise typer.Exit(exit_code(case.diagnosis))
+    raise typer.Exit(verdict_of(case.diagnosis).exit_code)
 
 
 def _write_junit(
@@ -118,8 +115,7 @@ def _write_junit(
             if found[-1].case is not None and not no_history:
                 mention(remember_triage(found[-1].case.diagnosis))
     emit(to_junit([one.suite for one in found]), out, force=force)
-    codes = {one.code for one in found}
-    return next(code for code in _GRAVEST if code in codes)
+    return exit_code(*(one.status for one in found))
 
 
 @app.command()
@@ -133,13 +129,15 @@ def demo() -> None:
     with Progress() as progress:
         case = care_core.triage(path, progress)
     emit(_written(case, None, None, to_file=False))
-    raise typer.Exit(exit_code(case.diagnosis))
+    raise typer.Exit(verdict_of(case.diagnosis).exit_code)
 
 
-def _format_of(out: Path | None) -> ReportFormat | None:
-    return None if out is None else SUFFIXES.get(out.suffix.lower())
+def _format_of(out: Path | None) -> str | None:
+    """What the name of a file chooses."""
+    row = None if out is None else format_of(out)
+    return None if row is None else row.name
 
 
-def _written(case: Case, format: ReportFormat | None, sharing: Sharing | None, *, to_file: bool) -> str:
+def _written(case: Case, format: str | None, sharing: Sharing | None, *, to_file: bool) -> str:
     text = case.report(format or "text", sharing)
     return text if to_file or format else painted(text)

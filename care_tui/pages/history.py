@@ -9,7 +9,7 @@ from typing import ClassVar
 from textual.content import Content
 
 from care_core.application.viewing import Past, past_runs
-from care_core.report.wording import fit_words
+from care_core.diagnose.verdict import fit_words
 from care_core.text import clean
 from care_tui.pages.page import Fetch, Page, View, sentence
 from care_tui.render.rows import ASCII, Row, Rows, labelled, padded, text
@@ -56,7 +56,7 @@ class HistoryPage(Page):
         count = f"{len(runs)} run{'' if len(runs) == 1 else 's'}"
         title = Content.assemble(f"History  {count}", ("  x marks one to compare with", "dim"))
         if self._marked is not None:
-            title = Content.assemble("History  against ", (_named(self._marked), "bold"), ("  x on it: no more", "dim"))
+            title = Content.assemble("History  against ", (_named(self._marked), "bold"), ("  x again unmarks", "dim"))
         return View(title, lambda i: Rows([]) if i is None else Rows(self._detail(i, runs)), listing)
 
     def _item(self, past: Past) -> Content:

@@ -21,7 +21,7 @@ def _wrong(typed: str) -> str:
     try:
         return "" if not typed or math.isfinite(float(typed)) else f"'{typed}' is no threshold."
     except ValueError:
-        return f"'{typed}' is no number."
+        return f"'{typed}' is not a number."
 
 
 class ObjectivesPage(DiagnosisPage):

@@ -7,23 +7,13 @@ from typing import ClassVar
 
 from textual.content import Content
 
-from care_core.application.case import SUFFIXES
 from care_core.errors import CareError
+from care_core.report.formats import FILE_FORMATS, FORMATS
 from care_core.text import clean
 from care_tui.pages.page import View, sentence
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.rows import error_rows, plain_rows
 from care_tui.screens.export import ExportDialog
-from care_tui.session import FORMATS
-
-LABELS = {
-    "yaml": "YAML",
-    "markdown": "Markdown",
-    "html": "HTML, its text here",
-    "json": "JSON",
-    "junit": "JUnit",
-    "patch": "patch",
-}
 
 
 class ReportPage(DiagnosisPage):
@@ -34,12 +24,17 @@ class ReportPage(DiagnosisPage):
     _text: str | CareError | None = None
     _written = ""
 
+    @property
+    def _is_page(self) -> bool:
+        """Whether it is for a browser: its text is shown instead."""
+        return self.session.format is FORMATS["html"]
+
     def enter(self) -> None:
         if self.session.state == "data":
             self._text = None
             case = self.session.decided_case()
-            format = "markdown" if self.session.format == "html" else self.session.format
-            self.screen.fetch("report", lambda _job: self.walk.engine.report(case, format), self._received)
+            shown = FORMATS["markdown"] if self._is_page else self.session.format
+            self.screen.fetch("report", lambda _job: self.walk.engine.report(case, shown.name), self._received)
 
     def _received(self, text: str | CareError) -> None:
         self._text = text
@@ -48,7 +43,8 @@ class ReportPage(DiagnosisPage):
 
     def view_of_diagnosis(self) -> View:
         tail = f"written to {clean(self._written)}" if self._written else "Enter writes it, f changes the format"
-        title = Content.assemble(f"Report as {LABELS[self.session.format]}", (f"  {tail}", "dim"))
+        as_text = ", its text here" if self._is_page else ""
+        title = Content.assemble(f"Report as {self.session.format.label}{as_text}", (f"  {tail}", "dim"))
         text = self._text
         if isinstance(text, CareError):
             return View(title, lambda _: error_rows(text))
@@ -61,7 +57,7 @@ class ReportPage(DiagnosisPage):
     def next_format(self) -> None:
         """Show the report in the next format."""
         session = self.session
-        session.format = FORMATS[(FORMATS.index(session.format) + 1) % len(FORMATS)]
+        session.format = FILE_FORMATS[(FILE_FORMATS.index(session.format) + 1) % len(FILE_FORMATS)]
         self._written = ""
         self.enter()
         self.screen.draw()
@@ -70,8 +66,7 @@ class ReportPage(DiagnosisPage):
         """Ask where the report goes, and write it."""
         if self.session.state != "data":
             return
-        suffix = next(suffix for suffix, format in SUFFIXES.items() if format == self.session.format)
-        name = f"{clean(Path(self.session.diagnosis.run.log.path).stem)}.care{suffix}"
+        name = f"{clean(Path(self.session.diagnosis.run.log.path).stem)}.care{self.session.format.suffixes[0]}"
         self.screen.app.push_screen(
             ExportDialog(self.session.decided_case(), Path(name), self.walk.engine), self._exported
         )

@@ -52,12 +52,18 @@ def cause_item(cause: Cause, share: float | None, dismissed: str | None, glyphs:
         return head, Content(f"{below}set aside: " + clean(dismissed))
     worth = ["not ruled out" if cause.is_lead else f"{cause.confidence} confidence"]
     if cause.p_fixed is not None:
-        worth.append(f"{percent(cause.p_fixed)} probability alone")
+        worth.append(f"{percent(cause.p_fixed)} if only this is changed")
     if cause.is_lead:  # its one caveat is that it is no more than a lead
         return head, Content(below + ", ".join(worth))
-    worth.append(f"costs {percent(cause.contribution)}")
+    worth.append(lowers(cause))
     caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
     return head, Content(below + ", ".join(worth) + caveats)
+
+
+def lowers(cause: Cause) -> str:
+    """What the option's value does to the run's odds."""
+    points = percent(cause.contribution).removesuffix(" %")
+    return f"lowers the odds by {points} point{'' if points == '1' else 's'}"
 
 
 def caveats_of(cause: Cause) -> tuple[str, ...]:
@@ -120,15 +126,14 @@ def cause_detail(
     rows += [*path_rows(cause, objective, glyphs), Row(Content())]
     if option.name in dismissed:
         rows.append(warning("Set aside", dismissed[option.name]))
-    gain = "" if cause.p_fixed is None else f", {percent(cause.p_fixed)} probability of no fault if it alone is changed"
+    alone = "" if cause.p_fixed is None else percent(cause.p_fixed)
+    gain = f"; {alone} probability of no fault if only this is changed" if alone else ""
     rows.append(labelled("Confidence", f"{cause.confidence}{gain}"))
     said = [part.text + meaning(part) for part in evidence if option.name in part.options]
     rows += [labelled("" if place else "The log says", line) for place, line in enumerate(said)]
     rows += [warning("Caveat", note) for note in caveats_of(cause)]
     if not cause.is_lead:
-        rows.append(
-            labelled("Contribution", f"costs {percent(cause.contribution)} of this run's probability of no fault")
-        )
+        rows.append(labelled("Contribution", f"{lowers(cause)} of a run without a fault"))
         rows += _runner_up(cause, rivals)
     if cause.predicted is not None and cause.suggested is not None:
         change = change_text(option, cause.current, cause.is_assumed, cause.suggested, glyphs)
@@ -154,7 +159,7 @@ def _runner_up(cause: Cause, rivals: Sequence[Cause]) -> list[Row]:
     if other is None:
         return [labelled("Runner-up", "no other option is under suspicion")]
     label = "Runner-up" if cause.rank == 1 else "First is"
-    return [labelled(label, f"{other.option.name}, costs {percent(other.contribution)}")]
+    return [labelled(label, f"{other.option.name}, {lowers(other)}")]
 
 
 def _effect(cause: Cause, effect: EffectRecord | None) -> str:
@@ -180,8 +185,8 @@ def doubt_rows(diagnosis: Diagnosis) -> list[Row]:
     """Why there is no answer, what the run met that may be the cause instead, and what would tell more."""
     rows = [] if diagnosis.abstained is None else [warning("No change advised", diagnosis.abstained)]
     for title, lines in (
-        ("It may be no parameter", [f"{rival.name}: {rival.text}" for rival in diagnosis.rivals]),
-        ("What would tell more", diagnosis.tell_more),
+        ("It may not be a parameter", [f"{rival.name}: {rival.text}" for rival in diagnosis.rivals]),
+        ("How to find out more", diagnosis.tell_more),
     ):
         if lines:
             rows += [heading(title), *(Row(text(f"- {line}"), 2) for line in lines)]

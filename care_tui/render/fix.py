@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Fix, ObjectiveResult, Prediction
+from care_core.diagnose.verdict import verdict_of
 from care_core.run import Run
-from care_core.text import clean, listed
+from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.basket import possible
 from care_tui.render.rows import (
@@ -95,12 +96,9 @@ def prediction(variable: Variable, predicted: Prediction, glyphs: Glyphs, *, is_
 
 def no_fix_rows(diagnosis: Diagnosis) -> Rows:
     """Why there is no fix."""
-    if diagnosis.abstained:
-        return Rows([Row(Content("No fix is suggested.")), warning("Reason", diagnosis.abstained)])
+    verdict = verdict_of(diagnosis)
+    if verdict.advice.refusal:
+        return Rows([Row(Content("No fix is suggested.")), warning("Reason", verdict.advice.refusal)])
     if diagnosis.faults:
         return Rows([Row(Content("No change of options is predicted to keep all thresholds."))])
-    if lost_by := diagnosis.lost_by:
-        return Rows([Row(text(f"What went wrong is no objective: {listed(lost_by)}. No change is suggested."))])
-    if all(objective.status == "ok" for objective in diagnosis.objectives):
-        return Rows([Row(Content("No fault was found: there is nothing to change."))])
-    return Rows([Row(Content("No fault was found, but not everything could be evaluated: no change is suggested."))])
+    return Rows([Row(Content(verdict.headline)), Row(Content("No change is suggested."))])

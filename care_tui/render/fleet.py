@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.fleet.rows import Row
 from care_core.fleet.together import Fleet
 from care_core.report.fleet import copies_of, counted, main_words, run_name, shared_lines, short_names, suggestion_lines
@@ -16,7 +17,6 @@ from care_core.text import WIDTH, clean
 MOST_ROWS = 60
 """Of a larger fleet the rows that need a look come first, and the others are counted."""
 _WORST_FIRST = ("fault", "unreadable", "not_evaluated", "ok")
-_VERDICTS = {"fault": "FAULT", "ok": "OK", "not_evaluated": "NOT EVALUATED", "unreadable": "UNREADABLE"}
 
 
 def fleet_text(fleet: Fleet) -> str:
@@ -55,7 +55,7 @@ def _table(fleet: Fleet, short: dict[str, str]) -> list[str]:
 
 
 def _verdict(row: Row) -> str:
-    return f"{_VERDICTS[row.status]} {', '.join(row.breaches)}".rstrip()
+    return f"{STATUS_WORDS[row.status]} {', '.join(row.breaches)}".rstrip()
 
 
 def _why(row: Row) -> str:

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
+from care_core.diagnose.verdict import hypothesis_text, verdict_of
 from care_core.ecosystems.findings import Event, Finding, Health, Severity
 from care_core.records import Record
 from care_core.report.marks import Mark
-from care_core.report.wording import SEVERITY_WORDS, fit_text, hypothesis_text, noted, unjudged
+from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.text import clean, seconds
 from care_tui.render.objectives import damage
-from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, text, warning
+from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, status, text, warning
 
 TIME_WIDTH, KIND_WIDTH = 8, 10
 _COLOURS: dict[Severity, str] = {"critical": "bold $text-error", "warning": "$text-warning", "info": ""}
@@ -83,26 +84,18 @@ def finding_rows(finding: Finding, cause: Finding | None = None) -> list[Row]:
 
 
 def verdict_line(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
-    """What robot this is, and the finding that comes first; that nothing was found is said plainly."""
-    health = diagnosis.health
+    """What robot this is, and the verdict on its run."""
+    health, verdict = diagnosis.health, verdict_of(diagnosis)
     robot = Content(clean(f"{health.robot}: " if health.robot else ""))
-    first = next(iter(health.findings), None)
-    if health.too_little:
-        return robot + Content(clean(unjudged(health.findings) if health.findings else health.too_little))
-    if first is None:
-        missed = sum(one.status == "fault" for one in diagnosis.objectives)
-        found = f"{missed} of {len(diagnosis.objectives)} objectives missed, no failed part found"
-        return robot + Content(found if missed else "nothing out of the ordinary was found")
-    sign = {"critical": f"{glyphs.fault} ", "warning": "! ", "info": ""}[first.severity]
-    return Content.assemble(robot, (sign + clean(first.title), "bold"), f" at {seconds(first.onset_s)}")
+    return Content.assemble(robot, status(verdict.status, glyphs), "  ", (verdict.failed, "bold"))
 
 
 def standing(diagnosis: Diagnosis, glyphs: Glyphs) -> list[Content]:
     """How far the answer carries, for every step: the fit of the profile, then what limits the answer besides."""
-    profile, fit = diagnosis.profile, diagnosis.profile.fit
+    fit = diagnosis.profile.fit
     style = {"fits": "", "partly": "$text-warning", "no": "bold $text-error"}[fit.verdict]
     mark = "" if fit.verdict == "fits" else "! "
-    lines = [Content.styled(f"{mark}{clean(fit_text(profile.name, fit))}", style)]
+    lines = [Content.styled(f"{mark}{verdict_of(diagnosis).fit}", style)]
     limits = warnings_of(diagnosis)
     if limits:
         lines.append(Content.styled("! " + clean("; ".join(limits)), "$text-warning"))
@@ -151,7 +144,7 @@ def fit_rows(diagnosis: Diagnosis, advice: Sequence[str]) -> list[Row]:
 def hypothesis_item(one: Hypothesis, finding: Finding | None) -> tuple[Content, Content]:
     """An explanation that is no cause of the list: how likely it is, what it is, and when it began."""
     when = "" if finding is None else f", from {seconds(finding.onset_s)}"
-    kind = {"hardware": "a part of the robot", "world": "what the robot met", "parameter": "a parameter"}
+    kind = {"hardware": "a part of the robot", "world": "something in the environment", "parameter": "a parameter"}
     head = Content.assemble(
         f"{percent(one.probability):>5} ", text(hypothesis_text(one, [finding] if finding else ()), "bold")
     )
@@ -162,6 +155,6 @@ def hypothesis_rows(one: Hypothesis, finding: Finding | None, notes: Sequence[st
     """All about an explanation, with the notes of the diagnosis that name it."""
     rows = [] if finding is None else [*finding_rows(finding), Row(Content())]
     if one.what in ("hardware", "world"):
-        rows.append(warning("No parameter", "as far as this explains it, no change of a parameter helps"))
+        rows.append(warning("Not a parameter", "if this is the cause, changing parameters will not help"))
     said = [warning("Note", note) for note in notes if one.what == "parameter" and one.name in note]
     return [labelled("Probability", percent(one.probability)), *said, *rows]

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status
+from care_core.diagnose.records import Diagnosis, ObjectiveResult
+from care_core.diagnose.verdict import STATUS_WORDS, verdict_of
 from care_core.run import Damage, Evidence, is_known
 from care_core.text import clean
 from care_tui.render.rows import (
-    WORDS,
     Glyphs,
     Row,
     Rows,
@@ -34,18 +33,12 @@ BOUND_WIDTH = 12
 STRIP_WIDTH = 42
 
 
-def worst(results: Sequence[ObjectiveResult]) -> Status:
-    """The verdict of several objectives: what was not evaluated is not OK."""
-    statuses = [result.status for result in results]
-    return "fault" if "fault" in statuses else "not_evaluated" if "not_evaluated" in statuses or not statuses else "ok"
-
-
 def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
     """The verdict on the run in one line; it counts all three states, so it never reads as a false all-clear."""
     statuses = [objective.status for objective in diagnosis.objectives]
     faults, unknown = statuses.count("fault"), statuses.count("not_evaluated")
     counts = f"  {faults} outside, {statuses.count('ok')} within, {unknown} not evaluated"
-    return status(worst(diagnosis.objectives), glyphs) + Content(counts)
+    return status(verdict_of(diagnosis).status, glyphs) + Content(counts)
 
 
 def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Content:
@@ -55,7 +48,7 @@ def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Conte
     if result.value is None and result.need is not None:
         wanted = ""  # made for a mission that was not flown, or not to its end
     return Content.assemble(
-        status(result.status, glyphs).pad_right(STATUS_WIDTH - len(WORDS[result.status]) - 2),
+        status(result.status, glyphs).pad_right(STATUS_WIDTH - len(STATUS_WORDS[result.status]) - 2),
         padded(variable.name, width + 2, "bold"),
         padded("" if result.value is None else measure(result.value, variable.unit), VALUE_WIDTH),
         padded(wanted, BOUND_WIDTH),

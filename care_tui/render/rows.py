@@ -21,6 +21,7 @@ from textual.visual import RenderOptions, Visual
 from care_core.diagnose.records import (
     Status,
 )
+from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.errors import CareError
 from care_core.records import Record
 from care_core.text import clean
@@ -79,7 +80,6 @@ ASCII = Glyphs(
     rule="-",
 )
 
-WORDS: dict[Status, str] = {"ok": "OK", "fault": "FAULT", "not_evaluated": "NOT EVALUATED"}
 _COLOURS: dict[Status, str] = {"ok": "$text-success", "fault": "bold $text-error", "not_evaluated": "$text-warning"}
 
 
@@ -197,7 +197,7 @@ def limit(threshold: Threshold | None, unit: str) -> str:
 def status(value: Status, glyphs: Glyphs) -> Content:
     """Sign and word of a status, such as `✗ FAULT`."""
     sign = {"ok": glyphs.ok, "fault": glyphs.fault, "not_evaluated": glyphs.unknown}[value]
-    return Content.styled(f"{sign} {WORDS[value]}", _COLOURS[value])
+    return Content.styled(f"{sign} {STATUS_WORDS[value]}", _COLOURS[value])
 
 
 def change_text(

@@ -13,14 +13,13 @@ from textual.content import Content
 from textual.screen import ModalScreen
 from textual.widgets import Input, Static
 
-from care_core.application.case import SUFFIXES, Case
+from care_core.application.case import Case
 from care_core.errors import CareError, UsageError
+from care_core.report.formats import Format, format_of, suffixes_text
 from care_core.text import clean
 from care_tui.jobs import Engine, as_care_error
 from care_tui.places import at_home
 from care_tui.widgets.line_input import LineInput
-
-NAMES = ".yaml, .md, .html, .json, .xml or .patch"
 
 
 class OverwriteDialog(ModalScreen[bool]):
@@ -58,7 +57,7 @@ class ExportDialog(ModalScreen[str | None]):
         with Vertical(classes="dialog small"):
             yield Static("Write the report to", classes="title", markup=False)
             yield box
-            yield Static(f"The name chooses the format: {NAMES}. Enter writes, Esc cancels.", classes="hint")
+            yield Static(f"The name chooses the format: {suffixes_text()}. Enter writes, Esc cancels.", classes="hint")
             yield Static(classes="error", markup=False)
 
     @on(Input.Submitted)
@@ -68,21 +67,22 @@ class ExportDialog(ModalScreen[str | None]):
 
     @work(exclusive=True, group="export")
     async def _export(self, path: Path) -> None:
-        if path.suffix.lower() not in SUFFIXES:
-            self._say(UsageError(f"The file name must end in {NAMES}."))
+        format = format_of(path)
+        if format is None:
+            self._say(UsageError(f"The file name must end in {suffixes_text()}."))
         elif path.is_dir():
             self._say(UsageError("This is a folder.", hint="Name a file in it."))
         elif not path.exists() or await self.app.push_screen_wait(OverwriteDialog(path)):
-            error = await self._write(path).wait()
+            error = await self._write(path, format).wait()
             if error is None:
                 self.dismiss(str(path.absolute()))
             else:
                 self._say(error)
 
     @work(thread=True, exclusive=True, group="write", exit_on_error=False)
-    def _write(self, path: Path) -> CareError | None:
+    def _write(self, path: Path, format: Format) -> CareError | None:
         try:
-            self._engine.save(path, self._engine.report(self._case, SUFFIXES[path.suffix.lower()]))
+            self._engine.save(path, self._engine.report(self._case, format.name))
         except Exception as err:
             return as_care_error(err)
         return None

@@ -14,9 +14,9 @@ from textual.binding import Binding, BindingType
 
 from care_core.application.case import Case, Request
 from care_core.diagnose.records import Fix
+from care_core.ecosystems.findings import Health
 from care_core.errors import CareError
 from care_core.records import Record, replace
-from care_core.report.wording import critical
 from care_tui.clipboard import fits, osc52
 from care_tui.jobs import CAUSES, Engine, Job
 from care_tui.messages import Progressed, StepChosen
@@ -79,8 +79,8 @@ class WalkScreen(PanesScreen):
         Binding("f6,b", "view('profiles')", "Profiles", show=False, id="view.profiles"),
         Binding("f7,v", "view('contents')", "Contents of the log", show=False, id="view.contents"),
         Binding("left,h,backspace", "do('step_back')", "Back a step", key_display="h", id="graph.back"),
-        Binding("plus,right_square_bracket", "do('closer')", "Closer", key_display="+", id="signals.closer"),
-        Binding("minus,left_square_bracket", "do('farther')", "Farther", key_display="-", id="signals.farther"),
+        Binding("plus,right_square_bracket", "do('closer')", "Zoom in", key_display="+", id="signals.closer"),
+        Binding("minus,left_square_bracket", "do('farther')", "Zoom out", key_display="-", id="signals.farther"),
         Binding("x", "do('mark')", "Compare", id="history.mark"),
         Binding("n", "do('next_marked')", "Next marked", id="messages.next"),
         Binding("f8,t", "view('missions')", "Missions of the log", show=False, id="view.missions"),
@@ -310,7 +310,7 @@ class WalkScreen(PanesScreen):
         self._pin()
         if self._view is not None:
             self.draw()
-        elif answer.diagnosis.profile.fit.verdict == "no" or critical(answer.diagnosis.health):
+        elif answer.diagnosis.profile.fit.verdict == "no" or _has_failed_part(answer.diagnosis.health):
             self._show(Place(self.step))  # what happened is the answer, or a part of it that comes first
         elif self.step == LOG:
             self.action_go(OBJECTIVES)
@@ -364,3 +364,8 @@ class WalkScreen(PanesScreen):
             self.say(f"Sent {what} to the clipboard; also in {name}")
         else:
             self.say(f"Too long for the clipboard: {what} are in {name}")
+
+
+def _has_failed_part(health: Health) -> bool:
+    """Whether something failed that would stop a mission, before it was down."""
+    return any(one.severity == "critical" and not one.after_impact for one in health.findings)

@@ -20,8 +20,9 @@ import numpy as np
 import pytest
 
 import care_core
-from care_core.application.case import Request, exit_code
+from care_core.application.case import Request
 from care_core.diagnose.judging import judge
+from care_core.diagnose.verdict import verdict_of
 from care_core.ecosystems.registry import run_model
 from care_core.errors import CareError, ExitCode, LogError
 from care_core.extract.read import read_run
@@ -167,7 +168,7 @@ def _diagnosed(path: Path, profile: str) -> Verdict:
         diagnosis = care_core.triage(Request(path, profile)).diagnosis
     except CareError as err:
         return Verdict(err.exit_code)
-    return _verdict(exit_code(diagnosis), diagnosis.run.mission)
+    return _verdict(verdict_of(diagnosis).exit_code, diagnosis.run.mission)
 
 
 def _verdict(code: ExitCode, mission: MissionInfo) -> Verdict:

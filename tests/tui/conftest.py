@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
-from care_core.application.case import Case, Progress, ReportFormat, Request
+from care_core.application.case import Case, Progress, Request
 from care_core.application.configuring import DiffSide
 from care_core.diagnose.records import Diagnosis, Fix
 from care_core.variables import Change
@@ -48,7 +48,7 @@ def fake_diff(case: Case, fix: Fix, side: DiffSide) -> str:
     return "\n".join(lines)
 
 
-def fake_report(case: Case, format: ReportFormat) -> str:
+def fake_report(case: Case, format: str) -> str:
     diagnosis = case.diagnosis
     assert diagnosis.fix is None or diagnosis.fix.changes
     changes = () if diagnosis.fix is None else diagnosis.fix.changes

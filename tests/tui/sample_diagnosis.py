@@ -205,7 +205,7 @@ def fitting(verdict: FitVerdict, *reasons: str) -> ProfileChoice:
 
 
 def crashed() -> Diagnosis:
-    """The faulty flight, and it lost a motor: hardware and parameters in one ranking; the profile fits in part."""
+    """The faulty flight, and it lost a motor: hardware and parameters in one ranking; the profile partly fits."""
     return replace(
         faulty(),
         profile=fitting("partly", "the firmware is 4.3.6, the profile's is 4.5", "3 options are not in the log"),

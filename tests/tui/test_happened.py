@@ -6,9 +6,9 @@ import pytest
 
 from care_core.application.case import Case, Progress, Request
 from care_core.diagnose.records import Diagnosis, Hypothesis, MissionVerdict
-from care_core.ecosystems.findings import Health
+from care_core.ecosystems.findings import WHOLE_LOG, Finding, Health
 from care_core.records import replace
-from care_core.run import Check, MissionInfo
+from care_core.run import Check, Fit, MissionInfo
 from care_tui.app import CareApp
 from care_tui.settings import Settings
 from care_tui.widgets.pinned import Pinned
@@ -26,7 +26,7 @@ async def test_the_first_step_tells_what_happened_the_first_cause_first(make_app
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot)
         assert walk(app).step == 1, "with a critical finding the app opens on it"
-        assert title(app).startswith("ArduCopter V4.3.6, quad X: ✗ motor 2 lost thrust \\x1b[31m at 91.3 s")
+        assert title(app).startswith("ArduCopter V4.3.6, quad X: ✗ FAULT  mission_time 187.2 s, wanted <= 150 s")
         lines = [line.split() for line in items(app).splitlines()]
         assert [line[:4] for line in lines[:4]] == [
             ["✗", "CRITICAL", "91.3", "s"],
@@ -53,8 +53,10 @@ async def test_that_nothing_was_found_is_said_plainly(make_app: MakeApp) -> None
     app = make_app(healthy)
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "1")
-        assert title(app) == "Rover V4.5: nothing out of the ordinary was found"
-    app = make_app(replace(healthy, health=Health("", (), (), too_little="too little is recorded")))
+        assert title(app) == "Rover V4.5: ✓ OK  all objectives are within their thresholds"
+    little = Finding("log", "too little is recorded", 0.0, 0.0, "info", "", WHOLE_LOG)
+    stranger = replace(healthy.profile, fit=Fit("no", ("a rover",)))
+    app = make_app(replace(healthy, profile=stranger, objectives=(), health=Health("", (), (little,))))
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "1")
         assert "too little is recorded" in title(app)
@@ -124,7 +126,7 @@ async def test_the_fit_and_the_warnings_stand_under_the_tabs_of_every_step_and_v
         for key in "123456yb":
             await settle(pilot, key)
             fit, warnings = pinned(app)
-            assert fit.startswith("! Profile arducopter fits in part: the firmware is 4.3.6, ")
+            assert fit.startswith("! Profile arducopter partly fits: the firmware is 4.3.6, ")
             assert warnings.startswith("! 142 bytes that are no message")
             assert all(len(line) <= 78 for line in (fit, warnings))
             assert app.screen.query_one(Pinned).size.height == 2
@@ -204,7 +206,7 @@ async def test_an_objective_is_judged_by_another_threshold() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "j", "equals_sign")
         await settle(pilot, *"2x", "enter")
-        assert "no number" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]
+        assert "not a number" in str(app.screen.query_one(".error").content)  # type: ignore[attr-defined]
         await settle(pilot, "backspace", "backspace", *"12", "enter")
         await settle(pilot)
         assert asked[-1] == {"mission_time": 150.0, "energy": 12.0}
@@ -255,5 +257,5 @@ async def test_no_odds_are_told_without_what_no_prediction_knows_of(make_app: Ma
         assert "another thing" not in text(app)
         await settle(pilot, "enter")
         assert "LAND_SPEED  " in text(app), "the cursor is on it"
-        assert text(app).startswith("What went wrong is no objective: motor 2 lost thrust")
+        assert text(app).startswith("FAULT: motor 2 lost thrust")
         assert "unless it happens again" in title(app)

@@ -59,7 +59,7 @@ async def test_every_view_opens_shows_the_run_and_closes() -> None:
         assert "▸ arducopter" in items(app)
         assert "Model card: arducopter" in text(app)
         await settle(pilot, "escape", "y")
-        assert "FAULT mission_time, energy" in items(app)
+        assert "FAULT: mission_time" in items(app)
         assert "LAND_SPEED" in text(app)
         await settle(pilot, "x", "x", "escape")
         assert isinstance(app.screen, WalkScreen)

@@ -97,7 +97,7 @@ async def test_the_path_follows_the_highlighted_cause(make_app: MakeApp) -> None
         assert "LAND_SPEED    16 cm/s  (expected 50)" in text(app)
         assert "effect -0.81 sd, in 97 % of resamples" in text(app)
         assert "outside the training support" in text(app)
-        assert "Runner-up     WPNAV_SPEED, costs 6 %" in text(app)
+        assert "Runner-up     WPNAV_SPEED, lowers the odds by 6 points" in text(app)
         await settle(pilot, "j")
         assert "WPNAV_SPEED" in text(app)
         assert "! few" in text(app)
@@ -275,14 +275,14 @@ async def test_leads_are_no_causes_and_what_would_tell_more_comes_first(make_app
     async with app.run_test(size=(80, 24)) as pilot:
         await settle(pilot, "3")
         assert "none found, 1 not ruled out" in title(app)
-        assert "not ruled out, 2 % probability alone" in items(app)
+        assert "not ruled out, 2 % if only this is changed" in items(app)
         assert "costs" not in text(app)
         lines = text(app).splitlines()
         assert "No change advised" in lines[0]
         assert lines[1:5] == [
-            "It may be no parameter",
+            "It may not be a parameter",
             "- wind: stronger than in 99 % of the training runs",
-            "What would tell more",
+            "How to find out more",
             "- run the same configuration again",
         ]
 

@@ -193,8 +193,8 @@ def test_where_nothing_is_off_its_reference_a_repeat_is_advised(planted: Profile
     assert any("same configuration again" in advice for advice in diagnosis.tell_more)
     report = build_document(diagnosis)
     assert report.tell_more
-    assert "What would tell more" in to_text(diagnosis)
-    assert "## What would tell more" in to_markdown(report)
+    assert "How to find out more" in to_text(diagnosis)
+    assert "## How to find out more" in to_markdown(report)
 
 
 def test_a_sure_cause_has_no_rivals(planted: Profile) -> None:

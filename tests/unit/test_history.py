@@ -19,8 +19,9 @@ from hypothesis import strategies as st
 from care_core.errors import CareError
 from care_core.history.store import History, HistoryError, Verified, history_path
 from care_core.history.track_record import sparkline, track_record, trends, write_record
-from care_core.report.document import build_document
-from care_core.report.history import history_document, history_json, history_schema, history_text, verdict_of
+from care_core.report.document import build_document, remembered_verdict
+from care_core.report.history import history_document, history_json, history_schema, history_text
+from care_core.report.reading import document_of
 from care_core.report.writers import published
 from tests.conftest import Care
 from tests.made import made_diagnosis
@@ -161,26 +162,35 @@ def test_the_document_fits_its_schema_and_the_text_is_clean(history: History) ->
     assert history_text(document, ascii=True).isascii()
 
 
-NAMED = {"kind": "crash", "title": "it hit the \x1bground", "severity": "critical"}
+NAMED = {
+    "kind": "crash", "title": "it hit the \x1bground", "onset_s": 9.0, "end_s": 9.0, "severity": "critical",
+    "after_impact": False, "evidence": "", "source": "ERR", "consequences": [],
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("statuses", "more", "verdict"),
     [
-        (["ok", "ok"], {}, "no fault"),
-        (["ok", "ok"], {"findings": [NAMED]}, "it hit the \\x1bground"),
-        (["ok", "fault"], {"findings": [NAMED]}, "it hit the \\x1bground; FAULT o1"),
-        (["ok", "not_evaluated"], {}, "not all evaluated"),
-        ([], {}, "not evaluated"),
-        (["not_evaluated"], {"fit": {"verdict": "no", "reasons": []}}, "not evaluated"),
-        (["ok"], {"findings": [{**NAMED, "severity": "info"}]}, "no fault"),
+        (["ok", "ok"], {}, "OK: all objectives are within their thresholds"),
+        (["ok", "ok"], {"findings": [NAMED]}, "FAULT: it hit the \\x1bground at 9.0 s"),
+        (["ok", "fault"], {"findings": [NAMED]}, "FAULT: o1 not met"),
+        (["ok", "not_evaluated"], {}, "NOT EVALUATED: no fault found, but o1 could not be evaluated"),
+        ([], {}, "NOT EVALUATED: nothing could be judged"),
+        (["not_evaluated"], {"fit": {"verdict": "no", "reasons": []}}, "NOT EVALUATED: no limit of this mission"),
+        (["ok"], {"findings": [{**NAMED, "severity": "info"}]}, "OK: all objectives are within their thresholds"),
     ],
 )
-def test_only_a_run_without_any_fault_is_told_to_have_none(
+def test_only_a_run_without_any_fault_is_remembered_as_fine(
     statuses: list[str], more: dict[str, Any], verdict: str
 ) -> None:
-    objectives = [{"name": f"o{place}", "status": status} for place, status in enumerate(statuses)]
-    assert verdict_of({"objectives": objectives, **more}) == verdict
+    objectives = [
+        {"name": f"o{place}", "value": None, "unit": "", "kind": "functional", "threshold": None, "status": status,
+         "reason": None}
+        for place, status in enumerate(statuses)
+    ]  # fmt: skip
+    fits = {"verdict": "fits", "reasons": []}
+    document = {**DOCUMENT, "fit": fits, "objectives": objectives, "findings": [], "fix": None, **more}
+    assert remembered_verdict(document_of(document)).headline.startswith(verdict)
 
 
 def test_verified_fixes_have_a_file_of_their_own_and_the_profile_stays_sound(

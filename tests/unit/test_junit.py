@@ -12,7 +12,6 @@ from care_core.application.case import Request
 from care_core.application.suites import suite_of_log
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import NOTHING_SEEN
-from care_core.errors import ExitCode
 from care_core.files import bundled
 from care_core.records import replace
 from care_core.report.document import build_document
@@ -61,7 +60,7 @@ def test_an_objective_is_a_case_and_a_broken_limit_fails_with_cause_and_suggesti
     assert failure.get("message") == "mission_time 190 s, wanted <= 150 s"
     told = failure.text or ""
     assert "land_speed -> land_time -> mission_time" in told
-    assert "suggestion: change land_speed from 16 to 50: 90% probability" in told
+    assert "Change land_speed 16 -> 50: 90% probability that all objectives are met" in told
     assert "param set LAND_SPEED 50" in told
     skipped = cases["energy"].find("skipped")
     assert skipped is not None
@@ -100,7 +99,7 @@ def test_each_log_is_a_suite_and_one_that_cannot_be_read_an_error(tmp_path: Path
     assert [one.get("name") for one in suites] == ["ardurover_failed.BIN", "broken.BIN"]
     assert [one.get("errors") for one in suites] == ["0", "1"]
     assert suites[0].get("timestamp") != suites[1].get("timestamp") == "1970-01-01T00:00:00"
-    assert [one.code for one in found] == [ExitCode.FAULT, ExitCode.UNREADABLE]
+    assert [one.status for one in found] == ["fault", "unreadable"]
 
 
 @pytest.mark.parametrize("start", [None, "", "2026-11-22T00:42:33.123+00:00"])

@@ -20,7 +20,7 @@ from care_core.report.document import build_document
 from care_core.report.html import to_html
 from care_core.report.marks import Mark
 from care_core.report.path_drawing import paths_svg
-from care_core.report.plots import Band, Drawn, Limit, Line, Plot, plot_figure
+from care_core.report.plots import Band, Drawing, Limit, Line, Plot, plot_figure
 from tests.made import HOSTILE, made_diagnosis
 
 NASTY = f"</script><script>alert(1)</script>\"'{HOSTILE}"
@@ -46,7 +46,7 @@ def made_plot(values: list[float], **more: object) -> Plot:
 
 @pytest.mark.parametrize("values", [[1.0], [5.0] * 10, [0.0, 1e9, -1e9], [1e-12, 2e-12], [0.0, 0.0]])
 def test_any_values_can_be_drawn(values: list[float]) -> None:
-    drawn = Drawn(start_s=0.0, end_s=max(len(values) - 1.0, 1e-9))
+    drawn = Drawing(start_s=0.0, end_s=max(len(values) - 1.0, 1e-9))
     figure = ElementTree.fromstring("".join(plot_figure(made_plot(values), drawn, "p")))
     path = next(one for one in figure.iter("path") if one.get("class") == "line line1").get("d", "")
     places = [float(number) for number in re.findall(r"-?\d+\.\d", path)]
@@ -59,7 +59,7 @@ def test_a_plot_says_in_words_what_it_shows() -> None:
         [1.0, 9.0, 2.0], limits=(Limit(8.0, "ceiling"),), bands=(Band(1.0, 2.0, "critical", "motor 4 lost thrust"),)
     )
     marks = (Mark(0.0, "arming", "armed", 3), Mark(1.0, "critical", "motor 4 lost thrust", 0))
-    figure = ElementTree.fromstring("".join(plot_figure(plot, Drawn(marks=marks, end_s=2.0, is_mission=True), "p")))
+    figure = ElementTree.fromstring("".join(plot_figure(plot, Drawing(marks=marks, end_s=2.0, is_mission=True), "p")))
     svg = next(figure.iter("svg"))
     assert svg.get("role") == "img"
     told = next(one.text or "" for one in figure.iter("desc"))
@@ -126,7 +126,7 @@ def test_names_of_a_log_are_no_markup_in_any_drawing() -> None:
         [1.0, 2.0], words=NASTY, source=NASTY, unit=NASTY, read_for=(NASTY,), limits=(Limit(1.5, NASTY),),
         bands=(Band(0.0, 1.0, "warning", NASTY),), lines=(Line(NASTY, (((0.0, 1.0), (1.0, 2.0)),)), Line("b", ())),
     )  # fmt: skip
-    drawn = Drawn(faults, (plot,), (Mark(0.5, "crash", NASTY, 0),), (Limit(0.5, NASTY),), 0.0, 1.0)
+    drawn = Drawing(faults, (plot,), (Mark(0.5, "crash", NASTY, 0),), (Limit(0.5, NASTY),), 0.0, 1.0)
     page = to_html(build_document(made), drawn)
     assert "<script" not in page
     assert not set(page) & {"\x1b", "\x07", "\u202e"}

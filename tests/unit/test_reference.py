@@ -76,7 +76,7 @@ def test_the_reference_is_the_operators_then_the_logs_then_the_profiles(planted:
     ours = judge(run, schema, planted.model).reference
     assert (ours.config["speed"], ours.source) == (DEFAULTS["speed"], "the profile's reference")
     logged = judge(driven(run, 1.2), schema, planted.model).reference
-    assert (logged.config["speed"], logged.source) == (1.2, "the defaults that the log records")
+    assert (logged.config["speed"], logged.source) == (1.2, "the firmware defaults stored in the log")
     good = Good({"SPEED": Setting("SPEED", 1.4, "good.param")}, "the configuration of good.param")
     named = judge(driven(run, 1.2), schema, planted.model, good=good).reference
     assert (named.config["speed"], named.source) == (1.4, "the configuration of good.param")
@@ -102,10 +102,13 @@ def test_what_a_reference_file_lacks_is_at_the_defaults_of_the_log(planted: Prof
     good = Good({"SPEED": Setting("SPEED", 1.4, "good.param")}, "the configuration of good.param")
     found = judge(replace(run, settings=settings), schema, planted.model, good=good).reference
     assert (found.config["speed"], found.config["accel"]) == (1.4, 1.1)
-    assert found.source == "the configuration of good.param and, for what it lacks (1), the defaults of the log"
+    assert (
+        found.source
+        == "the configuration of good.param and, for what it lacks (1), the firmware defaults stored in the log"
+    )
     empty = judge(replace(run, settings=settings), schema, planted.model, good=Good({}, "x.param")).reference
     assert empty.config["speed"] == 1.2
-    assert empty.source == "the defaults that the log records, as x.param holds no option"
+    assert empty.source == "the firmware defaults stored in the log, as x.param holds no option"
 
 
 def test_a_tuned_value_beyond_the_range_is_not_off_a_reference_that_has_it(planted: Profile) -> None:

@@ -11,9 +11,10 @@ import pytest
 
 import care_core
 from care_core.application.bundling import bundle_of
-from care_core.application.case import Case, ReportFormat
+from care_core.application.case import Case
 from care_core.application.sharing import HIDDEN, NO_PLACE, Hider, Sharing, without_places
 from care_core.files import bundled
+from care_core.report.formats import FORMATS
 from tests.goal_drives import drive
 from tests.rewritten import write_text
 
@@ -37,7 +38,6 @@ SECRETS = (
     "473977421", "12.5, -3.75", "2026-11-12", "14:05:33", "november", "10.11.12.13", "example.com", "aa:bb:cc",
     "heron9000", "kestrel", "8675309",
 )  # fmt: skip
-SENT: tuple[ReportFormat, ...] = ("text", "json", "yaml", "markdown", "html", "junit", "patch")
 
 
 @pytest.fixture(scope="module")
@@ -65,8 +65,8 @@ def test_what_is_planted_is_in_the_log_and_in_the_document(planted: Case) -> Non
     assert {"zelda", "quimby", "zq7", "heron9000", "kestrel"} <= set(found_in(everything))
 
 
-@pytest.mark.parametrize("format", SENT)
-def test_an_anonymous_report_holds_nothing_of_it(planted: Case, format: ReportFormat) -> None:
+@pytest.mark.parametrize("format", FORMATS)
+def test_an_anonymous_report_holds_nothing_of_it(planted: Case, format: str) -> None:
     report = planted.report(format, Sharing(positions=False, anonymous=True))
     assert found_in(report) == []
     assert planted.diagnosis.run.log.sha256 not in report
@@ -86,7 +86,7 @@ def test_an_anonymous_bundle_holds_nothing_of_it(planted: Case) -> None:
 
 
 @pytest.mark.parametrize("format", ["markdown", "html", "junit"])
-def test_reports_that_are_sent_have_no_positions_unless_asked_for(planted: Case, format: ReportFormat) -> None:
+def test_reports_that_are_sent_have_no_positions_unless_asked_for(planted: Case, format: str) -> None:
     usual = planted.report(format)
     assert not {"47.39", "473977421", "12.5, -3.75"} & set(found_in(usual))
     asked = planted.report(format, Sharing(positions=True))

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 
-from care_core.application.case import Request, exit_code, open_case
+from care_core.application.case import Request, open_case
 from care_core.diagnose.judging import judge_plainly
-from care_core.diagnose.records import overall
+from care_core.diagnose.verdict import status_of, verdict_of
 from care_core.ecosystems.measures import MISSION_KINDS, Mission
 from care_core.ecosystems.registry import run_model
 from care_core.errors import ExitCode
@@ -220,12 +220,12 @@ def test_a_log_without_a_run_is_not_judged(tmp_path: Path) -> None:
 
 
 def test_what_a_run_came_to() -> None:
-    assert overall(["ok"], [], "no") == "not_evaluated"
-    assert overall(["ok"], ["warning"], "fits") == "ok"
-    assert overall(["ok", "not_evaluated"], [], "no") == "not_evaluated"
-    assert overall([], [], "no") == "not_evaluated"
-    assert overall(["ok"], ["critical"], "fits") == "fault"
-    assert overall(["ok", "fault"], [], "no") == "fault"
+    assert status_of(["ok"], [], "no") == "not_evaluated"
+    assert status_of(["ok"], ["warning"], "fits") == "ok"
+    assert status_of(["ok", "not_evaluated"], [], "no") == "not_evaluated"
+    assert status_of([], [], "no") == "not_evaluated"
+    assert status_of(["ok"], ["critical"], "fits") == "fault"
+    assert status_of(["ok", "fault"], [], "no") == "fault"
 
 
 def test_a_failed_run_of_a_stranger_is_a_fault_without_causes_by_parameters(tmp_path: Path) -> None:
@@ -239,12 +239,12 @@ def test_a_failed_run_of_a_stranger_is_a_fault_without_causes_by_parameters(tmp_
     assert "Causes of" not in to_text(diagnosis)
     good = tuple(replace(one, value=1.0, status="ok", reason="") for one in diagnosis.objectives)
     fine = replace(diagnosis, objectives=good, faults=(), health=replace(diagnosis.health, findings=()))
-    assert exit_code(fine) == ExitCode.NOT_EVALUATED
+    assert verdict_of(fine).exit_code == ExitCode.NOT_EVALUATED
     for text in (to_text(fine), to_markdown(build_document(fine)), to_html(build_document(fine))):
         flat = " ".join(text.split())
         assert "no profile fits: no limits for time and energy, no causes by parameters" in flat
     bad = (replace(good[0], value=0.0, status="fault", reason="a failsafe acted"), *good[1:])
     failed = replace(fine, objectives=bad)
-    assert exit_code(failed) == ExitCode.FAULT
+    assert verdict_of(failed).exit_code == ExitCode.FAULT
     assert "FAULT: a failsafe acted" in to_text(failed)
-    assert "**Fault**: a failsafe acted" in to_markdown(build_document(failed))
+    assert "**FAULT**: a failsafe acted" in to_markdown(build_document(failed))
