@@ -233,9 +233,9 @@ async def test_enter_on_a_cause_opens_the_fix_at_its_option(make_app: MakeApp) -
 @pytest.mark.parametrize(
     ("diagnosis", "causes", "fix"),
     [
-        (sample.all_ok(), "nothing to explain", "No fault was found"),
+        (sample.all_ok(), "nothing to explain", "all objectives are within their thresholds"),
         (sample.abstaining(), "mean lean 19 deg", "mean lean 19 deg"),
-        (sample.not_evaluated(), "nothing to explain", "not everything could be evaluated"),
+        (sample.not_evaluated(), "nothing to explain", "could not be evaluated"),
     ],
 )
 async def test_without_a_cause_every_step_says_why(
