@@ -198,9 +198,10 @@ def test_a_report_is_written_in_the_format_of_its_name(care: Care, made: dict[st
     out = tmp_path / "report.yaml"
     outcome = care("triage", "a.BIN", "--out", out)
     assert (outcome.code, outcome.stdout, outcome.stderr) == (1, "", f"wrote {out}\n")
-    first, second = out.read_text().splitlines()[:2]
-    assert first.startswith("# Profile ")
-    assert second == "schema: care.triage/1"
+    *verdict, schema = out.read_text().partition("\nfit:")[0].splitlines()
+    assert verdict[0].startswith("# Profile ")
+    assert verdict[1].startswith("# FAULT: mission_time 190 s")
+    assert schema == "schema: care.triage/1"
     assert care("triage", "a.BIN", "--out", tmp_path / "none" / "report.json").code == 2
 
 
