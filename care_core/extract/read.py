@@ -46,12 +46,14 @@ def read_run(
     return source.run(mission_number(mission, len(source.missions)) - 1, overrides or {})
 
 
-def mission_number(asked: int | None, count: int) -> int:
-    """The mission that is meant of so many: the last where none is asked for. Raises UsageError."""
-    if asked is not None and not 1 <= asked <= count:
-        held = "holds one mission" if count == 1 else f"holds missions 1 to {count}"
-        raise UsageError(f"There is no mission {asked}: the log {held}.", hint="Name one of them.", where="--mission")
-    return asked or count
+def mission_number(requested: int | None, count: int) -> int:
+    """The mission that is meant of so many: the last where none is requested. Raises UsageError."""
+    if requested is not None and not 1 <= requested <= count:
+        missions = "holds one mission" if count == 1 else f"holds missions 1 to {count}"
+        raise UsageError(
+            f"There is no mission {requested}: the log {missions}.", hint="Name one of them.", where="--mission"
+        )
+    return requested or count
 
 
 def read_runs(
@@ -172,7 +174,9 @@ class _Source(Record, eq=False):
                 ended=self.kind.is_decided(mission),
                 fits=not mismatch,
                 mismatch=mismatch,
-                asked=tuple((name, value) for name, value in context.items() if is_known(value) and self._asks(name)),
+                asked=tuple(
+                    (name, value) for name, value in context.items() if is_known(value) and self._is_requested(name)
+                ),
             ),
             evidence=tuple(self.schema.pointed(evidence, config) for evidence in self.kind.evidence(mission)),
             changes=_changes(self.settings, mission),
@@ -180,9 +184,9 @@ class _Source(Record, eq=False):
             modes=self.kind.modes(mission),
         )
 
-    def _asks(self, context: str) -> bool:
+    def _is_requested(self, context: str) -> bool:
         extract = self.schema.variables[context].extract
-        return extract is not None and extract.kind in _ASKING
+        return extract is not None and extract.kind in _REQUESTED
 
     def _checks(self, mission: Mission) -> tuple[Check, ...]:
         return self.kind.checks(mission) if self.schema.objectives else self.kind.outcome(mission)
@@ -203,7 +207,7 @@ class _Source(Record, eq=False):
         return replace(value, hint=hint) if hint and value.channel else value
 
 
-_ASKING = ("mission_asked", "goals_asked")
+_REQUESTED = ("mission_asked", "goals_asked")
 """Extractors of what a mission asks for."""
 _CLOCK_ADVICE = "judge a log whose messages carry the time at which they were recorded"
 _LOOK = "look at its source with 'care inspect'"
