@@ -18,8 +18,8 @@ from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
 from care_core.fleet.together import Fleet
 from care_core.numbers import six_digits
 from care_core.records import field
-from care_core.report.document import estimate, plain_number
-from care_core.report.published import Document
+from care_core.report.document import estimate, parameter_names, plain_number
+from care_core.report.published import Document, publish
 from care_core.run import FitVerdict
 from care_core.tables import parquet
 from care_core.text import clean, listed, wrapped
@@ -180,46 +180,31 @@ def fleet_json(fleet: Fleet) -> str:
 
 def _row_entries(rows: Sequence[Row]) -> list[RowEntry]:
     copies = copies_of(rows)
-    return [
-        RowEntry(
-            log=row.log,
-            robot=row.robot,
-            called=row.called,
-            status=row.status,
-            reason=row.reason,
-            copy_of=copies.get(place),
-            start=row.start,
-            duration_s=row.duration_s,
-            sha256=row.sha256,
-            mission=row.mission,
-            kind=row.kind,
-            firmware=row.firmware,
-            frame=row.frame,
-            profile=row.profile,
-            version=row.version,
-            fit=row.fit,
-            objectives=dict(row.objectives),
-            breaches=list(row.breaches),
-            explained=[
-                ExplainedEntry(what=one.what, name=one.name, probability=six_digits(one.probability), kind=one.kind)
-                for one in row.explained
-            ],
-            causes=[
-                CauseEntry(
-                    option=one.option,
-                    confidence=one.confidence,
-                    current=plain_number(one.current),
-                    suggested=None if one.suggested is None else plain_number(one.suggested),
-                )
-                for one in row.causes
-            ],
-            findings=[SeenEntry(kind=one.kind, title=one.title, severity=one.severity) for one in row.findings],
-            change={name: plain_number(value) for name, value in row.change.items()},
-            p_fixed=estimate(row.p_fixed),
-            off={} if row.asked is None else {name: plain_number(row.asked.config[name]) for name in row.off},
+    return [_row_entry(row, copies.get(place)) for place, row in enumerate(rows)]
+
+
+def _row_entry(row: Row, copy_of: str | None) -> RowEntry:
+    explained = [publish(ExplainedEntry, one, probability=six_digits(one.probability)) for one in row.explained]
+    causes = [
+        publish(
+            CauseEntry,
+            one,
+            current=plain_number(one.current),
+            suggested=None if one.suggested is None else plain_number(one.suggested),
         )
-        for place, row in enumerate(rows)
+        for one in row.causes
     ]
+    return publish(
+        RowEntry,
+        row,
+        copy_of=copy_of,
+        explained=explained,
+        causes=causes,
+        findings=[publish(SeenEntry, one) for one in row.findings],
+        change={name: plain_number(value) for name, value in row.change.items()},
+        p_fixed=estimate(row.p_fixed),
+        off={} if row.asked is None else {name: plain_number(row.asked.config[name]) for name in row.off},
+    )
 
 
 def copies_of(rows: Sequence[Row]) -> dict[int, str]:
@@ -232,40 +217,13 @@ def copies_of(rows: Sequence[Row]) -> dict[int, str]:
 
 
 def _pattern_entry(one: Pattern) -> PatternEntry:
-    since = one.since
-    return PatternEntry(
-        kind=one.kind,
-        what=one.what,
-        name=one.name,
-        sort=one.sort,
-        unit=one.unit,
-        affected=list(one.affected),
-        others=list(one.others),
-        runs=one.runs,
-        of_runs=one.of_runs,
+    return publish(
+        PatternEntry,
+        one,
         values=one.values,
         others_values=one.others_values,
-        since=None
-        if since is None
-        else SinceEntry(
-            start=since.start,
-            earlier=since.earlier,
-            later_with=since.later_with,
-            later=since.later,
-            chance=since.chance,
-        ),
-        traits=[
-            TraitEntry(
-                name=trait.name,
-                value=trait.value,
-                others_with=trait.others_with,
-                others=trait.others,
-                instead=list(trait.instead),
-                chance=trait.chance,
-                compared=trait.compared,
-            )
-            for trait in one.traits
-        ],
+        since=one.since and publish(SinceEntry, one.since),
+        traits=[publish(TraitEntry, trait) for trait in one.traits],
     )
 
 
@@ -277,10 +235,9 @@ def _suggestion_entry(one: Suggestion | Silence) -> SuggestionEntry:
 
 
 def _change_entry(one: Suggestion) -> ChangeEntry:
-    parameters = one.option.parameters
     return ChangeEntry(
         option=one.option.name,
-        parameter=parameters[0] if len(parameters) == 1 else list(parameters),
+        parameter=parameter_names(one.option.parameters),
         to=plain_number(one.value),
         unit=one.unit,
         outlooks=[
