@@ -16,6 +16,7 @@ from typer.main import get_command
 from care_core.lint.rules import RULES
 from care_core.logs.formats import FORMATS
 from care_core.profile.store import load_profile
+from care_core.report.formats import FILE_FORMATS
 from care_tui.cli import command_line
 from care_tui.manual import EXIT_STATUS, first_sentence
 
@@ -75,6 +76,13 @@ def log_formats() -> str:
     return table(("name", "log", "files"), rows)
 
 
+def report_formats() -> str:
+    """The formats of the report that a file's name can choose."""
+    positions = {True: "left out unless `--positions`", False: "kept unless `--no-positions`"}
+    rows = ((f"`{'`, `'.join(row.suffixes)}`", row.label, positions[row.is_sent]) for row in FILE_FORMATS)
+    return table(("file", "format", "positions"), rows)
+
+
 def lint_rules() -> str:
     """What `care lint` looks for."""
     return table(("rule", "finds", "known from"), ((f"`{rule.id}`", rule.about, rule.source) for rule in RULES))
@@ -103,4 +111,5 @@ TABLES: dict[str, Callable[[], str]] = {
     "lint rules": lint_rules,
     "log formats": log_formats,
     "profiles": profiles,
+    "report formats": report_formats,
 }

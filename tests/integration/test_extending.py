@@ -16,6 +16,7 @@ from care_core.ecosystems import px4, registry
 from care_core.ecosystems.measures import EXTRACTORS
 from care_core.ecosystems.px4 import checks
 from care_core.logs import formats
+from care_core.report import formats as report_formats
 
 PAGE = Path(__file__).parents[2] / "docs" / "extending.md"
 _BLOCK = re.compile(r"```python\n# (?P<path>[\w/]+)\.py\n(?P<code>.*?)```", re.DOTALL)
@@ -34,6 +35,10 @@ def _add_log_format(patch: pytest.MonkeyPatch, module: ModuleType) -> None:
     patch.setattr(formats, "FORMATS", (*formats.FORMATS, module.JSON_LOG))
 
 
+def _add_report_format(patch: pytest.MonkeyPatch, module: ModuleType) -> None:
+    patch.setitem(report_formats.FORMATS, "csv", report_formats.Format("csv", "CSV", (".csv",), module.to_csv))
+
+
 def _add_ecosystem(patch: pytest.MonkeyPatch, module: ModuleType) -> None:
     patch.setattr(formats, "FORMATS", (*formats.FORMATS, sys.modules["care_core.logs.pump_log"].PUMP_LOG))
     patch.setattr(registry, "_PACKAGES", (*registry._PACKAGES, module.__name__))
@@ -43,6 +48,7 @@ ROWS: dict[str, Row] = {
     "A check": _add_check,
     "A measure": _add_measures,
     "A log format": _add_log_format,
+    "A report format": _add_report_format,
     "An ecosystem": _add_ecosystem,
 }
 
