@@ -123,7 +123,7 @@ def _wanted(report: Path, alternative: int, profile: str | None) -> list[Wanted]
     for change in sets[alternative].changes:
         option = variables.get(change.option)
         if option is None:
-            raise ConfigError(f"The profile has no option '{clean(change.option)}'.", where=str(report))
+            raise ConfigError(f"The profile has no parameter '{clean(change.option)}'.", where=str(report))
         named = [change.parameter] if isinstance(change.parameter, str) else change.parameter
         driven = None if change.assumed else float(change.from_)
         wanted += [Wanted(option, parameter, float(change.to), driven) for parameter in named]

@@ -106,10 +106,10 @@ def summary(made: Scaffold, out: Path) -> str:
         f"{out / PROFILE_FILE}: {schema.platform}",
         f"  missions    {schema.mission['kind']}, {len(made.measures.runs)} in {len(made.logs)} logs, "
         f"{len(made.good)} of them good",
-        f"  options     {len(schema.options)} ({guesses} with a guessed range), {left} parameters left out",
+        f"  parameters  {len(schema.options)} ({guesses} with a guessed range), {left} parameters left out",
         f"  measures    {measures}",
         *(f"  objective   {o.name} {o.threshold} {o.unit}".rstrip() for o in schema.objectives),
-        "Read it and correct what is a guess. Then, with missions under varied options:",
+        "Read it and correct what is a guess. Then, with missions under varied parameters:",
         f"  care ingest LOG... -o {out.name}.parquet --profile {out}",
         f"  care train {out.name}.parquet --schema {out / PROFILE_FILE} -o {out}",
         f"What is missing for that: care profiles check {out}",

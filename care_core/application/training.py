@@ -201,7 +201,7 @@ def _constants_named(faults: Sequence[FaultFile]) -> list[str]:
     right = sum(option in fault.true for fault, option in constant)
     return [
         "",
-        f"{len(constant)} of the {len(named)} published predictions name an option that never varies in its file "
+        f"{len(constant)} of the {len(named)} published predictions name a parameter that never varies in its file "
         f"({right} of them a true cause):",
         "rounding chose them, not the runs.",
     ]

@@ -224,7 +224,7 @@ def _ranges(
     for name in asked:
         if name not in options:
             hint = nearest(name, options)
-            raise UsageError(f"The profile has no option '{name}'.", hint=hint, where="options")
+            raise UsageError(f"The profile has no parameter '{name}'.", hint=hint, where="options")
     ranges: dict[str, tuple[float, float]] = {}
     left_out: list[tuple[str, str]] = []
     for name, option in options.items():

@@ -44,7 +44,7 @@ def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = (
         earliest = min(sooner, key=lambda one: one.onset_s)
         return (
             f"{earliest.title} from {earliest.onset_s:.0f} s on, before {rival.name}: that speaks of how the robot is "
-            "set, and training does not tell which option does it"
+            "set, and training does not tell which parameter does it"
         )
     return f"{rival.name}, which explains this failure better than any parameter: look at it first"
 

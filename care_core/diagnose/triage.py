@@ -383,10 +383,10 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
         return f"training says little of it, but this run shows it ({shown.text.partition(':')[0]}): bring {back} first"
     unsafe = needs_unsafe(case.query, enough)
     if unsafe is not None:
-        return f"only '{unsafe}' past its default is likely to help, and a safety option is never made looser"
+        return f"only '{unsafe}' past its default is likely to help, and a safety parameter is never made looser"
     if not has_cause:
         return (
-            "no option that this profile models explains the fault: look at what the run met "
+            "no parameter that this profile models explains the fault: look at what the run met "
             "(wind, battery, positioning, obstacles) or at parameters outside the profile"
         )
     pinned = f", with {', '.join(sorted(case.query.kept))} kept as it is" if case.query.kept else ""
@@ -419,9 +419,8 @@ def _out_of_reach(case: _Case, result: ObjectiveResult) -> str | None:
     if bound.op == "==" or bound.met(best):
         return None
     unit = f" {result.variable.unit}" if result.variable.unit else ""
-    return (
-        f"no run of the profile's training met {name} {bound}{unit} (the best: {best:g}{unit}): no option explains it"
-    )
+    nearest = f"the best: {best:g}{unit}"
+    return f"no run of the profile's training met {name} {bound}{unit} ({nearest}): no parameter explains it"
 
 
 def _refused_otherwise(case: _Case, health: Health) -> str | None:
@@ -431,11 +430,11 @@ def _refused_otherwise(case: _Case, health: Health) -> str | None:
     if said is None or case.run.refused_by:
         return None
     if said.suspect == "operation":
-        return f"{said.title}: that check reads no option of the profile, so none explains it"
+        return f"{said.title}: that check reads no parameter of the profile, so none explains it"
     complaints = [one for one in case.profile.schema.metrics if _is_of_one_complaint(one)]
     if not complaints or any(case.run.metrics.get(one.name) == 1 for one in complaints):
         return None
-    return f"{said.title}: that complaint speaks of no option of the profile, so none is blamed"
+    return f"{said.title}: that complaint speaks of no parameter of the profile, so none is blamed"
 
 
 def _is_of_one_complaint(metric: Variable) -> bool:
@@ -489,8 +488,8 @@ def _if_hidden(case: _Case, fix: Fix) -> str:
     doubt = max((effect.doubtful for effect in effects), default=1.0)
     left = min(fix.p_fixed, now + (1.0 - doubt) * (fix.p_fixed - now))
     return (
-        f"operators chose the options of the training runs: the fix has {fix.p_fixed:.0%} if nothing unrecorded made "
-        f"them choose so, {left:.0%} if something as strong as the strongest recorded cause did"
+        f"operators chose the parameters of the training runs: the fix has {fix.p_fixed:.0%} if nothing unrecorded "
+        f"made them choose so, {left:.0%} if something as strong as the strongest recorded cause did"
     )
 
 

@@ -147,10 +147,10 @@ def option_named(name: str, schema: Schema) -> Variable:
         return by_parameter[name]
     if variable is not None:
         how = "met" if variable.role is Role.CONTEXT else "measured"
-        raise UsageError(f"{name} is {how}, not set.", hint="Only options can be set.", where="--set")
+        raise UsageError(f"{name} is {how}, not set.", hint="Only parameters can be set.", where="--set")
     names = [option.name for option in schema.options]
     folded = {known.casefold(): known for known in names}
     close = folded.get(name.casefold())
     hint = f"Did you mean '{close}'?" if close else nearest(name, [*names, *by_parameter])
     hint = hint or f"List them with 'care profiles show {schema.name}'."
-    raise UsageError(f"The profile has no option '{name}'.", hint=hint, where="--set")
+    raise UsageError(f"The profile has no parameter '{name}'.", hint=hint, where="--set")

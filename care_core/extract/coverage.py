@@ -39,7 +39,7 @@ class Coverage(Record):
 
     def __str__(self) -> str:
         return (
-            f"{self.options} of {len(self.schema.options)} options and {self.sources} of {self.sources_wanted}"
+            f"{self.options} of {len(self.schema.options)} parameters and {self.sources} of {self.sources_wanted}"
             " sources are in the log"
         )
 

@@ -85,7 +85,7 @@ def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:
 def _lacks(coverage: Coverage) -> Iterator[str]:
     options = len(coverage.schema.options)
     if coverage.options < MOST * options:
-        yield f"{coverage.options} of its {options} options are in the log"
+        yield f"{coverage.options} of its {options} parameters are in the log"
     if coverage.sources < MOST * coverage.sources_wanted:
         yield f"{coverage.sources} of its {coverage.sources_wanted} sources are in the log"
 

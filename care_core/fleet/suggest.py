@@ -95,7 +95,7 @@ def _of_profile(name: str, rows: Sequence[Row], load: Callable[[str], Profile]) 
     # Workers of a cluster may have another version of the profile: their runs were asked by another model.
     asked = [row if row.version == profile.schema.version else _unasked(row) for row in rows]
     if not (candidates := _candidates(profile, model, rows)):
-        return Silence(name, "no run names an option that could be changed")
+        return Silence(name, "no run names a parameter that could be changed")
     best = max(_tried(name, model, candidates, asked, unit), key=_worth)
     return best if _is_good(best) else Silence(name, _why_not(best), best)
 
@@ -241,7 +241,7 @@ def _why_not(best: Suggestion) -> str:
     helped, harmed = best.having("helped"), best.having("harmed")
     if not helped:
         what = "any" if best.unit == "run" else "most failures of any"
-        return f"no single value of an option would repair {what} of the {best.failing} {units} that fail"
+        return f"no single value of a parameter would repair {what} of the {best.failing} {units} that fail"
     told = f"{change} would help {len(helped)} of the {best.failing} {units} that fail"
     if harmed:
         return f"{told}, and harm {len(harmed)} that did well with what they have"

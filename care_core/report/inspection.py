@@ -328,7 +328,7 @@ def _profile_lines(profiles: Iterable[ProfileEntry], width: int) -> Iterator[str
         held = ""
         if profile.sources_wanted:
             held = (
-                f"{profile.options} of {profile.options_wanted} options and {profile.sources} of"
+                f"{profile.options} of {profile.options_wanted} parameters and {profile.sources} of"
                 f" {profile.sources_wanted} sources are in the log"
             )
         verdict = held if profile.usable else "; ".join(part for part in (f"no: {profile.reason}", held) if part)

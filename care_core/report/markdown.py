@@ -98,7 +98,7 @@ def _objective(one: ObjectiveEntry) -> str:
 def _causes(names: list[str], causes: Iterable[CauseEntry]) -> Iterator[str]:
     yield from ("", f"## Causes of {listed([f'`{name}`' for name in names])}", "")
     lines = [line for cause in causes for line in _cause(cause)]
-    yield from lines or ["None was found among the options of the profile."]
+    yield from lines or ["None was found among the parameters of the profile."]
 
 
 def _cause(cause: CauseEntry) -> Iterator[str]:

@@ -112,7 +112,7 @@ def _causes(faults: Sequence[Fault]) -> Iterator[str]:
     fault = faults[-1]
     shown = [cause for cause in fault.causes if not cause.is_lead]
     if not shown:
-        yield "  none was found among the options of the profile"
+        yield "  none was found among the parameters of the profile"
     for cause in shown:
         yield from _cause(cause)
     leads = [f"{c.option.name} ({c.option.driven(c.current, c.is_assumed)})" for c in fault.causes if c.is_lead]
@@ -220,7 +220,7 @@ def _since(diagnosis: Diagnosis) -> Iterator[str]:
         named = "" if change.option is None or change.option.name == change.parameter else f" ({change.option.name})"
         yield from wrapped(f"{change.parameter}{named}  {change.text}", "  ", "    ")
     if len(others) > CHANGES_SHOWN:
-        yield f"  and {len(others) - CHANGES_SHOWN} more, which are no options of the profile; --json lists them"
+        yield f"  and {len(others) - CHANGES_SHOWN} more, which the profile does not model; --json lists them"
     if not since.changes:
         yield "  no parameter that anybody sets"
 

@@ -59,7 +59,7 @@ Thresholds = Annotated[
     list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")
 ]
 Keep = Annotated[
-    list[str] | None, typer.Option("--keep", metavar="OPTION", help="Never change this option; may be repeated.")
+    list[str] | None, typer.Option("--keep", metavar="OPTION", help="Never change this parameter; may be repeated.")
 ]
 Since = Annotated[
     Path | None,

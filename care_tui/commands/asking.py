@@ -35,7 +35,7 @@ app = typer.Typer()
 def whatif(
     log: LogPath,
     set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="OPTION=VALUE", help="Ask with this option changed.")
+        list[str] | None, typer.Option("--set", metavar="OPTION=VALUE", help="Ask with this parameter changed.")
     ] = None,
     profile: ProfileName = None,
     config: ConfigPaths = None,
@@ -52,7 +52,7 @@ def whatif(
     from care_core.report.whatif import whatif_json, whatif_text
 
     if not set_:
-        raise UsageError("Nothing is asked.", hint="Change an option with --set OPTION=VALUE.", where="--set")
+        raise UsageError("Nothing is asked.", hint="Change a parameter with --set OPTION=VALUE.", where="--set")
     request = Request(
         log,
         profile,

@@ -70,7 +70,7 @@ def _identified(profile: Profile) -> list[str]:
     except ProfileError as err:
         return [f"no effects: {err.message}"]
     unknown = [f"  {e.option} on {e.objective}" for e in effects if not e.identified]
-    counted = f"effects of an option on an objective: {len(effects) - len(unknown)} identified"
+    counted = f"effects of a parameter on an objective: {len(effects) - len(unknown)} identified"
     return [counted, *([f"not identified, never ranked ({len(unknown)})", *unknown] if unknown else [])]
 
 

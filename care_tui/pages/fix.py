@@ -26,7 +26,7 @@ class FixPage(DiagnosisPage):
     NEEDS_MISSION = True
     HELP = (
         "Space ticks a change, + and - nudge its value, = types one. The probability follows at once. a loads the next "
-        "alternative, s the suggestion, u takes the last change back. Every option of the profile is here: / finds "
+        "alternative, s the suggestion, u takes the last change back. Every parameter of the profile is here: / finds "
         "it. Enter shows the diff. Nothing is written to the robot."
     )
     ENTER = "Diff"
@@ -103,7 +103,7 @@ class FixPage(DiagnosisPage):
         notes = [note for change in (session.fix.changes if session.fix else ()) if change.option.name == option.name
                  for note in change.notes]  # fmt: skip
         if option.safety and value is not None and value != option.default:
-            notes.append("a safety option: think twice before it leaves its default")
+            notes.append("a safety parameter: think twice before it leaves its default")
         if option.name in session.dismissed:
             notes.append(f"set aside: {session.dismissed[option.name]}")
         return notes

@@ -112,7 +112,7 @@ def comparison(past: Past, other: Past) -> list[Row]:
     names = [name for name in past.config if past.config[name] != other.config.get(name)]
     rows += [Row(Content()), _columns("Option", "this run", _named(other), "bold")]
     if not names:
-        rows.append(Row(Content("all options are alike")))
+        rows.append(Row(Content("all parameters are alike")))
     return rows + [_columns(name, f"{past.config[name]:.6g}", _known(other.config.get(name))) for name in names]
 
 

@@ -157,7 +157,7 @@ def cause_detail(
 def _runner_up(cause: Cause, rivals: Sequence[Cause]) -> list[Row]:
     other = next((rival for rival in rivals if rival.rank != cause.rank), None)
     if other is None:
-        return [labelled("Runner-up", "no other option is under suspicion")]
+        return [labelled("Runner-up", "no other parameter is under suspicion")]
     label = "Runner-up" if cause.rank == 1 else "First is"
     return [labelled(label, f"{other.option.name}, {lowers(other)}")]
 
@@ -177,7 +177,7 @@ def no_cause_rows(diagnosis: Diagnosis, objective: ObjectiveResult | None) -> Ro
         return Rows([Row(Content("Not evaluated, so no cause is known.")), warning("Reason", objective.reason)])
     head = Row(Content("Outside its threshold, but no cause is named."))
     return Rows(
-        [head, *(doubt_rows(diagnosis) or [warning("Reason", "no option of the profile explains this objective")])]
+        [head, *(doubt_rows(diagnosis) or [warning("Reason", "no parameter of the profile explains this objective")])]
     )
 
 

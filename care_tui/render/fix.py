@@ -100,5 +100,5 @@ def no_fix_rows(diagnosis: Diagnosis) -> Rows:
     if verdict.advice.refusal:
         return Rows([Row(Content("No fix is suggested.")), warning("Reason", verdict.advice.refusal)])
     if diagnosis.faults:
-        return Rows([Row(Content("No change of options is predicted to keep all thresholds."))])
+        return Rows([Row(Content("No change of parameters is predicted to keep all thresholds."))])
     return Rows([Row(Content(verdict.headline)), Row(Content("No change is suggested."))])

@@ -140,7 +140,7 @@ def evidence_row(part: Evidence, option: str = "") -> Row:
     """A message of the log; marked where it points at `option`."""
     points = option and option in part.options
     head = f"{part.time_s:8.1f} s  {clean(part.kind):<9} "
-    tail = "  (points at this option)" if points else ""
+    tail = "  (points at this parameter)" if points else ""
     return Row(Content.assemble(head, text(part.text + meaning(part)), (tail, "bold")), len(head))
 
 

@@ -242,7 +242,7 @@ def test_a_journal_that_was_cut_off_goes_on(care: Care, tmp_path: Path) -> None:
         ({"command": "drive {parms}"}, "The command names '{parms}'. Did you mean 'params'?"),
         ({"command": "drive {params!r}"}, "a placeholder is a name in brackets"),
         ({"command": "drive 'a"}, "The command cannot be split into words"),
-        ({"options": ["max_sped"]}, "The profile has no option 'max_sped'. Did you mean 'max_speed'?"),
+        ({"options": ["max_sped"]}, "The profile has no parameter 'max_sped'. Did you mean 'max_speed'?"),
         ({"options": {"max_speed": [0.1, 5.0]}}, "goes beyond the profile's 0.2 to 1.2"),
         ({"options": {"max_speed": [0.7, 1.0]}}, "The reference of max_speed is 0.6, outside 0.7 to 1."),
         ({"limits": ["max_speed <= 0.5"]}, "The reference breaks the limit 'max_speed <= 0.5'."),

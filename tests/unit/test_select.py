@@ -63,7 +63,7 @@ def test_most_parameters_win() -> None:
     chosen, choice = choose_profile(log, [candidate("few", "A"), candidate("many", "A", "B", "C", "D", "E")])
     assert chosen is not None
     assert chosen.schema.name == choice.name == "many"
-    assert choice.reason.startswith("4 of 5 options")
+    assert choice.reason.startswith("4 of 5 parameters")
 
 
 def test_on_a_tie_the_name_decides_and_the_other_is_said() -> None:
@@ -88,7 +88,7 @@ def test_what_differs_makes_it_fit_in_part() -> None:
     assert fit.verdict == "partly"
     assert fit.reasons == (
         "the log's frame is 'HEXA/X', the profile is for 'QUAD'",
-        "1 of its 2 options are in the log",
+        "1 of its 2 parameters are in the log",
     )
 
 

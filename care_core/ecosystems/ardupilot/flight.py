@@ -89,19 +89,6 @@ class Flight(Airborne):
         return tuple((start, min(end, lost)) for start, end in self.airborne if start < lost)
 
     @cached_property
-    def hover(self) -> Mask | None:
-        """Rows of RCOU in steady flight: in the air, upright, under control, before anything was lost."""
-        table = self.one("RCOU", "C1")
-        if table is None:
-            return None
-        steady = during(self.airborne, table.t)
-        if (tilt := self.tilt) is not None:
-            steady &= np.interp(table.t, *tilt) < 25.0
-        if self.impact_s is not None:
-            steady &= table.t < self.impact_s
-        return steady
-
-    @cached_property
     def batteries(self) -> tuple[Battery, ...]:
         """The batteries whose voltage is recorded."""
         return tuple(Battery.of(self, number, table) for number, table in enumerate(self.all("BAT", "Volt"), start=1))
