@@ -30,9 +30,9 @@ from care_core.application.case import Request
 from care_core.application.fleet import triage_one
 from care_core.files import bundled
 from care_core.fleet.cluster import connected, each
+from care_core.fleet.fleet_report import together
 from care_core.fleet.rows import Row
 from care_core.fleet.sources import Source, gather
-from care_core.fleet.together import together
 from care_core.parallel import Failed
 
 MILLION = 1_000_000

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from care_core.application.case import Case, Progress, Request, open_case, predict
 from care_core.application.configuring import DiffSide, commands_of, diff_of
-from care_core.application.remembering import remember_triage
+from care_core.application.history_writing import remember_triage
 from care_core.application.reporting import report_of
 from care_core.errors import CareError
 from care_core.records import Record

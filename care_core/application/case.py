@@ -77,7 +77,7 @@ def open_case(request: Request, progress: Progress) -> Case:
     Raises:
         CareError: the log cannot be read, or the operator named what is not there.
     """
-    from care_core.application.pace import watching
+    from care_core.application.progress_estimate import watching
     from care_core.configs.loading import read_configs
     from care_core.ecosystems.examine import examine
     from care_core.errors import NoMissionError

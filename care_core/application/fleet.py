@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 from care_core.application.case import Case, Progress, Request, open_case
 from care_core.errors import CareError
+from care_core.fleet.fleet_report import Fleet, together
 from care_core.fleet.rows import Row, by_folder, row_of, unreadable
 from care_core.fleet.sources import Source, fetched, gather
-from care_core.fleet.together import Fleet, together
 from care_core.records import Record, replace
 
 if TYPE_CHECKING:

@@ -79,9 +79,9 @@ class Sharing(Record):
             return replace(case, diagnosis=cast("Diagnosis", mapped(case.diagnosis, without_places)))
         return case
 
-    def hider(self, case: OpenRun) -> Hider:
+    def hider(self, case: OpenRun) -> Redactor:
         """What hides the words of this case's log."""
-        return Hider(public_words(case), positions=self.positions)
+        return Redactor(public_words(case), positions=self.positions)
 
     def text(self, case: OpenRun) -> Callable[[str], str]:
         """How a text of the case is to be written."""
@@ -98,7 +98,7 @@ def without_places(text: str) -> str:
     return _PLACES.sub(NO_PLACE, text)
 
 
-class Hider(Record):
+class Redactor(Record):
     """Leaves out what says whose robot it was; the words in `public` say nothing of that, and single letters."""
 
     public: frozenset[str]

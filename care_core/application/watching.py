@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from care_core.application.case import Request, open_case
-from care_core.application.remembering import about_run
+from care_core.application.history_writing import about_run
 from care_core.diagnose.verdict import exit_code
 from care_core.errors import CareError, ExitCode
 from care_core.history.store import About, History, HistoryError
-from care_core.history.watched import Ledger
+from care_core.history.watched import WatchBook
 from care_core.logs.digest import log_digest
-from care_core.logs.finished import ABANDONED_S, QUIET_S, Patience, Sight, is_as_it_was, is_one, look
+from care_core.logs.finished import ABANDONED_S, QUIET_S, FileStatus, StabilityTimeout, is_as_it_was, is_one, look
 from care_core.parallel import Failed, each
 from care_core.records import Record, Struct, field, replace
 from care_core.report.watching import WatchEntry, judged_entry, unread_entry
@@ -64,7 +64,7 @@ class Watcher(Struct, eq=False, dict=True):
     triage: Callable[[Path, Task], Triage | Failed] = field(default_factory=lambda: triage_apart)
     known: int = 0
     """Logs that were done before this watcher first looked."""
-    waiting: tuple[Sight, ...] = ()
+    waiting: tuple[FileStatus, ...] = ()
     """Logs that were there at the last look and not finished."""
     _handled: dict[Path, str] = field(default_factory=dict)
     """Per log the stamp that it had when it was dealt with."""
@@ -76,8 +76,8 @@ class Watcher(Struct, eq=False, dict=True):
     _number: int = 0
 
     @cached_property
-    def _patience(self) -> Patience:
-        return Patience(self.task.quiet_s, self.task.abandoned_s)
+    def _patience(self) -> StabilityTimeout:
+        return StabilityTimeout(self.task.quiet_s, self.task.abandoned_s)
 
     def look(self) -> Iterator[WatchEntry]:
         """One look at the folders."""
@@ -111,7 +111,7 @@ class Watcher(Struct, eq=False, dict=True):
                 self.tell(f"{folder} is there again")
         self._there = there
 
-    def _deal_with(self, sight: Sight) -> WatchEntry | None:
+    def _deal_with(self, sight: FileStatus) -> WatchEntry | None:
         stamp = f"{sight.path.absolute()};{sight.stamp}"
         if not is_one(sight.path):
             self._handled[sight.path] = sight.stamp
@@ -134,7 +134,7 @@ class Watcher(Struct, eq=False, dict=True):
             return self._before(sight, sha256)
         return self._triage(sight, sha256)
 
-    def _triage(self, sight: Sight, sha256: str) -> WatchEntry | None:
+    def _triage(self, sight: FileStatus, sha256: str) -> WatchEntry | None:
         try:
             answer = self.triage(sight.path, self.task)
             is_same = is_as_it_was(sight)
@@ -153,7 +153,7 @@ class Watcher(Struct, eq=False, dict=True):
         self._handled[sight.path] = sight.stamp
         return judged_entry(self._next(), _now(), document, about.robot, unfinished=sight.open_by)
 
-    def _before(self, sight: Sight, sha256: str) -> WatchEntry | None:
+    def _before(self, sight: FileStatus, sha256: str) -> WatchEntry | None:
         """A log that is done already: those that were there from the start are only counted, unless another watcher
         has done it just now."""
         was_taken = sight.path in self._taken
@@ -169,16 +169,16 @@ class Watcher(Struct, eq=False, dict=True):
         entry = judged_entry(self._next(), _now(), past.document, past.robot, is_new=False)
         return replace(entry, log=str(sight.path))
 
-    def _unread(self, sight: Sight, reason: str, sha256: str | None) -> WatchEntry:
+    def _unread(self, sight: FileStatus, reason: str, sha256: str | None) -> WatchEntry:
         self._handled[sight.path] = sight.stamp
         return unread_entry(self._next(), _now(), sight.path, reason, sha256=sha256, unfinished=sight.open_by)
 
-    def _ask(self, question: Callable[[Ledger], Any], without: Any) -> Any:
+    def _ask(self, question: Callable[[WatchBook], Any], without: Any) -> Any:
         """Ask the ledger. A history that cannot be used costs a sentence, never the work."""
         if self.history is None:
             return without
         try:
-            return question(Ledger(self.history))
+            return question(WatchBook(self.history))
         except HistoryError as err:
             self.tell(f"care: {err}")
             return without

@@ -16,9 +16,9 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 
 from care_core.causal.counterfactual import CounterfactualQuery
-from care_core.diagnose.ranking import Suspect as Option
+from care_core.diagnose.ranking import Suspect
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
-from care_core.ecosystems.findings import Finding, Severity, Suspect
+from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.ecosystems.ranking import LIKELY
 from care_core.profile.schema import Schema
 from care_core.records import replace
@@ -45,7 +45,7 @@ LEAST = 0.005
 """Hypotheses less likely than this are told together with chance."""
 UNNAMED = "chance, or what no log shows"
 """What chance is called where there is no reference configuration that could fail as well."""
-_WHAT: Mapping[Suspect, str] = {"hardware": "hardware", "world": "world", "operation": "world"}
+_WHAT: Mapping[SuspectKind, str] = {"hardware": "hardware", "world": "world", "operation": "world"}
 
 
 def speaking(findings: Iterable[Finding], schema: Schema, config: Mapping[str, float]) -> dict[str, Evidence]:
@@ -62,7 +62,7 @@ def speaking(findings: Iterable[Finding], schema: Schema, config: Mapping[str, f
 def explain(
     query: CounterfactualQuery,
     broken: Sequence[ObjectiveResult],
-    found: Mapping[str, Sequence[Option]],
+    found: Mapping[str, Sequence[Suspect]],
     refused: Container[str],
     findings: Sequence[Finding],
     shown: Mapping[str, Evidence],
@@ -118,7 +118,7 @@ def unasked(
     return tuple(replace(one, name=UNNAMED) if one.what == "chance" else one for one in weighed)
 
 
-def _named_by(finding: Finding, names: Container[str], found: Mapping[str, Sequence[Option]]) -> dict[str, float]:
+def _named_by(finding: Finding, names: Container[str], found: Mapping[str, Sequence[Suspect]]) -> dict[str, float]:
     """The weight of a finding, shared by the suspects that it names as their own weights are."""
     weight: dict[str, float] = {}
     for suspect in (one for group in found.values() for one in group if one.option in names):

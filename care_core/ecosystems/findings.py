@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal
 
 from care_core.records import Record
 
@@ -36,9 +36,8 @@ FindingKind = Literal[
     "topics",
     "software",
 ]
-FINDING_KINDS: tuple[FindingKind, ...] = get_args(FindingKind)
 
-Suspect = Literal["hardware", "world", "parameter", "operation"]
+SuspectKind = Literal["hardware", "world", "parameter", "operation"]
 """What a finding speaks of: a part that failed, what the robot met, how it was set, what its operator did."""
 
 
@@ -67,7 +66,7 @@ class Finding(Record):
     """The numbers that show it, beside the limits that they broke."""
     source: str
     """What of the log shows it, and where its limit comes from (documentation, source line)."""
-    suspect: Suspect = "hardware"
+    suspect: SuspectKind = "hardware"
     probability: float = 0.5
     """How likely it is, seeing this, that the thing named really failed (0 to 1); measured on flights and drives whose
     truth is known where there are any."""

@@ -23,7 +23,7 @@ MOST_ATTEMPTS = 3
 """A log whose triage ended the program, or took too long, so often is not tried again."""
 
 
-class Ledger(Record):
+class WatchBook(Record):
     """The book that the watchers of a history keep. Every call may raise HistoryError."""
 
     history: History

@@ -35,7 +35,7 @@ _BAG_HEAD_BYTES = 4096
 _INDEX_POS = re.compile(rb"index_pos=(.{8})", re.DOTALL)
 
 
-class Sight(Record):
+class FileStatus(Record):
     """A log as it lies there: a file, or the folder of one recording."""
 
     path: Path
@@ -51,14 +51,14 @@ class _File(Record):
     written_ns: int
 
 
-class Patience(Struct, eq=False):
+class StabilityTimeout(Struct, eq=False):
     """How long each log has been at rest. Times are seconds of a clock that only goes forward."""
 
     quiet_s: float = QUIET_S
     abandoned_s: float = ABANDONED_S
     _since: dict[Path, tuple[str, float]] = field(default_factory=dict)
 
-    def rested(self, sights: Iterable[Sight], now_s: float) -> list[Sight]:
+    def rested(self, sights: Iterable[FileStatus], now_s: float) -> list[FileStatus]:
         """Those that are finished, and those given up, whose `open_by` says why they are not."""
         seen = {sight.path: sight for sight in sights}
         self._since = {path: since for path, since in self._since.items() if path in seen}
@@ -71,31 +71,31 @@ class Patience(Struct, eq=False):
                 continue
             why = sight.open_by or not_closed(path)
             if not why or rest_s >= self.abandoned_s:
-                found.append(Sight(path, sight.stamp, why))
+                found.append(FileStatus(path, sight.stamp, why))
         return found
 
 
-def look(folders: Iterable[Path]) -> list[Sight]:
+def look(folders: Iterable[Path]) -> list[FileStatus]:
     """Every log below these folders, finished or not, by name. A folder that is not there holds none."""
     found = {sight.path: sight for folder in folders for sight in _below(folder)}
     return [found[path] for path in sorted(found)]
 
 
-def is_as_it_was(sight: Sight) -> bool:
+def is_as_it_was(sight: FileStatus) -> bool:
     """Whether nothing was written to a log since it was seen; not where it is gone."""
     return any(again.path == sight.path and again.stamp == sight.stamp for again in _in(sight.path.parent, [])) or any(
         again.path == sight.path and again.stamp == sight.stamp for again in _in(sight.path, [])
     )
 
 
-def _below(folder: Path) -> Iterator[Sight]:
+def _below(folder: Path) -> Iterator[FileStatus]:
     below: list[Path] = []
     yield from _in(folder, below)
     for inner in below:
         yield from _below(inner)
 
 
-def _in(folder: Path, below: list[Path]) -> Iterator[Sight]:
+def _in(folder: Path, below: list[Path]) -> Iterator[FileStatus]:
     """The logs in a folder; the folders in it are put into `below`, unless it is one recording itself."""
     files: dict[str, _File] = {}
     hidden: list[str] = []
@@ -119,24 +119,24 @@ def _in(folder: Path, below: list[Path]) -> Iterator[Sight]:
         return
     below += sorted(folders)
     for name, file in logs.items():
-        yield Sight(folder / name, _stamp([file]), _open_by(file, [*files, *hidden]))
+        yield FileStatus(folder / name, _stamp([file]), _open_by(file, [*files, *hidden]))
 
 
-def _one_recording(folder: Path, files: Mapping[str, _File], logs: Mapping[str, _File]) -> Sight | None:
+def _one_recording(folder: Path, files: Mapping[str, _File], logs: Mapping[str, _File]) -> FileStatus | None:
     """The recording that a folder is as a whole, None where its logs are one each."""
     own = [name for name in logs if name.lower().endswith(ROS2_SUFFIXES)]
     stamp = _stamp(files.values())
     if FILE_NAME in files:
-        return Sight(folder, stamp, _unlisted(folder, files) or _any_open(own, files))
+        return FileStatus(folder, stamp, _unlisted(folder, files) or _any_open(own, files))
     if own and all(re.match(rf"{re.escape(folder.name)}_\d+\.", name) for name in own):  # as a ROS 2 recorder names
-        return Sight(folder, stamp, f"its recorder has not written {FILE_NAME}")
+        return FileStatus(folder, stamp, f"its recorder has not written {FILE_NAME}")
     bags = [name for name in logs if name.lower().endswith(ROS1_SUFFIXES)]
     parts = [parse_part(name) for name in bags]
     # Dated by the recorder and numbered from 0: other bags with numbers are runs of their own.
     if len(bags) > 1 and len(bags) == len(logs) and len({part and part[0] for part in parts}) == 1 and parts[0]:
         numbers = sorted(part[1] for part in parts if part)
         if numbers == list(range(len(numbers))):
-            return Sight(folder, stamp, _any_open(bags, files))
+            return FileStatus(folder, stamp, _any_open(bags, files))
     return None
 
 

@@ -11,11 +11,11 @@ from care_core.diagnose.records import Confidence, What
 from care_core.diagnose.verdict import RunStatus
 from care_core.ecosystems.findings import FindingKind, Severity
 from care_core.errors import UsageError
+from care_core.fleet.fleet_report import Fleet
 from care_core.fleet.rows import Explained, Row, distinct
 from care_core.fleet.shared import FEWEST, Kind, Pattern, Since, Trait, Unit
 from care_core.fleet.sources import INSTALL
 from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
-from care_core.fleet.together import Fleet
 from care_core.numbers import six_digits
 from care_core.records import field
 from care_core.report.document import estimate, parameter_names, plain_number

@@ -17,7 +17,7 @@ from care_core.records import Record
 from care_core.report.document import FaultEntry, FixEntry, Report
 from care_core.report.path_drawing import MOST, paths_svg
 from care_core.report.plots import NOTHING_DRAWN, Drawing, Plot, plot_figure
-from care_core.report.together import together
+from care_core.report.shared_causes import together
 from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.run import shown
 from care_core.text import clean, listed, seconds

@@ -22,7 +22,7 @@ from care_core.report.entries import (
     event_entries,
     finding_entries,
 )
-from care_core.report.happened import account_lines, finding_lines
+from care_core.report.health import account_lines, finding_lines
 from care_core.report.published import Document, publish
 from care_core.run import Damage, Fit, MissionInfo, ProfileChoice
 from care_core.text import WIDTH, clean, clock, wrapped

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 from care_core.records import Record
 from care_core.report.document import FaultEntry, ObjectiveEntry, Report
-from care_core.report.happened import finding_sentence
+from care_core.report.health import finding_sentence
 from care_core.report.wording import noted
 from care_core.text import clean, seconds
 

@@ -18,8 +18,8 @@ from care_core.report.document import (
     Report,
     SinceEntry,
 )
-from care_core.report.happened import finding_sentence
-from care_core.report.together import together
+from care_core.report.health import finding_sentence
+from care_core.report.shared_causes import together
 from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.run import shown
 from care_core.text import listed, seconds

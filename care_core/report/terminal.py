@@ -10,8 +10,8 @@ from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, PathNode, Prediction
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, chance, verdict_of
-from care_core.report.happened import account_lines, finding_lines, reason_lines
-from care_core.report.together import together
+from care_core.report.health import account_lines, finding_lines, reason_lines
+from care_core.report.shared_causes import together
 from care_core.text import clean, listed, wrapped
 from care_core.variables import Variable
 

@@ -9,7 +9,7 @@ import typer
 
 import care_core
 from care_core.application.case import Request, read_case
-from care_core.application.remembering import remember
+from care_core.application.history_writing import remember
 from care_core.errors import UsageError
 from care_tui.commands.arguments import (
     AsJson,

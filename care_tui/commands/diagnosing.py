@@ -9,7 +9,7 @@ import typer
 
 import care_core
 from care_core.application.case import Case, Request
-from care_core.application.remembering import remember_triage
+from care_core.application.history_writing import remember_triage
 from care_core.diagnose.verdict import exit_code, verdict_of
 from care_core.errors import ExitCode, LogError, UsageError
 from care_core.records import replace

@@ -11,7 +11,7 @@ from care_core.application.viewing import what_would_fit
 from care_core.ecosystems.findings import Health
 from care_tui.pages.page import Fetch, View
 from care_tui.pages.step import StepPage
-from care_tui.render.happened import (
+from care_tui.render.health import (
     FindingRow,
     fit_rows,
     health_row_details,

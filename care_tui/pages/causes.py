@@ -13,7 +13,7 @@ from care_core.variables import Variable
 from care_tui.pages.page import View
 from care_tui.pages.step import DiagnosisPage
 from care_tui.render.causes import cause_detail, cause_item, no_cause_rows
-from care_tui.render.happened import hypothesis_item, hypothesis_rows
+from care_tui.render.health import hypothesis_item, hypothesis_rows
 from care_tui.render.rows import Rows
 from care_tui.screens.prompt import Prompt
 from care_tui.widgets.choices import Listing
@@ -105,7 +105,7 @@ class CausesPage(DiagnosisPage):
         """The other faults with the same causes, as the report puts them together."""
         if fault is None:
             return ""
-        from care_core.report.together import together
+        from care_core.report.shared_causes import together
 
         groups = together(
             self.session.diagnosis.faults, lambda one: [[node.name for node in c.path] for c in one.causes]

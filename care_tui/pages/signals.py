@@ -14,7 +14,7 @@ from care_core.errors import CareError
 from care_core.report.marks import Mark, marks_of
 from care_core.text import clean, seconds
 from care_tui.pages.page import Fetch, Page, View, sentence
-from care_tui.render.happened import sign_of
+from care_tui.render.health import sign_of
 from care_tui.render.plot import WANTED, dots_across, plot
 from care_tui.render.rows import ASCII, Row, Rows, error_rows, padded, text
 from care_tui.screens.panes import PanesScreen

@@ -30,7 +30,7 @@ from care_tui.pages.page import Page
 from care_tui.pages.report import ReportPage
 from care_tui.pages.step import StepPage
 from care_tui.places import remember
-from care_tui.render.happened import standing
+from care_tui.render.health import standing
 from care_tui.render.rows import Glyphs
 from care_tui.screens.panes import PanesScreen
 from care_tui.session import Session

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from care_core.application.case import Case, Request
-from care_core.application.remembering import remember_triage
+from care_core.application.history_writing import remember_triage
 from care_core.diagnose.records import Diagnosis
 from care_core.errors import CareError
 from care_core.history.store import History

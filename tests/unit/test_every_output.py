@@ -24,7 +24,7 @@ from care_core.report.writers import published, to_json, to_yaml
 from care_core.run import Fit, FitVerdict
 from care_tui.render.causes import cause_item
 from care_tui.render.fix import option_item, outcome_rows
-from care_tui.render.happened import standing
+from care_tui.render.health import standing
 from care_tui.render.rows import UNICODE
 from tests.made import LAND_SPEED, made_diagnosis
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from care_core.logs.finished import Patience, Sight, is_as_it_was, look, not_closed
+from care_core.logs.finished import FileStatus, StabilityTimeout, is_as_it_was, look, not_closed
 
 MCAP = b"\x89MCAP0\r\n"
 
@@ -18,13 +18,13 @@ def write(path: Path, content: bytes = b"x") -> Path:
     return path
 
 
-def names(sights: list[Sight], folder: Path) -> dict[str, str]:
+def names(sights: list[FileStatus], folder: Path) -> dict[str, str]:
     return {str(sight.path.relative_to(folder)): sight.open_by for sight in sights}
 
 
 def test_a_log_is_finished_when_it_rests(tmp_path: Path) -> None:
     log = write(tmp_path / "1.BIN")
-    patience = Patience(quiet_s=10.0, abandoned_s=100.0)
+    patience = StabilityTimeout(quiet_s=10.0, abandoned_s=100.0)
     assert patience.rested(look([tmp_path]), 0.0) == []
     assert patience.rested(look([tmp_path]), 9.9) == []
     write(log, b"xx")
@@ -35,7 +35,7 @@ def test_a_log_is_finished_when_it_rests(tmp_path: Path) -> None:
 
 def test_neither_the_clock_on_the_wall_nor_that_of_the_log_counts(tmp_path: Path) -> None:
     """A log of a robot without a clock is of 1970, or of next year; while a laptop sleeps its steady clock stands."""
-    patience = Patience(quiet_s=10.0)
+    patience = StabilityTimeout(quiet_s=10.0)
     for number, stamp in enumerate((0, 4e9)):
         os.utime(write(tmp_path / f"{number}.BIN"), (stamp, stamp))
     assert patience.rested(look([tmp_path]), 0.0) == []
@@ -45,7 +45,7 @@ def test_neither_the_clock_on_the_wall_nor_that_of_the_log_counts(tmp_path: Path
 def test_a_folder_that_comes_back_is_waited_for_again(tmp_path: Path) -> None:
     stick = tmp_path / "stick"
     write(stick / "1.BIN")
-    patience = Patience(quiet_s=10.0)
+    patience = StabilityTimeout(quiet_s=10.0)
     patience.rested(look([stick]), 0.0)
     stick.rename(tmp_path / "away")
     assert patience.rested(look([stick]), 5.0) == []
@@ -74,7 +74,7 @@ def test_what_is_written_or_fetched_is_given_up_only_after_long(
     write(tmp_path / log)
     write(tmp_path / beside)
     write(tmp_path / "12.BIN.part")  # of another log
-    patience = Patience(quiet_s=1.0, abandoned_s=60.0)
+    patience = StabilityTimeout(quiet_s=1.0, abandoned_s=60.0)
     patience.rested(look([tmp_path]), 0.0)
     assert patience.rested(look([tmp_path]), 59.0) == []
     (given_up,) = patience.rested(look([tmp_path]), 60.0)
@@ -137,7 +137,7 @@ def test_hidden_files_and_folders_hold_no_logs(tmp_path: Path) -> None:
 def test_what_a_recorder_writes_last(tmp_path: Path, content: bytes, closed: bool) -> None:
     log = write(tmp_path / "1.mcap", content)
     assert (not_closed(log) == "") is closed
-    patience = Patience(quiet_s=1.0, abandoned_s=5.0)
+    patience = StabilityTimeout(quiet_s=1.0, abandoned_s=5.0)
     patience.rested(look([tmp_path]), 0.0)
     assert bool(patience.rested(look([tmp_path]), 1.0)) is closed
     assert patience.rested(look([tmp_path]), 6.0)

@@ -9,8 +9,8 @@ import pytest
 
 from care_core.diagnose.records import Status
 from care_core.errors import ExitCode, UsageError
+from care_core.fleet.fleet_report import Fleet, together
 from care_core.fleet.rows import Row, by_folder, row_of, unreadable
-from care_core.fleet.together import Fleet, together
 from care_core.records import replace
 from care_core.report.fleet import check_parquet_path, fleet_json, fleet_schema, short_names, write_parquet
 from care_core.run import Robot

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_core.fleet.fleet_report import together
 from care_core.fleet.rows import Asked, Explained, Row, Seen
 from care_core.fleet.shared import MAYBE, shared
-from care_core.fleet.together import together
 from care_core.records import replace
 from care_core.report.fleet import shared_lines
 

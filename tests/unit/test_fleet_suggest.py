@@ -11,10 +11,10 @@ from care_core.application.case import Request
 from care_core.application.fleet import triage_one
 from care_core.diagnose.advice import enough, falls_short
 from care_core.diagnose.records import Fix
+from care_core.fleet.fleet_report import together
 from care_core.fleet.rows import Explained, NamedCause, Row
 from care_core.fleet.sources import Source
 from care_core.fleet.suggest import Silence, Suggestion, suggest
-from care_core.fleet.together import together
 from care_core.profile.store import Profile, load_profile
 from care_core.records import replace
 from care_core.report.fleet import suggestion_lines

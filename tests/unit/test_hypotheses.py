@@ -8,13 +8,17 @@ from hypothesis import strategies as st
 
 from care_core.diagnose.hypotheses import unasked, weigh
 from care_core.diagnose.records import Hypothesis
-from care_core.ecosystems.findings import Finding, Severity, Suspect
+from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.records import replace
 from care_core.run import Evidence
 
 
 def finding(
-    probability: float, severity: Severity = "critical", suspect: Suspect = "hardware", *, after_impact: bool = False
+    probability: float,
+    severity: Severity = "critical",
+    suspect: SuspectKind = "hardware",
+    *,
+    after_impact: bool = False,
 ) -> Finding:
     return Finding(
         "motor",

@@ -13,8 +13,8 @@ import pytest
 from numpy.typing import NDArray
 
 from care_core import limits
-from care_core.application import pace as watched
-from care_core.application.pace import watching
+from care_core.application import progress_estimate as watched
+from care_core.application.progress_estimate import watching
 from care_core.logs.digest import SAMPLED, hashing, log_digest
 from care_core.logs.file_windows import FileBytes
 from care_core.logs.mcap_records import ENTRY

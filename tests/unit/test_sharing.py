@@ -12,7 +12,7 @@ import pytest
 import care_core
 from care_core.application.bundling import bundle_of
 from care_core.application.case import Case
-from care_core.application.sharing import HIDDEN, NO_PLACE, Hider, Sharing, without_places
+from care_core.application.sharing import HIDDEN, NO_PLACE, Redactor, Sharing, without_places
 from care_core.files import bundled
 from care_core.report.formats import FORMATS
 from tests.goal_drives import drive
@@ -129,4 +129,4 @@ def test_places_are_known_by_their_shape(text: str) -> None:
 )
 def test_what_only_looks_like_a_place_stays(text: str) -> None:
     assert without_places(text) == text
-    assert HIDDEN not in Hider(frozenset(("the", "at", "to", "items", "until", "in"))).text(text)
+    assert HIDDEN not in Redactor(frozenset(("the", "at", "to", "items", "until", "in"))).text(text)

@@ -21,7 +21,7 @@ from care_core.application.notifying import Notifier, filled, parse_notifier
 from care_core.application.watching import Task, Triage, Watcher, overall_code
 from care_core.errors import UsageError
 from care_core.history.store import About, History
-from care_core.history.watched import MOST_ATTEMPTS, Ledger
+from care_core.history.watched import MOST_ATTEMPTS, WatchBook
 from care_core.parallel import Failed
 from care_core.records import replace
 from care_core.report.document import build_document
@@ -214,7 +214,7 @@ def test_a_watcher_that_is_ended_gives_its_log_back(bench: Bench) -> None:
 def test_the_claim_of_a_process_that_is_gone_holds_nobody_up(bench: Bench) -> None:
     path = bench.put("1.BIN", "good")
     digest = sha256(b"good").hexdigest()
-    ledger = Ledger(bench.history)
+    ledger = WatchBook(bench.history)
     assert ledger.claim(digest, path, "s", 60.0) == "mine"
     with sqlite3.connect(bench.history.path) as connection:
         connection.execute("update watched set holder = 'elsewhere:1:1'")

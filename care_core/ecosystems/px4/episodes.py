@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.findings import Finding, FindingKind, Severity, Suspect
+from care_core.ecosystems.findings import Finding, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.px4.flight import Px4Flight, Span
 from care_core.logs.base import Table
 from care_core.records import Record
@@ -21,7 +21,7 @@ class State(Record):
     means: str
     kind: FindingKind | None = None
     severity: Severity = "warning"
-    suspect: Suspect = "hardware"
+    suspect: SuspectKind = "hardware"
 
 
 class Episode(NamedTuple):

@@ -110,11 +110,6 @@ def reason_words(reason: int) -> str:
     return _REASONS.get(reason, "")
 
 
-def is_asked_for(reason: int) -> bool:
-    """Whether the pilot or the ground station asked for the mode."""
-    return reason in _PILOT
-
-
 def px4_mode(custom_mode: int) -> int:
     """`nav_state` for the custom_mode of a PX4 heartbeat; -1 where they have none in common."""
     main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF

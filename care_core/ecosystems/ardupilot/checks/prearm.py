@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding, Severity, Suspect
+from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.logs.base import Wanted
 
 READS: Wanted = {}
@@ -50,7 +50,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     asked = any(is_order for _, _, is_order in refusals)
     severity: Severity = "critical" if asked and not flight.breaks_off else "warning"
     by_operator = all(_BY_OPERATOR.search(one) for _, one, _ in lasting)
-    suspect: Suspect = "operation" if by_operator else "parameter"
+    suspect: SuspectKind = "operation" if by_operator else "parameter"
     yield Finding(
         kind="prearm",
         title=f"arming was refused: {why}",

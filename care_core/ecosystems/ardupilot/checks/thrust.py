@@ -14,7 +14,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding, Severity, Suspect
+from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.logs.base import Wanted
 from care_core.numbers import median
 
@@ -30,7 +30,7 @@ _BELOW_M = LIMITS.add("height below the one wanted", 2.0, "m", "a choice: height
 _GROUNDED_S = LIMITS.add("full throttle on the ground", 5.0, "s", "a choice: a take-off takes less")
 SPIN_MOST = LIMITS.add("MOT_SPIN_MAX that keeps motors down", 0.9, "", "AP_MotorsMulticopter: 0.95 as shipped")
 _FLYING = LIMITS.add("least throttle in the air", 0.05, "", "a choice: above it motors turn")
-_PROBABILITY: Mapping[Suspect, float] = {
+_PROBABILITY: Mapping[SuspectKind, float] = {
     "hardware": LIMITS.add(
         "probability of a weak part", 0.3, "", "7 of 83 such training flights have one, and those vary little in weight"
     ),
@@ -103,7 +103,7 @@ def saturated(flight: Flight) -> list[Span]:
     return lasting(t, flown & (throttle > FULL), _FULL_LASTS_S, gap_s=1.0)
 
 
-def _by_option(flight: Flight) -> tuple[Suspect, str]:
+def _by_option(flight: Flight) -> tuple[SuspectKind, str]:
     """Whether a parameter keeps the motors from their full output."""
     most = flight.setting("MOT_SPIN_MAX")
     if most is not None and 0.0 < most < SPIN_MOST:

@@ -10,7 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding, FindingKind, Severity, Suspect
+from care_core.ecosystems.findings import Finding, FindingKind, Severity, SuspectKind
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import BATTERY, COMMANDS, GOALS, ODOMETRY, reading
 from care_core.ecosystems.ros.motion import BREAKS_LOOSE_MPS, Following
@@ -85,7 +85,7 @@ def _finding(
     *,
     kind: FindingKind = "drive",
     otherwise: Severity = "warning",
-    suspect: Suspect = "hardware",
+    suspect: SuspectKind = "hardware",
     probability: float = 0.9,
 ) -> Finding:
     """What is wrong with a drive, as seen by its odometry against its commands."""
