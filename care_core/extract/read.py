@@ -131,6 +131,12 @@ class _Source(Record, eq=False):
             with hashing(log.path) as digest:
                 return cls.read(model, schema, digest)
         kind = mission_kind(schema)
+        if log.format.name not in schema.logs:
+            raise NoMissionError(
+                f"Profile '{schema.name}' reads {', '.join(schema.logs)}, this is {log.format.name}.",
+                hint="Leave --profile out to have one chosen.",
+                where=str(log.path),
+            )
         tables = model.tables(reading_plan(schema))
         settings = log.settings()
         found = kind.missions(model, tables, schema.mission)
@@ -200,7 +206,7 @@ class _Source(Record, eq=False):
     def _explained(self, value: Value) -> Value:
         """The value, where it is a number; else why there is none: a dead source, or a kind of log that lacks much."""
         if not isinstance(value, Unavailable):
-            return value if math.isfinite(value) else Unavailable("what the log says of it is no number", _LOOK)
+            return value if math.isfinite(value) else Unavailable("its value in the log is not a number", _LOOK)
         if value.channel in self.dead:
             return Unavailable(self.dead[value.channel], "check the sensor and its driver")
         hint = format_named(self.log.format).missing_hint

@@ -15,11 +15,9 @@ Explain = Annotated[bool, typer.Option("--explain", help="With each limit, its u
 
 @app.command()
 def checks(
-    explain: Annotated[
-        bool, typer.Option("--explain", help="With each limit, its unit and where it comes from.")
-    ] = False,
+    explain: Explain = False,
 ) -> None:
-    """List the health checks of each ecosystem, and what each looks for."""
+    """List the health checks, and what each looks for."""
     from care_core.report.checks import checks_text
 
     emit(checks_text(explain=explain))

@@ -70,7 +70,7 @@ def test_values_are_typed_as_operators_write_them(option: Variable, typed: str, 
 
 @pytest.mark.parametrize(
     ("option", "typed", "says"),
-    [(FLOAT, "11", "from 0.01 to 10"), (FLOAT, "nan", "from"), (FLOAT, "x", "no number"), (INT, "50.5", "whole"),
+    [(FLOAT, "11", "from 0.01 to 10"), (FLOAT, "nan", "from"), (FLOAT, "x", "not a number"), (INT, "50.5", "whole"),
      (ENUM, "1", "0 (off), 2 (on)"), (INT, "1e9", "cm/s")],
 )  # fmt: skip
 def test_what_cannot_be_taken_is_refused_with_what_can(option: Variable, typed: str, says: str) -> None:

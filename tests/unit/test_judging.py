@@ -76,7 +76,7 @@ def test_a_mission_that_was_not_accomplished_has_no_time(success: Value) -> None
     for name in ("time", "energy"):
         value = judged.run.objectives[name]
         assert isinstance(value, Unavailable)
-        assert "not accomplished" in value.reason
+        assert "not completed" in value.reason
 
 
 def test_a_log_that_ends_early_evaluates_nothing() -> None:

@@ -46,8 +46,8 @@ def test_a_second_slow_run_takes_chance_out_of_the_promise(planted: Profile) -> 
 @pytest.mark.parametrize(
     ("pairs", "said"),
     [
-        ((0, 0), "not measured, no training run was repeated"),
-        ((0, 53), "not measured, training repeated runs on other days only (53 pairs)"),
+        ((0, 0), "run-to-run variation was not measured"),
+        ((0, 53), "measured only between days (53 pairs of training runs)"),
         ((4, 53), "measured on 4 pairs of training runs"),
     ],
 )

@@ -30,7 +30,10 @@ def limited(text: str, folder: Path, schema: Schema = ASKED) -> Schema:
 def test_the_operators_word_wins_over_the_site_and_the_site_over_the_profile(planted: Profile, tmp_path: Path) -> None:
     schema = limited('time: {op: "<=", value: 77}', tmp_path)
     ours = judge(planted_run(), schema, planted.model).results[1]
-    assert (ours.threshold, ours.wanted) == (Threshold("<=", 77), "<= 77 s (limit of ours.yaml)")
+    assert (ours.threshold, ours.wanted) == (
+        Threshold("<=", 77, source="ours.yaml"),
+        "<= 77 s (limit of ours.yaml)",
+    )
     named = judge(planted_run(), schema, planted.model, {"time": 90.0}).results[1]
     assert (named.threshold, named.wanted) == (Threshold("<=", 90), "<= 90 s")
     profiles = judge(planted_run(), SCHEMA, planted.model).results[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
+from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
 from care_core.ecosystems.plausible import is_alive
 from care_core.ecosystems.ros.measures.window import drive_of, topics
 from care_core.ecosystems.ros.sensors import LEAST_V, MOST_V, Battery
@@ -90,14 +90,17 @@ def _battery(mission: Mission) -> Battery | Unavailable:
     drive, channel = drive_of(mission), topics(mission.spec).battery
     battery = None if drive is None else drive.battery_on(channel)
     if battery is None:
-        return missing(channel)
+        table = mission.table(channel)
+        return _no_battery_has(float(np.nanmax(table["voltage"]))) if has(table, "voltage") else missing(channel)
     inside = battery.t[(battery.t >= mission.start_s) & (battery.t <= mission.end_s)]
     edge_s = max(5.0, 0.05 * (mission.end_s - mission.start_s))
     if len(inside) < 2 or inside[0] > mission.start_s + edge_s or inside[-1] < mission.end_s - edge_s:
         return Unavailable(f"{channel} does not cover the mission", "record it from the first goal to the last")
     volts = float(battery.voltage.max())
-    if not LEAST_V <= volts <= MOST_V:
-        return Unavailable(
-            f"the battery reports {volts:.3g} V, which no battery has", "check its sensor, and the driver's unit"
-        )
-    return battery
+    return battery if LEAST_V <= volts <= MOST_V else _no_battery_has(volts)
+
+
+def _no_battery_has(volts: float) -> Unavailable:
+    return Unavailable(
+        f"the battery reports {volts:.3g} V, which no battery has", "check its sensor, and the driver's unit"
+    )
