@@ -350,7 +350,7 @@ def thresholds_in_force(
 def check_wishes(schema: Schema, keep: Iterable[str], thresholds: Mapping[str, float]) -> None:
     """Refuse options to keep and thresholds that the profile does not have. Raises UsageError."""
     for name in keep:
-        _known(name, schema.options, "option", "--keep", schema.name)
+        _known(name, schema.options, "parameter", "--keep", schema.name)
     for name, bound in thresholds.items():
         objective = _known(name, schema.objectives, "objective", "--threshold", schema.name)
         if objective.kind == "functional" and bound not in (0, 1):

@@ -53,10 +53,7 @@ def cause_item(cause: Cause, share: float | None, dismissed: str | None, glyphs:
     worth = ["not ruled out" if cause.is_lead else f"{cause.confidence} confidence"]
     if cause.p_fixed is not None:
         worth.append(f"{percent(cause.p_fixed)} if only this is changed")
-    if cause.is_lead:  # its one caveat is that it is no more than a lead
-        return head, Content(below + ", ".join(worth))
-    worth.append(lowers(cause))
-    caveats = "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
+    caveats = "" if cause.is_lead else "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
     return head, Content(below + ", ".join(worth) + caveats)
 
 

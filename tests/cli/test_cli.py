@@ -338,7 +338,7 @@ def test_profiles_are_listed_and_shown(care: Care) -> None:
     assert "arducopter" in care("profiles").stdout
     shown = care("profiles", "show", "arducopter").stdout
     assert "objectives (4)" in shown
-    assert "effects of an option on an objective:" in shown
+    assert "effects of a parameter on an objective:" in shown
     assert "not identified" not in shown
     assert care("profiles", "show", "none").code == 2
 

@@ -97,7 +97,7 @@ def test_odds_are_told_with_what_lost_the_run_and_no_prediction_knows_of(planted
         ("speed=nan", "sets no value"),
         ("speed=inf", "sets no value"),
         ("sag=1", "measured, not set"),
-        ("=3", "no option ''"),
+        ("=3", "no parameter ''"),
     ],
 )
 def test_what_cannot_be_set_is_refused(text: str, words: str) -> None:
