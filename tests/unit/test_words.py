@@ -27,6 +27,13 @@ REPLACED_NAMES = {
     "_gravity": "severity",
     "Said": "LogMessage",
     "attend": "wait",
+    "Sight": "FileStatus",
+    "Patience": "StabilityTimeout",
+    "Ledger": "WatchBook",
+    "Hider": "Redactor",
+    "Drawn": "Drawing",
+    "RelativeThreshold": "Threshold",
+    "OwnLimit": "Threshold",
 }
 """Names of classes, functions and variables that may not be defined, with what to write."""
 
@@ -35,12 +42,29 @@ REPLACED_MODULES = {
     "frozen": "records",
     "kept": "profile.cache",
     "mapped": "file_windows",
+    "happened": "health",
+    "pace": "progress_estimate",
+    "remembering": "history_writing",
     "seen": "inputs",
+    "spelling": "parameter_aliases",
     "telling": "ranking",
+    "together": "fleet_report, shared_causes",
 }
 """Names that no module may have, with what to write."""
 
 REPLACED_PHRASES = {
+    "nothing out of the ordinary": "no health problems found in what this log records",
+    "something the robot met": "something in the environment (wind, obstacle, load)",
+    "a part whose failure left no trace": "a hardware fault that this log cannot show",
+    "chance: the reference configuration fails": "bad luck: this mission sometimes fails with the reference",
+    "judged against the defaults that the log records": "compared with the firmware defaults stored in the log",
+    "how alike such runs are": "run-to-run variation was not measured",
+    "fits in part": "partly fits",
+    "It may be no parameter": "it may not be a parameter",
+    "What would tell more": "how to find out more",
+    "so its value means nothing": "not judged: the mission was not completed",
+    "% probability alone": "if only this is changed",
+    "no option of the profile explains": "no parameter of the profile explains",
     "something this log does not show: control was lost": "control was lost; the log does not show why",
     "of this run are off it": "parameters differ",
     "No parameter as far as this explains it": "if this is the cause, changing parameters will not help",
