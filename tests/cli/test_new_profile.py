@@ -30,7 +30,7 @@ def test_a_new_robot_from_its_logs_to_a_diagnosis(care: Care, logs: Path, tmp_pa
     robot, table = tmp_path / "courier", tmp_path / "courier.csv"
     made = care("profiles", "new", logs, "--out", robot)
     assert made.code == 0
-    assert "options     5 (0 with a guessed range)" in made.stdout
+    assert "parameters  5 (0 with a guessed range)" in made.stdout
     checked = care("profiles", "check", robot)
     assert checked.code == 0
     assert f"{RUNS + 3} runs are enough to train with" in checked.stdout

@@ -114,7 +114,7 @@ def test_where_operators_chose_no_cause_is_sure_and_the_promise_says_what_it_res
     assert diagnosis.fix is not None
     now = float(planted_query(planted, speed=1.5).probability([run.config])[0])
     left = now + share * (diagnosis.fix.p_fixed - now)
-    told = [note for note in diagnosis.notes if note.startswith("operators chose the options")]
+    told = [note for note in diagnosis.notes if note.startswith("operators chose the parameters")]
     assert len(told) == 1
     assert f"the fix has {diagnosis.fix.p_fixed:.0%} if" in told[0]
     assert f", {left:.0%} if something" in told[0]
@@ -247,7 +247,7 @@ def test_a_fault_that_no_option_explains_abstains(planted: Profile) -> None:
     diagnosis = diagnosed(planted_run(CALM | {"error": 9.0}), planted)
     assert diagnosis.objectives[0].status == "fault"
     assert diagnosis.abstained is not None
-    assert "no option" in diagnosis.abstained
+    assert "no parameter" in diagnosis.abstained
     assert diagnosis.fix is None
     assert diagnosis.alternatives == ()
 

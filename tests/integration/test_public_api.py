@@ -57,7 +57,7 @@ def test_what_if_takes_parameters_and_refuses_strangers(case: care_core.Case) ->
     current = case.diagnosis.run.config[option.name]
     answer = care_core.what_if(case, {option.parameters[0]: current})
     assert answer.p_ok == pytest.approx(answer.p_ok_now)
-    with pytest.raises(UsageError, match="no option"):
+    with pytest.raises(UsageError, match="no parameter"):
         care_core.what_if(case, {"LAND_SPED": 40})
 
 
