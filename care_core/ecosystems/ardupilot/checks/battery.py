@@ -7,14 +7,13 @@ The board needs 4.3 V at least (ArduPilot, Power module and brown-outs: Vcc 5 V,
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from care_core.ecosystems.ardupilot.battery import Battery, within_reason
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
+from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
@@ -61,71 +60,73 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _pack(flight: Flight, battery: Battery, table: Table) -> Iterator[Finding]:
-    t, volts, cells, rest = table.t, table["Volt"], battery.cells, battery.rest_v
+    t, cells, rest = table.t, battery.cells, battery.rest_v
     watched = flight.watch(t)
-    failsafe = flight.battery_failsafe_s
-    lowest = smooth(t, volts, 2.0) / cells
+    lowest = smooth(t, table["Volt"], 2.0) / cells
     low = lasting(t, watched & (lowest < CRITICAL), _LASTS_S)
-    deep = bool(lasting(t, watched & (lowest < RUINOUS), _LASTS_S))
-    flown = float(np.min(lowest[watched])) if watched.any() else math.nan
     if rest is not None and rest / cells < NOT_FULL and flight.watched:
-        missing = 1 - rest / cells / NOT_FULL
-        severity: Severity = "critical" if failsafe is not None or low else "warning" if flight.armed else "info"
-        begin = flight.watched[0][0]
-        yield Finding(
-            kind="battery",
-            title="the battery was not charged",
-            onset_s=begin,
-            end_s=flight.watched[-1][1],
-            severity=severity,
-            evidence=(
-                f"{rest:.1f} V at rest before take-off, {rest / cells:.2f} V for each of {cells} cells "
-                f"(full 4.2, limit {NOT_FULL})" + _said(failsafe)
-            ),
-            source="BAT.Volt before take-off; voltages of lithium polymer cells",
-            probability=calibrated_probability(missing, _CALIBRATION),
-        )
+        yield _not_charged(flight, rest, cells, is_low=bool(low))
     elif low:
-        start, end = low[0]
-        amps = _load(table, start, end)
-        yield Finding(
-            kind="battery",
-            title="the battery sags under its load",
-            onset_s=start,
-            end_s=low[-1][1],
-            severity="critical" if deep or failsafe is not None else "warning",
-            evidence=(
-                f"down to {flown * cells:.1f} V, {flown:.2f} V for each of {cells} cells{amps}; {CRITICAL} V is the "
-                f"critical level" + _said(failsafe)
-            ),
-            source="BAT.Volt; 3.3 V a cell: ArduPilot, Battery Failsafe",
-            probability=_DEEP if deep else _SAGS,
-        )
-    elif failsafe is not None:
-        limit = flight.setting("BATT_LOW_VOLT", "FS_BATT_VOLTAGE", "LOW_VOLT") or 0.0
-        at_v = float(np.interp(failsafe, t, volts))
-        early = limit / cells > LOW + _EARLY_V
-        yield Finding(
-            kind="battery",
-            title="battery failsafe",
-            onset_s=failsafe,
-            end_s=flight.end_s,
-            severity="critical",
-            evidence=(
-                f"failsafe at {at_v:.1f} V, {at_v / cells:.2f} V for each of {cells} cells"
-                + (
-                    f"; BATT_LOW_VOLT={limit:g} asks for it at {limit / cells:.2f} V a cell, 3.5 is usual"
-                    if early
-                    else ""
-                )
-            ),
-            source="ERR of the battery failsafe; BAT.Volt",
-            suspect="parameter" if early else "operation",
-            probability=_FAILSAFE,
-        )
+        deep = bool(lasting(t, watched & (lowest < RUINOUS), _LASTS_S))
+        yield _sags(flight, table, low, float(np.min(lowest[watched])), cells, is_deep=deep)
+    elif (failsafe := flight.battery_failsafe_s) is not None:
+        yield _failsafe(flight, failsafe, float(np.interp(failsafe, t, table["Volt"])), cells)
 
 
-def _said(failsafe: float | None) -> str:
+def _not_charged(flight: Flight, rest: float, cells: int, *, is_low: bool) -> Finding:
+    failsafe = flight.battery_failsafe_s
+    severity: Severity = "critical" if failsafe is not None or is_low else "warning" if flight.armed else "info"
+    return Finding(
+        kind="battery",
+        title="the battery was not charged",
+        onset_s=flight.watched[0][0],
+        end_s=flight.watched[-1][1],
+        severity=severity,
+        evidence=(
+            f"{rest:.1f} V at rest before take-off, {rest / cells:.2f} V for each of {cells} cells "
+            f"(full 4.2, limit {NOT_FULL})" + _and_failsafe(failsafe)
+        ),
+        source="BAT.Volt before take-off; voltages of lithium polymer cells",
+        probability=calibrated_probability(1 - rest / cells / NOT_FULL, _CALIBRATION),
+    )
+
+
+def _sags(flight: Flight, table: Table, low: list[Span], lowest: float, cells: int, *, is_deep: bool) -> Finding:
+    failsafe = flight.battery_failsafe_s
+    return Finding(
+        kind="battery",
+        title="the battery sags under its load",
+        onset_s=low[0][0],
+        end_s=low[-1][1],
+        severity="critical" if is_deep or failsafe is not None else "warning",
+        evidence=(
+            f"down to {lowest * cells:.1f} V, {lowest:.2f} V for each of {cells} cells{_load(table, *low[0])}; "
+            f"{CRITICAL} V is the critical level" + _and_failsafe(failsafe)
+        ),
+        source="BAT.Volt; 3.3 V a cell: ArduPilot, Battery Failsafe",
+        probability=_DEEP if is_deep else _SAGS,
+    )
+
+
+def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int) -> Finding:
+    """A failsafe of a battery that was well: set too early, or flown until then."""
+    limit = flight.setting("BATT_LOW_VOLT", "FS_BATT_VOLTAGE", "LOW_VOLT") or 0.0
+    is_early = limit / cells > LOW + _EARLY_V
+    asks = f"; BATT_LOW_VOLT={limit:g} asks for it at {limit / cells:.2f} V a cell, 3.5 is usual" if is_early else ""
+    return Finding(
+        kind="battery",
+        title="battery failsafe",
+        onset_s=failsafe,
+        end_s=flight.end_s,
+        severity="critical",
+        evidence=f"failsafe at {volts:.1f} V, {volts / cells:.2f} V for each of {cells} cells{asks}",
+        source="ERR of the battery failsafe; BAT.Volt",
+        suspect="parameter" if is_early else "operation",
+        probability=_FAILSAFE,
+    )
+
+
+def _and_failsafe(failsafe: float | None) -> str:
     return "" if failsafe is None else f"; battery failsafe at {failsafe:.1f} s"
 
 
