@@ -123,7 +123,7 @@ class Format(Record):
 
     name: str
     make: Callable[[Path], bytes]
-    library: str
+    peer: str
     count: Callable[[Path], Iterator[Any]]
 
 
@@ -225,7 +225,7 @@ def damage(copies: int) -> None:
             f"{np.mean(ours[of::2]) / whole:4.0%} and {np.mean(theirs[of::2]) / whole:4.0%}" for of in (1, 0)
         )
         print(
-            f"  {form.name:12s} of {whole} messages we and {form.library} find {cut} cut, {turned} with bits turned; "
+            f"  {form.name:12s} of {whole} messages we and {form.peer} find {cut} cut, {turned} with bits turned; "
             f"more in {more} of {copies}, fewer in {less}"
         )
 
