@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -56,6 +57,14 @@ def _entry(text: str) -> Path:
 @cache
 def _program() -> bytes:
     """What tells one version of the program from another: the sizes and times of its source files."""
-    folder = Path(__file__).parents[1]
-    stats = [os.stat(entry) for entry in sorted(folder.rglob("*.py"))]
-    return ",".join(f"{stat.st_size}:{stat.st_mtime_ns}" for stat in stats).encode()
+    return ",".join(_stamps(Path(__file__).parents[1])).encode()
+
+
+def _stamps(folder: str | Path) -> Iterator[str]:
+    with os.scandir(folder) as entries:
+        for entry in sorted(entries, key=lambda entry: entry.name):
+            if entry.name.endswith(".py"):
+                stat = entry.stat()
+                yield f"{stat.st_size}:{stat.st_mtime_ns}"
+            elif entry.name != "__pycache__" and entry.is_dir():
+                yield from _stamps(entry.path)
