@@ -130,14 +130,14 @@ class _Telemetry(Record, eq=False, dict=True):
                 table[field][table[field] == _UNKNOWN[field]] = np.nan
         return table
 
-    def exchanged(self, message: str, *fields: str) -> list[Table]:
-        """A message that the vehicle sent, or that was sent to it; one table a sender."""
+    def exchanged(self, message: str, *fields: str) -> dict[str, Table]:
+        """A message that the vehicle sent, or that was sent to it: one table a sender, of the vehicle under ""."""
         names = [channel.name for channel in self.log.channels() if channel.name.partition("@")[0] == message]
         tables = self.log.read(dict.fromkeys(names, (*fields, "target_system")))
-        return [
-            table if name == message else table.where(table["target_system"] == self.system)
+        return {
+            name.partition("@")[2]: table if name == message else table.where(table["target_system"] == self.system)
             for name, table in tables.items()
-        ]
+        }
 
     @cached_property
     def system(self) -> int:
@@ -215,7 +215,7 @@ def _armings(log: _Telemetry) -> Table | None:
     armed = (beats["base_mode"].astype(np.int64) & _ARMED_FLAG) > 0
     changed = np.flatnonzero(armed[1:] != armed[:-1]) + 1
     t = (beats.t[changed] + beats.t[changed - 1]) / 2
-    commands = log.exchanged("COMMAND_LONG", "command", "param1", "param2")
+    commands = log.exchanged("COMMAND_LONG", "command", "param1", "param2").values()
     orders = [c.t[(c["command"] == _ARM_DISARM) & (c["param1"] == 0) & (c["param2"] == _FORCE)] for c in commands]
     forced = np.concatenate([np.empty(0), *orders])
     columns = {"ArmState": armed[changed].astype(np.float64)}
@@ -270,25 +270,48 @@ def _texts(log: _Telemetry) -> Iterator[Sample]:
 
 
 def _items(log: _Telemetry) -> Table | None:
-    """CMD: the mission as the vehicle or, to the vehicle, a ground station sent it. Item 0 is home, no item."""
+    """CMD: the mission as the vehicle or, to the vehicle, a ground station sent it. Item 0 is home, no item; here its
+    number says how many items there are, as the message before each transfer does."""
     rows: list[Sample] = []
     for message, scale in (("MISSION_ITEM_INT", 1e-7), ("MISSION_ITEM", 1.0)):
         for table in log.exchanged(
             message, "seq", "command", "param1", "param2", "x", "y", "z", "frame", "mission_type"
-        ):
+        ).values():
             own = table.where((table["mission_type"] == 0) & (table["seq"] > 0))
             columns = (
                 own["seq"], own["command"], own["param1"], own["param2"], own["x"] * scale, own["y"] * scale, own["z"],
-                own["frame"],
+                own["frame"], np.full(len(own), np.nan),
             )  # fmt: skip
             rows += zip(own.t.tolist(), zip(*(column.tolist() for column in columns), strict=True), strict=True)
-    top = max((int(row[0]) for _, row in rows), default=0)
-    for table in log.exchanged("MISSION_COUNT", "count", "mission_type"):
+    blank = (0.0,) * 8
+    announced = sorted(_counts(log))
+    if announced and announced[0][-1] and announced[0][0] <= min((t for t, _ in rows), default=np.inf):
+        rows.append((0.0, (*blank, 0.0)))  # what was held before the first upload is not known
+    rows += [(t, (*blank, count)) for t, count, _ in announced]
+    return _to_table(rows, ("CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame", "CTot"))
+
+
+def _counts(log: _Telemetry) -> Iterator[tuple[float, float, bool]]:
+    """When and how many items were announced, and whether to the vehicle; a mission that is cleared has none, and an
+    upload that the vehicle declined at once is none."""
+    for sender, table in log.exchanged("MISSION_COUNT", "count", "mission_type").items():
         own = table.where(table["mission_type"] == 0)
         for t, count in zip(own.t.tolist(), own["count"].tolist(), strict=True):
-            # A shorter mission has no items where the longer one before it had.
-            rows += [(t, (number, *[0.0] * 7)) for number in range(max(int(count), 1), top + 1)]
-    return _to_table(rows, ("CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame"))
+            if not sender or not _was_declined(log, t):
+                yield t, count, bool(sender)
+    for table in log.exchanged("MISSION_CLEAR_ALL", "mission_type").values():
+        yield from ((t, 0.0, True) for t in table.t[table["mission_type"] == 0].tolist())
+
+
+def _was_declined(log: _Telemetry, announced_s: float) -> bool:
+    """Whether the vehicle's answer to an upload is that it takes none: it asked for no item before."""
+    answers = log.heard("MISSION_ACK", "type", "mission_type")
+    if answers is None:
+        return False
+    own = answers.where((answers["mission_type"] == 0) & (answers.t >= announced_s))
+    asked = (log.heard(message, "seq") for message in ("MISSION_REQUEST", "MISSION_REQUEST_INT"))
+    later = (float(t) for table in asked if table is not None for t in table.t[table.t >= announced_s][:1])
+    return len(own) > 0 and own["type"][0] != 0 and bool(own.t[0] <= min(later, default=np.inf))
 
 
 def _to_table(rows: Iterable[Sample], fields: tuple[str, ...]) -> Table | None:

@@ -13,6 +13,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot import held_missions
+from care_core.ecosystems.ardupilot.held_missions import HeldMission
 from care_core.ecosystems.ardupilot.instances import instances
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded, recorded_as
 from care_core.ecosystems.ardupilot.texts import Refusal, refusal_of
@@ -30,6 +32,7 @@ READS: Wanted = {
     "MODE": ("ModeNum", "Rsn"),
     "ERR": ("Subsys", "ECode"),
     "EV": ("Id",),
+    **held_missions.READS,
 }
 
 _MODES = 2.0**32
@@ -210,6 +213,11 @@ class Recorded(RunModel):
     def events(self, *ids: int) -> list[float]:
         """Times of the EV records with one of these numbers."""
         return [t for t, number in self.event_records if number in ids]
+
+    @cached_property
+    def held_missions(self) -> tuple[HeldMission, ...]:
+        """The missions that the vehicle held, in order."""
+        return held_missions.held_missions(self.one("CMD", *held_missions.NEEDED))
 
     # --- modes -------------------------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from care_core.ecosystems.timeline import (
     parameter_changes,
     repeats,
     timeline_of,
+    within,
 )
 from care_core.ecosystems.vehicles import (
     FAILSAFE,
@@ -90,6 +91,7 @@ def timeline(flight: Flight, tables: Iterable[Table]) -> tuple[Event, ...]:
         *_events(flight),
         *_flown(flight),
         *_texts(flight),
+        *_replaced(flight),
         *parameter_changes(flight.settings, flight.armed, "PARM"),
         *supply_events(flight),
         *gaps(tables, flight.armed),
@@ -307,6 +309,15 @@ def _mission(flight: Flight, items: Sequence[tuple[float, int, str]]) -> Iterato
         text = f"mission: items {own[0][1]} to {max(number for _, number, _ in own)}"
         done = f", reached {_ranges(reached)}" if reached else ", none reached"
         yield Event(own[0][0], "mission", f"{text} until {last[0]:.0f} s{done}", "MSG")
+
+
+def _replaced(flight: Flight) -> Iterator[Event]:
+    """Each mission that took the place of another."""
+    for before, held in pairwise(flight.held_missions):
+        when = " while armed" if within(flight.armed, held.since_s) else ""
+        now = counted(len(held.waypoints), "waypoint")
+        text = f"another mission was uploaded{when}: {now}, {len(before.waypoints)} before"
+        yield Event(held.since_s, "mission", text if before.items else f"a mission was uploaded{when}: {now}", "CMD")
 
 
 def _ranges(numbers: Sequence[int]) -> str:

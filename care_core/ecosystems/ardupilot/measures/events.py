@@ -7,7 +7,7 @@ import re
 
 from care_core.ecosystems.ardupilot.armed import ArmChange
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, SAID_AFTER_S, analyse
-from care_core.ecosystems.ardupilot.measures.modes import flight_of
+from care_core.ecosystems.ardupilot.measures.modes import flight_of, is_armed
 from care_core.ecosystems.ardupilot.recorded import ErrorRecord
 from care_core.ecosystems.ardupilot.texts import Refusal, refusal_of
 from care_core.ecosystems.measures import Args, Mission, extractor, missing
@@ -33,11 +33,6 @@ def last_refusals(mission: Mission) -> list[Refusal]:
     attempts = [one for one in refusals if one.was_tried] or list(refusals)
     standing = {one.why: one for one in refusals if one.time_s >= attempts[-1].time_s - _STILL_S}
     return sorted(standing.values(), key=lambda one: (one.time_s, one.text))
-
-
-def is_armed(mission: Mission) -> bool:
-    """Whether the vehicle was armed before the mission's end."""
-    return any(change.is_armed and change.time_s <= mission.end_s for change in flight_of(mission).arm_changes)
 
 
 def errors(mission: Mission) -> list[ErrorRecord]:

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot import armed, recorded
+from care_core.ecosystems.ardupilot.held_missions import LAND, RETURN
 from care_core.ecosystems.ardupilot.measures.modes import flight_of, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import (
     ITEMS,
-    Item,
     RequestedMission,
     home_of,
-    items_of,
+    mission_held,
     requested_mission,
 )
 from care_core.ecosystems.ardupilot.messages import expanded
@@ -48,8 +48,7 @@ AIRBORNE_M = 2.0
 """Height above home from which a vehicle counts as airborne."""
 
 _METRES_PER_DEGREE = 111_319.49
-_NAV_WAYPOINT = 16
-_HOMEWARD = (20, 21)  # MAV_CMD_NAV_RETURN_TO_LAUNCH, MAV_CMD_NAV_LAND
+_HOMEWARD = (RETURN, LAND)
 _AT_HEIGHT_M = 0.5
 _STARTED = re.compile(r"Mission: (\d+) ")
 _REACHED = re.compile(r"Reached (?:command|waypoint) #(\d+)")
@@ -148,8 +147,8 @@ class FlownMission(Record, eq=False):
 
 def analyse(mission: Mission) -> FlownMission:
     """Works out what was flown of a mission; use through `mission.shared`."""
-    items = _items(mission)
-    numbers = [number for number, item in items.items() if _is_waypoint(item)]
+    held = mission.shared(mission_held)
+    items, numbers = ({}, []) if isinstance(held, Unavailable) else (held.items, held.waypoints)
     waypoints = tuple(Waypoint(items[n].lat, items[n].lng, items[n].alt_m) for n in numbers)
     home = home_of(mission)
     track = _track(mission, home)
@@ -214,10 +213,6 @@ def metres_between(lat: Floats, lng: Floats) -> float:
     return math.hypot(north, east * math.cos(math.radians(known_median(lat))))
 
 
-def _items(mission: Mission) -> dict[int, Item]:
-    return items_of(mission.tables.get("CMD"), mission.end_s)
-
-
 def _way(found: RequestedMission | Unavailable) -> tuple[Floats, tuple[float, float] | None]:
     """The corners of the way that was asked for, from home, and where it ends."""
     if isinstance(found, Unavailable):
@@ -227,10 +222,6 @@ def _way(found: RequestedMission | Unavailable) -> tuple[Floats, tuple[float, fl
         corners = np.vstack((corners, np.zeros(2)))
     end = (float(corners[-1, 0]), float(corners[-1, 1]))
     return corners, None if found.ending == "open" else end
-
-
-def _is_waypoint(item: Item) -> bool:
-    return item.command == _NAV_WAYPOINT and (item.lat != 0 or item.lng != 0)
 
 
 def _offset(home: Sequence[float], lat: float, lng: float) -> tuple[float, float]:
@@ -308,7 +299,8 @@ def _drive_phases(
 
 def _homeward(mission: Mission, started: Mapping[int, float]) -> float | None:
     """When the vehicle set out for home: by a mission item, a failsafe or the operator."""
-    items = _items(mission)
+    held = mission.shared(mission_held)
+    items = {} if isinstance(held, Unavailable) else held.items
     times = [t for number, t in started.items() if number in items and items[number].command in _HOMEWARD]
     homeward = (mode.start_s for mode in modes_in_force(mission) if mode.way in ("return", "land"))
     times += [t for t in homeward if t >= mission.start_s]

@@ -14,14 +14,14 @@ from care_core.ecosystems.ardupilot.measures.events import (
     errors,
     failed,
     forced,
-    is_armed,
     is_over,
     last_refusals,
     telling,
 )
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse, waypoint_offsets
-from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, mode_names
+from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, is_armed, mode_names
 from care_core.ecosystems.ardupilot.measures.outcome import HEIGHTS, WAYPOINT_TOLERANCE_M, plain_checks
+from care_core.ecosystems.ardupilot.measures.requested import mission_held
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric, points
 from care_core.ecosystems.vehicles import error_kind, error_words
@@ -58,6 +58,9 @@ class ArduPilotFlight(MissionKind):
         flown = mission.shared(analyse).waypoints
         if not expected:
             return ""
+        held = mission.shared(mission_held)
+        if isinstance(held, Unavailable) and not flown and flight_of(mission).held_missions:
+            return held.reason
         if len(flown) != len(expected):
             return f"the mission has {len(flown)} waypoints, the profile's has {len(expected)}"
         tolerance_m = float(mission.spec.get("tolerance_m", WAYPOINT_TOLERANCE_M))

@@ -18,6 +18,11 @@ def modes_in_force(mission: Mission) -> tuple[Mode, ...]:
     return tuple(mode for mode in modes if mode.number is not None)
 
 
+def is_armed(mission: Mission) -> bool:
+    """Whether the vehicle was armed before the mission's end."""
+    return any(change.is_armed and change.time_s <= mission.end_s for change in flight_of(mission).arm_changes)
+
+
 def mode_names(mission: Mission) -> tuple[str, ...]:
     """The names of the modes in force during the mission, each once."""
     return tuple(dict.fromkeys(mode.name for mode in modes_in_force(mission)))

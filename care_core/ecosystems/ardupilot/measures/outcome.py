@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.measures.events import CUT, failed, forced, has_event, is_armed, is_over
+from care_core.ecosystems.ardupilot.measures.events import CUT, failed, forced, has_event, is_over
 from care_core.ecosystems.ardupilot.measures.flown_mission import (
     AIRBORNE_M,
     NEEDS,
@@ -15,7 +15,8 @@ from care_core.ecosystems.ardupilot.measures.flown_mission import (
     analyse,
     metres_between,
 )
-from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, modes_in_force
+from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, is_armed, modes_in_force
+from care_core.ecosystems.ardupilot.measures.requested import mission_held
 from care_core.ecosystems.ardupilot.measures.route import landing_error
 from care_core.ecosystems.measures import Args, Mission, extractor, has
 from care_core.ecosystems.vehicles import flies
@@ -42,6 +43,12 @@ HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
 
 def _nothing_to_judge(mission: Mission, flown: FlownMission) -> Unavailable | None:
     """Why a flight says nothing about a mission, None when it does."""
+    held = mission.shared(mission_held)
+    if isinstance(held, Unavailable):
+        return held
+    if held.lacks:
+        known = f"the log holds {len(held.items)} of the {len(held.items) + held.lacks} items of the mission"
+        return Unavailable(known, "judge a log that is whole")
     if not flown.waypoints:
         return Unavailable("the log names no waypoints", "record CMD")
     if "MSG" not in mission.tables:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN, is_armed
+from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
 from care_core.ecosystems.ardupilot.measures.flown_mission import FlownMission, analyse
+from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.measures import Args, Mission, numeric, one_of
 from care_core.run import Unavailable
 

@@ -13,7 +13,23 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems.ardupilot import held_missions
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.held_missions import (
+    CHANGE_SPEED,
+    DELAY,
+    HOLDS,
+    JUMP,
+    LAND,
+    PLACES,
+    RETURN,
+    TAKEOFF,
+    HeldMission,
+    Item,
+)
 from care_core.ecosystems.ardupilot.instances import split
+from care_core.ecosystems.ardupilot.measures.modes import flight_of, is_armed, modes_in_force
+from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
@@ -24,20 +40,16 @@ Floats = NDArray[np.float64]
 Ending = Literal["return", "land", "open"]
 
 ITEMS: Wanted = {
-    "CMD": ("CNum", "CId", "Prm1", "Prm2", "Lat", "Lng", "Alt", "Frame"),
+    **held_missions.READS,
     "ORGN": ("Type", "Lat", "Lng", "Alt"),
     "POS": ("Lat", "Lng"),
 }
 """What `requested_mission` reads."""
 
-# Commands of MAVLink's common dialect (MAV_CMD).
-_WAYPOINT, _LOITER_TURNS, _LOITER_TIME, _RETURN, _LAND, _TAKEOFF, _SPLINE = 16, 18, 19, 20, 21, 22, 82
-_DELAY, _JUMP, _CHANGE_SPEED = 93, 177, 178
-_PLACES = frozenset((_WAYPOINT, _LOITER_TURNS, _LOITER_TIME, _SPLINE))
-_HOLDS = frozenset((_WAYPOINT, _LOITER_TIME))
 _ABOVE_SEA = (0, 5)
 """MAV_FRAME of a height above sea level; the others count from home (3, 6) or from the terrain (10, 11)."""
 _AIRSPEED, _GROUNDSPEED = 0, 1
+_ONE_MISSION = "judge a run whose mission stays as it was uploaded"
 _MOST_ITEMS = 2000
 """Items that are followed: a jump without end would never stop."""
 _HOME = 1
@@ -47,18 +59,6 @@ _SHARP_DEG = 60.0
 _LEVEL_M = 0.5
 """Height difference below which a leg is level."""
 _METRES_PER_DEGREE = 111_319.49
-
-
-class Item(Record):
-    """One mission item: command, its first two parameters, place in degrees, height in metres and its frame."""
-
-    command: int
-    first: float
-    second: float
-    lat: float
-    lng: float
-    alt_m: float
-    frame: int
 
 
 class RequestedMission(Record, eq=False):
@@ -105,58 +105,75 @@ class RequestedMission(Record, eq=False):
 
 def requested_mission(mission: Mission) -> RequestedMission | Unavailable:
     """The mission that the vehicle was given; use through `mission.shared`."""
-    items = items_of(mission.tables.get("CMD"), mission.end_s)
-    if not items:
-        return Unavailable("the log names no mission items", "record CMD")
+    held = mission.shared(mission_held)
+    if isinstance(held, Unavailable):
+        return held
+    if not held.items:
+        return Unavailable("the mission has no items", "upload one")
     home = home_of(mission)
     if home is None:
         return Unavailable("the log does not say where home is", "record ORGN or POS")
     points, holds, speeds = [(0.0, 0.0, 0.0)], [], []
     speed = 0.0
     ending: Ending = "open"
-    for item in _followed(items):
-        if item.command == _TAKEOFF:
+    for item in _followed(held.items):
+        if item.command == TAKEOFF:
             points[0] = (0.0, 0.0, _height(item, home))
-        elif item.command == _CHANGE_SPEED and item.first in (_AIRSPEED, _GROUNDSPEED):
+        elif item.command == CHANGE_SPEED and item.first in (_AIRSPEED, _GROUNDSPEED):
             speed = item.second if item.second > 0 else speed
-        elif item.command in _PLACES:
+        elif item.command in PLACES:
             points.append(_place(item, home, points[-1]))
-            holds.append(max(item.first, 0.0) if item.command in _HOLDS else 0.0)
+            holds.append(max(item.first, 0.0) if item.command in HOLDS else 0.0)
             speeds.append(speed)
-        elif item.command == _DELAY and holds:
+        elif item.command == DELAY and holds:
             holds[-1] += max(item.first, 0.0)
-        elif item.command in (_RETURN, _LAND):
-            if item.command == _LAND and (item.lat or item.lng):
+        elif item.command in (RETURN, LAND):
+            if item.command == LAND and (item.lat or item.lng):
                 points.append((*_offset(item, home), points[-1][2]))
                 holds.append(0.0)
                 speeds.append(speed)
-            ending = "return" if item.command == _RETURN else "land"
+            ending = "return" if item.command == RETURN else "land"
             break
     if len(points) < 2:
         return Unavailable("the mission has no waypoints")
     return RequestedMission(np.array(points), np.array(holds), np.array(speeds), ending)
 
 
-def items_of(table: Table | None, until_s: float) -> dict[int, Item]:
-    """The mission's items by their number as last loaded before a time, home (number 0) left out."""
-    if table is None or not has(table, "CNum", "CId", "Lat", "Lng", "Alt"):
-        return {}
-    part = table.where(table.t <= until_s)
-    zeros = np.zeros(len(part))
-    columns = [part.columns.get(name, zeros) for name in ITEMS["CMD"]]
-    items: dict[int, Item] = {}
-    for number, command, first, second, lat, lng, alt, frame in zip(*(c.tolist() for c in columns), strict=True):
-        items[int(number)] = Item(int(command), first, second, lat, lng, alt, int(frame))
-    return {number: item for number, item in sorted(items.items()) if number > 0}
+def mission_held(mission: Mission) -> HeldMission | Unavailable:
+    """The mission that the vehicle held while it flew one; use through `mission.shared`. What is uploaded before its
+    mission begins counts, as does what is uploaded when all of it is done; else nobody was asked for one mission."""
+    flight = flight_of(mission)
+    known = [one for one in flight.held_missions if one.since_s <= mission.end_s]
+    if not known:
+        return Unavailable("the log names no mission items", "record CMD")
+    begun_s = _begun_s(mission)
+    later = [one for one in known[1:] if one.since_s > begun_s]
+    held = known[-len(later) - 1]
+    if not later or _is_done(flight, held, begun_s, mission.end_s, later[0].since_s):
+        return held
+    return Unavailable(f"the mission was replaced under way, at {later[0].since_s:.0f} s", _ONE_MISSION)
+
+
+def _begun_s(mission: Mission) -> float:
+    """When the vehicle began its mission; a vehicle that began none holds the last that it was given."""
+    begun = [mode.start_s for mode in modes_in_force(mission) if mode.way == "mission"]
+    return max(mission.start_s, min(begun)) if begun and is_armed(mission) else mission.end_s
+
+
+def _is_done(flight: Flight, held: HeldMission, begun_s: float, end_s: float, replaced_s: float) -> bool:
+    """Whether all waypoints of a mission were reached when it was replaced, and the new one was never begun."""
+    told = [(t, item) for t, text in flight.messages_between(begun_s, end_s) if (item := mission_item(text))]
+    reached = {number for t, (number, what) in told if what == "reached" and t <= replaced_s}
+    return reached.issuperset(held.waypoints) and not any(t > replaced_s for t, _ in told)
 
 
 def _followed(items: Mapping[int, Item]) -> Iterator[Item]:
     """The items in the order in which they are flown."""
-    left = {number: int(item.second) for number, item in items.items() if item.command == _JUMP}
+    left = {number: int(item.second) for number, item in items.items() if item.command == JUMP}
     number, count = min(items), 0
     while number in items and count < _MOST_ITEMS:
         item, count = items[number], count + 1
-        if item.command == _JUMP and left[number] > 0 and int(item.first) in items:
+        if item.command == JUMP and left[number] > 0 and int(item.first) in items:
             left[number] -= 1
             number = int(item.first)
             continue

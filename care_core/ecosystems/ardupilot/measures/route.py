@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN, is_armed
+from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
+from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission, span_of_phase
 from care_core.ecosystems.ardupilot.measures.requested import requested_mission
 from care_core.ecosystems.ardupilot.measures.series import statistic
