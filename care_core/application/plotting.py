@@ -110,7 +110,7 @@ def ranked(case: OpenRun, sharing: Sharing = EVERYTHING) -> tuple[list[list[Sign
     matters = {result.variable.name for result in diagnosis.objectives if result.status == "fault"}
     matters |= {node.name for fault in diagnosis.faults for cause in fault.causes[:1] for node in cause.path}
     findings = [one for one in diagnosis.health.findings if one.severity != "info"]
-    named = [_channels(one) for one in (*findings, *(below for one in findings for below in one.consequences))]
+    named = [_channels(one) for one in (*findings, *(below for one in findings for below in one.below))]
 
     def rank(group: Sequence[Signal]) -> tuple[float, float]:
         found = next((place for place, names in enumerate(named) if group[0].channel in names), None)
@@ -170,7 +170,7 @@ def _plot(
             lines.append(Line(one.wanted_name, _segments(*wanted, span, wrap), is_wanted=True))
     if not lines:
         return None
-    findings = [one for found in case.diagnosis.health.findings for one in (found, *found.consequences)]
+    findings = [one for found in case.diagnosis.health.findings for one in (found, *found.below)]
     return Plot(
         words=_TOGETHER.get(channel, "") or words,
         source=f"{channel} {', '.join(drawn)}",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from collections.abc import Sequence
+from typing import Literal, Protocol, TypeVar
 
 from care_core.records import Record
 
@@ -74,7 +76,38 @@ class Finding(Record):
     """How likely a mission fails with it (0 to 1), where the training flights tell; None: as its severity says."""
     after_impact: bool = False
     consequences: tuple[Finding, ...] = ()
-    """Later findings that this one explains."""
+    """Later findings that this one led to, by physical steps each forwards in time."""
+    followed_by: tuple[Finding, ...] = ()
+    """Findings of its course of events that nothing shows it to have led to; some are seen just before it."""
+
+    @property
+    def below(self) -> tuple[Finding, ...]:
+        """All that is folded under it."""
+        return (*self.consequences, *self.followed_by)
+
+    @property
+    def links(self) -> tuple[tuple[str, tuple[Finding, ...]], ...]:
+        """What is folded under it, by the words for how it hangs together."""
+        return linked(self.onset_s, self.consequences, self.followed_by)
+
+
+class _Timed(Protocol):
+    @property
+    def onset_s(self) -> float | None: ...
+
+
+T = TypeVar("T", bound=_Timed)
+
+
+def linked(
+    onset_s: float | None, consequences: Sequence[T], followed_by: Sequence[T]
+) -> tuple[tuple[str, tuple[T, ...]], ...]:
+    """What is folded under a finding, by the words for how it hangs together; without empty ones."""
+    since_s = math.inf if onset_s is None else onset_s
+    later = tuple(one for one in followed_by if one.onset_s is None or one.onset_s >= since_s)
+    before = tuple(one for one in followed_by if one not in later)
+    links = (("led to", tuple(consequences)), ("followed by", later), ("seen just before it", before))
+    return tuple(link for link in links if link[1])
 
 
 WHOLE_LOG = "the whole log"

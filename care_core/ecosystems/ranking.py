@@ -5,16 +5,15 @@ Severe before mild, likely before suspected, causes before symptoms, then in ord
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
+from care_core.ecosystems.explains import EXPLAINS, Explains
 from care_core.ecosystems.findings import Finding, FindingKind
 from care_core.records import replace
 
-Explains = Mapping[FindingKind, frozenset[FindingKind]]
-"""Per kind of finding the kinds that it can bring about."""
-
 SLACK_S = 1.5
-"""Onsets are told this exactly: a consequence may be seen so much before its cause is."""
+"""Onsets are told this exactly: a consequence may be seen so much before its cause, which is told first all the same.
+"""
 LIKELY = 0.5
 """A finding at least this probable is told before suspicions of the same severity, and is no consequence of one."""
 OVER_S = 60.0
@@ -27,27 +26,31 @@ _SEVERITY = {"critical": 0, "warning": 1, "info": 2}
 
 
 def rank_findings(
-    findings: Iterable[Finding], explains: Explains, impact_s: float | None = None
+    findings: Iterable[Finding], impact_s: float | None = None, explains: Explains = EXPLAINS
 ) -> tuple[Finding, ...]:
-    """Findings in the order told: causes first, what each explains folded under it, what comes after the impact last.
+    """Findings in the order told: causes first, what belongs to each folded under it, what comes after the impact last.
 
-    A finding is explained by one that is told before it and began before it, whose kind can lead to its kind, directly
-    or by others, and that is not much less sure: a part that surely failed is no consequence of a mere suspicion.
+    A finding leads to another by a step of the table, or by several through findings that are there, each forwards in
+    time. What several steps would reach whose findings are missing, or what is seen within the slack before it, is of
+    the same course of events and no more. Neither is much surer than the first: a part that surely failed is no
+    consequence of a mere suspicion.
 
     Args:
-        explains: which kind can bring about which.
         impact_s: when the vehicle was down against its will, None where it was not.
+        explains: which kind can bring about which directly.
     """
     marked = [replace(f, after_impact=impact_s is not None and f.onset_s > impact_s) for f in findings]
     reach = _closure(explains)
-    roots: list[tuple[Finding, list[Finding]]] = []
-    for finding in sorted(marked, key=lambda f: _place(f, marked, reach)):
-        cause = next((entry for entry in roots if _explains(entry[0], finding, reach)), None)
-        if cause is None:
-            roots.append((finding, []))
-        else:
-            cause[1].append(finding)
-    return tuple(replace(root, consequences=tuple(sorted(below, key=lambda f: f.onset_s))) for root, below in roots)
+    left = sorted(marked, key=lambda f: _place(f, marked, reach))
+    told = []
+    while left:
+        root, *left = left
+        below = [one for one in left if _belongs(root, one, reach)]
+        led_to = _led_to(root, below, explains)
+        left = [one for one in left if one not in below]
+        others = [one for one in below if one not in led_to]
+        told.append(replace(root, consequences=_in_time(led_to), followed_by=_in_time(others)))
+    return tuple(told)
 
 
 def lost_by(findings: Iterable[Finding], *, is_judged: bool) -> tuple[str, ...]:
@@ -63,6 +66,10 @@ def lost_by(findings: Iterable[Finding], *, is_judged: bool) -> tuple[str, ...]:
     )
 
 
+def _in_time(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    return tuple(sorted(findings, key=lambda f: f.onset_s))
+
+
 def _place(finding: Finding, every: Iterable[Finding], reach: Explains) -> tuple[bool, int, bool, bool, float, bool]:
     """Sorts findings: one whose cause was seen within the slack after it comes after that cause."""
     causes = (
@@ -70,8 +77,8 @@ def _place(finding: Finding, every: Iterable[Finding], reach: Explains) -> tuple
         for other in every
         if other.onset_s > finding.onset_s
         and _rank(other) == _rank(finding)
-        and _explains(other, finding, reach)
-        and not _explains(finding, other, reach)
+        and _belongs(other, finding, reach)
+        and not _belongs(finding, other, reach)
     )
     onset_s = max(causes, default=finding.onset_s)
     return *_rank(finding), onset_s, onset_s > finding.onset_s
@@ -82,14 +89,27 @@ def _rank(finding: Finding) -> tuple[bool, int, bool, bool]:
     return finding.after_impact, _SEVERITY[finding.severity], not likely, finding.kind in SYMPTOMS
 
 
-def _explains(cause: Finding, finding: Finding, reach: Explains) -> bool:
+def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
+    """Whether a finding is of the course of events that another began."""
     return (
         not (finding.severity == "info" and finding.suspect == "parameter")  # it was set so before anything failed
-        and finding.kind in reach.get(cause.kind, frozenset())
-        and cause.onset_s <= finding.onset_s + SLACK_S
-        and cause.end_s >= finding.onset_s - OVER_S
-        and (finding.probability < LIKELY or (cause.probability >= LIKELY and not _only_set(cause, finding)))
+        and finding.kind in reach.get(root.kind, frozenset())
+        and root.onset_s <= finding.onset_s + SLACK_S
+        and root.end_s >= finding.onset_s - OVER_S
+        and (finding.probability < LIKELY or (root.probability >= LIKELY and not _only_set(root, finding)))
     )
+
+
+def _led_to(root: Finding, others: Iterable[Finding], explains: Explains) -> list[Finding]:
+    """What of others a finding led to, step by step."""
+    found, left, steps = list[Finding](), list(others), [root]
+    while steps:
+        cause = steps.pop()
+        after = [one for one in left if cause.onset_s <= one.onset_s and one.kind in explains.get(cause.kind, ())]
+        left = [one for one in left if one not in after]
+        found += after
+        steps += after
+    return found
 
 
 def _only_set(cause: Finding, finding: Finding) -> bool:

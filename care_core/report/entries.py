@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from care_core.ecosystems.findings import Finding, FindingKind, Health, Severity
+from care_core.ecosystems.findings import Finding, FindingKind, Health, Severity, linked
+from care_core.records import field
 from care_core.report.published import Document, publish
 from care_core.run import Damage
 
@@ -19,7 +20,7 @@ class EventEntry(Document, kw_only=True):
 
 
 class ConsequenceEntry(Document, kw_only=True):
-    """A later finding that an earlier one explains."""
+    """A finding that is folded under another."""
 
     kind: FindingKind
     title: str
@@ -28,7 +29,7 @@ class ConsequenceEntry(Document, kw_only=True):
 
 
 class FindingEntry(Document, kw_only=True):
-    """Something that was not as it should be; what it explains is folded under it."""
+    """Something that was not as it should be; what belongs to it is folded under it."""
 
     kind: FindingKind
     title: str
@@ -39,6 +40,14 @@ class FindingEntry(Document, kw_only=True):
     evidence: str
     source: str
     consequences: list[ConsequenceEntry]
+    """Later findings that it led to, by physical steps each forwards in time."""
+    followed_by: list[ConsequenceEntry] = field(default_factory=list)
+    """Findings of its course of events that nothing shows it to have led to."""
+
+    @property
+    def links(self) -> tuple[tuple[str, tuple[ConsequenceEntry, ...]], ...]:
+        """What is folded under it, by the words for how it hangs together."""
+        return linked(self.onset_s, self.consequences, self.followed_by)
 
 
 class DamageEntry(Document, kw_only=True):
@@ -57,7 +66,8 @@ def finding_entries(health: Health) -> list[FindingEntry]:
 
 def _finding(finding: Finding) -> FindingEntry:
     consequences = [publish(ConsequenceEntry, below) for below in finding.consequences]
-    return publish(FindingEntry, finding, consequences=consequences)
+    followed_by = [publish(ConsequenceEntry, below) for below in finding.followed_by]
+    return publish(FindingEntry, finding, consequences=consequences, followed_by=followed_by)
 
 
 def damage_entries(places: Iterable[Damage]) -> list[DamageEntry]:

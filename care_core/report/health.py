@@ -20,9 +20,9 @@ E = TypeVar("E", bound="Event | EventEntry")
 
 
 def finding_sentence(finding: FindingEntry) -> str:
-    """A finding of a document with its numbers and what it led to."""
+    """A finding of a document with its numbers and what is folded under it."""
     late = ", after it was down" if finding.after_impact else ""
-    led = f" Led to: {'; '.join(one.title for one in finding.consequences)}." if finding.consequences else ""
+    led = "".join(f" {words.capitalize()}: {'; '.join(one.title for one in below)}." for words, below in finding.links)
     return f"{finding.title}, at {seconds(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
 
 
@@ -52,7 +52,7 @@ def telling(account: Sequence[E], most: int) -> list[E]:
 
 
 def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
-    """The findings as text, consequences under what explains them; that nothing was found is said plainly."""
+    """The findings as text, what belongs to another under it; that nothing was found is said plainly."""
     shown = noted(findings)
     if findings and not shown:
         return
@@ -66,14 +66,14 @@ def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
         yield from wrapped(f"{finding.title}, at {seconds(finding.onset_s)}{late}", head)
         if finding.evidence:
             yield from wrapped(finding.evidence, " " * len(head))
-        yield from _led_to(finding, " " * len(head))
+        yield from _folded(finding, " " * len(head))
 
 
-def _led_to(finding: Finding | FindingEntry, indent: str) -> Iterator[str]:
-    titles = list(dict.fromkeys(f"{one.title} ({seconds(one.onset_s)})" for one in finding.consequences))
-    if titles:
+def _folded(finding: Finding | FindingEntry, indent: str) -> Iterator[str]:
+    for words, below in finding.links:
+        titles = list(dict.fromkeys(f"{one.title} ({seconds(one.onset_s)})" for one in below))
         more = f" and {len(titles) - LED_TO_SHOWN} more" if len(titles) > LED_TO_SHOWN else ""
-        yield from wrapped(f"led to: {'; '.join(titles[:LED_TO_SHOWN])}{more}", indent)
+        yield from wrapped(f"{words}: {'; '.join(titles[:LED_TO_SHOWN])}{more}", indent)
 
 
 def reason_lines(reasons: Sequence[Reason]) -> Iterator[str]:

@@ -48,9 +48,9 @@ _GRAVE = 2
 
 
 def marks_of(diagnosis: Diagnosis) -> list[Mark]:
-    """What happened, in order of time: findings and what they led to, the moments that matter, and what the diagnosis
-    rests on."""
-    findings = [one for found in noted(diagnosis.health.findings) for one in (found, *found.consequences)]
+    """What happened, in order of time: findings with what is folded under them, the moments that matter, and what the
+    diagnosis rests on."""
+    findings = [one for found in noted(diagnosis.health.findings) for one in (found, *found.below)]
     marks = [Mark(f.onset_s, f.severity, f.title, _RANKS[f.severity]) for f in findings]
     account = diagnosis.health.timeline
     marks += [Mark(one.time_s, one.kind, one.text, _RANKS[one.kind]) for one in account if one.kind in _RANKS]

@@ -17,14 +17,17 @@ from care_tui.render.objectives import damage
 from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, status, text, warning
 
 TIME_WIDTH, KIND_WIDTH = 8, 10
+_SHORT = {"led to": "led to", "followed by": "then", "seen just before it": "before"}
 _COLOURS: dict[Severity, str] = {"critical": "bold $text-error", "warning": "$text-warning", "info": ""}
 
 
 class FindingRow(Record):
-    """A line of the pane: a finding, one that `cause` led to, or an event of the timeline."""
+    """A line of the pane: a finding, one that is folded under `cause`, or an event of the timeline."""
 
     what: Finding | Event
     cause: Finding | None = None
+    link: str = ""
+    """How it hangs together with that."""
 
     @property
     def time_s(self) -> float:
@@ -39,21 +42,24 @@ class FindingRow(Record):
 
 
 def health_rows(health: Health) -> list[FindingRow]:
-    """Findings, the first cause first and what each led to below it; then the account in order of time."""
+    """Findings, the first cause first and what is folded under each below it; then the account in order of time."""
     lines = []
     for finding in noted(health.findings):
-        lines += [FindingRow(finding), *(FindingRow(below, finding) for below in finding.consequences)]
+        lines.append(FindingRow(finding))
+        lines += [FindingRow(below, finding, link) for link, several in finding.links for below in several]
     return [*lines, *(FindingRow(event) for event in health.timeline)]
 
 
 def health_row_item(one: FindingRow, glyphs: Glyphs) -> Content:
-    """One line of the pane. A finding has a sign and a word, what it led to is set in, an event is plain."""
+    """One line of the pane. A finding has a sign and a word, what is folded under it is set in, an event is plain."""
     time = f"{seconds(one.time_s):>{TIME_WIDTH}}  "
     if isinstance(one.what, Event):
         return Content.assemble("  ", padded(one.what.kind, KIND_WIDTH), time, text(one.what.text))
     late = "  (after it was down)" if one.what.after_impact else ""
     if one.cause is not None:
-        return Content.assemble(f"  {glyphs.to} ", padded("led to", KIND_WIDTH - 2), time, text(one.what.title + late))
+        return Content.assemble(
+            f"  {glyphs.to} ", padded(_SHORT[one.link], KIND_WIDTH - 2), time, text(one.what.title + late)
+        )
     sign = {"critical": glyphs.fault, "warning": "!", "info": " "}[one.what.severity]
     head = padded(f"{sign} {SEVERITY_WORDS[one.what.severity]}", KIND_WIDTH + 2, _COLOURS[one.what.severity])
     return Content.assemble(head, time, text(one.what.title, "bold"), text(late))
@@ -63,11 +69,11 @@ def health_row_details(one: FindingRow) -> list[Row]:
     """All about one line of the pane."""
     if isinstance(one.what, Event):
         return [labelled(seconds(one.what.time_s), one.what.text), labelled("From", one.what.source)]
-    return finding_rows(one.what, one.cause)
+    return finding_rows(one.what, one.cause, one.link)
 
 
-def finding_rows(finding: Finding, cause: Finding | None = None) -> list[Row]:
-    """A finding with its numbers, where they come from, and what it led to."""
+def finding_rows(finding: Finding, cause: Finding | None = None, link: str = "") -> list[Row]:
+    """A finding with its numbers, where they come from, and what is folded under it."""
     span = seconds(finding.onset_s)
     if finding.end_s > finding.onset_s:
         span += f" to {seconds(finding.end_s)}"
@@ -75,10 +81,15 @@ def finding_rows(finding: Finding, cause: Finding | None = None) -> list[Row]:
     rows += [labelled("Seen by", finding.evidence)] if finding.evidence else []
     rows += [labelled("From", finding.source)] if finding.source else []
     if cause is not None:
-        rows.append(labelled("Explained by", f"{cause.title} ({seconds(cause.onset_s)})"))
+        how = "Explained by" if link == "led to" else "Seen with"
+        rows.append(labelled(how, f"{cause.title} ({seconds(cause.onset_s)})"))
     rows += [
-        labelled("" if place else "It led to", f"{below.title} ({seconds(below.onset_s)})")
-        for place, below in enumerate(finding.consequences)
+        labelled(
+            "" if place else f"It {words}" if words == "led to" else words.capitalize(),
+            f"{below.title} ({seconds(below.onset_s)})",
+        )
+        for words, several in finding.links
+        for place, below in enumerate(several)
     ]
     return rows
 

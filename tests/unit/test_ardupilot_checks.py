@@ -461,7 +461,7 @@ def test_motors_at_their_limit_before_it_swings_are_not_the_oscillations_doing()
     made = Made()
     oscillating(made, start=60.0)
     made.table["CTUN"]["ThO"][made.after(30.0, 80.0)] = 0.98
-    found = {one.title: one for root in made.find() for one in (root, *root.consequences)}
+    found = {one.title: one for root in made.find() for one in (root, *root.below)}
     assert found["pitch oscillates"].severity == "warning"
     assert first(made).title == "too little thrust"
 

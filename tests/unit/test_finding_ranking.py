@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from hypothesis import given
 from hypothesis import strategies as st
 
+from care_core.ecosystems.explains import Explains
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
-from care_core.ecosystems.ranking import OVER_S, SLACK_S, Explains, lost_by, rank_findings
+from care_core.ecosystems.ranking import OVER_S, SLACK_S, lost_by, rank_findings
 from care_core.records import replace
 
 EXPLAINS: Explains = {
@@ -22,32 +25,53 @@ def finding(kind: FindingKind, onset_s: float, severity: Severity = "critical") 
     return Finding(kind, kind, onset_s, onset_s + 1, severity, "", "")
 
 
+def ranked(findings: Iterable[Finding], impact_s: float | None = None) -> tuple[Finding, ...]:
+    return rank_findings(findings, impact_s, EXPLAINS)
+
+
 def test_what_a_cause_leads_to_by_several_steps_folds_under_it() -> None:
-    (root,) = rank_findings([finding("control", 9.0), finding("laser", 1.0), finding("planner", 5.0)], EXPLAINS)
+    (root,) = ranked([finding("control", 9.0), finding("laser", 1.0), finding("planner", 5.0)])
     assert (root.kind, [one.kind for one in root.consequences]) == ("laser", ["planner", "control"])
 
 
-def test_a_cause_seen_just_after_its_consequence_still_leads_it() -> None:
-    (root,) = rank_findings([finding("planner", 5.0), finding("laser", 5.0 + SLACK_S)], EXPLAINS)
-    assert (root.kind, [one.kind for one in root.consequences]) == ("laser", ["planner"])
-    assert [
-        one.kind for one in rank_findings([finding("planner", 5.0), finding("laser", 5.1 + SLACK_S)], EXPLAINS)
-    ] == [
-        "planner",
-        "laser",
-    ]
+def test_a_cause_seen_just_after_its_consequence_is_told_first_and_did_not_lead_to_it() -> None:
+    (root,) = ranked([finding("planner", 5.0), finding("laser", 5.0 + SLACK_S)])
+    assert (root.kind, root.consequences, [one.kind for one in root.followed_by]) == ("laser", (), ["planner"])
+    assert [words for words, _ in root.links] == ["seen just before it"]
+    late = ranked([finding("planner", 5.0), finding("laser", 5.1 + SLACK_S)])
+    assert [one.kind for one in late] == ["planner", "laser"]
+
+
+def test_a_step_that_is_missing_leads_to_nothing() -> None:
+    """A laser stops a controller through the planner; where the planner did well, it is only followed by it."""
+    (root,) = ranked([finding("laser", 1.0), finding("control", 9.0)])
+    assert root.consequences == ()
+    assert [(words, [one.kind for one in below]) for words, below in root.links] == [("followed by", ["control"])]
+
+
+@given(st.permutations([("laser", 3.0), ("planner", 2.0), ("control", 4.0)]))
+def test_a_step_backwards_in_time_leads_to_nothing(given_ones: list[tuple[FindingKind, float]]) -> None:
+    (root,) = ranked([finding(*one) for one in given_ones])
+    assert root.consequences == ()
+    assert [one.kind for one in root.followed_by] == ["planner", "control"]
+
+
+def test_a_compass_loses_no_fix() -> None:
+    """By the table of the program itself: through a lost attitude alone, whose antenna looks down."""
+    (root,) = rank_findings([finding("compass", 1.0), finding("gps", 9.0)])
+    assert [words for words, _ in root.links] == ["followed by"]
+    (root,) = rank_findings([finding("compass", 1.0), finding("attitude", 5.0), finding("gps", 9.0)])
+    assert [(words, len(below)) for words, below in root.links] == [("led to", 2)]
 
 
 def test_what_was_over_long_before_brings_nothing_about() -> None:
     soon, late = finding("planner", 2.0 + OVER_S), finding("planner", 2.1 + OVER_S)
-    assert len(rank_findings([finding("laser", 1.0), soon], EXPLAINS)) == 1
-    assert len(rank_findings([finding("laser", 1.0), late], EXPLAINS)) == 2
+    assert len(ranked([finding("laser", 1.0), soon])) == 1
+    assert len(ranked([finding("laser", 1.0), late])) == 2
 
 
 def test_a_lesser_finding_explains_no_worse_one() -> None:
-    assert [
-        one.kind for one in rank_findings([finding("laser", 1.0, "warning"), finding("planner", 5.0)], EXPLAINS)
-    ] == [
+    assert [one.kind for one in ranked([finding("laser", 1.0, "warning"), finding("planner", 5.0)])] == [
         "planner",
         "laser",
     ]
@@ -56,33 +80,33 @@ def test_a_lesser_finding_explains_no_worse_one() -> None:
 def test_what_is_likely_is_told_before_suspicions_and_is_no_consequence_of_one() -> None:
     suspected = replace(finding("laser", 1.0), probability=0.2)
     likely = replace(finding("planner", 5.0), probability=0.9)
-    assert [one.kind for one in rank_findings([suspected, likely], EXPLAINS)] == ["planner", "laser"]
+    assert [one.kind for one in ranked([suspected, likely])] == ["planner", "laser"]
 
 
 def test_a_part_that_surely_failed_is_not_what_a_setting_led_to() -> None:
     by_setting = replace(finding("laser", 1.0), probability=0.8, suspect="parameter")
     part = replace(finding("planner", 5.0), probability=0.6)
-    assert [one.kind for one in rank_findings([by_setting, part], EXPLAINS)] == ["laser", "planner"]
-    (root,) = rank_findings([by_setting, replace(part, probability=0.3)], EXPLAINS)
+    assert [one.kind for one in ranked([by_setting, part])] == ["laser", "planner"]
+    (root,) = ranked([by_setting, replace(part, probability=0.3)])
     assert root.kind == "laser"
 
 
 def test_a_symptom_is_told_after_a_cause_of_its_weight() -> None:
-    assert [one.kind for one in rank_findings([finding("attitude", 1.0), finding("battery", 9.0)], {})] == [
+    assert [one.kind for one in rank_findings([finding("attitude", 1.0), finding("battery", 9.0)], explains={})] == [
         "battery",
         "attitude",
     ]
 
 
 def test_what_comes_after_the_impact_is_told_last() -> None:
-    first, last = rank_findings([finding("laser", 8.0), finding("drive", 2.0, "warning")], EXPLAINS, impact_s=5.0)
+    first, last = ranked([finding("laser", 8.0), finding("drive", 2.0, "warning")], 5.0)
     assert (first.kind, first.after_impact, last.kind, last.after_impact) == ("drive", False, "laser", True)
 
 
 @given(st.lists(st.tuples(st.sampled_from(KINDS), st.floats(0, 20), st.sampled_from(SEVERITIES)), max_size=8))
 def test_every_finding_is_told_once(given_ones: list[tuple[FindingKind, float, Severity]]) -> None:
     findings = [finding(*one) for one in given_ones]
-    said = [(one.kind, one.onset_s) for root in rank_findings(findings, EXPLAINS) for one in (root, *root.consequences)]
+    said = [(one.kind, one.onset_s) for root in ranked(findings) for one in (root, *root.below)]
     assert sorted(said) == sorted((one.kind, one.onset_s) for one in findings)
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from care_core.ecosystems.ardupilot import flight as flight_model
 from care_core.ecosystems.ardupilot import timeline
 from care_core.ecosystems.ardupilot.checks import CHECKS
-from care_core.ecosystems.ardupilot.explains import EXPLAINS
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, Health
@@ -29,7 +28,7 @@ def find(flight: Flight) -> tuple[Finding, ...]:
     flight.expect(READS)
     with np.errstate(all="ignore"):
         found = [finding for check in CHECKS for finding in check.find(flight)]
-    return rank_findings(found, EXPLAINS, flight.down_s)
+    return rank_findings(found, flight.down_s)
 
 
 def examine(flight: Flight) -> Health:

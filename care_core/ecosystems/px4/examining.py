@@ -5,7 +5,6 @@ from __future__ import annotations
 from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health
 from care_core.ecosystems.px4 import checks, timeline
 from care_core.ecosystems.px4 import flight as flights
-from care_core.ecosystems.px4.explains import EXPLAINS
 from care_core.ecosystems.px4.flight import STATUS, Px4Flight
 from care_core.ecosystems.ranking import rank_findings
 from care_core.ecosystems.vehicles import vehicle_of
@@ -24,7 +23,7 @@ def reads() -> Wanted:
 def examine(flight: Px4Flight) -> Health:
     """What happened in a ULog."""
     tables = flight.tables(reads())
-    findings = rank_findings(_findings(flight), EXPLAINS)
+    findings = rank_findings(_findings(flight))
     is_readable = STATUS in tables and flight.end_s >= _TOO_SHORT_S
     too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
     title = vehicle_of(flight.log.facts, flight.log.settings()).title

@@ -1,0 +1,56 @@
+"""Which finding can bring about which: the one table of physical steps, for every ecosystem.
+
+A row holds direct steps alone. What a cause leads to by several steps it does through findings that are there: a motor
+upsets the estimator through an attitude that was lost, not past one that was held.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from care_core.ecosystems.findings import FindingKind
+
+Explains = Mapping[FindingKind, frozenset[FindingKind]]
+"""Per kind of finding the kinds that it can bring about directly."""
+
+_TUMBLES: frozenset[FindingKind] = frozenset(
+    ("crash", "takeoff", "thrust", "estimator", "vibration", "imu", "gps", "compass", "barometer", "log")
+)
+"""What turns over falls with its motors at their limit; its antenna looks down, its sensors turn faster than they or
+the estimator can follow, and air streams over the barometer."""
+
+EXPLAINS: Explains = {
+    # --- vehicles: what fails first shows in what follows, the attitude and the crash last
+    "vibration": frozenset(("imu", "estimator", "tuning", "attitude", "crash")),  # aliased and clipped inertial data
+    "imu": frozenset(("vibration", "estimator", "tuning", "thrust", "attitude", "crash", "localisation")),
+    "motor": frozenset(("thrust", "tuning", "vibration", "attitude", "takeoff", "crash")),
+    "thrust": frozenset(("attitude", "battery", "takeoff", "crash")),  # full throttle draws the pack down
+    "gps": frozenset(("estimator", "attitude", "crash", "prearm")),  # position control leans after a false position
+    "compass": frozenset(("estimator", "attitude", "crash", "prearm")),  # a false heading steers the wrong way
+    "barometer": frozenset(("estimator", "thrust", "crash", "prearm")),  # a false height
+    "estimator": frozenset(("attitude", "crash", "prearm")),
+    "tuning": frozenset(("vibration", "thrust", "estimator", "attitude", "takeoff", "crash")),
+    "takeoff": frozenset(("attitude", "motor", "compass", "tuning", *_TUMBLES)),  # motors run on against the ground
+    "attitude": frozenset(_TUMBLES),
+    # --- robots that drive by their sensors
+    "laser": frozenset(("laser", "localisation", "planner", "blocked", "control", "tf", "software")),
+    "localisation": frozenset(("localisation", "planner", "blocked", "control", "tf")),
+    "drive": frozenset(("drive", "planner", "control")),
+    "commands": frozenset(("drive", "planner")),
+    "tf": frozenset(("tf", "planner", "control")),
+    "topics": frozenset(("topics", "tf", "planner")),
+    "planner": frozenset(("planner", "control", "tf")),  # one that finds no path keeps the computer busy
+    "software": frozenset(("software", "topics")),
+    # --- both
+    "battery": frozenset(("battery", "thrust", "log", "crash", "drive", "commands", "topics", "laser", "cpu")),
+    "cpu": frozenset(("cpu", "estimator", "tuning", "log", "attitude", "crash", "control", "tf", "topics", "commands")),
+    "radio": frozenset(("crash", "topics", "laser", "localisation", "commands", "drive", "tf", "imu")),
+    "blocked": frozenset(
+        ("motor", "thrust", "tuning", "vibration", "attitude", "crash", "planner", "drive", "control", "tf")
+    ),
+    "crash": frozenset(
+        ("attitude", "log", "vibration", "imu", "estimator", "gps", "compass", "barometer", "localisation", "drive",
+         "planner", "software")
+    ),
+}  # fmt: skip
+"""By physics, not by statistics. A compass loses no fix, and a battery makes no gyro noisy."""
