@@ -6,12 +6,12 @@ known key and takes as long to import as numpy: a triage reads none of that.
 
 from __future__ import annotations
 
-import math
 import re
+import sys
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from msgspec import DecodeError, Struct, ValidationError, convert, field, json, to_builtins
+from msgspec import DecodeError, Meta, Struct, ValidationError, convert, field, json, to_builtins
 from msgspec.structs import asdict, force_setattr, replace
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ else:  # a type checker alone needs it
 
 
 __all__ = [
+    "Meta",
     "Record",
     "Struct",
     "UnfitError",
@@ -99,8 +100,8 @@ def _unfit(err: ValidationError) -> UnfitError:
 
 def _not_finite(value: Any, where: str) -> Iterator[str]:
     """Where in plain values a number is that JSON does not have."""
-    if isinstance(value, float):
-        if not math.isfinite(value):
+    if isinstance(value, (float, int)):
+        if not -sys.float_info.max <= value <= sys.float_info.max:  # nor any number of more digits than that
             yield where
     elif isinstance(value, Mapping):
         for key, part in value.items():

@@ -164,6 +164,16 @@ class Variable(Record):
             return any(value == code for code, _ in self.labels)
         return self.range is None or self.range[0] <= value <= self.range[1]
 
+    def is_no_looser(self, value: float, now: float | None) -> bool:
+        """Whether a `safety` option may be set to `value`: on the way from what it is now to its default, not past
+        it. Codes have no order, and what nobody knows has no way: there only the default, or what it is already."""
+        default = self.default
+        if default is None or value in (default, now):
+            return default is not None
+        if now is None or self.labels:
+            return False
+        return min(now, default) <= value <= max(now, default)
+
     @property
     def acceptable(self) -> str:
         """The acceptable values in words."""

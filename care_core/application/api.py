@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, choose, fitting, good_of, open_case, opened, read_case
+from care_core.application.case import Case, Progress, Request, choose, fitting, open_case, read_case
 from care_core.errors import CareError, LogError
+from care_core.records import replace
 
 if TYPE_CHECKING:
     from care_core.configs.edit import EditedFile
@@ -72,31 +73,39 @@ def what_if(asked: Case | Request | str | Path, changes: Mapping[str, float]) ->
 
 def verify(
     report: str | Path,
-    log: str | Path,
+    log: Request | str | Path,
     profile: str | None = None,
     mission: int | None = None,
     reference: str | Path | None = None,
 ) -> VerifyDocument:
-    """What became of a report's promise in the run of a later log.
+    """What became of a report's promise in the run of a later log, which is triaged for that.
 
     Args:
-        profile: another than that of the report.
+        log: also the whole request, which then says what the others would.
+        profile: another than that of the report, by name or folder.
         reference: the configuration that the run is judged against, as in the triage that wrote the report.
 
     Raises:
-        CareError: the report is none or suggests no change, or the log cannot be read.
+        CareError: the report is none, suggests no change or one of no parameter of its profile, no such profile is
+            installed, or the log cannot be read.
     """
-    from care_core.diagnose.verify import verify_log
-    from care_core.report.reading import profile_of, read_report
+    from care_core.diagnose.verify import verify as compare
+    from care_core.profile.store import load_profile
+    from care_core.report.reading import read_report
+    from care_core.report.suggested import report_profile
     from care_core.report.verification import promise_of, verify_document
 
-    promised = read_report(report)
-    promise = promise_of(promised)
-    with opened(Path(log)) as (found, sha256):
-        chosen, _ = fitting(found, profile or profile_of(promised).name)
-        good = good_of(None if reference is None else Path(reference), chosen)
-        run, verification = verify_log(promise, found, chosen, mission, sha256, good)
-    return verify_document(promised, run, verification)
+    promised, path = read_report(report), Path(report)
+    good = None if reference is None else Path(reference)
+    asked = log if isinstance(log, Request) else Request(Path(log), profile, mission=mission, reference=good)
+    chosen = load_profile(asked.profile) if asked.profile else report_profile(promised, path)
+    promise = promise_of(promised, chosen.schema, path)
+    case = open_case(replace(asked, profile=str(chosen.path)), _silent)
+    if case.reading is None and case.log is not None:
+        fitting(case.log, str(chosen.path))  # a run without a mission is compared, one of another robot is not
+    schema = chosen.schema if case.reading is None else case.reading.profile.schema
+    verification = compare(promise, case.diagnosis, schema, asked.thresholds)
+    return verify_document(promised, case.diagnosis.run, verification)
 
 
 def apply(

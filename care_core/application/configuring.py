@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from care_core.errors import ConfigError, UsageError
+from care_core.run import Setting
 from care_core.text import clean
 
 if TYPE_CHECKING:
@@ -61,14 +62,13 @@ def _suggested(report: TriageDocument, path: Path) -> Side:
     """The configuration that a report suggests: what was driven, with its fix."""
     from care_core.configs.compare import Side
     from care_core.configs.driven import readable
-    from care_core.profile.store import load_profile
-    from care_core.report.reading import profile_of
-    from care_core.run import Setting
+    from care_core.report.suggested import report_profile, suggested_changes
 
     config = {name: float(value) for name, value in report.config.items()}
+    schema = report_profile(report, path).schema
     if report.fix is not None:
-        config.update({change.option: float(change.to) for change in report.fix.changes})
-    options = [option for option in load_profile(profile_of(report).name).schema.options if option.name in config]
+        config |= {one.option.name: one.value for one in suggested_changes(report.fix, schema, path, "fix")}
+    options = [option for option in schema.options if option.name in config]
     keys = {parameter: config[option.name] for option in options for parameter in readable(option)}
     return Side(str(path), {key: Setting(key, value, str(path)) for key, value in keys.items()}, partial=True)
 
@@ -78,56 +78,90 @@ def apply_report(
 ) -> tuple[EditedFile, ...]:
     """Configuration files with a report's fix put in, or with one of its alternatives.
 
+    A report may be a stranger's: it sets the parameters of the profile's options alone, each to a value that the
+    profile accepts, and a `safety` one no looser than its file and its default.
+
     Args:
         configs: files in the order they are loaded, `FILE` or for ROS `NAMESPACE=FILE`.
         profile: name or folder; the one that the report names where it is None.
 
     Raises:
-        CareError: the report suggests no change or is damaged, or no file can hold it.
+        CareError: the report suggests no change, one that the profile does not allow, or is damaged; no such profile is
+            installed; or no file can hold the change.
     """
     from care_core.configs.edit import apply_changes
 
-    return apply_changes(configs, _wanted(report, alternative, profile))
+    wanted = _wanted(report, alternative, profile)
+    _check_safety(report, configs, wanted)
+    return apply_changes(configs, wanted)
 
 
 def override_of(report: Path, configs: Sequence[str], alternative: int = 0, profile: str | None = None) -> str:
     """A report's fix as a file of its own, to be loaded after the others: for one that several nodes load.
 
-    Args and Raises as `apply_report`; `configs` say the format alone.
+    Args and Raises as `apply_report`; `configs` say the format, and the values in force so far.
     """
+    from care_core.configs.edit import check_held
     from care_core.configs.formats import text_for, write_params
     from care_core.configs.loading import read_configs
     from care_core.ecosystems.ros.yaml_tree import typed
-    from care_core.run import Setting
 
     format = read_configs(configs)[0].format
     wanted = _wanted(report, alternative, profile)
+    _check_safety(report, configs, wanted)
     texts = {one.parameter: text_for(format, one.option, one.value) for one in wanted}
-    return write_params({name: Setting(name, typed(text), str(report)) for name, text in texts.items()}, format)
+    text = write_params({name: Setting(name, typed(text), str(report)) for name, text in texts.items()}, format)
+    check_held(text, format, wanted)
+    return text
 
 
 def _wanted(report: Path, alternative: int, profile: str | None) -> list[Wanted]:
+    from care_core.configs.driven import parameter_value
     from care_core.configs.edit import Wanted
     from care_core.profile.store import load_profile
-    from care_core.report.reading import profile_of, read_report
+    from care_core.report.reading import read_report
+    from care_core.report.suggested import check_acceptable, fix_sets, report_profile, suggested_changes
 
     document = read_report(report)
     if document.fix is None:
         raise UsageError("The report suggests no change.", where=str(report))
-    sets = [document.fix, *document.fix.alternatives]
+    sets = list(fix_sets(document.fix))
     if alternative >= len(sets):
         held = "none" if len(sets) == 1 else f"1 to {len(sets) - 1}"
         raise UsageError(f"There is no alternative {alternative}: the report has {held}.", where="--alternative")
-    variables = load_profile(profile or profile_of(document).name).schema.variables
+    schema = (load_profile(profile) if profile else report_profile(document, report)).schema
+    key, chosen = sets[alternative]
     wanted = []
-    for change in sets[alternative].changes:
-        option = variables.get(change.option)
-        if option is None:
-            raise ConfigError(f"The profile has no parameter '{clean(change.option)}'.", where=str(report))
-        named = [change.parameter] if isinstance(change.parameter, str) else change.parameter
-        driven = None if change.assumed else float(change.from_)
-        wanted += [Wanted(option, parameter, float(change.to), driven) for parameter in named]
+    for change in suggested_changes(chosen, schema, report, key):
+        check_acceptable(change, report)
+        option = change.option
+        driven = None if change.is_assumed else parameter_value(option, change.before)
+        value = parameter_value(option, change.value)
+        wanted += [Wanted(option, parameter, value, driven) for parameter in option.parameters]
     return wanted
+
+
+def _check_safety(report: Path, configs: Sequence[str], wanted: Sequence[Wanted]) -> None:
+    """Refuse to loosen a `safety` option: the files say what it is now, not the report. Raises ConfigError."""
+    from care_core.configs.driven import option_value
+    from care_core.configs.loading import read_configs, resolve
+
+    guarded = [one for one in wanted if one.option.safety and one.option.default is not None]
+    if not guarded:
+        return
+    settings = resolve(read_configs(configs), [one.parameter for one in guarded])
+    for one in guarded:
+        option, setting = one.option, settings.get(one.parameter)
+        value = option_value(option, Setting(one.parameter, one.value, str(report)))
+        now = None if setting is None else option_value(option, setting)
+        if value is None or not option.is_no_looser(value, now):
+            held = "no file holds it" if now is None else f"the file has {option.show(now)}"
+            raise ConfigError(
+                f"{option.name} is a safety parameter, which is moved towards its default of "
+                f"{option.show(option.default)} and never past it: {held}, the report wants {option.show(value)}.",
+                hint="Set it by hand if you are sure.",
+                where=str(report),
+            )
 
 
 def patch_of(files: Iterable[EditedFile]) -> str:

@@ -179,11 +179,11 @@ def _with_line(text: str, format: Dialect, setting: Setting, after: str) -> str:
 
 def _check(file: EditedFile) -> None:
     """Raise ConfigError where the edited text does not read as the old one with the new values."""
-    changed = [edit for edit in file.edits if edit.setting is not None]
-    if not changed or _reads_back(file, file.after, file.edits):
+    if _reads_back(file, file.after, file.edits):
         return
-    for edit in changed:
-        assert edit.setting is not None
+    for edit in file.edits:
+        if edit.setting is None:
+            continue
         alone = _with_line(file.before, file.format, edit.setting, edit.after)
         if not _reads_back(file, alone, [edit]):
             break
@@ -192,6 +192,28 @@ def _check(file: EditedFile) -> None:
         hint=f"Set it to {edit.after} by hand.",
         where=edit.where,
     )
+
+
+def check_written(file: EditedFile, path: Path) -> None:
+    """Raise ConfigError where the file that was written does not read as it was meant to."""
+    if not _reads_back(file, _as_it_is(path), file.edits):
+        raise ConfigError(
+            "The file that was written does not hold the changes.",
+            hint="The old one is back. Is the disk full, or does another program write to it?",
+            where=str(path),
+        )
+
+
+def check_held(text: str, format: Dialect, wanted: Sequence[Wanted]) -> None:
+    """Raise ConfigError where a text of that format does not read as exactly these parameters with their values."""
+    file = ConfigFile("", format, format.functions.read(text, Path("changes")))
+    held = resolve([file], [one.parameter for one in wanted])
+    for one in wanted:
+        setting = held.get(one.parameter)
+        if setting is None or not _is(setting.value, text_for(format, one.option, one.value)):
+            raise ConfigError(f"{one.parameter} cannot be written into such a file.", hint="Set it by hand.")
+    if len(file.settings) != len({one.parameter for one in wanted}):
+        raise ConfigError("The changes cannot be written into such a file.", hint="Set them by hand.")
 
 
 def _reads_back(file: EditedFile, text: str, edits: Sequence[Edit]) -> bool:
@@ -208,8 +230,10 @@ def _reads_back_in(file: EditedFile, load: ConfigFile, text: str, edits: Sequenc
     new_values = {
         (edit.where, _bare_name(file, edit.setting)): edit.after for edit in edits if edit.setting is not None
     }
-    added = {edit.parameters[0] for edit in edits if edit.setting is None}
-    if now.format is not load.format or now.settings.keys() != load.settings.keys() | added:
+    added = {edit.parameters[0]: edit.after for edit in edits if edit.setting is None}
+    if now.format is not load.format or now.settings.keys() != load.settings.keys() | added.keys():
+        return False
+    if not all(_is(now.settings[name].value, after) for name, after in added.items()):
         return False
     for name, before in load.settings.items():
         value = now.settings[name].value

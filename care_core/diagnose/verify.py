@@ -1,22 +1,19 @@
 """Report and the run after it -> was the change made, and did it do what was promised?
 
 The report is plain data (`Promise`), so this module knows no file format; `care_core.report.verification` fills it in.
+The run comes as triage leaves it: what triage does not find well has not recovered.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from typing import Literal
 
 from care_core.configs.driven import option_value, readable, same_value
-from care_core.diagnose.judging import Judged, read_and_judge, thresholds_in_force
-from care_core.diagnose.records import ObjectiveResult, Status
-from care_core.diagnose.reference import Good
-from care_core.ecosystems.registry import run_model
-from care_core.logs.base import Log
-from care_core.logs.digest import Sha256
+from care_core.diagnose.judging import thresholds_in_force
+from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status
+from care_core.diagnose.verdict import status_of, verdict_of
 from care_core.profile.schema import Schema
-from care_core.profile.store import Profile
 from care_core.records import Record, replace
 from care_core.run import Run
 from care_core.variables import Threshold, Variable
@@ -34,6 +31,12 @@ class Before(Record):
     status: Status
     threshold: Threshold | None
     need: float | None = None
+
+
+SAME_LOG = "this is the log that the report is about, not one of a later run"
+
+NOT_HELD = Before(None, "not_evaluated", None)
+"""An objective of which the report says nothing."""
 
 
 class PromisedSet(Record):
@@ -100,6 +103,8 @@ class Verification(Record):
     changes: tuple[MadeChange, ...]
     others: tuple[OtherChange, ...]
     objectives: tuple[ObjectiveCheck, ...]
+    headline: str
+    """What triage says of the run."""
     notes: tuple[str, ...] = ()
 
     @property
@@ -110,75 +115,77 @@ class Verification(Record):
         return self.verdict != "not_fixed"
 
 
-def verify_log(
-    promise: Promise,
-    log: Log,
-    profile: Profile,
-    mission: int | None = None,
-    sha256: Sha256 | None = None,
-    good: Good | None = None,
-) -> tuple[Run, Verification]:
-    """Compare one mission of a log, judged by the report's thresholds, with what was promised for it.
+def verify(promise: Promise, diagnosis: Diagnosis, schema: Schema, thresholds: Container[str] = ()) -> Verification:
+    """Compare a run, as triage judged it, with what was promised for it.
 
-    A threshold that is a multiple of what the reference configuration needs is this mission's own: the one that failed
-    was given up half-way, or went elsewhere.
-
-    Raises:
-        CareError: the log holds no mission of the profile.
-    """
-    schema = profile.schema
-    usual = thresholds_in_force(schema, {})
-    wanted = {
-        name: before.threshold
-        for name, before in promise.objectives.items()
-        if before.threshold is not None and before.need is None
-    }
-    own = {name: bound.bound for name, bound in wanted.items() if name not in usual or usual[name].bound != bound.bound}
-    judged = read_and_judge(run_model(log), profile, thresholds=own, mission=mission, good=good, sha256=sha256)
-    found = verify(promise, judged, schema, _doubt(promise, judged.run, schema))
-    return judged.run, replace(found, notes=tuple(_notes(promise, judged.run, schema)))
-
-
-def _doubt(promise: Promise, run: Run, schema: Schema) -> str:
-    if run.log.sha256 == promise.sha256:
-        return "this is the log that the report is about, not one of a later run"
-    return "" if schema.travels else run.mission.mismatch
-
-
-def _notes(promise: Promise, run: Run, schema: Schema) -> Iterator[str]:
-    if promise.version != schema.version:
-        yield f"the report was written with version {promise.version} of the profile, not {schema.version}"
-    if promise.start and run.log.start and run.log.start < promise.start:
-        yield "this log is older than the one of the report"
-
-
-def verify(promise: Promise, judged: Judged, schema: Schema, doubt: str = "") -> Verification:
-    """Compare a run with what was promised for it.
+    Every objective of the profile counts, whatever the report names, and so does every finding. A limit of the report's
+    own is held as well where it is stricter than triage's; a looser one is the operator's to give, not a file's.
 
     Args:
         promise: at least one set.
-        judged: the run, judged by the report's thresholds.
-        doubt: why the run may not be of the same robot or mission, one sentence; empty where it is.
+        thresholds: objectives whose limit the operator gave for this run, which is what counts for them.
     """
-    run = judged.run
+    run = diagnosis.run
     attempts = [_changes(one, run, schema) for one in promise.sets]
     chosen = max(range(len(attempts)), key=lambda i: (_share_made(attempts[i]), -i))
     kept, changes = promise.sets[chosen], attempts[chosen]
     others = tuple(_others(promise, kept, run, schema))
+    own = {name: limit for name, limit in _own_limits(promise, schema).items() if name not in thresholds}
     checks = tuple(
-        _check(promise.objectives[result.variable.name], result, kept.intervals.get(result.variable.name))
-        for result in judged.results
-        if result.variable.name in promise.objectives
+        _check(
+            promise.objectives.get(one.name, NOT_HELD), _held_to(one, own.get(one.name)), kept.intervals.get(one.name)
+        )
+        for one in diagnosis.objectives
     )
-    verdict, sentence = _verdict(changes, others, checks, doubt)
-    return Verification(verdict, sentence, chosen, kept.p_fixed, changes, others, checks)
+    verdict, sentence = _verdict(changes, others, checks, diagnosis, _doubt(promise, run, schema))
+    notes = tuple(_notes(promise, run, schema, diagnosis.objectives, own))
+    headline = verdict_of(diagnosis).headline
+    return Verification(verdict, sentence, chosen, kept.p_fixed, changes, others, checks, headline, notes)
+
+
+def _own_limits(promise: Promise, schema: Schema) -> dict[str, Threshold]:
+    """Fixed limits of the report that are not the profile's: whoever made it gave them."""
+    usual = thresholds_in_force(schema, {})
+    return {
+        name: before.threshold
+        for name, before in promise.objectives.items()
+        if before.threshold is not None
+        and before.need is None
+        and (name not in usual or usual[name].bound != before.threshold.bound)
+    }
+
+
+def _held_to(result: ObjectiveResult, own: Threshold | None) -> ObjectiveResult:
+    """The result, a fault as well where it is well by triage's limit and not by the report's."""
+    if own is None or result.status != "ok" or result.value is None or own.met(result.value):
+        return result
+    return replace(result, threshold=own, need=None, status="fault", reason="by the report's own limit")
+
+
+def _doubt(promise: Promise, run: Run, schema: Schema) -> str:
+    """Why the run may not be of the same robot or mission, one clause; empty where it is."""
+    if run.log.sha256 == promise.sha256:
+        return SAME_LOG
+    return "" if schema.travels else run.mission.mismatch
+
+
+def _notes(
+    promise: Promise, run: Run, schema: Schema, results: Iterable[ObjectiveResult], own: Mapping[str, Threshold]
+) -> Iterator[str]:
+    if promise.version != schema.version:
+        yield f"the report was written with version {promise.version} of the profile, not {schema.version}"
+    if promise.start and run.log.start and run.log.start < promise.start:
+        yield "this log is older than the one of the report"
+    for one in results:
+        limit = own.get(one.name)
+        if limit is not None and one.status != "ok" and one.variable.kind != "functional":
+            given = f"give --threshold {one.name}={limit.bound:g} if it is yours"
+            yield f"the report's own limit of {one.name}, {limit}, does not count for this run: {given}"
 
 
 def _changes(promised: PromisedSet, run: Run, schema: Schema) -> tuple[MadeChange, ...]:
     return tuple(
-        _made(schema.variables[name], before, wanted, run)
-        for name, (before, wanted) in promised.changes.items()
-        if name in schema.variables
+        _made(schema.variables[name], before, wanted, run) for name, (before, wanted) in promised.changes.items()
     )
 
 
@@ -247,28 +254,46 @@ def _outcome(
 
 
 def _verdict(
-    changes: Sequence[MadeChange], others: Sequence[OtherChange], checks: Sequence[ObjectiveCheck], doubt: str
+    changes: Sequence[MadeChange],
+    others: Sequence[OtherChange],
+    checks: Sequence[ObjectiveCheck],
+    diagnosis: Diagnosis,
+    doubt: str,
 ) -> tuple[VerifyVerdict, str]:
-    broken = [check.variable.name for check in checks if check.after.status == "fault"]
-    unknown = [check for check in checks if check.outcome == "unknown"]
     unmade = [change.option.name for change in changes if change.made in ("not_made", "other_value")]
     unseen = [change.option.name for change in changes if change.made == "unknown"]
+    severities = {finding.severity for finding in diagnosis.health.findings}
+    status = status_of({check.after.status for check in checks}, severities, diagnosis.profile.fit.verdict)
+    if doubt == SAME_LOG:
+        return "cannot_tell", f"Cannot tell: {doubt}."
+    if status == "fault" and unmade:
+        return "change_not_made", f"The change was not made ({', '.join(unmade)}), and {_lost(checks, diagnosis)}."
+    if status == "fault":
+        unsure = f"; whether {', '.join(unseen)} was changed is not in the log" if unseen else ""
+        return "not_fixed", f"Not fixed: {_lost(checks, diagnosis)}{unsure}."
     if doubt:
         return "cannot_tell", f"Cannot tell: {doubt}."
-    if broken and unmade:
-        return "change_not_made", f"The change was not made ({', '.join(unmade)}), and {_are(broken)} still at fault."
-    if broken:
-        unsure = f"; whether {', '.join(unseen)} was changed is not in the log" if unseen else ""
-        return "not_fixed", f"Not fixed: {_are(broken)} at fault{unsure}."
-    if unknown:
-        names = ", ".join(check.variable.name for check in unknown)
-        return "cannot_tell", f"Cannot tell: {names} could not be evaluated ({unknown[0].after.reason})."
-    if not checks:
-        return "cannot_tell", "Cannot tell: the report and the run share no objective."
+    if status == "not_evaluated":
+        return "cannot_tell", f"Cannot tell: {_untold(checks, diagnosis)}."
     although = list(_although(unmade, unseen, others, checks))
     if although:
         return "fixed_although", f"Recovered: every objective is within its threshold, although {'; '.join(although)}."
     return "fixed_as_promised", "Fixed as promised: the change was made, and every objective is where it was predicted."
+
+
+def _lost(checks: Sequence[ObjectiveCheck], diagnosis: Diagnosis) -> str:
+    """What is wrong with the run, in a clause: objectives at fault, else what triage found."""
+    broken = [check.variable.name for check in checks if check.after.status == "fault"]
+    still = all(check.before.status == "fault" for check in checks if check.after.status == "fault")
+    return f"{_are(broken)} {'still ' if still else ''}at fault" if broken else verdict_of(diagnosis).failed
+
+
+def _untold(checks: Sequence[ObjectiveCheck], diagnosis: Diagnosis) -> str:
+    unknown = [check for check in checks if check.outcome == "unknown"]
+    if not unknown:
+        return verdict_of(diagnosis).failed
+    names = ", ".join(check.variable.name for check in unknown)
+    return f"{names} could not be evaluated ({unknown[0].after.reason})"
 
 
 def _although(

@@ -23,7 +23,7 @@ from care_core.diagnose.fixes import GAIN_FOR_ONE_MORE
 from care_core.errors import CareError
 from care_core.fleet.rows import Row, distinct
 from care_core.fleet.shared import FEWEST, Unit, name_of, unit_of
-from care_core.profile.store import Profile, load_profile
+from care_core.profile.store import Profile, installed_profile
 from care_core.records import Record, replace
 from care_core.variables import Variable
 
@@ -71,7 +71,7 @@ class Silence(Record):
     best: Suggestion | None = None
 
 
-def suggest(rows: Sequence[Row], load: Callable[[str], Profile] = load_profile) -> tuple[Suggestion | Silence, ...]:
+def suggest(rows: Sequence[Row], load: Callable[[str], Profile] = installed_profile) -> tuple[Suggestion | Silence, ...]:
     """For each profile that judged robots which fail: the change that helps most of them, or why there is none."""
     judged = [row for row in distinct(rows) if row.profile and row.is_judged]
     return tuple(

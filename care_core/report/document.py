@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.driven import parameter_value
@@ -30,7 +30,7 @@ from care_core.diagnose.records import (
 )
 from care_core.diagnose.verdict import Advice, Verdict, chance, compose, verdict_of
 from care_core.numbers import six_digits
-from care_core.records import field
+from care_core.records import Meta, field
 from care_core.report.entries import (
     DamageEntry,
     EventEntry,
@@ -45,6 +45,9 @@ from care_core.text import clean
 from care_core.variables import ASSUMED, Change, Kind, Op, Threshold
 
 SCHEMA_ID: Final = "care.triage/1"
+
+Share = Annotated[float, Meta(ge=0, le=1)]
+"""A probability, or a part of a whole."""
 
 
 class ProfileEntry(Document, kw_only=True):
@@ -129,7 +132,7 @@ class CauseEntry(Document, kw_only=True):
     """Whether no source holds `current`."""
     suggested: int | float | None
     predicted: PredictedValue | None
-    p_fixed: float | None
+    p_fixed: Share | None
     confidence: Confidence
     edge_support: list[float | None]
     in_support: bool
@@ -174,7 +177,7 @@ class ChangeEntry(Document, kw_only=True):
 
 class FixSet(Document, kw_only=True):
     changes: list[ChangeEntry]
-    p_fixed: float
+    p_fixed: Share
     guess: bool = False
     """Whether a value is one that no training run came near."""
     predicted: dict[str, PredictedObjective]

@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from care_core.diagnose.records import ObjectiveResult
 from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.diagnose.verify import (
+    NOT_HELD,
     Before,
     Made,
     MadeChange,
@@ -19,6 +21,7 @@ from care_core.diagnose.verify import (
     VerifyVerdict,
 )
 from care_core.errors import ExitCode, UsageError
+from care_core.profile.schema import Schema
 from care_core.records import field
 from care_core.report.document import (
     ObjectiveEntry,
@@ -29,6 +32,7 @@ from care_core.report.document import (
 )
 from care_core.report.published import Document, publish, publishable
 from care_core.report.reading import profile_of
+from care_core.report.suggested import fix_sets, suggested_changes
 from care_core.run import Run
 from care_core.text import clean, wrapped
 from care_core.variables import Threshold
@@ -98,6 +102,8 @@ class VerifyDocument(Document, kw_only=True):
     log: VerifiedLog
     verdict: VerifyVerdict
     sentence: str
+    triage: str
+    """What `care triage` says of the run."""
     alternative: int
     """0: the suggested set of changes; else the number of the alternative that was made instead."""
     p_fixed: float
@@ -114,8 +120,13 @@ def verify_schema() -> dict[str, Any]:
     return VerifyDocument.json_schema()
 
 
-def promise_of(report: TriageDocument) -> Promise:
-    """What a report said and promised. Raises UsageError where it suggests no change."""
+def promise_of(report: TriageDocument, schema: Schema, path: Path) -> Promise:
+    """What a report said and promised of the parameters of its profile.
+
+    Raises:
+        UsageError: it suggests no change.
+        ConfigError: what it suggests is of no parameter of the profile.
+    """
     if report.fix is None:
         why = report.abstained or "every objective was within its threshold"
         raise UsageError(f"The report suggests no change, so nothing was promised: {clean(why)}.")
@@ -135,11 +146,11 @@ def promise_of(report: TriageDocument) -> Promise:
         },
         sets=tuple(
             PromisedSet(
-                {change.option: (float(change.from_), float(change.to)) for change in one.changes},
-                one.p_fixed,
-                {name: (predicted.low, predicted.high) for name, predicted in one.predicted.items()},
+                {one.option.name: (one.before, one.value) for one in suggested_changes(fix, schema, path, key)},
+                fix.p_fixed,
+                {name: (predicted.low, predicted.high) for name, predicted in fix.predicted.items()},
             )
-            for one in (report.fix, *report.fix.alternatives)
+            for key, fix in fix_sets(report.fix)
         ),
     )
 
@@ -156,12 +167,13 @@ def verify_document(report: TriageDocument, run: Run, found: Verification) -> Ve
         alternative=found.chosen,
         p_fixed=found.p_fixed,
         worked=found.worked,
+        triage=found.headline,
         changes=[_change(change) for change in found.changes],
         other_changes=[
             OtherChangeEntry(option=o.option.name, from_=plain_number(o.before), to=plain_number(o.driven))
             for o in found.others
         ],
-        objectives=[_objective(check, before[check.variable.name]) for check in found.objectives],
+        objectives=[_objective(check, before.get(check.variable.name)) for check in found.objectives],
         notes=publishable(found.notes),
     )
 
@@ -177,7 +189,10 @@ def _change(change: MadeChange) -> CheckedChange:
     )
 
 
-def _objective(check: ObjectiveCheck, before: ObjectiveEntry) -> CheckedObjective:
+def _objective(check: ObjectiveCheck, before: ObjectiveEntry | None) -> CheckedObjective:
+    if before is None:
+        reason = "the report does not name it"
+        before = objective_entry(ObjectiveResult(check.variable, None, None, NOT_HELD.status, reason))
     interval = None if check.interval is None else Interval(low=check.interval[0], high=check.interval[1])
     return CheckedObjective(
         before=before,
@@ -203,6 +218,7 @@ def _lines(document: VerifyDocument) -> Iterator[str]:
     yield ""
     yield from wrapped(f"{Path(document.report_log.path).name}, profile {document.profile.name}", "Report  ")
     yield from wrapped(Path(document.log.path).name, "Log     ")
+    yield from wrapped(document.triage, "Triage  ")
     for note in document.notes:
         yield from wrapped(note, "  ! ")
     yield ""

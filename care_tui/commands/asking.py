@@ -73,6 +73,9 @@ def verify(
     report: Annotated[Path, typer.Argument(metavar="REPORT", help="The report, YAML or JSON.", show_default=False)],
     log: LogPath,
     profile: ProfileName = None,
+    config: ConfigPaths = None,
+    threshold: Thresholds = None,
+    site: Site = None,
     reference: Reference = None,
     mission: Mission = None,
     json: AsJson = False,
@@ -85,9 +88,18 @@ def verify(
 
     if out is not None and out.exists() and report.exists() and out.samefile(report):
         raise UsageError("That is the report itself.", hint="Name another file.", where=str(out))
+    request = Request(
+        log,
+        profile,
+        tuple(config or ()),
+        thresholds=bounds(threshold or ()),
+        site=site,
+        reference=reference,
+        mission=mission,
+    )
     with Progress() as progress:
         progress("reading the log", 0.0)
-        document = care_core.verify(report, log, profile, mission, reference)
+        document = care_core.verify(report, request)
     if not no_history:
         verified = document.plain()
         mention(remember(lambda history: history.add_verification(verified)))

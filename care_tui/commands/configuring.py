@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import care_core
-from care_core.errors import ExitCode, UsageError
+from care_core.errors import ConfigError, ExitCode, UsageError
 from care_core.text import clean
 from care_tui import __version__
 from care_tui.commands.arguments import AsJson, Force, Out, is_json
@@ -152,9 +152,8 @@ def _replace(file: EditedFile) -> None:
     from care_core.files import write_atomically
 
     backup = next(path for path in _backups(file.path) if not path.exists())
-    mode = file.path.stat().st_mode & 0o777
-    write_atomically(backup, file.before, mode)
-    write_atomically(file.path, file.after, mode)
+    write_atomically(backup, file.before, file.path.stat().st_mode & 0o777)
+    _write_checked(file, file.path)
     say(f"wrote {file.path}, the old one is {backup}")
 
 
@@ -167,7 +166,7 @@ def _backups(path: Path) -> Iterator[Path]:
 
 
 def _write_to(out: Path, edited: Sequence[EditedFile], *, force: bool) -> None:
-    from care_core.files import check_replaceable, write_atomically
+    from care_core.files import check_replaceable
 
     targets = [out / file.path.name if len(edited) > 1 or out.is_dir() else out for file in edited]
     if len(set(targets)) < len(targets):
@@ -179,5 +178,25 @@ def _write_to(out: Path, edited: Sequence[EditedFile], *, force: bool) -> None:
     for target, file in zip(targets, edited, strict=True):
         if not force:
             check_replaceable(target, file.after)
-        write_atomically(target, file.after, file.path.stat().st_mode & 0o777)
+        _write_checked(file, target)
         say(f"wrote {target}")
+
+
+def _write_checked(file: EditedFile, target: Path) -> None:
+    """Write an edited file and read it again; where it does not hold the changes, what was there before is put back."""
+    from care_core.configs.edit import check_written
+    from care_core.files import replace_file, write_atomically
+
+    mode = file.path.stat().st_mode & 0o777
+    before = target.read_bytes() if target.is_file() else None
+    write_atomically(target, file.after, mode)
+    if not target.is_file():  # a pipe, which says nothing of what it took
+        return
+    try:
+        check_written(file, target)
+    except ConfigError:
+        if before is None:
+            target.unlink()
+        else:
+            replace_file(target, before, mode)
+        raise

@@ -13,14 +13,15 @@ from ruamel.yaml import YAML
 
 from care_core.configs.driven import same_value
 from care_core.diagnose.judging import judge
-from care_core.diagnose.records import Need
+from care_core.diagnose.records import Diagnosis, Need
 from care_core.diagnose.verify import Before, Promise, PromisedSet, Verification, _notes, verify
+from care_core.ecosystems.findings import Finding, Health, Severity
 from care_core.errors import ConfigError
 from care_core.records import replace
 from care_core.report.document import build_document
 from care_core.report.reading import read_report
 from care_core.report.writers import to_json, to_yaml
-from care_core.run import Setting, Unavailable
+from care_core.run import FITS, Fit, ProfileChoice, Run, Setting, Unavailable
 from care_core.variables import Threshold
 from tests.conftest import Care
 from tests.made import made_diagnosis
@@ -45,8 +46,15 @@ def promise(*others: PromisedSet) -> Promise:
     )
 
 
-def checked(doubt: str = "", *others: PromisedSet, **options: float) -> Verification:
-    return verify(promise(*others), judge(planted_run(**options), SCHEMA, None), SCHEMA, doubt)
+def triaged(run: Run, *findings: Finding, fit: Fit = FITS) -> Diagnosis:
+    """A run as triage judges it, with what its health checks found."""
+    judged = judge(run, SCHEMA, None)
+    choice = ProfileChoice("planted", "1", "", "", fit)
+    return Diagnosis(choice, judged.run, judged.results, (), None, health=Health("", (), findings))
+
+
+def checked(*others: PromisedSet, **options: float) -> Verification:
+    return verify(promise(*others), triaged(planted_run(**options)), SCHEMA)
 
 
 def test_a_change_that_was_made_and_did_what_it_promised() -> None:
@@ -61,10 +69,10 @@ def test_a_change_that_was_made_and_did_what_it_promised() -> None:
 
 def test_another_version_of_the_profile_and_an_older_log_are_told() -> None:
     run = replace(planted_run(), log=replace(planted_run().log, start="2024-05-01T10:00:00+00:00"))
-    assert list(_notes(promise(), run, SCHEMA)) == []
-    (told,) = _notes(replace(promise(), version="0"), run, SCHEMA)
+    assert list(_notes(promise(), run, SCHEMA, (), {})) == []
+    (told,) = _notes(replace(promise(), version="0"), run, SCHEMA, (), {})
     assert told == "the report was written with version 0 of the profile, not 1"
-    (told,) = _notes(replace(promise(), start="2024-05-02T10:00:00+00:00"), run, SCHEMA)
+    (told,) = _notes(replace(promise(), start="2024-05-02T10:00:00+00:00"), run, SCHEMA, (), {})
     assert told == "this log is older than the one of the report"
 
 
@@ -110,7 +118,7 @@ def test_a_move_within_what_runs_differ_by_is_none(time_s: float, outcome: str) 
     run = planted_run(speed=5.0)
     driven = replace(run, objectives={**run.objectives, "time": time_s})
     within = replace(PROMISED, intervals={"time": (130.0, 170.0)})
-    found = verify(replace(promise(), sets=(within,)), judge(driven, SCHEMA, None), SCHEMA)
+    found = verify(replace(promise(), sets=(within,)), triaged(driven), SCHEMA)
     assert {check.variable.name: check.outcome for check in found.objectives}["time"] == outcome
 
 
@@ -118,9 +126,9 @@ def test_a_longer_mission_is_held_against_what_it_needs_itself() -> None:
     """The mission that failed was given up half-way: the reference needed 60 s for it, and 120 s for the next."""
     half = {"time": Before(None, "not_evaluated", Threshold("<=", 87.5), need=60.0)}
     within = replace(PROMISED, intervals={"time": (65.0, 75.0)})
-    judged = judge(planted_run(speed=5.0), SCHEMA, None)
-    time = next(result for result in judged.results if result.variable is TIME)
-    now = replace(judged, results=(replace(time, need=Need(120.0, 110.0, 130.0)),))
+    judged = triaged(planted_run(speed=5.0))
+    time = next(result for result in judged.objectives if result.variable is TIME)
+    now = replace(judged, objectives=(replace(time, need=Need(120.0, 110.0, 130.0)),))
     found = verify(replace(promise(), objectives=half, sets=(within,)), now, SCHEMA)
     (check,) = found.objectives
     assert check.interval == (130.0, 150.0)
@@ -142,15 +150,19 @@ def test_a_mission_that_failed_otherwise_is_not_fixed() -> None:
 def test_what_was_not_evaluated_or_is_another_mission_cannot_be_told() -> None:
     run = planted_run(speed=5.0)
     run = replace(run, objectives={**run.objectives, "time": Unavailable("the log ends early")})
-    found = verify(promise(), judge(run, SCHEMA, None), SCHEMA)
+    found = verify(promise(), triaged(run), SCHEMA)
     assert found.verdict == "cannot_tell"
     assert "the log ends early" in found.sentence
-    assert checked("the mission has 3 waypoints", speed=5.0).verdict == "cannot_tell"
+    run = planted_run(speed=5.0)
+    elsewhere = replace(run, mission=replace(run.mission, mismatch="the mission has 3 waypoints"))
+    found = verify(promise(), triaged(elsewhere), SCHEMA)
+    assert found.verdict == "cannot_tell"
+    assert "3 waypoints" in found.sentence
 
 
 def test_an_alternative_that_was_made_instead_is_what_is_judged() -> None:
     other = PromisedSet({"planner": (1.0, 0.0), "speed": (2.0, 4.0)}, 0.7, {})
-    found = checked("", other, speed=4.0, planner=0.0)
+    found = checked(other, speed=4.0, planner=0.0)
     assert found.chosen == 1
     assert found.p_fixed == 0.7
     assert [change.made for change in found.changes] == ["made", "made"]
@@ -162,9 +174,9 @@ def test_an_option_of_two_keys_is_made_when_both_are() -> None:
     for values, made in (((0.3, 0.3), "made"), ((0.3, 0.5), "not_made"), ((0.4, 0.4), "other_value")):
         keys = dict(zip(("/a/radius", "/b/radius"), values, strict=True))
         driven = replace(run, settings={key: Setting(key, value, "log") for key, value in keys.items()})
-        found = verify(replace(promise(), sets=(both,)), judge(driven, SCHEMA, None), SCHEMA)
+        found = verify(replace(promise(), sets=(both,)), triaged(driven), SCHEMA)
         assert found.changes[0].made == made
-    unread = judge(replace(run, config={}), SCHEMA, None)
+    unread = triaged(replace(run, config={}))
     assert verify(replace(promise(), sets=(both,)), unread, SCHEMA).changes[0].made == "unknown"
 
 
@@ -174,6 +186,51 @@ def test_a_value_is_the_same_after_a_trip_through_32_bits(value: float) -> None:
     import numpy as np
 
     assert same_value(value, float(np.float32(value))) or abs(value) < 1e-9
+
+
+# Triage has the last word
+
+
+def lost(severity: Severity = "critical") -> Finding:
+    return Finding("crash", "it hit the ground", 40.0, 41.0, severity, "24 m/s", "EV")
+
+
+def test_a_run_that_triage_calls_lost_has_not_recovered() -> None:
+    found = verify(promise(), triaged(planted_run(speed=5.0), lost()), SCHEMA)
+    assert {check.outcome for check in found.objectives} == {"kept", "recovered"}
+    assert found.verdict == "not_fixed"
+    assert found.worked is False
+    assert "it hit the ground" in found.sentence
+    assert found.headline.startswith("FAULT")
+    warned = verify(promise(), triaged(planted_run(speed=5.0), lost("warning")), SCHEMA)
+    assert warned.verdict == "fixed_as_promised"
+
+
+def test_objectives_that_the_report_leaves_out_count_too() -> None:
+    fast = replace(promise(), objectives={"success": Before(1.0, "ok", SUCCESS.threshold)})
+    found = verify(fast, triaged(planted_run(speed=5.0, planner=2.0)), SCHEMA)
+    assert found.verdict == "not_fixed"
+    assert "time" in found.sentence
+
+
+def test_a_run_that_no_profile_fits_or_that_has_no_objective_cannot_be_told() -> None:
+    found = verify(promise(), triaged(planted_run(speed=5.0), fit=Fit("no", ("no mission",))), SCHEMA)
+    assert found.verdict == "cannot_tell"
+    nothing = replace(triaged(planted_run(speed=5.0)), objectives=())
+    assert verify(promise(), nothing, SCHEMA).verdict == "cannot_tell"
+
+
+def test_a_reports_own_limit_counts_where_it_is_stricter_only() -> None:
+    def with_limit(bound: float, run: Run, *given: str) -> Verification:
+        time = Before(230.0, "fault", Threshold("<=", bound))
+        said = promise()
+        return verify(replace(said, objectives={**said.objectives, "time": time}), triaged(run), SCHEMA, given)
+
+    assert with_limit(50.0, planted_run(speed=5.0)).verdict == "not_fixed"
+    assert with_limit(50.0, planted_run(speed=5.0), "time").verdict == "fixed_as_promised", "who gives one decides"
+    slow = with_limit(1e9, planted_run(speed=5.0, planner=2.0))
+    assert slow.verdict == "not_fixed"
+    assert any("--threshold time=1e+09" in note for note in slow.notes)
 
 
 # Reports on disk
@@ -263,6 +320,12 @@ def test_a_run_is_judged_against_the_reference_of_the_triage(care: Care, report:
     (judged,) = (one for one in json.loads(out)["objectives"] if one["name"] == "mission_time")
     assert bound("--reference", slow) == judged["threshold"]["value"] > bound()
     assert care("whatif", SAMPLE, "--set", "LAND_SPEED=40", "--reference", slow).code == 0
+
+
+@pytest.mark.parametrize("log", ["samples/arducopter_motor.BIN", "tests/data/arducopter_good.BIN"])
+def test_it_ends_as_triage_of_the_run_does(care: Care, report: Path, log: str) -> None:
+    run = Path(__file__).parents[2] / log
+    assert care("verify", report, run).code == care("triage", run).code
 
 
 def test_what_cannot_be_verified_is_refused(care: Care, report: Path, tmp_path: Path) -> None:
