@@ -144,6 +144,18 @@ class ProfileChoice(Record):
     platform: str
     reason: str
     fit: Fit = FITS
+    origin: str = ""
+    """Where a profile is from that is not CaRE's own and not one of the user's, in a clause; empty for those."""
+
+    @property
+    def title(self) -> str:
+        """Its name, and where it is from if that needs to be known; empty where there is none."""
+        return profile_title(self.name, self.origin)
+
+
+def profile_title(name: str, origin: str) -> str:
+    """A profile's name with where it is from."""
+    return f"{name} ({origin})" if origin else name
 
 
 class MissionInfo(Record):

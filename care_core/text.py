@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import textwrap
 import unicodedata
 from collections.abc import Sequence
@@ -29,6 +30,12 @@ def cell(text: str) -> str:
     """The text as a cell of a table, made safe: a spreadsheet computes what begins as a formula does."""
     made = clean(text)
     return f"'{made}" if made[:1] in ("=", "+", "-", "@") else made
+
+
+def command(*words: str, note: str = "") -> str:
+    """A line for a shell or a ground station, in which each word stays one word, whatever it holds."""
+    line = shlex.join(map(clean, words))
+    return f"{line}  # {clean(note)}" if note else line
 
 
 def listed(names: Sequence[str], last: str = "and") -> str:

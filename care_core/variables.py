@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import re
 from collections.abc import Mapping
 from enum import Enum
 from types import MappingProxyType
@@ -27,6 +28,9 @@ About = Literal["mission", "vehicle", "world"]
 """What a context tells of: what was asked, what flew, or what was met. The first two are known before the start."""
 ValueType = Literal["float", "int", "bool", "enum"]
 
+_NAME = re.compile(r"\w[\w.-]*")
+_PARAMETER = re.compile(r"[A-Za-z0-9_/~][\w./~-]*", re.ASCII)
+
 _WORDS = {"true": 1.0, "yes": 1.0, "on": 1.0, "false": 0.0, "no": 0.0, "off": 0.0}
 _COMPARE = {"<=": operator.le, ">=": operator.ge, "<": operator.lt, ">": operator.gt, "==": operator.eq}
 
@@ -36,6 +40,16 @@ ASSUMED = " (assumed)"
 SAME_SHARE, SAME_LEAST = 0.05, 0.5
 """Two missions are the same where their numbers differ by no more: home is never in the same place to the metre, and a
 leg more is one."""
+
+
+def is_variable_name(name: str) -> bool:
+    """Whether a profile may call a variable so: one word in every table, file and command."""
+    return _NAME.fullmatch(name) is not None
+
+
+def is_parameter_name(name: str) -> bool:
+    """Whether a robot's parameter can be called so. What is written into files and shells has nothing else in it."""
+    return _PARAMETER.fullmatch(name) is not None
 
 
 class Threshold(Record):

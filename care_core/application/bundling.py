@@ -15,13 +15,13 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from care_core.application.open_run import OpenRun, log_of
 from care_core.application.plotting import ranked, sources_of, thinned
 from care_core.application.reporting import report_of
-from care_core.application.sharing import Sharing
+from care_core.application.sharing import ELSEWHERE, Sharing
 from care_core.application.signals import Line, Source, lines_of
 from care_core.application.viewing import messages_of
 from care_core.errors import CareError
 from care_core.files import BUNDLE_FOLDER
 from care_core.records import Record, replace
-from care_core.run import Setting, Unavailable
+from care_core.run import Setting, Unavailable, profile_title
 from care_core.text import cell, clean, seconds
 
 if TYPE_CHECKING:
@@ -89,7 +89,9 @@ def _without_folders(case: OpenRun) -> OpenRun:
     """The case without the folders that its log lay in."""
     run = case.diagnosis.run
     log = replace(run.log, path=Path(run.log.path).name)
-    return replace(case, diagnosis=replace(case.diagnosis, run=replace(run, log=log)))
+    profile = case.diagnosis.profile
+    profile = replace(profile, origin=ELSEWHERE if profile.origin else "")
+    return replace(case, diagnosis=replace(case.diagnosis, profile=profile, run=replace(run, log=log)))
 
 
 def _packed(files: Mapping[str, str]) -> bytes:
@@ -108,7 +110,9 @@ def _versions(case: OpenRun, version: str) -> Iterator[str]:
     run, profile = case.diagnosis.run, case.diagnosis.profile
     yield f"care {version}"
     yield f"Python {platform.python_version()} on {platform.system()} {platform.machine()}"
-    yield fit_text(f"{profile.name} {profile.version}" if profile.name else "", profile.fit)
+    yield fit_text(
+        profile_title(f"{profile.name} {profile.version}", profile.origin) if profile.name else "", profile.fit
+    )
     yield f"log format {run.log.format}"
     yield from (clean(f"{name} {value}") for name, value in sorted(run.log.facts.items()))
 

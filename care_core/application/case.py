@@ -5,7 +5,7 @@ The work is imported by the function that needs it: the app draws its first fram
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -157,14 +157,20 @@ def choose(log: Log, name: str | None = None) -> tuple[Profile | None, ProfileCh
 
     profiles, left_out = _candidates(log, name)
     profile, choice = choose_profile(log, profiles)
-    return profile, replace(choice, reason=f"{choice.reason}{left_out}")
+    return profile, replace(_from(choice, profiles), reason=f"{choice.reason}{left_out}")
 
 
 def fitting(log: Log, name: str | None = None) -> tuple[Profile, ProfileChoice]:
     """As `choose`, for those who can do nothing without a profile: raises ProfileError where none fits."""
     from care_core.extract.select import fitting_profile
 
-    return fitting_profile(log, _candidates(log, name)[0])
+    profile, choice = fitting_profile(log, _candidates(log, name)[0])
+    return profile, _from(choice, [profile])
+
+
+def _from(choice: ProfileChoice, profiles: Sequence[Profile]) -> ProfileChoice:
+    """The choice with where its profile is from."""
+    return replace(choice, origin=next((one.origin for one in profiles if one.schema.name == choice.name), ""))
 
 
 def _candidates(log: Log, name: str | None) -> tuple[list[Profile], str]:

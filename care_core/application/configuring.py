@@ -199,7 +199,7 @@ def _file_against_driven(case: Case) -> str:
     settings = case.diagnosis.run.settings
     held = resolve(read_configs(case.configs), settings)
     found = compare(Side("as driven", {name: settings[name] for name in held if name in settings}), Side("file", held))
-    return "".join(f"{difference}\n" for difference in found)
+    return "".join(f"{clean(str(difference))}\n" for difference in found)
 
 
 def commands_of(diagnosis: Diagnosis) -> list[str]:

@@ -22,6 +22,8 @@ from care_core.variables import Variable
 
 NO_PLACE = "(position left out)"
 LEFT_OUT = "(text left out)"
+ELSEWHERE = "not CaRE's own"
+"""Of a profile, without the folder that it lies in."""
 HIDDEN = "\u2026"
 
 _NUMBER = r"[-+]?\d+(?:\.\d+)?"
@@ -125,8 +127,10 @@ class Redactor(Record):
         timeline = tuple(self._event(one) for one in health.timeline)
         evidence = tuple(replace(one, text=self.said(one.text)) for one in run.evidence)
         since = diagnosis.since and replace(diagnosis.since, log="good log")
+        profile = replace(diagnosis.profile, origin=ELSEWHERE if diagnosis.profile.origin else "")
         told = replace(
             diagnosis,
+            profile=profile,
             run=replace(run, log=log, evidence=evidence),
             health=replace(health, timeline=timeline, robot=self.text(health.robot)),
             since=since,

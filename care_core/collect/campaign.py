@@ -22,7 +22,7 @@ from care_core.collect.space import Axis, Space
 from care_core.configs.driven import option_value, readable
 from care_core.configs.loading import read_configs, resolve, split_name
 from care_core.errors import UsageError, nearest
-from care_core.files import PROFILE_FILE
+from care_core.files import PROFILE_FILE, profile_folders
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
 from care_core.records import Record
@@ -172,7 +172,9 @@ def _explained(err: ValidationError, path: Path) -> UsageError:
 
 
 def _profile_place(name: str, folder: Path) -> str:
-    """A profile named by its place lies beside the campaign; any other name is an installed one's."""
+    """The name of an installed profile, or the place of one beside the campaign."""
+    if name in profile_folders():
+        return name
     beside = folder / name
     is_there = (beside / PROFILE_FILE).is_file() or (beside.name == PROFILE_FILE and beside.is_file())
     return str(beside) if is_there else name

@@ -9,6 +9,7 @@ from care_core.configs.driven import option_value, parameter_value, readable
 from care_core.configs.formats import format_for
 from care_core.ecosystems.dialect import Dialect
 from care_core.run import Run
+from care_core.text import clean
 from care_core.variables import Change, Variable
 
 
@@ -32,7 +33,7 @@ def unified_diff(run: Run, changes: Sequence[Change]) -> str:
         n=0,
         lineterm="",
     )
-    return "".join(f"{line}\n" for line in lines)
+    return "".join(f"{clean(line)}\n" for line in lines)
 
 
 def apply_commands(changes: Iterable[Change], format: Dialect) -> list[str]:

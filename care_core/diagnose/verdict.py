@@ -147,7 +147,7 @@ class Verdict(Record):
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
     """The verdict of a diagnosis."""
     return compose(
-        diagnosis.profile.name,
+        diagnosis.profile.title,
         diagnosis.profile.fit,
         diagnosis.objectives,
         diagnosis.health.findings,

@@ -71,7 +71,9 @@ class Silence(Record):
     best: Suggestion | None = None
 
 
-def suggest(rows: Sequence[Row], load: Callable[[str], Profile] = installed_profile) -> tuple[Suggestion | Silence, ...]:
+def suggest(
+    rows: Sequence[Row], load: Callable[[str], Profile] = installed_profile
+) -> tuple[Suggestion | Silence, ...]:
     """For each profile that judged robots which fail: the change that helps most of them, or why there is none."""
     judged = [row for row in distinct(rows) if row.profile and row.is_judged]
     return tuple(

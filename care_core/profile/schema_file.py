@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -19,6 +19,7 @@ from care_core.ecosystems.vehicles import Kind as VehicleKind
 from care_core.errors import ProfileError, nearest
 from care_core.logs import formats
 from care_core.profile.schema import EvidenceRule, Schema, Side
+from care_core.text import clean
 from care_core.variables import (
     About,
     Events,
@@ -29,7 +30,11 @@ from care_core.variables import (
     Threshold,
     ValueType,
     Variable,
+    is_parameter_name,
+    is_variable_name,
 )
+
+_PROFILE_NAME = re.compile(r"\w[\w .-]*")
 
 
 class Strict(BaseModel):
@@ -87,6 +92,14 @@ class _Variable(Strict):
     events: dict[str, str] | None = None
     extract: dict[str, Any] | None = None
     order: int | None = None
+
+    @field_validator("parameter")
+    @classmethod
+    def _are_parameters(cls, names: str | list[str]) -> str | list[str]:
+        for name in [names] if isinstance(names, str) else names:
+            if not is_parameter_name(name):
+                raise ValueError(f"no parameter is called '{clean(name)}': letters, digits and _ . / - ~ make a name")
+        return names
 
     @model_validator(mode="after")
     def _fits_role(self) -> _Variable:
@@ -185,6 +198,21 @@ class _Profile(Strict):
     known: list[_Known] = Field(default_factory=list)
     variables: dict[str, _Variable]
 
+    @field_validator("name")
+    @classmethod
+    def _is_a_name(cls, name: str) -> str:
+        if not _PROFILE_NAME.fullmatch(name):
+            raise ValueError(f"no profile is called '{clean(name)}': letters, digits, spaces and _ . - make a name")
+        return name
+
+    @field_validator("variables")
+    @classmethod
+    def _are_names(cls, variables: dict[str, _Variable]) -> dict[str, _Variable]:
+        for name in variables:
+            if not is_variable_name(name):
+                raise ValueError(f"no variable is called '{clean(name)}': letters, digits and _ . - make a name")
+        return variables
+
     @field_validator("logs")
     @classmethod
     def _are_formats(cls, names: list[str]) -> list[str]:
@@ -234,10 +262,27 @@ def parsed(text: str, path: Path) -> Schema:
         raise ProfileError(f"Not valid YAML: {err}.", hint="Correct the line.", where=str(path)) from err
     if not isinstance(data, dict):
         raise ProfileError("A profile is a mapping with 'name' and 'variables'.", where=str(path))
+    for key in _unprintable(data, ""):
+        hint = "Write it as plain text."
+        raise ProfileError(f"'{clean(key)}' holds a character that steers a terminal.", hint=hint, where=str(path))
     try:
         return _to_schema(_Profile.model_validate(data))
     except ValidationError as err:
         raise _explain(err, path) from err
+
+
+def _unprintable(value: object, key: str) -> Iterator[str]:
+    """Keys of what holds a character that cannot be printed; line ends are of a longer text."""
+    if isinstance(value, str) and not value.replace("\n", "").isprintable():
+        yield key
+    elif isinstance(value, Mapping):
+        for name, part in value.items():
+            inner = f"{key}.{name}".lstrip(".")
+            yield from _unprintable(str(name).replace("\n", "\0"), inner)
+            yield from _unprintable(part, inner)
+    elif isinstance(value, list):
+        for part in value:
+            yield from _unprintable(part, key)
 
 
 def _explain(err: ValidationError, path: Path) -> ProfileError:

@@ -153,7 +153,7 @@ def baseline_text(found: Baseline) -> str:
 
 
 def _lines(found: Baseline) -> Iterator[str]:
-    yield from wrapped(fit_text(found.choice.name, found.choice.fit))
+    yield from wrapped(fit_text(found.choice.title, found.choice.fit))
     flown = f" of {found.missions} mission{'s' if found.missions > 1 else ''}" if found.runs else ""
     runs, logs = len(found.runs), found.logs
     counted = f"{runs} good run{'s' if runs != 1 else ''}{flown} in {logs} log{'s' if logs > 1 else ''}"

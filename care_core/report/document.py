@@ -40,7 +40,7 @@ from care_core.report.entries import (
     finding_entries,
 )
 from care_core.report.published import Document, publish, publishable
-from care_core.run import FITS, Fit, Value, is_known
+from care_core.run import FITS, Fit, Value, is_known, profile_title
 from care_core.text import clean
 from care_core.variables import ASSUMED, Change, Kind, Op, Threshold
 
@@ -50,10 +50,17 @@ Share = Annotated[float, Meta(ge=0, le=1)]
 """A probability, or a part of a whole."""
 
 
-class ProfileEntry(Document, kw_only=True):
+class ProfileEntry(Document, kw_only=True, omit_defaults=True):
     name: str
     version: str
     platform: str
+    origin: str = ""
+    """Where it is from, if it neither came with the program nor is one of the user's."""
+
+    @property
+    def title(self) -> str:
+        """Its name, and where it is from if that needs to be known."""
+        return profile_title(self.name, self.origin)
 
 
 class LogEntry(Document, kw_only=True):
@@ -325,7 +332,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
 def remembered_verdict(document: TriageDocument) -> Verdict:
     """The verdict of a document that was read back."""
     return compose(
-        document.profile.name if document.profile else "",
+        document.profile.title if document.profile else "",
         document.fit,
         document.objectives,
         document.findings,

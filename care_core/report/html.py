@@ -91,7 +91,7 @@ def _facts(report: Report) -> list[tuple[str, str]]:
         ("Recorded (UTC)", (log.start or "")[:19].replace("T", " ")),
         ("Length of the log", seconds(log.duration_s)),
         ("Mission", mission),
-        ("Profile", f"{report.profile.name} {report.profile.version}" if report.profile else ""),
+        ("Profile", f"{report.profile.title} {report.profile.version}" if report.profile else ""),
         ("Damage", f"{len(log.damage)} place{'s' if len(log.damage) > 1 else ''}" if log.damage else ""),
     ]
 

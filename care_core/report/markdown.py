@@ -142,7 +142,7 @@ def _origin(report: Report) -> Iterator[str]:
     sha256 = f", SHA-256 `{log.sha256}`" if log.sha256 else ""
     yield from ("", f"Log {_code(Path(log.path).name)}, {log.format}, {log.duration_s:.0f} s{sha256}.")
     if profile is not None:
-        yield _escape(f"Profile {profile.name} {profile.version} ({profile.platform}).")
+        yield _escape(f"Profile {profile.title} {profile.version} ({profile.platform}).")
     for damage in log.damage[:5]:
         yield f"Damage: {_clipped(damage.what)}."
     if len(log.damage) > 5:

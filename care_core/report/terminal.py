@@ -12,7 +12,7 @@ from care_core.diagnose.records import Cause, Diagnosis, Fault, PathNode, Predic
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, chance, verdict_of
 from care_core.report.health import account_lines, finding_lines, reason_lines
 from care_core.report.shared_causes import together
-from care_core.text import clean, listed, wrapped
+from care_core.text import listed, wrapped
 from care_core.variables import Variable
 
 EVIDENCE_SHOWN = 5
@@ -57,7 +57,7 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     which = f", {mission}" if run.mission.count else ""
     yield from wrapped(f"{Path(run.log.path).name}{which}, {duration}{facts}", "Log      ")
     if profile.name:
-        yield from wrapped(f"{profile.name} {profile.version}: {profile.reason}", "Profile  ")
+        yield from wrapped(f"{profile.title} {profile.version}: {profile.reason}", "Profile  ")
     elif diagnosis.profile.fit.verdict == "no":
         yield from wrapped("none fits", "Profile  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
@@ -164,7 +164,7 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
         likely = chance(other.p_fixed, other.is_guess)
         yield from wrapped(f"or {', '.join(map(str, other.changes))}: {likely}", "  ", "     ")
     yield ""
-    yield from (f"  {clean(line)}" for line in unified_diff(diagnosis.run, fix.changes).splitlines())
+    yield from (f"  {line}" for line in unified_diff(diagnosis.run, fix.changes).splitlines())
     yield ""
     yield from (
         f"  {line}"

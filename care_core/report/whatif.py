@@ -107,7 +107,7 @@ def whatif_text(question: Question, answer: Answer) -> str:
 
 
 def _lines(question: Question, answer: Answer) -> Iterator[str]:
-    yield from wrapped(fit_text(question.profile.name, question.profile.fit))
+    yield from wrapped(fit_text(question.profile.title, question.profile.fit))
     log = Path(question.run.log.path).name
     yield from wrapped(f"{log}, profile {question.profile.name} {question.profile.version}", "Log  ")
     yield ""

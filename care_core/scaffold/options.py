@@ -14,7 +14,7 @@ from care_core.records import Record, Struct, field
 from care_core.run import Setting
 from care_core.scaffold.excluded import SAFETY, reason_to_exclude
 from care_core.scaffold.inputs import InputLog
-from care_core.variables import Role, ValueType, Variable
+from care_core.variables import Role, ValueType, Variable, is_parameter_name
 
 _SPREAD = 2.0
 """Where nothing says what is acceptable: half to double of what was driven, for people to correct."""
@@ -117,6 +117,8 @@ def _all_driven(logs: Sequence[InputLog]) -> list[_Driven]:
 
 def _reason_to_exclude(stack: str, driven: _Driven, logs: int, fact: Fact | None, known: Mapping[str, Variable]) -> str:
     """Why a parameter is not an option; '' for one that is."""
+    if not is_parameter_name(driven.name):
+        return "no parameter is called so: the log is damaged there"
     reason = reason_to_exclude(stack, driven.name)
     if reason:
         return reason

@@ -109,7 +109,7 @@ def run_rows(diagnosis: Diagnosis) -> Rows:
         span = f"from {mission.start_s:.1f} s to {mission.end_s:.1f} s of the log"
         rows.append(labelled(diagnosis.run.noun.capitalize(), f"{mission.index} of {mission.count}, {span}"))
     if profile.name:
-        rows.append(labelled("Profile", f"{profile.name} {profile.version} ({profile.platform})"))
+        rows.append(labelled("Profile", f"{profile.title} {profile.version} ({profile.platform})"))
         rows.append(labelled("", profile.reason))
     if diagnosis.abstained:
         rows.append(warning("No change advised", diagnosis.abstained))

@@ -11,7 +11,7 @@ import numpy as np
 
 from care_core.errors import ConfigError
 from care_core.run import Find, Setting
-from care_core.text import clean
+from care_core.text import clean, command
 from care_core.variables import Variable
 
 FLAGS = frozenset({"@READONLY"})
@@ -92,7 +92,7 @@ def line_of(option: Variable, parameter: str, value: float) -> str:
 def commands(changes: Iterable[tuple[Variable, str, float]]) -> list[str]:
     """MAVProxy's commands for (option, parameter, value), which PX4's shell knows as well."""
     changes = tuple(changes)
-    lines = [f"param set {parameter} {text_of(option, value)}" for option, parameter, value in changes]
+    lines = [command("param", "set", parameter, text_of(option, value)) for option, parameter, value in changes]
     if any(option.reboot_required for option, _, _ in changes):
         lines.append("reboot")
     return lines

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from care_core.ecosystems.ros import yaml_tree
 from care_core.run import Find, Setting
+from care_core.text import command
 from care_core.variables import Variable
 
 
@@ -99,7 +99,7 @@ def commands(changes: Iterable[tuple[Variable, str, float]]) -> list[str]:
         node, _, name = parameter.rpartition("/")
         text = text_of(option, value)
         if option.reboot_required:
-            lines.append(f"rosparam set {shlex.quote(parameter)} {text}  # before {node} is started")
+            lines.append(command("rosparam", "set", parameter, text, note=f"before {node} is started"))
         else:
-            lines.append(f"rosrun dynamic_reconfigure dynparam set {shlex.quote(node)} {shlex.quote(name)} {text}")
+            lines.append(command("rosrun", "dynamic_reconfigure", "dynparam", "set", node, name, text))
     return lines

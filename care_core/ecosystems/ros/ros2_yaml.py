@@ -7,7 +7,6 @@ a pattern: `/**.use_sim_time`.
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
@@ -17,6 +16,7 @@ from care_core.ecosystems.ros import yaml_tree
 from care_core.ecosystems.ros.ros1_yaml import line_of, text_of
 from care_core.errors import ConfigError
 from care_core.run import Find, Setting
+from care_core.text import clean, command
 from care_core.variables import Variable
 
 __all__ = ["PARAMETERS", "commands", "finder", "line_of", "read", "text_of", "write"]
@@ -107,7 +107,7 @@ def commands(changes: Iterable[tuple[Variable, str, float]]) -> list[str]:
         node, _, path = parameter.partition(".")
         text = text_of(option, value)
         if option.reboot_required:
-            lines.append(f"# in the parameter file of {node}: {path}: {text}, then start it again")
+            lines.append(clean(f"# in the parameter file of {node}: {path}: {text}, then start it again"))
         else:
-            lines.append(f"ros2 param set {shlex.quote(node)} {shlex.quote(path)} {text}")
+            lines.append(command("ros2", "param", "set", node, path, text))
     return lines
