@@ -14,6 +14,7 @@ import hashlib
 import json
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from care_core.causal.abduction import ErrorCovariance, next_passes
 from care_core.causal.counterfactual import CounterfactualQuery
+from care_core.causal.graph import CausalGraph
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import UNKNOWN_CARRY_OVER
 from care_core.diagnose.judging import query_of, read_and_judge
@@ -68,6 +70,10 @@ class HeldOut(Record):
     met: FloatArray
 
 
+def _graph(schema: Schema, runs: pd.DataFrame, rng: np.random.Generator) -> CausalGraph:
+    return learn_structure(runs, schema, rng=rng).graph
+
+
 def held_out(table: Path, schema: Schema, cache: Path) -> HeldOut:
     """Cross-validated probabilities, all learned anew in each fold; kept in `cache` by table and code."""
     code = [path.read_bytes() for room in ("learn", "causal") for path in sorted((CORE / room).glob("*.py"))]
@@ -79,7 +85,7 @@ def held_out(table: Path, schema: Schema, cache: Path) -> HeldOut:
         probabilities = held_out_probabilities(
             frame,
             schema,
-            lambda runs, rng: learn_structure(runs, schema, rng=rng).graph,
+            partial(_graph, schema),
             np.random.default_rng(0),
             folds=FOLDS,
             n_jobs=2,

@@ -14,10 +14,11 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from care_core.errors import CareError
 from care_core.records import Record, Struct
+from care_core.starting import isolated_children
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
@@ -33,20 +34,24 @@ class Failed(Record):
     is_final: bool
 
 
-class _Worker(Struct, eq=False):
+class Worker(Struct, eq=False):
     """A process, the parent's end of its pipe, and the item that it works on since `since` (monotonic seconds)."""
 
     process: BaseProcess
     pipe: Connection
+    function: Callable[[Any], Any] | None = None
     item: int | None = None
     since: float = 0.0
 
-    def give(self, place: int, item: object) -> None:
-        self.item, self.since = place, time.monotonic()
+    def give(self, function: Callable[[Any], Any], place: int, item: object) -> None:
+        """Have it answer an item; the function is sent where it is another than before."""
+        is_known = self.function is function
+        self.function, self.item, self.since = function, place, time.monotonic()
         with suppress(OSError):  # it died meanwhile, which its sentinel tells
-            self.pipe.send(item)
+            self.pipe.send((None if is_known else function, item))
 
     def end(self) -> None:
+        """Kill it, whatever it does."""
         self.process.kill()
         self.process.join()
         self.pipe.close()
@@ -55,21 +60,19 @@ class _Worker(Struct, eq=False):
 class _Pool(Generic[Item, Answer]):
     """The processes and what is still to be given to them."""
 
-    def __init__(self, function: Callable[[Item], Answer], items: Sequence[Item], limit_s: float) -> None:
-        self._function, self._items, self._limit_s = function, items, limit_s
+    def __init__(
+        self, function: Callable[[Item], Answer], items: Sequence[Item], limit_s: float, spare: list[Worker] | None
+    ) -> None:
+        self._function, self._items, self._limit_s, self._spare = function, items, limit_s, spare
         self._next = 0
-        self._workers: list[_Worker] = []
+        self._workers: list[Worker] = []
         # A fresh interpreter holds no lock of the parent's threads and none of its pipes.
         self._context = multiprocessing.get_context("spawn")
 
     def start(self) -> None:
         """One more process, with an item if there is one left."""
         if self._next < len(self._items):
-            ours, theirs = self._context.Pipe()
-            process = self._context.Process(target=_serve, args=(self._function, theirs), daemon=True)
-            process.start()
-            theirs.close()
-            worker = _Worker(process, ours)
+            worker = self._spare.pop() if self._spare else self._spawned()
             self._workers.append(worker)
             self._feed(worker)
 
@@ -86,7 +89,15 @@ class _Pool(Generic[Item, Answer]):
         for worker in self._workers:
             worker.end()
 
-    def _answer(self, worker: _Worker) -> tuple[int, Answer | Failed]:
+    def _spawned(self) -> Worker:
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(target=_serve, args=(theirs,), daemon=True)
+        with isolated_children():
+            process.start()
+        theirs.close()
+        return Worker(process, ours)
+
+    def _answer(self, worker: Worker) -> tuple[int, Answer | Failed]:
         place = self._place(worker)
         try:
             answer: Answer | Failed = worker.pipe.recv()
@@ -96,15 +107,18 @@ class _Pool(Generic[Item, Answer]):
         self._feed(worker)
         return place, answer
 
-    def _feed(self, worker: _Worker) -> None:
+    def _feed(self, worker: Worker) -> None:
         if self._next < len(self._items):
-            worker.give(self._next, self._items[self._next])
+            worker.give(self._function, self._next, self._items[self._next])
             self._next += 1
-        else:
-            self._workers.remove(worker)
+            return
+        self._workers.remove(worker)
+        if self._spare is None:
             worker.end()
+        else:
+            self._spare.append(worker)
 
-    def _lose(self, worker: _Worker, reason: str) -> tuple[int, Failed]:
+    def _lose(self, worker: Worker, reason: str) -> tuple[int, Failed]:
         place = self._place(worker)
         self._workers.remove(worker)
         worker.end()
@@ -112,14 +126,19 @@ class _Pool(Generic[Item, Answer]):
         return place, Failed(reason, is_final=False)
 
     @staticmethod
-    def _place(worker: _Worker) -> int:
+    def _place(worker: Worker) -> int:
         if worker.item is None:
             raise ValueError("a worker without an item has no answer")
         return worker.item
 
 
 def each(
-    function: Callable[[Item], Answer], items: Sequence[Item], *, workers: int | None = None, limit_s: float = 600.0
+    function: Callable[[Item], Answer],
+    items: Sequence[Item],
+    *,
+    workers: int | None = None,
+    limit_s: float = 600.0,
+    spare: list[Worker] | None = None,
 ) -> Generator[tuple[int, Answer | Failed], None, None]:
     """`function(item)` of every item, as (place of the item, answer), in the order in which they are done.
 
@@ -127,8 +146,9 @@ def each(
         function: importable by name, as its arguments and answers must be sent between processes.
         workers: processes; one a core when None.
         limit_s: seconds after which an item's process is ended.
+        spare: processes that wait for work: they are taken first, and those that have no more are put there.
     """
-    pool: _Pool[Item, Answer] = _Pool(function, items, limit_s)
+    pool: _Pool[Item, Answer] = _Pool(function, items, limit_s, spare)
     try:
         for _ in range(min(workers or os.cpu_count() or 1, len(items))):
             pool.start()
@@ -137,12 +157,15 @@ def each(
         pool.close()
 
 
-def _serve(function: Callable[[Item], Answer], pipe: Connection) -> None:
+def _serve(pipe: Connection) -> None:
     """Body of a process: answer items until the parent hangs up."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is the parent's to handle
+    function: Any = None
     with suppress(EOFError, OSError):
         while True:
-            pipe.send(_attempt(function, pipe.recv()))
+            new, item = pipe.recv()
+            function = new or function
+            pipe.send(_attempt(function, item))
 
 
 def _attempt(function: Callable[[Item], Answer], item: Item) -> Answer | Failed:

@@ -37,6 +37,13 @@ def main() -> None:
             signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+def own_command(*words: str) -> list[str]:
+    """The command that runs this program once more."""
+    from care_core.starting import python_command
+
+    return python_command("from care_tui.start import main; main()", *words)
+
+
 def _leave(number: int, _frame: FrameType | None) -> None:
     """End as on an error, so that temporary files go: the system's own way leaves them.
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from care_core.errors import UsageError, nearest
 from care_core.records import Record
 from care_core.report.watching import NO_ROBOT, WatchEntry, entry_json
+from care_core.starting import program_path
 
 PLACES = ("log", "name", "verdict", "robot", "says", "profile", "sha256", "number")
 """What a command may name: {log} is the path of the log, {name} its last part."""
@@ -40,7 +41,7 @@ class Notifier(Record):
         command = filled(self.words, entry)
         try:
             process = subprocess.Popen(
-                command,
+                [program_path(command[0]), *command[1:]],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,

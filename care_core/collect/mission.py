@@ -26,6 +26,7 @@ from care_core.files import write_atomically
 from care_core.logs.finding import logs_below
 from care_core.records import Record
 from care_core.run import Setting
+from care_core.starting import script_command
 from care_core.tables.rows import TableRow, rows_of
 
 RECORD, OUTPUT, LOGS = "ended.json", "command.log", "logs"
@@ -148,7 +149,7 @@ def _run(
     words: Sequence[str], campaign: Campaign, environment: Mapping[str, str], folder: Path, stop: threading.Event
 ) -> bool:
     """Run the command until it ends; whether it took too long. Raises StoppedError."""
-    guarded = [sys.executable, "-I", guard.__file__, str(_GRACE_S), str((folder / RECORD).absolute()), *words]
+    guarded = script_command(guard.__file__, str(_GRACE_S), str((folder / RECORD).absolute()), *words)
     with (folder / OUTPUT).open("wb") as output:
         process = subprocess.Popen(
             guarded,

@@ -25,6 +25,7 @@ from typing import Any, TypeVar
 from care_core.errors import UsageError
 from care_core.fleet.sources import INSTALL
 from care_core.parallel import Failed
+from care_core.starting import isolated_children
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
@@ -130,6 +131,7 @@ def _local(workers: int, memory: str | None) -> Iterator[Any]:
         }
         with (
             dask.config.set(settings),
+            isolated_children(),
             _ignoring_interrupts(),
             patiently(lambda: distributed.LocalCluster(**ours)) as cluster,
             distributed.Client(cluster) as client,

@@ -36,11 +36,15 @@ def cross_validated_skill(
     """
     if not folds:
         return {}
-    promised = held_out_probabilities(frame, schema, lambda _runs, _rng: graph, rng, folds=folds, n_jobs=n_jobs)
+    promised = held_out_probabilities(frame, schema, partial(_kept, graph), rng, folds=folds, n_jobs=n_jobs)
     truth: dict[str, FloatArray] = {objective.name: met(objective, frame, schema) for objective in schema.objectives}
     truth["all"] = all_met(frame, schema)
     found = {name: score(promised[name], truth[name]) for name in promised}
     return {name: skill for name, skill in found.items() if skill is not None}
+
+
+def _kept(graph: CausalGraph, _runs: pd.DataFrame, _rng: np.random.Generator) -> CausalGraph:
+    return graph
 
 
 Learn = Callable[[pd.DataFrame, np.random.Generator], CausalGraph]
@@ -50,21 +54,27 @@ Learn = Callable[[pd.DataFrame, np.random.Generator], CausalGraph]
 def held_out_probabilities(
     frame: pd.DataFrame, schema: Schema, learn: Learn, rng: np.random.Generator, *, folds: int, n_jobs: int = 1
 ) -> dict[str, FloatArray]:
-    """Probability of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each."""
+    """Probability of every objective, and of `all`, for each run by a model that has not seen it; shape (n,) each.
+
+    Args:
+        learn: can be imported by name where `n_jobs` is more than 1.
+    """
     fold = _folds(frame, schema, rng, folds)
     seeds = rng.integers(2**32, size=folds)
-
-    def predict(k: int) -> Mapping[str, FloatArray]:
-        own = np.random.default_rng(seeds[k])
-        runs = frame[fold != k]
-        return _probabilities(runs, frame[fold == k], schema, learn(runs, own), own)
-
-    predicted = answers([partial(predict, k) for k in range(folds)], n_jobs)
+    calls = [partial(_predict, frame[fold != k], frame[fold == k], schema, learn, seeds[k]) for k in range(folds)]
+    predicted = answers(calls, n_jobs)
     promised: dict[str, FloatArray] = {}
     for k, values in enumerate(predicted):
         for name, held_out in values.items():
             promised.setdefault(name, np.full(len(frame), np.nan))[fold == k] = held_out
     return promised
+
+
+def _predict(
+    runs: pd.DataFrame, left_out: pd.DataFrame, schema: Schema, learn: Learn, seed: int
+) -> Mapping[str, FloatArray]:
+    rng = np.random.default_rng(seed)
+    return _probabilities(runs, left_out, schema, learn(runs, rng), rng)
 
 
 def _folds(frame: pd.DataFrame, schema: Schema, rng: np.random.Generator, folds: int) -> NDArray[np.int64]:

@@ -34,7 +34,7 @@ from care_core.learn.outcomes import (
     questions_of_objectives,
     varying_options,
 )
-from care_core.learn.processes import answers
+from care_core.learn.processes import answers, kept_processes
 from care_core.learn.relative import of_ratios, relative
 from care_core.learn.repeats import carry_over
 from care_core.learn.robustness import robustness
@@ -75,7 +75,7 @@ def train(frame: pd.DataFrame, schema: Schema, settings: TrainSettings, progress
     Raises:
         LearningError: too few runs, or no option has an effect that the table can show.
     """
-    with threadpool_limits(1):
+    with threadpool_limits(1), kept_processes():
         return _train(frame, schema, settings, progress or (lambda _step, _share: None))
 
 
@@ -258,14 +258,6 @@ def _edge_effects(
     An edge from an option that shares a hidden cause with its effect has none that the runs could tell, and carries
     no path.
     """
-    options = {option.name for option in schema.options}
-
-    def measure(question: Question) -> dict[Edge, _Measured]:
-        child = question.target
-        parents = sorted(graph.parents(child))
-        effects = _measure(parents, question.answer(), frame, schema, resamples)
-        hidden = options & {*graph.siblings(child)}
-        return {(parent, child): effect for parent, effect in effects.items() if parent not in hidden}
 
     def asked(i: int, child: str) -> Question | None:
         rng = np.random.default_rng([settings.seed, i])
@@ -273,8 +265,22 @@ def _edge_effects(
         return ask([parents], child, frame, schema, rng, effort=METRIC) if parents else None
 
     questions = [asked(i, child) for i, child in enumerate(graph.topological_order())]
-    calls = [partial(measure, question) for question in questions if question is not None]
+    calls = [
+        partial(_effects_on_child, question, frame, schema, graph, resamples)
+        for question in questions
+        if question is not None
+    ]
     return {edge: effect for part in answers(calls, settings.n_jobs) for edge, effect in part.items()}
+
+
+def _effects_on_child(
+    question: Question, frame: pd.DataFrame, schema: Schema, graph: CausalGraph, resamples: _Resamples
+) -> dict[Edge, _Measured]:
+    child = question.target
+    parents = sorted(graph.parents(child))
+    effects = _measure(parents, question.answer(), frame, schema, resamples)
+    hidden = {option.name for option in schema.options} & {*graph.siblings(child)}
+    return {(parent, child): effect for parent, effect in effects.items() if parent not in hidden}
 
 
 def _edge_record(

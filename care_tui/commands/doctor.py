@@ -84,11 +84,11 @@ def _colours(term: str) -> tuple[Status, str, str]:
 
 def _tmux() -> Checked:
     from care_core.application.checkup import Checked
+    from care_core.starting import program_path
 
     try:
-        asked = subprocess.run(
-            ["tmux", "show-options", "-sv", "escape-time"], capture_output=True, text=True, timeout=_LOOK_S, check=False
-        )
+        words = [program_path("tmux"), "show-options", "-sv", "escape-time"]
+        asked = subprocess.run(words, capture_output=True, text=True, timeout=_LOOK_S, check=False)
         wait_ms = int(asked.stdout)
     except (OSError, ValueError, subprocess.TimeoutExpired):
         return Checked("tmux", "ok", "inside tmux, which does not say how long it holds Esc back")

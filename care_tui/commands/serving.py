@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +12,7 @@ from care_core.errors import UsageError
 from care_tui.commands.arguments import ConfigPaths, ProfileName
 from care_tui.console import emit, say
 from care_tui.settings import SERVER
+from care_tui.start import own_command
 
 app = typer.Typer()
 
@@ -36,11 +36,11 @@ def serve(
 
     _check_free(HOST, port)
     os.environ[SERVER] = str(os.getpid())
-    words = [sys.executable, "-m", "care_tui", *([str(log.absolute())] if log else [])]
+    words = [str(log.absolute())] if log else []
     words += ["--profile", profile] if profile else []
     words += [word for path in config or () for word in ("--config", path)]
     replaced = "exec " if os.name == "posix" else ""  # the app is to be the server's own child, not a shell's
-    server = TokenServer(f"{replaced}{shlex.join(words)}", port, secrets.token_urlsafe(24))
+    server = TokenServer(f"{replaced}{shlex.join(own_command(*words))}", port, secrets.token_urlsafe(24))
     emit(f"{server.address}\n")
     say("Open this address in a browser of this machine. Ctrl+C ends it.")
     server.serve()

@@ -21,6 +21,7 @@ from care_core.records import Struct, field
 from care_tui.commands.arguments import ProfileName, RobotName, Site, Thresholds, bounds
 from care_tui.commands.past import NoHistory
 from care_tui.console import emit, painted, say
+from care_tui.start import own_command
 
 if TYPE_CHECKING:
     from care_core.application.notifying import Notifier
@@ -252,7 +253,7 @@ class _Screen(Struct, eq=False, dict=True):
         if not chosen:
             say(f"there is no log {wanted} yet" if self.entries else "there is no log yet")
             return
-        self._app = subprocess.Popen([sys.executable, "-m", "care_tui", chosen[-1].log, *self.words])
+        self._app = subprocess.Popen(own_command(chosen[-1].log, *self.words))
 
     def _await_app(self, pause_s: float) -> None:
         until = time.monotonic() + pause_s

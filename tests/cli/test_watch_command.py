@@ -97,7 +97,7 @@ def test_the_number_of_a_log_opens_the_app_on_it(monkeypatch: pytest.MonkeyPatch
 
     class Opened:
         def __init__(self, command: list[str]) -> None:
-            opened.append(command[3:])
+            opened.append(command[command.index("-c") + 2 :])
 
         def wait(self, _limit_s: float | None = None) -> int:
             return 0

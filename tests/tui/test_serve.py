@@ -26,20 +26,20 @@ pytest.importorskip("textual_serve", reason="needs the extra 'serve'")
 
 @pytest.fixture
 def address() -> Iterator[str]:
-    server, address = _serve()
+    server, address = serve()
     with server:
         yield address
         server.terminate()
 
 
-def _serve() -> tuple[subprocess.Popen[str], str]:
-    """A server, and the address that it says."""
+def serve(*care: str, cwd: Path | None = None) -> tuple[subprocess.Popen[str], str]:
+    """A server, and the address that it says. `care`: what the command begins with."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     sample = str(bundled("samples", "arducopter_failed.BIN"))
-    command = [sys.executable, "-m", "care_tui", "serve", sample, "--port", str(port)]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    command = [*(care or (sys.executable, "-m", "care_tui")), "serve", sample, "--port", str(port)]
+    server = subprocess.Popen(command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     assert server.stdout is not None
     address = server.stdout.readline().strip()
     _wait_for(port)
@@ -71,7 +71,11 @@ def test_only_who_has_the_token_is_let_in(address: str) -> None:
 
 
 def test_the_app_runs_behind_the_socket(address: str) -> None:
-    """Connects as the page does, turns to the causes, and reads what is drawn."""
+    assert b"LAND_SPEED" in asyncio.run(causes_behind(address))
+
+
+async def causes_behind(address: str) -> bytes:
+    """Connect as the page does, turn to the causes, and read what is drawn."""
     import aiohttp
 
     async def walk() -> bytes:
@@ -90,10 +94,7 @@ def test_the_app_runs_behind_the_socket(address: str) -> None:
                         return seen
             return b""
 
-    async def in_time() -> bytes:
-        return await asyncio.wait_for(walk(), 60)
-
-    assert b"LAND_SPEED" in asyncio.run(in_time())
+    return await asyncio.wait_for(walk(), 60)
 
 
 class Browser:
@@ -202,7 +203,7 @@ def test_sessions_end_with_the_server(tmp_path: Path, number: signal.Signals) ->
     """Also where it is killed; and what no page sends does not end them before."""
     import aiohttp
 
-    process, address = _serve()
+    process, address = serve()
 
     hostile = ("[]", "5", "{}", '["resize", {"width": 99999999, "height": 1}]', '["resize"]', '["stdin", 5]')
 
