@@ -13,6 +13,7 @@ from rosbags.rosbag2 import StoragePlugin
 from care_core.application.case import Request, open_case
 from care_core.diagnose.judging import judge_plainly
 from care_core.diagnose.verdict import status_of, verdict_of
+from care_core.ecosystems.examine import examine
 from care_core.ecosystems.measures import MISSION_KINDS, Mission
 from care_core.ecosystems.registry import run_model
 from care_core.errors import ExitCode
@@ -28,7 +29,7 @@ from care_core.run import Check, Unavailable, Value, is_known
 from tests.nav2_drive import recorded
 from tests.rewritten import write_text
 from tests.ros_samples import write_bag
-from tests.tables import read
+from tests.tables import TablesLog, read
 from tests.unit.test_ardupilot_extract import HOME, KIND, METRES, flight, table
 from tests.unit.test_px4_health import states
 
@@ -136,10 +137,11 @@ def test_a_refusal_is_a_fault_only_where_somebody_asked_to_arm() -> None:
 def px4(**status: Any) -> dict[str, Value]:
     landed = status.pop("landed", [(0.0, 1), (12.0, 0), (49.5, 1)])
     result = status.pop("result", None)
+    told_of_it = status.pop("mission", {})
     told = {"arming_state": [(0.0, 1), (10.0, 2), (50.0, 1)], "nav_state": [(0.0, 3)], "failsafe": [(0.0, 0)], **status}
     tables = {"vehicle_status": states(**told), "vehicle_land_detected": states(landed=landed)}
     if result is not None:
-        tables["mission_result"] = states(finished=result)
+        tables["mission_result"] = states(finished=result, **told_of_it)
     (mission,) = PX4.missions(*read(tables, 60.0, formats.PX4_ULG), {})
     return checks(PX4.outcome(mission))
 
@@ -150,6 +152,39 @@ def test_a_px4_mission_that_was_finished_is_fine() -> None:
         ("armed", "took_off", "mission_success", "no_crash", "no_failsafe", "landed", "disarmed"), 1.0
     )
     assert not is_known(px4()["mission_success"])
+
+
+def test_what_px4_says_of_take_off_and_return_is_nothing_of_a_mission() -> None:
+    modes = [(0.0, 4), (10.0, 17), (20.0, 3), (30.0, 5)]
+    for finished in ([(0.0, 0), (15.0, 1), (20.0, 0)], [(0.0, 0), (45.0, 1)]):
+        assert not is_known(px4(nav_state=modes, result=finished)["mission_success"])
+
+
+def test_a_px4_mission_whose_last_item_returned_and_landed_is_flown_whatever_mode_follows() -> None:
+    modes = [(0.0, 3), (30.0, 5), (49.8, 3)]
+    reached = {"seq_total": [(0.0, 4)], "seq_reached": [(0.0, -1), (20.0, 1), (29.0, 2), (49.8, -1)]}
+    quiet = [(0.0, 0)]
+    assert px4(nav_state=modes, result=quiet, mission=reached)["mission_success"] == 1.0
+    early = {**reached, "seq_reached": [(0.0, -1), (20.0, 2)]}
+    assert not is_known(px4(nav_state=modes, result=quiet, mission=early)["mission_success"])
+    every = {**reached, "seq_reached": [(0.0, -1), (20.0, 3), (49.8, -1)]}
+    assert px4(nav_state=[(0.0, 3)], result=quiet, mission=every)["mission_success"] == 1.0
+
+
+@pytest.mark.parametrize("name", ["mission_id", "instance_count"])
+def test_a_px4_mission_replaced_under_way_is_not_evaluated(name: str) -> None:
+    finished, modes = [(0.0, 0), (40.0, 1)], [(0.0, 3), (45.0, 5)]
+    replaced = px4(nav_state=modes, result=finished, mission={name: [(0.0, 7), (25.0, 8)]})["mission_success"]
+    assert isinstance(replaced, Unavailable)
+    assert replaced.reason == "the mission was replaced under way, at 25 s"
+    for t in (5.0, 42.0, 48.0):  # before the flight, when all of it is done, on the way home
+        assert px4(nav_state=modes, result=finished, mission={name: [(0.0, 7), (t, 8)]})["mission_success"] == 1.0
+    log = TablesLog({"mission_result": states(**{name: [(0.0, 7), (25.0, 8)]})}, 60.0, formats.PX4_ULG)
+    begun = {name: [(0.0, 7), (42.0, 8)], "seq_reached": [(0.0, -1), (44.0, 0)]}
+    two = px4(nav_state=modes, result=[(0.0, 0), (40.0, 1), (42.0, 0)], mission=begun)["mission_success"]
+    assert isinstance(two, Unavailable)
+    timeline = examine(run_model(log)).timeline
+    assert "another mission was uploaded" in [event.text for event in timeline]
 
 
 def test_px4_says_what_failed() -> None:

@@ -20,13 +20,14 @@ Span = tuple[float, float]
 
 STATUS, MESSAGES, LANDED = "vehicle_status", "logged_messages", "vehicle_land_detected"
 POSITION, RESULT, FLAGS = "vehicle_local_position", "mission_result", "failsafe_flags"
+RESULT_FIELDS = ("finished", "failure", "mission_id", "instance_count", "seq_reached", "seq_total")
 
 READS: Wanted = {
     STATUS: ("arming_state", "nav_state", "failsafe", "failure_detector_status", "vehicle_type"),
     MESSAGES: ("level", "message"),
     LANDED: ("landed",),
     POSITION: ("z",),
-    RESULT: ("finished", "failure"),
+    RESULT: RESULT_FIELDS,
     FLAGS: ("fd_critical_failure", "fd_motor_failure"),
     "sensor_combined": ("gyro_rad[0]",),
 }
@@ -182,6 +183,11 @@ class Px4Flight(RunModel):
         """Whether a field had a value in a span."""
         table = self.during(topic, field, span)
         return table is not None and bool(np.any(table[field] == value))
+
+    def at_least(self, topic: str, field: str, value: float, span: Span) -> bool:
+        """Whether a field reached a value in a span."""
+        table = self.during(topic, field, span)
+        return table is not None and bool(np.any(table[field] >= value))
 
     def last(self, topic: str, field: str, t: float) -> float | None:
         """The value in force at a time, which may have been published before or just after it."""

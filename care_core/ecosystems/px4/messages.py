@@ -50,6 +50,9 @@ MESSAGES: Dictionary = {
         "finished": Field(label="mission finished", plausible=_SHARE),
         "failure": Field(label="mission failed", plausible=_SHARE),
         "seq_reached": Field(label="last waypoint reached"),
+        "seq_total": Field(label="items of the mission"),
+        "mission_id": Field(label="number of the mission"),
+        "instance_count": Field(label="number of the mission"),
     }),
     "vehicle_local_position": Message({
         "x": Field("m", "position north", is_position=True),

@@ -15,11 +15,13 @@ from care_core.ecosystems.px4.flight import (
     MESSAGES,
     POSITION,
     RESULT,
+    RESULT_FIELDS,
     ROVER,
     STATUS,
     Px4Flight,
     Span,
 )
+from care_core.ecosystems.px4.flown_mission import mission_outcome
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.logs.base import Table, Wanted
 from care_core.run import Check, Evidence, Unavailable, Value
@@ -40,7 +42,7 @@ class Px4Missions(MissionKind):
             STATUS: ("arming_state", "nav_state", "failsafe", "failure_detector_status", "vehicle_type"),
             LANDED: ("landed",),
             POSITION: ("z",),
-            RESULT: ("finished", "failure"),
+            RESULT: RESULT_FIELDS,
             FLAGS: ("fd_critical_failure", "fd_motor_failure"),
             MESSAGES: ("message",),
         }
@@ -81,7 +83,9 @@ def _checks(flight: Px4Flight, span: Span, *, ended: bool) -> Iterator[Check]:
     if flies:
         yield Check("took_off", _took_off(flight, span), "it left the ground")
     if any(way_of("px4", mode) == "mission" for mode in flight.modes_during(span)):
-        yield Check("mission_success", _mission(flight, span), "the mission was flown to its end", "the mission failed")
+        yield Check(
+            "mission_success", mission_outcome(flight, span), "the mission was flown to its end", "the mission failed"
+        )
     yield _no_crash(flight, span)
     failsafe = flight.ever(STATUS, "failsafe", 1, span)
     yield Check("no_failsafe", float(not failsafe), "no failsafe acted", "a failsafe acted")
@@ -116,15 +120,3 @@ def _on_ground(flight: Px4Flight, span: Span, *, ended: bool) -> Value:
     if flight.during(LANDED, "landed", span) is None:
         return Unavailable("the log does not say when it was on the ground", f"record {LANDED}", LANDED)
     return float(flight.last(LANDED, "landed", span[1]) == 1) if ended else _CUT
-
-
-def _mission(flight: Px4Flight, span: Span) -> Value:
-    """1 where the navigator called the mission finished, 0 where it failed or was still under way at the end."""
-    if flight.during(RESULT, "finished", span) is None:
-        return Unavailable("the log does not say how the mission ended", f"record {RESULT}", RESULT)
-    if flight.ever(RESULT, "finished", 1, span):
-        return 1.0
-    if flight.ever(RESULT, "failure", 1, span):
-        return 0.0
-    last = mode_name("px4", flight.modes_during(span)[-1])
-    return Unavailable(f"the mission was not flown to its end, the last mode was {last}")

@@ -15,6 +15,7 @@ from care_core.ecosystems.px4.flight import (
     LANDED,
     MESSAGES,
     POSITION,
+    RESULT,
     SAID_WITHIN_S,
     STATUS,
     Px4Flight,
@@ -24,7 +25,8 @@ from care_core.ecosystems.px4.flight import (
     reason_of,
     without_speaker,
 )
-from care_core.ecosystems.timeline import damage_of, gaps, parameter_changes, repeats, timeline_of
+from care_core.ecosystems.px4.flown_mission import uploads
+from care_core.ecosystems.timeline import counted, damage_of, gaps, parameter_changes, repeats, timeline_of
 from care_core.ecosystems.vehicles import mode_name, vehicle_of
 from care_core.logs.base import Table, Wanted
 
@@ -56,6 +58,7 @@ def timeline(flight: Px4Flight, tables: Collection[Table]) -> tuple[Event, ...]:
     events = [
         *_arming(flight),
         *_modes(flight),
+        *_uploads(flight),
         *_landings(flight),
         *_states(flight),
         *_spoken(flight),
@@ -89,6 +92,13 @@ def _arming(flight: Px4Flight) -> Iterator[Event]:
 
 def _modes(flight: Px4Flight) -> Iterator[Event]:
     yield from (Event(t, "mode", f"mode {mode_name('px4', mode)}", STATUS) for t, mode in flight.modes)
+
+
+def _uploads(flight: Px4Flight) -> Iterator[Event]:
+    for t, count in uploads(flight):
+        when = " while armed" if flight.began_armed(t) else ""
+        size = "" if count is None else f": {counted(count, 'item')}"
+        yield Event(t, "mission", f"another mission was uploaded{when}{size}", RESULT)
 
 
 def _landings(flight: Px4Flight) -> Iterator[Event]:
