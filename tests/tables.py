@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.registry import run_model
 from care_core.logs import formats
@@ -28,6 +31,10 @@ class TablesLog(Record, eq=False):
 
     def channels(self) -> tuple[Channel, ...]:
         return tuple(Channel(name, name, len(table)) for name, table in self.tables.items())
+
+    def times(self) -> Mapping[str, NDArray[np.float64]]:
+        """As logs of ROS tell them."""
+        return {name: table.t for name, table in self.tables.items()}
 
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
         return self.known

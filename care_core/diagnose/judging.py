@@ -282,7 +282,7 @@ def meaningful(
     if not run.mission.ended:
         cut = Unavailable("the log ends before the mission does", "record until the mission has ended")
         return {name: cut if is_known(value) else value for name, value in run.objectives.items()}
-    accomplished = _accomplished(run, schema, bounds)
+    missed = _not_accomplished(run, schema, bounds)
     found = dict(run.objectives)
     for objective in schema.objectives:
         name = objective.name
@@ -292,8 +292,8 @@ def meaningful(
             found[name] = Unavailable("no mission was flown")
         elif not is_known(found.get(name)):
             continue
-        elif not accomplished:
-            found[name] = Unavailable("not judged: the mission was not completed")
+        elif missed:
+            found[name] = Unavailable(f"not judged: {missed}")
         elif name not in judged_anyway and (mismatch := _of_another_mission(objective, run, schema)):
             hint = f"give this mission's bound with --threshold {name}=VALUE"
             found[name] = Unavailable(mismatch, hint)
@@ -308,14 +308,18 @@ def _of_another_mission(objective: Variable, run: Run, schema: Schema) -> str:
     return objective.threshold.mismatch(run.context)
 
 
-def _accomplished(run: Run, schema: Schema, bounds: Mapping[str, Threshold]) -> bool:
+def _not_accomplished(run: Run, schema: Schema, bounds: Mapping[str, Threshold]) -> str:
+    """Why the mission does not count as completed, empty where it does."""
+    why = ""
     for objective in schema.objectives:
         if objective.kind != "functional":
             continue
         value, bound = run.objectives.get(objective.name), bounds.get(objective.name)
-        if not is_known(value) or (bound is not None and not bound.met(value)):
-            return False
-    return True
+        if not is_known(value):
+            why = "whether the mission was completed is not known"
+        elif bound is not None and not bound.met(value):
+            return "the mission was not completed"
+    return why
 
 
 def _without_limits_of(named: Container[str], schema: Schema) -> Schema:

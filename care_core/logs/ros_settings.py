@@ -51,7 +51,10 @@ def settings_in(types: Mapping[str, str], tables: Mapping[str, Table]) -> dict[s
             for name, value, time_s in _config_values(tables[topic]):
                 _add(histories, f"{namespace}/{name}", value, time_s, topic, bounds, name)
         elif types[topic] == _EVENT:
-            for name, value, time_s in _event_values(tables[topic]):
+            space = topic.rpartition("/")[0]
+            for node, value, time_s in _event_values(tables[topic]):
+                # What was renamed while it was recorded is another robot's, whatever its node calls itself.
+                name = node if node.startswith(f"{space}/") else f"{space}{node}"
                 _add(histories, name, value, time_s, topic, _Bounds(None), name)
     return {name: tuple(history) for name, history in histories.items()}
 

@@ -69,14 +69,20 @@ def test_without_a_threshold_the_value_is_shown_but_not_judged() -> None:
     assert "--threshold" in time.reason
 
 
-@pytest.mark.parametrize("success", [0.0, Unavailable("told so")])
-def test_a_mission_that_was_not_accomplished_has_no_time(success: Value) -> None:
+@pytest.mark.parametrize(
+    ("success", "why"),
+    [
+        (0.0, "the mission was not completed"),
+        (Unavailable("told so"), "whether the mission was completed is not known"),
+    ],
+)
+def test_a_mission_that_was_not_accomplished_has_no_time(success: Value, why: str) -> None:
     run = replace(planted_run(), objectives={**planted_run().objectives, "success": success})
     judged = judge(run, SCHEMA, MODEL, {"time": 90.0})
     for name in ("time", "energy"):
         value = judged.run.objectives[name]
         assert isinstance(value, Unavailable)
-        assert "not completed" in value.reason
+        assert value.reason == f"not judged: {why}"
 
 
 def test_a_log_that_ends_early_evaluates_nothing() -> None:

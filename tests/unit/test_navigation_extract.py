@@ -166,6 +166,37 @@ def test_a_log_that_stops_between_two_goals() -> None:
     assert isinstance(value("goals_success", mission(between)), Unavailable)
 
 
+def test_a_goal_replaced_in_its_time_is_no_failure_and_no_success() -> None:
+    sent, ended = goals((10, 2, 0), (21, 4, 0), (25, 6, 0)), results((20, 0, 3), (25.1, 1, 2), (35, 2, 3))
+    replaced = drive(move_base__goal=sent, move_base__result=ended, odom=odometry({10: 0, 20: 2, 21: 2, 35: 6}))
+    found = value("goals_success", mission(replaced))
+    assert isinstance(found, Unavailable)
+    assert found.reason == "goal 2 was replaced by another under way, at 25 s"
+    aborted = replaced | {"/move_base/result": results((20, 0, 4), (25.1, 1, 2), (35, 2, 3))}
+    assert value("goals_success", mission(aborted)) == 0
+
+
+def test_a_goal_sent_again_to_the_same_place_is_one_goal() -> None:
+    again = drive(
+        move_base__goal=goals((10, 2, 0), (21, 4, 0), (25, 4, 0)),
+        move_base__result=results((20, 0, 3), (25.1, 1, 2), (31, 2, 3)),
+    )
+    one = mission(again)
+    assert (value("goals_sent", one), value("goals_success", one)) == (2, 1)
+    assert value("goals_time", one) == pytest.approx(value("goals_time", mission(drive())))
+
+
+def test_a_robot_that_drives_on_after_its_last_known_goal_is_not_evaluated_unless_a_person_drives() -> None:
+    on = drive(odom=odometry({0: 0, 10: 0, 20: 2, 21: 2, 31: 4, 60: 9}))
+    found = value("goals_success", mission(on))
+    assert isinstance(found, Unavailable)
+    assert found.reason == "the recording tells of no goal after 31 s, though the robot drives on"
+    piloted = on | {"/joy": table([50.0, 70.0], ("axes",), [(1.0,), (1.0,)])}
+    assert value("goals_success", mission(piloted)) == 1
+    shaken = drive(odom=odometry({0: 0, 10: 0, 20: 2, 21: 2, 31: 4, **{40 + n: 4 + 0.01 * (n % 2) for n in range(50)}}))
+    assert value("goals_success", mission(shaken)) == 1
+
+
 def test_no_answer_within_the_time_is_an_end() -> None:
     silent = drive(move_base__goal=goals((10, 2, 0)), move_base__result=results((5, 9, 3)))
     assert mission(silent).ended

@@ -68,6 +68,8 @@ class Ros(Ecosystem):
             yield {"kind": "actionlib_goals", "action": action, "goal_timeout_s": _PATIENCE_S}
         if any(channel.count and channel.name.endswith(_STATUS) for channel in channels):
             yield {"kind": "nav2_goals", "goal_timeout_s": _PATIENCE_S}
+        for action in _nav2_actions(channels):
+            yield {"kind": "nav2_goals", "action": action, "goal_timeout_s": _PATIENCE_S}
 
     def messages(self) -> Dictionary:
         from care_core.ecosystems.ros.messages import MESSAGES
@@ -104,6 +106,12 @@ def _actions(channels: tuple[Channel, ...]) -> list[str]:
     goals = [channel for channel in channels if channel.count and channel.type.partition(",")[0].endswith(_GOAL)]
     names = [channel.name.rpartition("/")[0] for channel in goals]
     return sorted(names, key=lambda name: not any(word in name for word in _DRIVES))
+
+
+def _nav2_actions(channels: tuple[Channel, ...]) -> list[str]:
+    """Driving actions of ROS 2 in a name space, each robot's of its own."""
+    names = [one.name.removesuffix(_STATUS) for one in channels if one.count and one.name.endswith(_STATUS)]
+    return sorted(name for name in names if name.count("/") > 1 and any(word in name for word in _DRIVES))
 
 
 ECOSYSTEM = Ros()

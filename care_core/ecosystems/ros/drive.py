@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -31,6 +32,7 @@ from care_core.ecosystems.ros.messages import (
     type_of,
 )
 from care_core.ecosystems.ros.motion import Commands, Following, Odometry, commands_of, following, odometry_of
+from care_core.ecosystems.ros.namespaces import is_of, robot_namespaces
 from care_core.ecosystems.ros.node_messages import LogMessage, Report, log_messages, reports
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
 from care_core.logs.base import Channel, Table, Wanted, merge_needs
@@ -46,6 +48,10 @@ STREAM_MESSAGES, STEADY = 10, 3.0
 """A stream has so many messages, and nine in ten of its pauses are below so many times the usual one."""
 SILENT_S, SILENT_PERIODS = 5.0, 10.0
 """A stream has ended when it is silent for so long and for so many of its periods."""
+DROVE_M = 1.0
+"""So far no robot is pushed or drifts that is done with its goals."""
+PILOTED = re.compile(r"joy|teleop|key", re.IGNORECASE)
+"""In the name of a topic on which a person drives."""
 FEWEST_COMMANDS = 3
 """Fewer commands tell of no drive."""
 
@@ -68,8 +74,10 @@ class Drive(RunModel):
 
     log: RosLog
 
-    def __init__(self, log: RosLog) -> None:
+    def __init__(self, log: RosLog, robot: str | None = None) -> None:
+        """`robot` is the name space of the robot that is meant, where the recording is of several."""
         super().__init__(log)
+        self._robot = robot
         self.damage: tuple[Damage, ...] = ()
         """What is broken in what health looked at."""
         self._looked_at: Wanted = {}
@@ -79,13 +87,27 @@ class Drive(RunModel):
     # The recording
 
     @cached_property
+    def robots(self) -> tuple[str, ...]:
+        """Name spaces of the robots of this recording, the one that is meant first; none where it is of one robot."""
+        spaces = robot_namespaces(self.log.channels())
+        return tuple(sorted(spaces, key=lambda space: space != self._robot))
+
+    @cached_property
+    def others(self) -> tuple[Drive, ...]:
+        """The drives of the other robots that were recorded beside this one."""
+        return tuple(Drive(self.log, space) for space in self.robots[1:]) if self._robot is None else ()
+
+    @cached_property
     def channels(self) -> tuple[Channel, ...]:
-        return self.log.channels()
+        """The topics of this robot."""
+        every = self.log.channels()
+        return tuple(one for one in every if is_of(one.name, self.robots[0], self.robots)) if self.robots else every
 
     @cached_property
     def times(self) -> Mapping[str, Floats]:
         """Record times of every topic, s; nothing is decoded for them."""
-        return self.log.times()
+        times = self.log.times()
+        return {one.name: times[one.name] for one in self.channels if one.name in times} if self.robots else times
 
     @property
     def duration_s(self) -> float:
@@ -239,6 +261,21 @@ class Drive(RunModel):
             found += nav2_goals({topic.removesuffix(STATUS_TOPIC): table}, self.duration_s)
         driving = [goal for goal in found if goal.drives]
         return tuple(sorted(driving or found, key=lambda goal: goal.sent_s))
+
+    def goals_untold_s(self, goals: Sequence[Goal], odometry: Odometry | None) -> float | None:
+        """Since when the recording tells of no goal though the robot drives on by itself; None where it does not."""
+        if not goals or odometry is None:
+            return None
+        last_s, is_open = max((goal.end_s, not goal.outcome) for goal in goals)
+        if is_open:  # its action still says how it is going, if it is recorded
+            action = f"{goals[-1].action}/"
+            told = (t for name, t in self.times.items() if name.startswith(action) and len(t) >= STREAM_MESSAGES)
+            last_s = max((float(t[-1]) for t in told), default=math.inf)
+        since_s = last_s + SILENT_S
+        is_piloted = any(
+            PILOTED.search(name) and len(times) and times[-1] > since_s for name, times in self.times.items()
+        )
+        return last_s if not is_piloted and odometry.spread_m(since_s) > DROVE_M else None
 
     def severity(self, onset_s: float, otherwise: Severity = "warning") -> Severity:
         """How much something that began then matters: critical where a goal failed afterwards, or is left open at the

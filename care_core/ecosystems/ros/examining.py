@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from care_core.ecosystems.findings import Health
+from care_core.ecosystems.findings import Finding, Health
 from care_core.ecosystems.ranking import rank_findings
 from care_core.ecosystems.ros.checks import CHECKS
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive
 from care_core.ecosystems.ros.messages import BATTERY, DIAGNOSTICS, MESSAGES, ODOMETRY, ROBOT, SCAN, type_of
+from care_core.ecosystems.ros.other_robots import other_robots
 from care_core.ecosystems.ros.timeline import READS, timeline
 from care_core.logs.base import merge_needs
 from care_core.text import listed
@@ -24,9 +25,14 @@ _STACKS = {"move_base": "move_base", "nav2": "Nav2"}
 
 def examine(drive: Drive) -> Health:
     """What happened in a ROS 1 bag or a ROS 2 drive."""
-    drive.look_at(merge_needs((READS, *(check.reads for check in CHECKS))))
-    findings = rank_findings(finding for check in CHECKS for finding in check.find(drive))
+    others = [(other, _found(other)) for other in drive.others]
+    findings = rank_findings((*_found(drive), *other_robots(drive, others)))
     return Health(_robot(drive), timeline(drive), findings, "" if findings else _too_little(drive))
+
+
+def _found(drive: Drive) -> tuple[Finding, ...]:
+    drive.look_at(merge_needs((READS, *(check.reads for check in CHECKS))))
+    return tuple(finding for check in CHECKS for finding in check.find(drive))
 
 
 def _robot(drive: Drive) -> str:

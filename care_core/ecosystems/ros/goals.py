@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from enum import IntEnum
 from typing import Any, Literal
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from care_core.ecosystems.ros.messages import ACTION_RESULT, MESSAGES, STATUS, holds, yaw_of
 from care_core.logs.base import Table
-from care_core.records import Record, Struct
+from care_core.records import Record, Struct, replace
 
 Outcome = Literal["reached", "cancelled", "aborted", "rejected", "lost", "replaced", ""]
 """How a goal ended; empty where the recording does not say."""
@@ -41,6 +41,8 @@ _OUTCOMES: Mapping[int, Outcome] = {
     Status.RECALLED: "cancelled",
     Status.LOST: "lost",
 }
+_SAME_M = 0.05
+"""Goals that lie no farther apart are the same place."""
 _ROS2 = {4: Status.SUCCEEDED, 5: Status.PREEMPTED, 6: Status.ABORTED}
 """Final codes of action_msgs/GoalStatus (1 accepted, 2 executing, 3 canceling)."""
 
@@ -113,6 +115,24 @@ def actionlib_goals(action: str, sent: Table, results: Table | None, until_s: fl
         _, status, text = answer or (end_s, None, "")
         goals.append(Goal(action, sent_s, end_s, status, text, *places[row], is_replaced=replaced))
     return tuple(goals)
+
+
+def sent_again(goals: Sequence[Goal]) -> tuple[Goal, ...]:
+    """The goals, where those that were sent anew to the same place while they were under way are one, from when it was
+    first sent."""
+    merged: list[Goal] = []
+    for goal in goals:
+        last = merged[-1] if merged else None
+        if (
+            last is not None
+            and last.is_replaced
+            and last.frame == goal.frame
+            and last.offset(goal.x, goal.y) <= _SAME_M
+        ):
+            merged[-1] = replace(goal, sent_s=last.sent_s)
+        else:
+            merged.append(goal)
+    return tuple(merged)
 
 
 def _places(sent: Table) -> Iterator[tuple[float, float, float, str]]:

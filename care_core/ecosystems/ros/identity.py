@@ -6,13 +6,12 @@ import re
 from collections.abc import Iterator, Mapping
 
 from care_core.ecosystems.identity import LONGEST, noted_robots
+from care_core.ecosystems.ros.messages import type_of
+from care_core.ecosystems.ros.namespaces import MOVES, is_software
 from care_core.logs.base import Log
 from care_core.run import Robot, Setting
 from care_core.text import clean
 
-_MOVES = ("nav_msgs/Odometry", "geometry_msgs/Twist", "geometry_msgs/TwistStamped")
-_NO_ROBOT = ("controller", "server", "base", "filter")
-"""How name spaces of software end."""
 _DESCRIPTION = "/robot_description"
 _URDF_NAME = re.compile(r"<robot\b[^>]*?\bname\s*=\s*[\"']([^\"']+)[\"']")
 _URDF_HEAD = 4000
@@ -22,9 +21,9 @@ def robots(log: Log) -> Iterator[Robot]:
     """What tells this robot from others, the surest first."""
     settings = log.settings()
     yield from noted_robots(((name, history[-1].value) for name, history in settings.items()), "parameter")
-    moved = (channel.name.strip("/") for channel in log.channels() if channel.type.replace("/msg/", "/") in _MOVES)
+    moved = (channel.name.strip("/") for channel in log.channels() if type_of(channel) in MOVES)
     roots = {name.rpartition("/")[0].partition("/")[0] for name in moved}
-    if len(roots) == 1 and (root := clean(roots.pop())) and not root.endswith(_NO_ROBOT):
+    if len(roots) == 1 and (root := clean(roots.pop())) and not is_software(root):
         has_number = any(character.isdigit() for character in root)
         yield Robot(root, root, "name space of the topics", is_sure=has_number)
     yield from _described(log, settings)

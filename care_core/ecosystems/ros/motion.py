@@ -83,6 +83,11 @@ class Odometry(Record, eq=False):
         inside = (self.t >= start_s) & (self.t <= end_s)
         return float(np.sum(np.hypot(np.diff(self.x[inside]), np.diff(self.y[inside]))))
 
+    def spread_m(self, start_s: float) -> float:
+        """Diagonal of the area that its positions lie in from a time on, m."""
+        x, y = (axis[(self.t >= start_s) & np.isfinite(axis)] for axis in (self.x, self.y))
+        return float(np.hypot(np.ptp(x), np.ptp(y))) if len(x) and len(y) else 0.0
+
     def advancing(self) -> Odometry | None:
         """The samples with a heading that were made one after the other; None where hardly any were."""
         good = np.isfinite(self.yaw + self.t)

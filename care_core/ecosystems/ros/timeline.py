@@ -30,6 +30,7 @@ from care_core.ecosystems.ros.messages import (
 )
 from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, level_word
+from care_core.ecosystems.ros.other_robots import other_goals
 from care_core.ecosystems.ros.recoveries import announced, repairs
 from care_core.logs.ros_message import short_name
 from care_core.numbers import Floats, quantile
@@ -53,6 +54,8 @@ def timeline(drive: Drive) -> tuple[Event, ...]:
         *_recorded(drive),
         *_damage(drive),
         *_goals(drive),
+        *other_goals(drive),
+        *_untold(drive),
         *_recoveries(drive),
         *_log_messages(drive),
         *_diagnostics(drive),
@@ -95,6 +98,13 @@ def _goals(drive: Drive) -> Iterator[Event]:
     if len(shown) < len(goals):
         reached = sum(goal.outcome == "reached" for goal in goals)
         yield Event(goals[0].sent_s, "goal", f"{len(goals)} goals, {reached} reached", goals[0].action)
+
+
+def _untold(drive: Drive) -> Iterator[Event]:
+    last_s = drive.goals_untold_s(drive.goals, drive.odometry)
+    if last_s is not None:
+        words = "the recording tells of no goal from here on, though the robot drives on"
+        yield Event(last_s, "goal", words, "recording")
 
 
 def _recoveries(drive: Drive) -> Iterator[Event]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, has, missing
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.goals import Goal, actionlib_goals
+from care_core.ecosystems.ros.goals import Goal, actionlib_goals, sent_again
 from care_core.ecosystems.ros.measures.goals import GoalMissions
 from care_core.ecosystems.ros.measures.window import GOAL_SERVERS, GoalServer
 from care_core.ecosystems.ros.messages import ACTION_GOAL, ACTION_RESULT, MESSAGES, RECOVERY
@@ -30,7 +30,7 @@ def goals(drive: Drive, spec: Args) -> tuple[Goal, ...]:
     sent = tables.get(f"{action}/goal")
     if not has(sent, *MESSAGES[ACTION_GOAL].reads):
         return ()
-    return actionlib_goals(action, sent, tables.get(f"{action}/result"), drive.duration_s)
+    return sent_again(actionlib_goals(action, sent, tables.get(f"{action}/result"), drive.duration_s))
 
 
 def recoveries(mission: Mission) -> Recoveries | Unavailable:

@@ -111,13 +111,16 @@ class GoalMissions(MissionKind):
 
     def outcome(self, mission: Mission) -> tuple[Check, ...]:
         """Whether the goals were reached; one that its sender cancelled or replaced is no failure of the robot."""
-        goals = mission.shared(window).goals
+        drive = mission.shared(window)
+        goals = drive.goals
         reached = sum(goal.status == Status.SUCCEEDED for goal in goals)
         failed = sum(goal.status in (Status.ABORTED, Status.REJECTED, Status.LOST) for goal in goals)
         word = f"{reached} of {len(goals)} goals were reached"
         value: Value = 1.0 if reached else Unavailable(f"{word}, the others were cancelled or left open")
         if failed:
             value = 0.0
+        elif drive.untold is not None:
+            value = drive.untold
         elif goals and goals[-1].status is None:
             value = Unavailable("the log ends before the last goal was answered", "record until it is")
         return (Check("goals_reached", value, "every goal that was not taken back was reached", word),)

@@ -13,7 +13,7 @@ import numpy as np
 
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, extractor, has, missing, one_of
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, nav2_goals
+from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, nav2_goals, sent_again
 from care_core.ecosystems.ros.measures.goals import GoalMissions
 from care_core.ecosystems.ros.measures.requested import PER_GOAL, PER_METRE, divided
 from care_core.ecosystems.ros.measures.window import GOAL_SERVERS, GoalServer, Poses, window
@@ -89,7 +89,7 @@ def goals(drive: Drive, spec: Args) -> tuple[Goal, ...]:
     tables = drive.tables(_needs(spec))
     topics = {action: _status_topic(action) for action in _actions(spec)}
     states = {action: tables[topic] for action, topic in topics.items() if topic in tables}
-    return tuple(_placed(goal, tables, spec) for goal in nav2_goals(states, drive.duration_s))
+    return sent_again([_placed(goal, tables, spec) for goal in nav2_goals(states, drive.duration_s)])
 
 
 def _placed(goal: Goal, tables: Mapping[str, Table], spec: Args) -> Goal:

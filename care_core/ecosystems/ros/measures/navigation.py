@@ -38,6 +38,8 @@ from care_core.run import Unavailable, Value
 _CRAWL_M = 0.3
 """How much nearer a goal must have come in the last fifth of its time to count as under way."""
 
+_CUT = Unavailable("the log ends before the mission does", "record until the mission has ended")
+
 T = TypeVar("T")
 _Ends = list[tuple[float, float]]
 
@@ -175,10 +177,26 @@ def goals_success(mission: Mission, args: Args) -> Value:
     """1 when every goal of the mission's list was reached within its time, else 0."""
     drive = mission.shared(window)
     wanted = len(drive.listed) or len(drive.goals)
-    answered = [goal for goal in drive.goals if goal.status is not None or goal.time_s > drive.timeout_s]
-    if all(goal.reached(drive.timeout_s) for goal in answered) and not mission.ended:
-        return Unavailable("the log ends before the mission does", "record until the mission has ended")
+    unknown = _untold(drive) if mission.ended or drive.untold is not None else _CUT
+    if unknown is not None and not any(_is_missed(goal, drive) for goal in drive.goals):
+        return unknown
     return float(len(drive.reached) == wanted and len(drive.goals) == wanted)
+
+
+def _untold(drive: DriveWindow) -> Unavailable | None:
+    """Why it is not known whether the robot would have reached its goals, None where it is."""
+    for number, goal in enumerate(drive.goals, start=1):
+        if goal.is_replaced and goal.time_s <= drive.timeout_s:
+            replaced = f"goal {number} was replaced by another under way, at {goal.end_s:.0f} s"
+            return Unavailable(replaced, "judge a drive whose goals stay as they were sent")
+    return drive.untold
+
+
+def _is_missed(goal: Goal, drive: DriveWindow) -> bool:
+    """Whether a goal failed, or ran out of its time, as far as the recording tells."""
+    if goal.is_replaced or not goal.outcome:
+        return goal.time_s > drive.timeout_s and (goal.is_replaced or drive.untold is None)
+    return not goal.reached(drive.timeout_s)
 
 
 @extractor(

@@ -185,6 +185,8 @@ class DriveWindow(Record, eq=False):
     commands: ActiveCommands | None
     topics: Topics
     doubt: str = ""
+    untold: Unavailable | None = None
+    """Why the goals are not known to the end, None where they are."""
     placed: ActiveOdometry | None = None
     """The odometry in the frame of the goals, where the goal server says where the robot is; its steps are not those of
     the wheels: a localization corrects itself."""
@@ -215,8 +217,17 @@ def window(mission: Mission) -> DriveWindow:
         commands=None if commands is None else _commands(commands, mission, goals),
         topics=names,
         doubt=doubt,
+        untold=None if drive is None or not goals or goals[-1] != every[-1] else _untold(drive, every, whole),
         placed=None if doubt or odometry is None else _placed(odometry, server.poses(mission)),
     )
+
+
+def _untold(drive: Drive, goals: Sequence[Goal], odometry: Odometry | None) -> Unavailable | None:
+    last_s = drive.goals_untold_s(goals, odometry)
+    if last_s is None:
+        return None
+    reason = f"the recording tells of no goal after {last_s:.0f} s, though the robot drives on"
+    return Unavailable(reason, "record the topics of the action to the end")
 
 
 def no_odometry(drive: DriveWindow) -> Unavailable:
