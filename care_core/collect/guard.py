@@ -3,7 +3,11 @@
 The command has a process group of its own. When the guard's standard input is closed, because whoever started it is
 done with it or was killed, everything is ended that the command started: asked first, and after GRACE_S made to. When
 the command ends by itself, what it leaves running is ended too, and RECORD is written: `{"code": 0, "time_s": 1.2}`, or
-`{"error": "..."}` where it could not be started. There is no RECORD of a command that was ended from here.
+`{"error": "..."}` where it could not be started. There is no RECORD of a command that was ended from here. Where RECORD
+cannot be written, the guard ends with NO_RECORD and the number of the system's error: the disk may be full.
+
+A guard that is killed takes its command with it on Linux; what that had started, `leftovers` ends by its session, which
+is the guard's.
 
 Launchers of simulators give what they start sessions of its own (roslaunch does), which no signal to the group reaches.
 On Linux the guard adopts what loses its parent, so that whatever was started stays below it.
@@ -23,23 +27,36 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import NamedTuple, NoReturn
 
-_ADOPT_ORPHANS = 36
-"""PR_SET_CHILD_SUBREAPER of prctl(2)."""
+NO_RECORD = 100
+"""What is added to the number of an error (at most 133) that kept RECORD from being written."""
+
+_ADOPT_ORPHANS, _DIE_WITH_PARENT = 36, 1
+"""PR_SET_CHILD_SUBREAPER and PR_SET_PDEATHSIG of prctl(2)."""
 _LOOK_S = 0.02
 
 
 def main(grace_s: float, record: Path, command: list[str]) -> None:
     """Run the command until it ends or standard input is closed."""
     started = time.monotonic()
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_ADOPT_ORPHANS, 1, 0, 0, 0)
+    control = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
+    if control is not None:
+        control(_ADOPT_ORPHANS, 1, 0, 0, 0)
+    guard = os.getpid()
+
+    def in_child() -> None:
+        os.setpgrp()
+        if control is not None:
+            control(_DIE_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
+            if os.getppid() != guard:  # it was killed meanwhile
+                os._exit(1)
+
     try:
         # The pipe whose end is awaited must not be the command's too.
-        child = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
+        child = subprocess.Popen(command, stdin=subprocess.DEVNULL, preexec_fn=in_child)  # noqa: PLW1509  # no threads yet
     except OSError as err:
-        _write(record, {"error": f"{err.strerror}: {command[0]}"})
-        return
+        _write_and_end(record, {"error": f"{err.strerror}: {command[0]}"})
     stopped = threading.Event()
 
     def wait_for_child() -> None:
@@ -47,8 +64,7 @@ def main(grace_s: float, record: Path, command: list[str]) -> None:
         if not stopped.is_set():
             time_s = time.monotonic() - started
             _end(child.pid, grace_s)
-            _write(record, {"code": code, "time_s": round(time_s, 3)})
-            os._exit(0)
+            _write_and_end(record, {"code": code, "time_s": round(time_s, 3)})
 
     threading.Thread(target=wait_for_child, daemon=True).start()
     while os.read(0, 1024):
@@ -92,26 +108,45 @@ def _reap() -> None:
 
 def _below(process: int) -> list[int]:
     """Living processes that a process started, and what these did; none where the system does not list them."""
+    listed = processes()
     children: dict[int, list[int]] = {}
-    dead: set[int] = set()
+    for number, one in listed.items():
+        children.setdefault(one.parent, []).append(number)
+    found = [process]
+    for number in found:  # grows while it is read
+        found += children.get(number, [])
+    return [number for number in found[1:] if not listed[number].is_dead]
+
+
+class Process(NamedTuple):
+    """What the system lists of a process."""
+
+    parent: int
+    session: int
+    is_dead: bool
+    """It ended, and whoever started it did not yet take note."""
+
+
+def processes() -> dict[int, Process]:
+    """Every process by its number; none where the system does not list them."""
+    found = {}
     for place in Path("/proc").glob("[0-9]*/stat"):
         try:
-            state, parent = place.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[:2]
-        except (OSError, ValueError):  # it ended meanwhile
+            words = place.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+            found[int(place.parent.name)] = Process(int(words[1]), int(words[3]), words[0] == "Z")
+        except (OSError, ValueError, IndexError):  # it ended meanwhile
             continue
-        children.setdefault(int(parent), []).append(int(place.parent.name))
-        if state == "Z":
-            dead.add(int(place.parent.name))
-    found = [process]
-    for one in found:  # grows while it is read
-        found += children.get(one, [])
-    return [one for one in found[1:] if one not in dead]
+    return found
 
 
-def _write(record: Path, found: dict[str, float | str]) -> None:
+def _write_and_end(record: Path, found: dict[str, float | str]) -> NoReturn:
     new = record.with_name(f".{record.name}")
-    new.write_text(json.dumps(found), encoding="utf-8")
-    new.replace(record)
+    try:
+        new.write_text(json.dumps(found), encoding="utf-8")
+        new.replace(record)
+    except OSError as err:
+        os._exit(NO_RECORD + (err.errno or 0))
+    os._exit(0)
 
 
 if __name__ == "__main__":

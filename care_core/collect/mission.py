@@ -7,6 +7,7 @@ was under way is left as it is, and the next attempt begins in a new folder.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
@@ -18,6 +19,7 @@ from pathlib import Path
 from care_core.collect import guard
 from care_core.collect.campaign import Campaign, parameter_file_names
 from care_core.collect.journal import Done
+from care_core.collect.leftovers import LOGS_VARIABLE, end_leftovers
 from care_core.collect.sampling import Planned
 from care_core.configs.driven import parameter_value, readable, same_value
 from care_core.configs.edit import Wanted, apply_changes
@@ -29,12 +31,15 @@ from care_core.run import Setting
 from care_core.starting import script_command
 from care_core.tables.rows import TableRow, rows_of
 
+RUNS = "runs"
 RECORD, OUTPUT, LOGS = "ended.json", "command.log", "logs"
 
 _LOOK_S = 0.1
 """How often a command under way is looked at for a stop."""
-_GRACE_S = 5.0
+GRACE_S = 5.0
 """Time that a command has to close its log when it is ended."""
+_LEAST_BYTES = 256 * 1024
+"""With less than this left the disk is full: what a mission wrote then is not believed to be whole."""
 _TOLD = 300
 """Characters of a command's last words that are told."""
 
@@ -64,8 +69,9 @@ def fly(
 
     Raises:
         StoppedError: `stop` was set.
+        OSError: the attempt could not be written down, or the disk is full: nothing is to be recorded of this run.
     """
-    place = folder / "runs" / f"{run.number:04d}"
+    place = folder / RUNS / f"{run.number:04d}"
     earlier = None if afresh else _ended_before(place)
     made: list[_Ended] = [] if earlier is None else [earlier]
     while not made or (made[-1].failure and len(made) <= campaign.retries):
@@ -128,18 +134,25 @@ def _attempt(campaign: Campaign, run: Planned, place: Path, slot: int, stop: thr
     before = _attempts(place)
     folder = place / str(int(before[-1].name) + 1 if before else 1)
     logs = folder / LOGS
+    place.mkdir(parents=True, exist_ok=True)
+    _check_room(place)
     logs.mkdir(parents=True)
     params = write_parameters(campaign, run.config, folder)[0]
     words = command_words(campaign, run, params.absolute(), logs.absolute(), slot)
     environment = {
         **os.environ,
         "CARE_PARAMS": str(params.absolute()),
-        "CARE_LOGS": str(logs.absolute()),
+        LOGS_VARIABLE: str(logs.absolute()),
         "CARE_RUN": str(run.number),
         "CARE_SEED": str(run.seed),
         "CARE_SLOT": str(slot),
     }
     is_late = _run(words, campaign, environment, folder, stop)
+    try:
+        _check_room(folder)
+    except OSError:
+        (folder / RECORD).unlink(missing_ok=True)  # so that it is made again
+        raise
     if is_late:
         return _Ended(folder, campaign.time_limit_s, f"the command took longer than {campaign.time_limit_s:g} s")
     return _ending(folder) or _Ended(folder, 0.0, "the command was ended from outside")
@@ -148,8 +161,9 @@ def _attempt(campaign: Campaign, run: Planned, place: Path, slot: int, stop: thr
 def _run(
     words: Sequence[str], campaign: Campaign, environment: Mapping[str, str], folder: Path, stop: threading.Event
 ) -> bool:
-    """Run the command until it ends; whether it took too long. Raises StoppedError."""
-    guarded = script_command(guard.__file__, str(_GRACE_S), str((folder / RECORD).absolute()), *words)
+    """Run the command until it ends; whether it took too long. Raises StoppedError, and OSError where how it ended
+    cannot be written down."""
+    guarded = script_command(guard.__file__, str(GRACE_S), str((folder / RECORD).absolute()), *words)
     with (folder / OUTPUT).open("wb") as output:
         process = subprocess.Popen(
             guarded,
@@ -164,16 +178,32 @@ def _run(
     try:
         while left_s > 0 and not stop.is_set():
             try:
-                process.wait(min(_LOOK_S, left_s))
+                _check_guard(process.wait(min(_LOOK_S, left_s)), folder)
                 return False
             except subprocess.TimeoutExpired:
                 left_s -= _LOOK_S
     finally:
         process.communicate()
+        if process.returncode < 0:  # the guard was killed
+            end_leftovers(folder, GRACE_S, session=process.pid)
     if stop.is_set():
         raise StoppedError
     # It may have ended in the last moment.
     return not (folder / RECORD).exists()
+
+
+def _check_guard(code: int, folder: Path) -> None:
+    """Raises OSError where a guard says that it could not write down how its command ended."""
+    if code > guard.NO_RECORD:
+        number = code - guard.NO_RECORD
+        raise OSError(number, os.strerror(number), str(folder / RECORD))
+
+
+def _check_room(folder: Path) -> None:
+    """Raises OSError where the disk of a folder is full."""
+    room = os.statvfs(folder)
+    if room.f_bavail * room.f_frsize < _LEAST_BYTES or (room.f_files and not room.f_favail):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder))
 
 
 def _ending(folder: Path) -> _Ended | None:

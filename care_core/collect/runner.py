@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -15,11 +17,12 @@ from typing import Any
 from care_core.collect.adaptive import Known, choose
 from care_core.collect.campaign import Campaign, parameter_file_names
 from care_core.collect.journal import Done, Journal
-from care_core.collect.mission import fly
+from care_core.collect.leftovers import end_leftovers
+from care_core.collect.mission import GRACE_S, RUNS, fly
 from care_core.collect.sampling import Planned, one_at_a_time, points, repeat_of, repeats_among, run_seed, with_repeats
 from care_core.configs.driven import parameter_value, readable
 from care_core.configs.edit import Wanted, apply_changes
-from care_core.errors import UsageError
+from care_core.errors import CareError, UsageError
 from care_core.records import Struct, field
 from care_core.tables.rows import ABOUT, CONDITIONS, TableRow, write_rows, write_table
 
@@ -113,21 +116,27 @@ def collect(campaign: Campaign, folder: Path, *, retry_failed: bool = False, pro
         again = {number for number, done in journal.done.items() if done.failure} if retry_failed else set()
         found = Collected(campaign, folder, journal.planned, journal.done, len(journal.done) - len(again))
         work = _Work(found, journal, again, progress)
+        end_leftovers(folder / RUNS, GRACE_S)
         try:
             while not found.stopped:
                 work.make([run for n, run in sorted(journal.planned.items()) if n not in journal.done or n in again])
                 if found.stopped or len(journal.planned) >= campaign.runs or campaign.sampling != "adaptive":
                     break
                 journal.plan(_next_round(found))
-        finally:
-            if found.rows:
+        except BaseException:
+            with suppress(CareError):  # a full disk is told of once
                 _write(found)
+            raise
+        _write(found)
     return found
 
 
 def _write(found: Collected) -> None:
-    """The table; the seed that a command takes tells which runs met the same conditions, else their date has to."""
+    """The table, where a run gave a row. The seed that a command takes tells which runs met the same conditions, else
+    their date has to."""
     schema = found.campaign.schema
+    if not found.rows:
+        return
     if not any("{seed}" in word for word in found.campaign.command):
         write_table(found.table, found.rows, schema)
         return
@@ -232,8 +241,11 @@ class _Work(Struct, eq=False):
         try:
             return fly(self.found.campaign, run, self.found.folder, slot, self.stop, afresh=run.number in self.again)
         except OSError as err:
-            hint = "Put it right and give the same command again."
+            hint = "Put it right and give the same command again: the runs that are done are kept."
             message = f"Run {run.number} cannot be made: {err.strerror}."
+            if err.errno in (errno.ENOSPC, errno.EDQUOT):
+                hint = "Make room and give the same command again: the runs that are done are kept."
+                message = f"The disk is full: run {run.number} is not counted."
             raise UsageError(message, hint=hint, where=str(err.filename or "")) from err
         finally:
             free.put(slot)

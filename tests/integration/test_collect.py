@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from care_core.collect import guard
 from care_core.collect.journal import FILE
 from care_core.errors import ExitCode
+from care_core.starting import script_command
 from tests.campaigns import campaign_in, drive
 from tests.conftest import Care
 
@@ -134,6 +139,85 @@ def _wait_for_the_end_of(process: int) -> None:
             return
         time.sleep(0.05)
     pytest.fail(f"process {process} is still there")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux says what belongs to whom")
+@pytest.mark.parametrize("program_too", [False, True])
+def test_a_mission_does_not_outlive_its_guard(program_too: bool, tmp_path: Path) -> None:
+    """Nor does what it started in sessions of its own, or without its environment; also where the whole program goes
+    and the same command is given again. A slot never has two missions."""
+    (tmp_path / "launcher.py").write_text(LAUNCHER)
+    script = (
+        "for file in pid child bare elsewhere; do test -e $file && "
+        "grep -qs '^State:.[^Z]' /proc/$(cat $file)/status && cat $file >> left; done; touch left; "
+        'test -e pid && {{ cp drive.bag "$CARE_LOGS"; exit; }}; '
+        f"echo $PPID > guard; sleep 60 & echo $! > child; env -i sleep 60 & echo $! > bare; "
+        f"{sys.executable} launcher.py; while ! test -s elsewhere; do sleep 0.02; done; echo $$ > pid; wait"
+    )
+    path = campaign_in(tmp_path, command=["sh", "-c", script], runs=2)
+    command = [sys.executable, "-m", "care_tui", "collect", str(path)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not (tmp_path / "pid").exists() or not (tmp_path / "pid").read_text().strip():
+        time.sleep(0.02)
+    guard = int((tmp_path / "guard").read_text())
+    if program_too:
+        process.kill()
+        os.kill(guard, signal.SIGKILL)
+        process.wait()
+        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    else:
+        os.kill(guard, signal.SIGKILL)
+    assert process.wait(60) == ExitCode.OK
+    left = (tmp_path / "left").read_text().split()
+    bare = (tmp_path / "bare").read_text().strip()
+    # Whose guard and program are both gone, and who dropped its environment, nobody knows any more.
+    assert [one for one in left if not (program_too and one == bare)] == []
+    for name in ("pid", "child", "elsewhere"):
+        _wait_for_the_end_of(int((tmp_path / name).read_text()))
+    if program_too:
+        os.kill(int(bare), signal.SIGKILL)
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A disk of few megabytes."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=4m", "none", str(disk)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("needs the right to mount a small disk")
+    yield disk
+    subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+@pytest.mark.parametrize("ends", ["exit 0", "exit 1", "sleep 3600"])
+def test_a_full_disk_is_said_to_be_one_and_costs_no_run(
+    care: Care, tmp_path: Path, small_disk: Path, ends: str
+) -> None:
+    script = (
+        'cp drive.bag "$CARE_LOGS"; test $CARE_RUN = 3 -a ! -e filled && '
+        f"{{{{ touch filled; cat /dev/zero > disk/fill; {ends}; }}}}; true"
+    )
+    limit_s = 3.0 if ends.startswith("sleep") else 60.0
+    path = campaign_in(tmp_path, command=["sh", "-c", script], time_limit_s=limit_s, retries=2, slots=2)
+    began = time.monotonic()
+    code, _, said = care("collect", path, "--out", small_disk / "campaign")
+    assert code == ExitCode.USAGE
+    assert "is full" in said or "No space left" in said
+    assert "longer than" not in said
+    assert time.monotonic() - began < 60.0
+    assert {1, 2} >= set(_done(small_disk))
+    (small_disk / "fill").unlink()
+    code, out, _ = care("collect", path, "--out", small_disk / "campaign", "--json")
+    assert (code, json.loads(out)["done"], json.loads(out)["failed"]) == (ExitCode.OK, 4, 0)
+
+
+def test_a_guard_that_cannot_write_how_it_ended_says_so(tmp_path: Path) -> None:
+    for command in ("true", "nothing-of-this-name"):
+        words = script_command(guard.__file__, "1", str(tmp_path / "none" / "ended.json"), command)
+        with subprocess.Popen(words, stdin=subprocess.PIPE) as process:
+            assert process.wait(30) == guard.NO_RECORD + errno.ENOENT
 
 
 def test_a_run_that_takes_too_long_is_ended_and_the_others_are_made(care: Care, tmp_path: Path) -> None:
