@@ -15,7 +15,8 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from care_core.application.open_run import OpenRun, log_of
 from care_core.application.plotting import ranked, sources_of, thinned
 from care_core.application.reporting import report_of
-from care_core.application.sharing import ELSEWHERE, Sharing
+from care_core.application.shared_parameters import may_go
+from care_core.application.sharing import ELSEWHERE, Sharing, parameters_of
 from care_core.application.signals import Line, Source, lines_of
 from care_core.application.viewing import messages_of
 from care_core.errors import CareError
@@ -40,13 +41,11 @@ _NO_DATE = (1980, 1, 1, 0, 0, 0)
 """The least that a zip can say: the same run gives the same bundle."""
 
 _PLACES = re.compile(
-    r"(^|[_./])(LAT|LNG|LON|LATITUDE|LONGITUDE|DATUM|ORIGIN\w*|INITIAL_POSE\w*)(_|\d|$)"
-    r"|_OPOS_|MAG_DECL|COMPASS_DEC$|GND_(ABS_)?PRESS",
+    r"(^|[_./])(LAT|LNG|LON|LATITUDE|LONGITUDE|DATUM|ORIG(IN\w*)?|INITIAL_POSE\w*)(_|\d|$)"
+    r"|_OPOS_|MAG_DECL|COMPASS_DEC$|GND_(ABS_)?PRESS|FIELD_ELV|TERR_ALT",
     re.IGNORECASE,
 )
 """Parameters that tell a place: coordinates, declination, and the air pressure at the start, which is a height."""
-_IDENTITIES = re.compile(r"SERIAL_?NUM|^SYSID|MAV_SYS_?ID|^STAT_|^O?DID_|UUID|HOST", re.IGNORECASE)
-"""Parameters that name one vehicle, its hours or the day they were counted from."""
 
 
 class Bundle(Record):
@@ -141,7 +140,7 @@ def _parameters(case: OpenRun, sharing: Sharing) -> tuple[str, str, int]:
     from care_core.configs.formats import format_for, write_params
 
     settings = {name: history[-1] for name, history in log_of(case).settings().items()}
-    kept = {name: one for name, one in settings.items() if _is_shared(one, sharing)}
+    kept = {name: one for name, one in settings.items() if sharing.positions or not _PLACES.search(name)}
     if sharing.anonymous:
         kept = _anonymous(case, kept, sharing)
     format = format_for(case.diagnosis.run.log.format, settings)
@@ -149,16 +148,11 @@ def _parameters(case: OpenRun, sharing: Sharing) -> tuple[str, str, int]:
     return f"parameters{format.suffix}", text, len(settings) - len(kept)
 
 
-def _is_shared(one: Setting, sharing: Sharing) -> bool:
-    if not sharing.positions and _PLACES.search(one.name):
-        return False
-    return not (sharing.anonymous and _IDENTITIES.search(one.name))
-
-
 def _anonymous(case: OpenRun, settings: Mapping[str, Setting], sharing: Sharing) -> dict[str, Setting]:
     """Settings that name nobody. The names of firmware's parameters are its own; those of ROS have namespaces."""
-    text = sharing.text(case)
-    named = {(text(name) if "/" in name else name): one for name, one in settings.items()}
+    text, options = sharing.text(case), parameters_of(case)
+    kept = {name: one for name, one in settings.items() if may_go(name, options, case.diagnosis.run.log.format)}
+    named = {(text(name) if "/" in name else name): one for name, one in kept.items()}
     return {
         name: replace(one, name=name)
         for name, one in named.items()
