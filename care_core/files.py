@@ -1,43 +1,55 @@
-"""Files of the program: where those lie that come with it, and how one is written whole or not at all."""
+"""Files of the program: where those lie that come with it, how a small one is read, and how one is written whole or
+not at all.
+
+Every small file (configurations, sites, campaigns, reports, profiles, what the program keeps for itself) is read by
+`read_small_text` or `read_small_bytes`, and everything larger is opened by `open_regular`: what is no regular file, or
+larger than such files are, is refused before a byte of it is read. A link may lead to a device without end, a pipe
+waits for ever.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
-import re
-import tempfile
-from codecs import getincrementaldecoder
+import stat
+from functools import cache
+from io import BufferedRandom, BufferedReader, FileIO, StringIO
 from pathlib import Path
-from typing import Literal
+from typing import Literal, overload
 
+from care_core import limits
 from care_core.errors import UsageError
-from care_core.logs.formats import log_suffixes
-from care_core.logs.opening import is_recording
 
 PROFILE_FILE = "profile.yaml"
 
 _PACKAGE = Path(__file__).parent
-_HEAD_BYTES = 4096
-_OWN_DOCUMENT = re.compile(r'\{\s*"(schema": "care\.|\$defs"|\$schema")')
-_KINDS = {
-    "html": re.compile(r"<!doctype html|<html", re.IGNORECASE),
-    "markdown": re.compile(r"# \S"),
-    "comment": re.compile(r"#|--- "),
-    "parameters": re.compile(r"[A-Z][A-Z0-9_]*(\s*,\s*|\s+)[-+.\w]+$"),
-    "yaml": re.compile(r"[\w/.-]+:(\s|$)"),
-    "table": re.compile(r"[^,\s]+(,[^,\s]+)+$"),
-}
-"""How the first line of a text shows what it is."""
+_OWN_PROJECT = 'name = "care-tui"'
+_LONGEST_PREFIX = 60
+"""Characters of a file's name that its temporary one begins with: a name of 255 has no room for more."""
 
 
-_FIRST_WORD = re.compile(r"[^\W\d_]+")
-"""Plain text is told by how it begins: "12 logs of 3 robots" and "Profile rover fits" are not somebody's notes."""
+@cache
+def bundled_folder(kind: Literal["profiles", "samples"]) -> Path:
+    """The folder of the profiles or samples that come with the program; it may not exist.
+
+    It lies inside the package. Beside the package only in a checkout of this project: what lies beside an installed one
+    may be anybody's.
+    """
+    inside, checkout = _PACKAGE / f"_{kind}", _PACKAGE.parent
+    return checkout / kind if not inside.is_dir() and _is_checkout(checkout) else inside
+
+
+def _is_checkout(folder: Path) -> bool:
+    """Whether a folder is the project of this very package."""
+    try:
+        return _OWN_PROJECT in read_small_text(folder / "pyproject.toml").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return False
 
 
 def bundled(kind: Literal["profiles", "samples"], name: str = "") -> Path:
     """The path of a bundled profile or sample, or of the folder that holds them all; it may not exist."""
-    checkout = _PACKAGE.parent
-    folder = checkout / kind if (checkout / "pyproject.toml").is_file() else _PACKAGE / f"_{kind}"
-    return folder / name if name else folder
+    return bundled_folder(kind) / name if name else bundled_folder(kind)
 
 
 def profile_folders() -> dict[str, Path]:
@@ -55,39 +67,157 @@ def own_profiles() -> Path:
     return user_data_path("care", appauthor=False) / "profiles"
 
 
+def read_small_bytes(path: Path, most: int = limits.SMALL_FILE_BYTES) -> bytes:
+    """What a small file holds, in `most` bytes at most.
+
+    Raises:
+        OSError: it cannot be read, is no regular file or too large; `strerror` says which.
+    """
+    with open_regular(path, most=most) as stream:
+        content = stream.read(most + 1)  # a file of /proc has no size, and one may grow
+    _check_size(path, len(content), most)
+    return content
+
+
+def read_small_text(
+    path: Path,
+    *,
+    encoding: str = "utf-8",
+    errors: str = "strict",
+    as_it_is: bool = False,
+    most: int = limits.SMALL_FILE_BYTES,
+) -> str:
+    """The text of a small file.
+
+    Args:
+        as_it_is: keep the ends of its lines; else each is a newline.
+
+    Raises:
+        OSError: as `read_small_bytes`.
+        UnicodeDecodeError: it is no text.
+    """
+    text = read_small_bytes(path, most).decode(encoding, errors)
+    return text if as_it_is or "\r" not in text else StringIO(text, newline=None).read()
+
+
+@overload
+def open_regular(path: Path, *, most: int | None = None) -> BufferedReader: ...
+
+
+@overload
+def open_regular(path: Path, *, buffering: Literal[0]) -> FileIO: ...
+
+
+def open_regular(path: Path, *, buffering: Literal[0, -1] = -1, most: int | None = None) -> BufferedReader | FileIO:
+    """A file opened to be read, of any size or of `most` bytes.
+
+    Raises:
+        OSError: it cannot be opened, is no regular file or too large; `strerror` says which.
+    """
+    try:
+        _check_regular(path, os.stat(path))  # to open a device may do something already
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except ValueError as err:
+        raise OSError(errno.EINVAL, "its name holds a character that no name can", repr(str(path))) from err
+    try:
+        found = os.fstat(handle)
+        _check_regular(path, found)
+        _check_size(path, found.st_size, most)
+        raw = FileIO(handle)
+        return raw if buffering == 0 else BufferedReader(raw)
+    except BaseException:
+        os.close(handle)
+        raise
+
+
+def open_to_append(path: Path) -> BufferedRandom:
+    """A table or journal opened to be read and appended to, made where it is not there.
+
+    Raises:
+        OSError: it cannot be opened, is a link, no regular file or too large; `strerror` says which.
+    """
+    if path.is_symlink():
+        raise OSError(errno.ELOOP, "it is a link", str(path))
+    if path.exists():
+        found = os.stat(path)
+        _check_regular(path, found)
+        _check_size(path, found.st_size, limits.TABLE_BYTES)
+    return open(path, "a+b", opener=_opened_unlinked)
+
+
+def _opened_unlinked(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0), 0o666)
+
+
+def _check_regular(path: Path, found: os.stat_result) -> None:
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "this is no file but a pipe or a device", str(path))
+
+
+def _check_size(path: Path, size: int, most: int | None) -> None:
+    if most is not None and size > most:
+        raise OSError(errno.EFBIG, f"it is larger than {limits.megabytes(most)}", str(path))
+
+
 def write_atomically(path: Path, text: str, mode: int | None = None) -> None:
     """Write a file through a temporary one beside it: a reader sees the old file or the new one, never half.
 
-    What a link leads to is written, and the link stays. A pipe or a device is written to as it is. `mode` is that of
-    the new file; without it, it keeps that of the file it replaces.
+    A link is refused: whoever made it chose another file than the one that was named. A pipe or a terminal is written
+    to as it is. `mode` is that of the new file; without it, it keeps that of the file it replaces.
 
     Raises:
-        UsageError: the folder does not exist or may not be written to, or the file is a log.
+        UsageError: the folder does not exist or may not be written to, or the name is a link's or a device's.
     """
-    refuse_recording(path)
     try:
-        if path.exists() and not path.is_file() and not path.is_dir():
-            path.write_text(text, encoding="utf-8")
+        if is_stream(path):
+            with path.open("w", encoding="utf-8", errors="backslashreplace") as stream:
+                stream.write(text)
             return
-        replace_file(path, text.encode(), mode)
+        refuse_link(path)
+        replace_file(path, text.encode("utf-8", "backslashreplace"), mode)
     except OSError as err:
-        raise UsageError(
-            f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
-        ) from err
+        raise cannot_write(path, err) from err
+
+
+def cannot_write(path: Path, err: OSError) -> UsageError:
+    """What to say of a file that could not be written."""
+    return UsageError(f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path))
+
+
+def refuse_link(path: Path) -> None:
+    """Raise UsageError for a link: nothing is written through one, and none is replaced."""
+    if path.is_symlink():
+        hint = f"Name the file itself: {os.path.realpath(path)}."
+        raise UsageError("This is a link, and links are not written through.", hint=hint, where=str(path))
+
+
+def is_stream(path: Path) -> bool:
+    """Whether a name stands for something that is written to as it is: a pipe, a terminal, /dev/stdout, /dev/null."""
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):
+        return False
+    return stat.S_ISFIFO(mode) or stat.S_ISCHR(mode) or str(path) in ("/dev/stdout", "/dev/stderr")
 
 
 def replace_file(path: Path, content: bytes, mode: int | None = None) -> None:
     """Put a file in another's place: after a crash or a power cut either the old one is there, or the new one whole.
 
-    Raises OSError.
+    A link of this name is replaced itself, what it leads to stays as it is. Raises OSError.
     """
-    path = path.resolve()
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    import tempfile
+
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "there is a folder, a pipe or a device of that name", str(path))
+    # Its name is nobody's to guess, and it is made anew or not at all: no link waits there.
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:_LONGEST_PREFIX]}.")
     try:
         with os.fdopen(handle, "wb") as stream:
             stream.write(content)
             stream.flush()
-            Path(temporary).chmod(_mode(path) if mode is None else mode)
+            os.chmod(stream.fileno(), _mode(path) if mode is None else mode)
             os.fsync(stream.fileno())
         Path(temporary).replace(path)
     except BaseException:
@@ -108,90 +238,6 @@ def sync_folder(folder: Path) -> None:
         pass
     finally:
         os.close(handle)
-
-
-def check_replaceable(path: Path, text: str) -> None:
-    """Raise UsageError for a file that is there and is not of the kind of the text that is to replace it.
-
-    A log whose head is damaged is no log to look at, so an ending that logs have counts as well.
-    """
-    refuse_recording(path)
-    if not path.is_file() or not path.stat().st_size:
-        return
-    with path.open("rb") as stream:
-        head = stream.read(_HEAD_BYTES)
-    if path.suffix.lower() in log_suffixes() or b"\0" in head or _kind(_decoded(head)) != _kind(text):
-        raise UsageError(
-            "There is a file of another kind, which is kept.",
-            hint="Name another file, or replace it with --force.",
-            where=str(path),
-        )
-
-
-BUNDLE_FOLDER = "care-bundle"
-_ZIP_HEAD, _ZIP_NAME_AT = b"PK\x03\x04", 30
-"""How a zip begins, and where the name of its first file stands (PKWARE APPNOTE 4.3.7)."""
-
-
-def write_bundle(path: Path, content: bytes, *, force: bool = False) -> None:
-    """Write a bundle whole or not at all.
-
-    Raises:
-        UsageError: something else is there, or the folder may not be written to.
-    """
-    check_bundle(path, force=force)
-    try:
-        replace_file(path, content)
-    except OSError as err:
-        raise UsageError(
-            f"Cannot write the file: {err.strerror}.", hint="Choose another place.", where=str(path)
-        ) from err
-
-
-def check_bundle(path: Path, *, force: bool = False) -> None:
-    """Raise UsageError for a file that no bundle may replace: any but a bundle; with `force`, a log or an archive."""
-    if not path.is_file() or _is_bundle(path):
-        return
-    refuse_recording(path)
-    if not force and path.stat().st_size:
-        raise UsageError(
-            "There is a file of another kind, which is kept.",
-            hint="Name another file, or replace it with --force.",
-            where=str(path),
-        )
-
-
-def _is_bundle(path: Path) -> bool:
-    """Whether a file is a zip whose first file lies in a bundle's folder."""
-    with path.open("rb") as stream:
-        head = stream.read(_ZIP_NAME_AT + len(BUNDLE_FOLDER) + 1)
-    return head.startswith(_ZIP_HEAD) and head.endswith(f"{BUNDLE_FOLDER}/".encode())
-
-
-def _decoded(head: bytes) -> str:
-    """The first bytes of a file as text, which may end inside a character; empty where they are none."""
-    try:
-        return getincrementaldecoder("utf-8")().decode(head)
-    except UnicodeDecodeError:
-        return ""
-
-
-def _kind(text: str) -> str:
-    """What a text is, by its first line that is not empty; of a document of this program, whose it is."""
-    start = text.lstrip("\ufeff \t\r\n")
-    if not start:
-        return "no text"
-    line = start.partition("\n")[0].rstrip()
-    if start[:1] in ("{", "["):
-        return "care document" if _OWN_DOCUMENT.match(start) else "json"
-    kind = next((kind for kind, shape in _KINDS.items() if shape.match(line)), "text")
-    return f"text {_FIRST_WORD.findall(line)[:1]}" if kind == "text" else kind
-
-
-def refuse_recording(path: Path) -> None:
-    """Raise UsageError for a path that holds a log: logs are never written to."""
-    if path.is_file() and is_recording(path):
-        raise UsageError("This is a log, and logs are never overwritten.", hint="Name another file.", where=str(path))
 
 
 def _mode(path: Path) -> int:

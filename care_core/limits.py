@@ -35,6 +35,10 @@ TOPIC_DEFINITIONS = 500
 TEXT_MESSAGE_TYPES = 1_000
 """A DataFlash log numbers its types by one byte."""
 
+SMALL_FILE_BYTES = 16_000_000
+"""Of any file that is read whole and is no log, table or model: configurations, reports, campaigns, profiles."""
+TABLE_BYTES = 512 * MEBIBYTE
+"""Of a table of runs: 100,000 runs of 500 variables."""
 YAML_BYTES = 16 * MEBIBYTE
 YAML_DEPTH = 64
 YAML_NODES = 200_000

@@ -6,7 +6,7 @@ import math
 import shlex
 import textwrap
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 WIDTH = 80
 """Columns of plain text for people."""
@@ -26,10 +26,26 @@ def _shown(character: str) -> str:
     return character if character.isprintable() or unicodedata.category(character) == "Zs" else ascii(character)[1:-1]
 
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\uff1d", "\uff0b", "\uff0d", "\uff20")
+"""What a spreadsheet takes for the beginning of a formula (OWASP, CSV injection), full-width signs too."""
+
+
 def cell(text: str) -> str:
     """The text as a cell of a table, made safe: a spreadsheet computes what begins as a formula does."""
     made = clean(text)
-    return f"'{made}" if made[:1] in ("=", "+", "-", "@") else made
+    return f"'{made}" if text.startswith(_FORMULA) or made.lstrip().startswith(_FORMULA) else made
+
+
+def csv_table(rows: Iterable[Iterable[object]]) -> str:
+    """Rows as CSV, the first one the header: texts are cells that no spreadsheet computes, numbers stay numbers, and of
+    nothing a cell is empty. Every table that is written as CSV comes from here."""
+    import csv
+    from io import StringIO
+
+    stream = StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerows([cell(value) if isinstance(value, str) else value for value in row] for row in rows)
+    return stream.getvalue()
 
 
 def command(*words: str, note: str = "") -> str:

@@ -19,7 +19,7 @@ from typer.core import TyperGroup
 
 from care_core.errors import UsageError, nearest
 from care_tui import __version__
-from care_tui.console import emit, explain
+from care_tui.console import emit, escape_the_rest, explain
 
 HELP = "Which parameter made the run fail, along which path, and what to change. 'care LOG' opens the terminal app."
 OPEN = "open"
@@ -127,6 +127,7 @@ def main() -> None:
     # Whoever closes a stream wants none of it (cron, `>&-`).
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
+    escape_the_rest()
     completes = "_CARE_COMPLETE" in os.environ  # the shell's words are not the command's then
     command_line(None if completes else sys.argv[1:])(prog_name="care")
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import sys
 import time
 import traceback
+from json import dumps
 from pathlib import Path
 
 from care_core.errors import CareError, ExitCode, UsageError
@@ -18,23 +20,30 @@ PIPE_CLOSED = 128 + 13
 QUIET_S, AGAIN_S = 1.0, 60.0
 """Work that takes longer says what it is doing; how often it says so where no line can be rewritten."""
 
+_UNLISTED = re.compile(r"[^\x00-\x7f]")
 _STATUS = re.compile(r"\b(FAULT|NOT EVALUATED|OK)\b")
 _COLOURS = {"FAULT": "\x1b[1;31m", "NOT EVALUATED": "\x1b[33m", "OK": "\x1b[32m"}
 _RESET = "\x1b[0m"
 
 
-def emit(text: str, out: Path | None = None, *, force: bool = False) -> None:
-    """Write data: to the file `out`, whole or not at all, else to stdout. `force` replaces a file of another kind."""
-    if out is not None:
-        from care_core.files import check_replaceable, write_atomically
+def emit(
+    text: str, out: Path | None = None, *, force: bool = False, hint: str | None = None, is_plain: bool = False
+) -> None:
+    """Write data: to the file `out`, whole or not at all, else to stdout.
 
-        if not force:
-            check_replaceable(out, text)
-        write_atomically(out, text)
+    Args:
+        force: replace a file of another kind.
+        hint: what to do with such a file; by default, --force.
+        is_plain: it is text for people, which says in a file who wrote it.
+    """
+    if out is not None:
+        from care_core.outputs import FORCE_HINT, signed, write_output
+
+        write_output(out, signed(text) if is_plain else text, force=force, hint=hint or FORCE_HINT)
         say(f"wrote {out}")
         return
     try:
-        sys.stdout.write(text)
+        sys.stdout.write(encodable(text, sys.stdout.encoding))
         sys.stdout.flush()
     except BrokenPipeError:
         # The interpreter flushes stdout once more when it ends, which must not fail again.
@@ -46,9 +55,28 @@ def emit(text: str, out: Path | None = None, *, force: bool = False) -> None:
         raise UsageError(f"Cannot write the output: {err.strerror}.", hint="Write it to another place.") from None
 
 
+def escape_the_rest() -> None:
+    """Have stdout and stderr write a character that their encoding lacks as its name, `\\N{DEGREE SIGN}`: no error."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="namereplace")
+
+
+def encodable(text: str, encoding: str | None) -> str:
+    """The text in characters that an encoding has; JSON, HTML and XML have escapes of their own for the others."""
+    try:
+        text.encode(encoding or "utf-8")
+    except UnicodeEncodeError:
+        if text.startswith(("{", "[")):
+            return _UNLISTED.sub(lambda match: dumps(match[0])[1:-1], text)
+        errors = "xmlcharrefreplace" if text.startswith("<") else "namereplace"
+        return text.encode(encoding or "utf-8", errors).decode(encoding or "utf-8")
+    return text
+
+
 def check_writable(out: Path) -> None:
     """Refuse, before any work is done, a file that could not be written. Raises UsageError."""
-    from care_core.files import refuse_recording
+    from care_core.outputs import refuse_recording
 
     refuse_recording(out)
     check_place(out)

@@ -68,10 +68,10 @@ def open_and_warm(request: Request, progress: Progress) -> Case:
 
 
 def save_text(path: Path, text: str) -> None:
-    """Write a file; it is whole or not there at all."""
-    from care_core.files import write_atomically
+    """Write a file; it is whole or not there at all. Of one that is there the operator was asked; a log is kept."""
+    from care_core.outputs import write_output
 
-    write_atomically(path, text)
+    write_output(path, text, force=True)
 
 
 class Engine(Record):

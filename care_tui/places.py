@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from care_core.files import read_small_text
 from care_core.records import Record
 
 PLACES = (
@@ -94,7 +95,7 @@ def _look(path: Path, is_recent: bool) -> LogFile | None:
 def recent_logs() -> list[Path]:
     """Logs that were opened before, the last one first."""
     try:
-        return [Path(line) for line in _recent_file().read_text(encoding="utf-8").splitlines() if line]
+        return [Path(line) for line in read_small_text(_recent_file()).splitlines() if line]
     except (OSError, UnicodeDecodeError):
         return []
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from care_core.errors import ConfigError, UsageError, nearest
+from care_core.files import read_small_text
 from care_core.records import Record, field, replace
 from care_tui.places import PLACES, at_home
 
@@ -77,7 +78,7 @@ def _read(file: Path) -> Any:
     from care_core.plain_yaml import PlainYamlError, load
 
     try:
-        return load(file.read_text(encoding="utf-8"))
+        return load(read_small_text(file))
     except OSError as err:
         raise ConfigError(f"Cannot read the settings: {err.strerror}.", where=str(file)) from err
     except (PlainYamlError, UnicodeDecodeError) as err:

@@ -15,8 +15,9 @@ from typing import NamedTuple
 
 from care_core.configs.loading import read_config
 from care_core.diagnose.records import Diagnosis
-from care_core.files import bundled, check_replaceable, write_atomically
+from care_core.files import bundled, write_atomically
 from care_core.history.store import History
+from care_core.outputs import write_output
 from care_core.profile.model import read_model, write_model
 from care_core.records import replace
 from care_core.report.document import build_document
@@ -49,8 +50,7 @@ def _check_notes(notes: Sequence[str]) -> None:
 
 def _write_report(folder: Path, version: int) -> None:
     path, text = folder / "report.yaml", to_yaml(build_document(_diagnosis(version % 2)))
-    check_replaceable(path, text)
-    write_atomically(path, text)
+    write_output(path, text)
 
 
 def _check_report(folder: Path) -> int:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from care_core import plain_yaml
 from care_core.application.case import fitting, opened
 from care_core.errors import CareError, ConfigError, LogError
+from care_core.files import read_small_text
 from care_core.profile.site import load_site
 from care_core.records import replace
 
@@ -104,7 +105,7 @@ def site_text(found: Baseline, file: Path) -> str:
     """
     if file.is_file() and file.stat().st_size:
         load_site(file)
-        text = file.read_text(encoding="utf-8")
+        text = read_small_text(file)
     else:
         from care_core.profile.site_file import SITE_SCHEMA
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 import platform
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from io import BytesIO, StringIO
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
@@ -20,10 +20,10 @@ from care_core.application.sharing import ELSEWHERE, Sharing, parameters_of
 from care_core.application.signals import Line, Source, lines_of
 from care_core.application.viewing import messages_of
 from care_core.errors import CareError
-from care_core.files import BUNDLE_FOLDER
+from care_core.outputs import BUNDLE_FOLDER
 from care_core.records import Record, replace
 from care_core.run import Setting, Unavailable, profile_title
-from care_core.text import cell, clean, seconds
+from care_core.text import clean, csv_table, seconds
 
 if TYPE_CHECKING:
     import numpy as np
@@ -162,20 +162,14 @@ def _anonymous(case: OpenRun, settings: Mapping[str, Setting], sharing: Sharing)
 
 def _messages(case: OpenRun, sharing: Sharing) -> str:
     """What the robot's software said, in order of time, as CSV."""
-    import csv
-
     hider = sharing.hider(case) if sharing.anonymous else None
     text = hider.said if hider else sharing.text(case)
-    stream = StringIO()
-    rows = csv.writer(stream, lineterminator="\n")
-    rows.writerow(("time_s", "kind", "text"))
     try:
         messages = messages_of(case)
     except CareError:  # a log without any
         messages = []
-    for message in messages[:_MOST_MESSAGES]:
-        rows.writerow((f"{message.time_s:.3f}", message.kind, cell(text(message.text))))
-    return stream.getvalue()
+    rows = ((round(one.time_s, 3), one.kind, text(one.text)) for one in messages[:_MOST_MESSAGES])
+    return csv_table([("time_s", "kind", "text"), *rows])
 
 
 def _signals(case: OpenRun, sharing: Sharing, room: int) -> tuple[dict[str, str], list[str]]:
@@ -215,7 +209,7 @@ def _table(lines: Mapping[str, Line], span: tuple[float, float], most: int) -> s
         ",".join((f"{time_s:.3f}", *("" if value != value else f"{value:.6g}" for value in row)))
         for time_s, *row in zip(times, *columns, strict=True)
     )
-    return "\n".join((",".join(("time_s", *lines)), *rows)) + "\n"
+    return csv_table([("time_s", *lines)]) + "".join(f"{row}\n" for row in rows)
 
 
 def _in_order(line: Line, span: tuple[float, float], most: int) -> NDArray[np.intp]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +10,8 @@ from care_core.collect.campaign import Campaign, default_folder, read_campaign
 from care_core.collect.runner import Collected, collect, first_round
 from care_core.errors import ExitCode
 from care_core.report.collection import CollectDocument, CollectedRun, LeftOutOption, VariedOption
-from care_core.text import clean
+from care_core.report.document import plain_number
+from care_core.text import clean, csv_table
 
 if TYPE_CHECKING:
     from care_core.collect.sampling import Planned
@@ -33,14 +32,12 @@ def run_campaign(path: Path, out: Path | None, *, retry_failed: bool, progress: 
 def plan_table(path: Path) -> tuple[Campaign, str]:
     """A campaign and its plan as CSV (run, seed, the run it repeats, each option); nothing is run. Raises CareError."""
     campaign = read_campaign(path)
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
     names = [axis.name for axis in campaign.space.axes]
-    writer.writerow(("run", "seed", "repeats", *names))
-    for run in first_round(campaign):
-        values = (f"{run.config[name]:.7g}" for name in names)
-        writer.writerow((run.number, run.seed, "" if run.repeats is None else run.repeats, *values))
-    return campaign, stream.getvalue()
+    rows = (
+        (run.number, run.seed, run.repeats, *(plain_number(float(f"{run.config[name]:.7g}")) for name in names))
+        for run in first_round(campaign)
+    )
+    return campaign, csv_table([("run", "seed", "repeats", *names), *rows])
 
 
 def document_of(found: Collected) -> CollectDocument:

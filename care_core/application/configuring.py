@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from care_core.errors import ConfigError, UsageError
+from care_core.files import open_regular
 from care_core.run import Setting
 from care_core.text import clean
 
@@ -46,9 +47,7 @@ def side_of(name: str) -> Side:
 def _head(path: Path) -> bytes:
     """The first bytes of a file. Raises ConfigError for what is none, or empty."""
     try:
-        if path.exists() and not path.is_file():
-            raise ConfigError("This is no file but a pipe or a device.", hint="Save it to a file.", where=str(path))
-        with path.open("rb") as stream:
+        with open_regular(path) as stream:
             head = stream.read(_HEAD_BYTES)
     except OSError as err:
         hint = "Check the path."

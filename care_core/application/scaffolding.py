@@ -29,11 +29,13 @@ def new_profile(logs: Sequence[Path], out: Path, *, force: bool, progress: Progr
         LogError: none of the logs can be read, or they hold nothing that a profile could be made of.
     """
     from care_core.files import write_atomically
+    from care_core.outputs import REMOVE_HINT, check_replaceable
     from care_core.scaffold.inputs import open_input
     from care_core.scaffold.scaffold import scaffold
-    from care_core.tables.rows import rows_of, write_table
+    from care_core.tables.rows import KIND, rows_of, write_table
 
     check_new(out, force=force)
+    check_replaceable(out / RUNS_FILE, kind=KIND, hint=REMOVE_HINT)
     seen, failed = [], {}
     for number, path in enumerate(logs):
         progress(f"reading {path.name}", 0.5 * number / len(logs))

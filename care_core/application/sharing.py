@@ -20,6 +20,7 @@ from care_core.application.open_run import OpenRun
 from care_core.application.shared_parameters import may_go
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import Event
+from care_core.files import read_small_text
 from care_core.records import Record, replace
 from care_core.variables import Variable
 
@@ -144,7 +145,7 @@ def mapped(value: object, change: Callable[[str], str]) -> object:
 
 def public_words(case: OpenRun) -> frozenset[str]:
     """Words of firmware, navigation stacks, this program and the case's profile."""
-    listed = Path(__file__).with_name("public_words.txt").read_text(encoding="utf-8").split()
+    listed = read_small_text(Path(__file__).with_name("public_words.txt")).split()
     return frozenset((*listed, *(word for variable in _variables(case) for word in _words_of(variable))))
 
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from care_core import plain_yaml
 from care_core.errors import UsageError
-from care_core.files import PROFILE_FILE
-from care_core.profile.model import write_model
+from care_core.files import PROFILE_FILE, read_small_text
+from care_core.profile.model import ARRAYS_FILE, MODEL_FILE, write_model
 from care_core.profile.reading import parse_schema, read_schema
 from care_core.profile.store import CARD_FILE, load_profile
 from care_core.records import asdict
@@ -48,13 +48,14 @@ def train_profile(runs: Path, schema_path: Path, out: Path, *, seed: int, resamp
         ProfileError: the schema is unsound.
         LearningError: the table cannot be read, or cannot carry a model.
     """
-    schema = read_schema(schema_path)
+    schema, text = read_schema(schema_path), read_small_text(schema_path)
+    _check_folder(out, text)
     with _learning():
         from care_core.learn.table import read_table
         from care_core.learn.train import TrainSettings, train
     frame = read_table(runs, schema)
     model = train(frame, schema, TrainSettings(seed=seed, resamples=resamples, origin=runs.name), progress)
-    _write(out, schema, model, schema_path.read_text(encoding="utf-8"))
+    _write(out, schema, model, text)
 
 
 def update_profile(source: str, runs: Path, out: Path, *, seed: int, progress: Progress) -> tuple[str, ...]:
@@ -67,6 +68,7 @@ def update_profile(source: str, runs: Path, out: Path, *, seed: int, progress: P
         As `train_profile`; UsageError also when `out` is the source itself.
     """
     profile = load_profile(source)
+    _check_folder(out)
     if out.resolve() == profile.path.resolve():
         raise UsageError("The new profile would replace its source.", hint="Choose another --out.", where=str(out))
     with _learning():
@@ -75,11 +77,28 @@ def update_profile(source: str, runs: Path, out: Path, *, seed: int, progress: P
         from care_core.learn.transfer import FEWEST, out_of_support, update
     frame = read_table(runs, profile.schema, at_least=FEWEST)
     outside = out_of_support(profile.model, profile.schema, frame)
-    text = _retargeted((profile.path / PROFILE_FILE).read_text(encoding="utf-8"), out.name, runs.name, outside)
+    text = _retargeted(read_small_text(profile.path / PROFILE_FILE), out.name, runs.name, outside)
     schema = parse_schema(text, runs)
     model = update(profile.model, schema, frame, TrainSettings(seed=seed, origin=runs.name), progress)
     _write(out, schema, model, text)
     return tuple(map(str, outside))
+
+
+_OTHER_FOLDER = "Choose another --out, or remove what is there first."
+
+
+def _check_folder(out: Path, text: str = "") -> None:
+    """Refuse, before anything is learned, a folder with files of somebody's own. Raises UsageError.
+
+    A `profile.yaml` is our copy where a model lies beside it; without one it is kept, unless it is `text` itself.
+    """
+    from care_core.outputs import check_replaceable
+
+    for name, kind in ((MODEL_FILE, "model"), (CARD_FILE, "card")):
+        check_replaceable(out / name, kind=kind, hint=_OTHER_FOLDER)
+    if not (out / MODEL_FILE).is_file():
+        check_replaceable(out / PROFILE_FILE, text.encode(), hint=_OTHER_FOLDER)
+        check_replaceable(out / ARRAYS_FILE, hint=_OTHER_FOLDER)
 
 
 def _retargeted(text: str, name: str, runs: str, outside: Sequence[OutOfSupport]) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from care_core.application.open_run import OpenRun, log_of
 from care_core.errors import CareError
+from care_core.files import read_small_text
 from care_core.records import Record
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def _card(folder: Path) -> str:
     from care_core.profile.store import CARD_FILE
 
     files = [folder / name for name in (CARD_FILE, RECORD_FILE)]
-    texts = [file.read_text(encoding="utf-8") for file in files if file.is_file()]
+    texts = [read_small_text(file) for file in files if file.is_file()]
     return "\n".join(texts) if texts else "It has no model card.\n"
 
 

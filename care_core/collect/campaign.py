@@ -22,7 +22,7 @@ from care_core.collect.space import Axis, Space
 from care_core.configs.driven import option_value, readable
 from care_core.configs.loading import read_configs, resolve, split_name
 from care_core.errors import UsageError, nearest
-from care_core.files import PROFILE_FILE, profile_folders
+from care_core.files import PROFILE_FILE, profile_folders, read_small_text
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
 from care_core.records import Record
@@ -143,7 +143,7 @@ def read_campaign(path: Path) -> Campaign:
 
 def _checked(path: Path) -> _Campaign:
     try:
-        data = plain_yaml.load(path.read_text(encoding="utf-8-sig"))
+        data = plain_yaml.load(read_small_text(path, encoding="utf-8-sig"))
     except OSError as err:
         hint = "Check the path."
         raise UsageError(f"Cannot read the campaign: {err.strerror}.", hint=hint, where=str(path)) from err

@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 
 from care_core.collect.sampling import Planned
 from care_core.errors import UsageError
+from care_core.files import open_to_append
 from care_core.records import Record, Struct, field, plain
 from care_core.tables.rows import TableRow
 
@@ -54,7 +55,7 @@ class Journal(Struct, eq=False):
         """
         path = folder / FILE
         try:
-            stream = path.open("a+b")
+            stream = open_to_append(path)
         except OSError as err:
             raise UsageError(f"Cannot write the journal: {err.strerror}.", where=str(path)) from err
         try:

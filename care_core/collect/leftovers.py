@@ -13,6 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from care_core.collect import guard
+from care_core.files import read_small_bytes
 
 LOGS_VARIABLE = "CARE_LOGS"
 
@@ -56,7 +57,7 @@ def _left(folder: Path, session: int | None) -> set[int]:
 def _names(process: int, start: bytes) -> bool:
     """Whether a variable in the environment of a process begins like this."""
     try:
-        environment = Path(f"/proc/{process}/environ").read_bytes()
+        environment = read_small_bytes(Path(f"/proc/{process}/environ"))
     except OSError:  # it ended meanwhile, or is another user's
         return False
     return any(variable.startswith(start) for variable in environment.split(b"\0"))

@@ -24,7 +24,7 @@ from care_core.collect.sampling import Planned
 from care_core.configs.driven import parameter_value, readable, same_value
 from care_core.configs.edit import Wanted, apply_changes
 from care_core.errors import CareError, ConfigError
-from care_core.files import write_atomically
+from care_core.files import open_regular, read_small_text, write_atomically
 from care_core.logs.finding import logs_below
 from care_core.records import Record
 from care_core.run import Setting
@@ -209,7 +209,7 @@ def _check_room(folder: Path) -> None:
 def _ending(folder: Path) -> _Ended | None:
     """How an attempt ended by itself; None where it did not."""
     try:
-        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        record = json.loads(read_small_text(folder / RECORD))
     except (OSError, ValueError):
         return None
     if "error" in record:
@@ -224,7 +224,7 @@ def _ending(folder: Path) -> _Ended | None:
 
 
 def _last_words(output: Path) -> str:
-    with output.open("rb") as stream:
+    with open_regular(output) as stream:
         stream.seek(max(0, output.stat().st_size - 4096))
         lines = stream.read().decode("utf-8", "replace").split("\n")
     said = [line.strip() for line in lines if line.strip()]

@@ -24,7 +24,7 @@ from care_core.configs.driven import parameter_value, readable
 from care_core.configs.edit import Wanted, apply_changes
 from care_core.errors import CareError, UsageError
 from care_core.records import Struct, field
-from care_core.tables.rows import ABOUT, CONDITIONS, TableRow, write_rows, write_table
+from care_core.tables.rows import ABOUT, CONDITIONS, KIND, TableRow, check_table_path, write_rows, write_table
 
 TABLE = "runs.csv"
 
@@ -115,6 +115,7 @@ def collect(campaign: Campaign, folder: Path, *, retry_failed: bool = False, pro
             journal.plan(first_round(campaign))
         again = {number for number, done in journal.done.items() if done.failure} if retry_failed else set()
         found = Collected(campaign, folder, journal.planned, journal.done, len(journal.done) - len(again))
+        check_table_path(found.table)
         work = _Work(found, journal, again, progress)
         end_leftovers(folder / RUNS, GRACE_S)
         try:
@@ -141,7 +142,7 @@ def _write(found: Collected) -> None:
         write_table(found.table, found.rows, schema)
         return
     rows = [{**row, CONDITIONS: found.planned[n].seed} for n in sorted(found.done) for row in found.done[n].rows]
-    write_rows(found.table, rows, [*ABOUT, CONDITIONS, *schema.variables])
+    write_rows(found.table, rows, [*ABOUT, CONDITIONS, *schema.variables], KIND)
 
 
 def _check_parameters(campaign: Campaign) -> None:

@@ -18,6 +18,7 @@ from care_core.configs.loading import ConfigFile, guesses, read_configs, read_te
 from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.px4.dialect import QGC_PARAMS
 from care_core.errors import ConfigError
+from care_core.files import read_small_text
 from care_core.records import Record, Struct, field
 from care_core.run import Setting, shown
 from care_core.variables import Variable
@@ -112,8 +113,7 @@ def _opened(loads: Sequence[ConfigFile], paths: Sequence[Path]) -> tuple[EditedF
 
 
 def _as_it_is(path: Path) -> str:
-    with path.open(encoding="utf-8", newline="") as stream:  # with its line ends
-        return stream.read()
+    return read_small_text(path, as_it_is=True)
 
 
 def _set(file: EditedFile, setting: Setting, wanted: Wanted, *, unsure: bool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gc
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -12,6 +13,7 @@ from care_core.configs.formats import format_of
 from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.ros.dialect import ROS1_YAML
 from care_core.errors import ConfigError
+from care_core.files import read_small_text
 from care_core.records import Record
 from care_core.run import Find, Setting
 
@@ -71,11 +73,9 @@ def _no_collector() -> Iterator[None]:
 def text_of_file(path: Path) -> str:
     """The text of a configuration file, without the mark that some editors begin it with. Raises ConfigError."""
     try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise ConfigError("Too large for a configuration file.", hint="Is it a log?", where=str(path))
-        return path.read_text(encoding="utf-8-sig")
+        return read_small_text(path, encoding="utf-8-sig", most=_LARGEST_BYTES)
     except OSError as err:
-        hint = "Check the path."
+        hint = "Is it a log?" if err.errno == errno.EFBIG else "Check the path."
         raise ConfigError(f"Cannot read the configuration: {err.strerror}.", hint=hint, where=str(path)) from err
     except UnicodeDecodeError as err:
         raise ConfigError("Not a configuration file: it is not text.", hint="Is it a log?", where=str(path)) from err

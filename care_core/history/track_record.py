@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 
-from care_core.files import write_atomically
 from care_core.history.store import Triaged, Verified
+from care_core.outputs import REMOVE_HINT, write_output
 from care_core.records import Record
 
 EDGES = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
@@ -85,7 +85,7 @@ def write_record(folder: Path, record: TrackRecord) -> Path:
         UsageError: the folder may not be written to.
     """
     path = folder / RECORD_FILE
-    write_atomically(path, _as_markdown(record))
+    write_output(path, _as_markdown(record), hint=REMOVE_HINT)
     return path
 
 

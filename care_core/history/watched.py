@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+from care_core.files import read_small_text
 from care_core.history.store import About, History, insert_triage
 from care_core.records import Record
 
@@ -114,6 +115,6 @@ def _is_at_work(holder: str, until: float) -> bool:
 def _started(pid: int) -> str:
     """When a process was started, in ticks since the system was; empty where that is not told."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[19]
+        return read_small_text(Path(f"/proc/{pid}/stat"), errors="replace").rpartition(")")[2].split()[19]
     except (OSError, IndexError):
         return ""

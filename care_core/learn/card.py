@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from care_core.causal.model import EffectRecord, Model, SkillRecord
+from care_core.files import read_small_text
 from care_core.learn.identification import identify
 from care_core.profile.schema import Schema
 from care_core.profile.store import CARD_FILE, Profile
@@ -44,7 +45,7 @@ def recomputed(profile: Profile) -> tuple[str, ...]:
     card = profile.path / CARD_FILE
     if not card.is_file():
         found.append(f"There is no {CARD_FILE}.")
-    elif card.read_text(encoding="utf-8") != model_card(profile.schema, model):
+    elif read_small_text(card) != model_card(profile.schema, model):
         found.append(f"{CARD_FILE} is not what the model gives.")
     return tuple(found)
 

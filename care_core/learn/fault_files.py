@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pandas as pd
 
+from care_core import limits
 from care_core.errors import LearningError
+from care_core.files import open_regular
 from care_core.profile.schema import Schema
 from care_core.records import Record
 
@@ -91,8 +93,11 @@ def _by_objective(files: Sequence[Path], objectives: Sequence[str]) -> dict[str,
 
 def _read(path: Path, wanted: Sequence[str]) -> pd.DataFrame:
     try:
-        frame = pd.read_csv(path)
-    except (OSError, ValueError, UnicodeDecodeError) as err:
+        with open_regular(path, most=limits.TABLE_BYTES) as stream:
+            frame = pd.read_csv(stream)
+    except OSError as err:
+        raise LearningError(f"Cannot read the table: {err.strerror}.", where=str(path)) from err
+    except ValueError as err:
         raise LearningError(f"Cannot read the table: {err}.", where=str(path)) from err
     absent = [name for name in wanted if name not in frame]
     if absent:

@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import ndtri
 from scipy.stats import rankdata
 
+from care_core import limits
 from care_core.errors import LearningError, nearest
+from care_core.files import open_regular
 from care_core.profile.schema import Schema
 from care_core.tables.readiness import MIN_RUNS
 from care_core.tables.rows import CONDITIONS
@@ -111,7 +113,8 @@ def _read(path: Path) -> pd.DataFrame:
             where=str(path),
         )
     try:
-        frame: pd.DataFrame = pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path)
+        with open_regular(path, most=limits.TABLE_BYTES) as stream:
+            frame: pd.DataFrame = pd.read_csv(stream) if path.suffix.lower() == ".csv" else pd.read_parquet(stream)
     except OSError as err:  # pyarrow's errors too
         reason = err.strerror or "it is not a table of that format"
         raise LearningError(f"Cannot read the table: {reason}.", where=str(path)) from err

@@ -12,6 +12,7 @@ from typing import IO
 
 from care_core import limits
 from care_core.errors import LogError
+from care_core.files import open_regular
 from care_core.logs.file_windows import FileBytes
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -117,7 +118,7 @@ class PlainFile:
         self.path = path
         self.is_cut = False
         try:
-            with path.open("rb") as stream:
+            with open_regular(path) as stream:
                 if stream.read(len(ZSTD_MAGIC)) == ZSTD_MAGIC:
                     stream.seek(0)
                     self._unpack(stream)

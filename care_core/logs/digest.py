@@ -11,6 +11,7 @@ from typing import BinaryIO
 
 from care_core import limits
 from care_core.errors import LogError
+from care_core.files import open_regular
 from care_core.logs.opening import cannot_open
 
 Sha256 = Callable[[], str]
@@ -37,7 +38,7 @@ def log_digest(path: str | Path, stopped: Event | None = None) -> str:
         files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
         is_whole = sum(file.stat().st_size for file in files) <= limits.WHOLE_BYTES
         for file in files:
-            with file.open("rb", buffering=0) as stream:
+            with open_regular(file, buffering=0) as stream:
                 for piece in _whole(stream) if is_whole else _samples(stream, file.stat().st_size):
                     digest.update(piece)
                     if stopped is not None and stopped.is_set():

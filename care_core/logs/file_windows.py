@@ -20,6 +20,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from care_core import limits
 from care_core.errors import LogError
+from care_core.files import open_regular
 
 Bytes = NDArray[np.uint8]
 Offsets = NDArray[np.integer[Any]]
@@ -112,7 +113,7 @@ def cut_while_read(path: Path) -> LogError:
 def opened(path: Path, magic: bytes, what: str) -> Iterator[FileBytes]:
     """The file's bytes. Raises LogError when it cannot be read or does not begin with `magic`."""
     try:
-        with path.open("rb", buffering=0) as stream:
+        with open_regular(path, buffering=0) as stream:
             log = FileBytes(path, stream)
             if log[: len(magic)] != magic:
                 raise LogError(f"Not {what}.", hint="Was it copied whole?", where=str(path))
@@ -139,7 +140,7 @@ class FileArray:
     def open(cls, path: Path) -> FileArray:
         """The bytes of a file. Raises LogError where it cannot be read."""
         try:
-            stream = path.open("rb", buffering=0)
+            stream = open_regular(path, buffering=0)
         except OSError as err:
             raise LogError(f"Cannot read the file: {err}.", where=str(path)) from err
         found = cls(stream, path)

@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
+from care_core.files import open_regular, read_small_text
 from care_core.logs.finding import SHARED_SUFFIX, begins_like_a_log
 from care_core.logs.formats import log_suffixes
 from care_core.logs.recording import ROS1_SUFFIXES, ROS2_SUFFIXES, parse_part
@@ -143,7 +144,7 @@ def _one_recording(folder: Path, files: Mapping[str, _File], logs: Mapping[str, 
 def _unlisted(folder: Path, files: Mapping[str, _File]) -> str:
     """What the metadata of a ROS 2 recording names and is not there; empty where all is."""
     try:
-        text = (folder / FILE_NAME).read_text("utf-8", "replace")
+        text = read_small_text(folder / FILE_NAME, errors="replace")
     except OSError:
         return f"{FILE_NAME} cannot be read"
     metadata = parse_metadata(text)
@@ -176,7 +177,7 @@ def not_closed(path: Path) -> str:
     try:
         if not path.is_file():
             return ""
-        with path.open("rb") as stream:
+        with open_regular(path) as stream:
             head = stream.read(_BAG_HEAD_BYTES)
             if head.startswith(_MCAP_END):
                 stream.seek(-len(_MCAP_END), os.SEEK_END)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from importlib import import_module
 from pathlib import Path
 from typing import BinaryIO
 
 from care_core.errors import LogError
+from care_core.files import open_regular
 from care_core.logs import formats
 from care_core.logs.base import Log
 from care_core.logs.formats import LogFormat
@@ -87,7 +90,7 @@ def _read_head(path: Path, size: int = formats.SNIFF_BYTES) -> bytes:
     try:
         if path.exists() and not path.is_file():  # reading a pipe could wait for ever
             raise LogError("This is no file but a pipe or a device.", hint="Save the log to a file.", where=str(path))
-        with path.open("rb") as stream:
+        with open_regular(path) as stream:
             head = stream.read(size)
             if head and not head.strip(b"\0"):
                 stream.seek(_first_written(stream))
@@ -105,14 +108,25 @@ def _read_head(path: Path, size: int = formats.SNIFF_BYTES) -> bytes:
 def _first_written(stream: BinaryIO) -> int:
     """The byte from which on a file is more than zeros, with room for the zeros that a time stamp begins with: what
     was set aside for a log and never written, or lost. The file's end where there is none."""
-    stream.seek(0)
-    at = 0
+    at = _next_data(stream, 0)
+    stream.seek(at)
     while piece := stream.read(_PIECE_BYTES):
         rest = piece.lstrip(b"\0")
         if rest:
             return max(at + len(piece) - len(rest) - 8, 0)
-        at += len(piece)
+        at = _next_data(stream, at + len(piece))
+        stream.seek(at)
     return at
+
+
+def _next_data(stream: BinaryIO, at: int) -> int:
+    """Where a file was written to from here on, its end where nowhere: of a hole of terabytes no byte is read."""
+    if not hasattr(os, "SEEK_DATA"):
+        return at
+    try:
+        return os.lseek(stream.fileno(), at, os.SEEK_DATA)
+    except OSError as err:
+        return stream.seek(0, os.SEEK_END) if err.errno == errno.ENXIO else at
 
 
 def _unpacked(path: Path) -> bytes:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
+from care_core.files import open_regular
 from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.clock import PAUSE_S, find_clock
@@ -210,7 +211,8 @@ def _believable(t: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 def _first_break(path: Path, end_s: float) -> Damage | None:
     """Where the chain of records breaks for the first time; a cut ends the log at `end_s`."""
-    data = path.read_bytes()
+    with open_regular(path) as stream:
+        data = stream.read()
     place, size = _HEADER_BYTES, len(data)
     while place + 3 <= size:
         length = data[place] | data[place + 1] << 8

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from care_core.errors import LogError
+from care_core.files import read_small_text
 from care_core.logs.ros_log import Flaw
 from care_core.logs.ros_metadata import FILE_NAME, Metadata, parse_metadata
 from care_core.records import Record, field
@@ -114,7 +115,7 @@ def _siblings(path: Path, metadata: Metadata) -> list[str]:
 
 def _metadata_beside(folder: Path) -> Metadata:
     try:
-        return parse_metadata((folder / FILE_NAME).read_text("utf-8", "replace"))
+        return parse_metadata(read_small_text(folder / FILE_NAME, errors="replace"))
     except OSError:
         return Metadata()
 

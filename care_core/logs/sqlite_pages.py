@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.files import open_regular
 from care_core.logs.file_windows import FileBytes
 
 MAGIC = b"SQLite format 3\0"
@@ -41,7 +42,7 @@ _LONGEST_HEAD = 64
 
 def promised_size(path: Path) -> int:
     """Bytes that a file should have, as its header says; 0 where the header is missing or not up to date."""
-    with path.open("rb") as stream:
+    with open_regular(path) as stream:
         head = stream.read(_FIRST_PAGE_HEADER)
     if len(head) < _FIRST_PAGE_HEADER or head[24:28] != head[92:96]:
         return 0

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 
+from care_core.files import read_small_text
 from care_core.metadata.fact import Fact, expanded, number
 from care_core.metadata.words import word_of
 from care_core.records import Record
@@ -108,14 +109,13 @@ def _codes(text: str) -> Iterator[float]:
 @cache
 def _rows() -> Mapping[str, list[_Row]]:
     found: dict[str, list[_Row]] = {}
-    with _TABLE.open(encoding="utf-8") as stream:
-        lines = (line.rstrip("\n") for line in stream if not line.startswith("#"))
-        next(lines)
-        for line in lines:
-            pattern, releases, *cells = line.split("\t")
-            row = _Row(_releases(releases), tuple(cells))
-            for name in expanded(pattern):
-                found.setdefault(name, []).append(row)
+    lines = (line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#"))
+    next(lines)
+    for line in lines:
+        pattern, releases, *cells = line.split("\t")
+        row = _Row(_releases(releases), tuple(cells))
+        for name in expanded(pattern):
+            found.setdefault(name, []).append(row)
     return found
 
 

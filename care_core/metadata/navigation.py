@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Literal, TypeGuard, get_args
 
+from care_core.files import read_small_text
 from care_core.metadata.fact import Fact, FactType, number
 from care_core.metadata.words import word_of
 
@@ -152,7 +153,7 @@ def _by_owner(ros: Ros) -> Mapping[str, Mapping[str, list[Fact]]]:
 
 @cache
 def _table() -> tuple[Mapping[str, str], ...]:
-    lines = [line for line in _TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    lines = [line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#")]
     columns = lines[0].split("\t")
     return tuple(dict(zip(columns, line.split("\t"), strict=True)) for line in lines[1:])
 

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from care_core.files import read_small_text
 from care_core.metadata.fact import expanded
 
 TABLE = Path(__file__).with_name("words.tsv")
@@ -35,7 +36,7 @@ def word_of(ecosystem: str, name: str, owner: str = "") -> Word:
 @cache
 def _words() -> Mapping[tuple[str, str, str], Word]:
     found: dict[tuple[str, str, str], Word] = {}
-    for line in TABLE.read_text(encoding="utf-8").splitlines():
+    for line in read_small_text(TABLE).splitlines():
         if line and not line.startswith("#"):
             ecosystem, owner, name, unit, text = line.split("\t")
             word = Word(unit, text)

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from care_core.files import read_small_text
 from care_core.profile.schema import Schema
 from care_core.records import UnfitError, plain, read_json
 
@@ -24,7 +25,7 @@ _MOST = 64
 def cached(text: str) -> Schema | None:
     """The schema of a `profile.yaml` with this text, None where it is not in the cache."""
     try:
-        digest, _, stored = _entry(text).read_text(encoding="utf-8").partition("\n")
+        digest, _, stored = read_small_text(_entry(text)).partition("\n")
         if hashlib.sha256(stored.encode()).hexdigest() != digest:
             return None
         return read_json(Schema, stored.encode())

@@ -31,14 +31,15 @@ from care_core.causal.model import (
 )
 from care_core.causal.nominal import FORMULAS, Nominal
 from care_core.errors import ProfileError
-from care_core.files import replace_file, sync_folder
+from care_core.files import read_small_bytes, replace_file, sync_folder
 from care_core.numbers import six_digits
 from care_core.records import Record, UnfitError, asdict, field, plain, read_json, replace
 
 ARCHIVE = b"PK\x03\x04"
 _DAMAGED = (ValueError, TypeError, KeyError, EOFError, OverflowError, RuntimeError)
 """What numpy and zipfile raise for what is no archive of arrays, beside their own errors."""
-_ARRAYS, _NEXT_ARRAYS = "mechanisms.npz", "mechanisms.npz.next"
+MODEL_FILE, ARRAYS_FILE = "model.json", "mechanisms.npz"
+_NEXT_ARRAYS = f"{ARRAYS_FILE}.next"
 PRIOR = "prior:"
 """Begins the key of a mechanism that belongs to the platform a profile was carried over from."""
 
@@ -115,8 +116,8 @@ def write_model(model: Model, folder: Path) -> None:
     )
     text = json.dumps(_rounded(plain(record)), indent=1, ensure_ascii=False, default=lambda one: one.item()) + "\n"
     replace_file(folder / _NEXT_ARRAYS, arrays)
-    replace_file(folder / "model.json", text.encode())
-    (folder / _NEXT_ARRAYS).replace(folder / _ARRAYS)
+    replace_file(folder / MODEL_FILE, text.encode())
+    (folder / _NEXT_ARRAYS).replace(folder / ARRAYS_FILE)
     sync_folder(folder)
 
 
@@ -184,7 +185,7 @@ def read_model(folder: Path) -> Model:
     Raises:
         ProfileError: a file is missing, damaged, or of another version.
     """
-    path = folder / "model.json"
+    path = folder / MODEL_FILE
     try:
         record = read_json(_ModelFile, _content(path))
         mechanisms = _mechanisms(record.mechanisms, _read_arrays(folder, record.arrays_sha256))
@@ -213,25 +214,23 @@ def read_model(folder: Path) -> Model:
 
 def _read_arrays(folder: Path, sha256: str) -> Mapping[str, FloatArray]:
     """The arrays that a `model.json` belongs to; they may not have got their name yet when writing was broken off."""
-    content = _content(folder / _ARRAYS)
+    content = _content(folder / ARRAYS_FILE)
     following = folder / _NEXT_ARRAYS
     if sha256 and hashlib.sha256(content).hexdigest() != sha256:
         content = _content(following) if following.is_file() else b""
         if hashlib.sha256(content).hexdigest() != sha256:
-            raise ValueError(f"{_ARRAYS} is not the one that model.json was written with")
+            raise ValueError(f"{ARRAYS_FILE} is not the one that model.json was written with")
     if not content.startswith(ARCHIVE):
-        raise ValueError(f"{_ARRAYS} is not an archive of arrays")
+        raise ValueError(f"{ARRAYS_FILE} is not an archive of arrays")
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         if sum(member.file_size for member in archive.infolist()) > limits.MODEL_BYTES:
-            raise ValueError(f"{_ARRAYS} unpacks to more than {limits.megabytes(limits.MODEL_BYTES)}")
+            raise ValueError(f"{ARRAYS_FILE} unpacks to more than {limits.megabytes(limits.MODEL_BYTES)}")
         names = {name.removesuffix(".npy"): name for name in archive.namelist()}
         return {key: _array(key, archive.read(name)) for key, name in names.items()}
 
 
 def _content(path: Path) -> bytes:
-    if path.stat().st_size > limits.MODEL_BYTES:
-        raise ValueError(f"{path.name} is larger than {limits.megabytes(limits.MODEL_BYTES)}")
-    return path.read_bytes()
+    return read_small_bytes(path, limits.MODEL_BYTES)
 
 
 def _array(name: str, stored: bytes) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from care_core.errors import ProfileError
+from care_core.files import read_small_text
 from care_core.profile.cache import cached, store
 from care_core.profile.schema import Schema
 
@@ -16,7 +17,7 @@ def read_schema(path: Path) -> Schema:
         ProfileError: no such file, not YAML, or a key or value that does not belong, with the nearest known key.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_small_text(path)
     except OSError as err:
         raise ProfileError(f"Cannot read the profile: {err.strerror}.", where=str(path)) from err
     except UnicodeDecodeError as err:

@@ -9,6 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from care_core import plain_yaml
 from care_core.errors import ConfigError
+from care_core.files import read_small_text
 from care_core.profile.schema_file import Bound, Strict
 
 SITE_SCHEMA = "care.site/1"
@@ -42,7 +43,7 @@ def limits_of(file: Path) -> dict[str, dict[str, SiteLimit]]:
         ConfigError: there is no such file, or it is no site file, with the key that is wrong.
     """
     try:
-        data = plain_yaml.load(file.read_text(encoding="utf-8"))
+        data = plain_yaml.load(read_small_text(file))
     except OSError as err:
         raise ConfigError(f"Cannot read the site file: {err.strerror}.", where=str(file)) from err
     except (plain_yaml.PlainYamlError, UnicodeDecodeError) as err:

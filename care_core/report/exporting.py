@@ -9,8 +9,10 @@ from care_core.history.store import Triaged
 from care_core.report.document import remembered_verdict
 from care_core.report.reading import document_of
 from care_core.tables.rows import TableRow, write_rows
-from care_core.text import cell
+from care_core.text import clean
 
+KIND = "history"
+"""What `outputs` calls such a table."""
 ABOUT = (
     "at", "start", "robot", "robot_name", "log", "sha256", "mission", "profile", "profile_version", "firmware",
     "status", "cause", "changes", "p_fixed",
@@ -29,7 +31,7 @@ def history_rows(triages: Sequence[Triaged]) -> tuple[list[TableRow], list[str]]
 def export_history(path: Path, triages: Sequence[Triaged]) -> int:
     """Write the table, .csv or .parquet, and return its rows. Raises UsageError."""
     rows, columns = history_rows(triages)
-    write_rows(path, rows, columns)
+    write_rows(path, rows, columns, KIND)
     return len(rows)
 
 
@@ -40,14 +42,14 @@ def _row(one: Triaged) -> TableRow:
     row: TableRow = {
         "at": one.at,
         "start": document.log.start,
-        "robot": None if one.robot is None else cell(one.robot.id),
-        "robot_name": None if one.robot is None else cell(one.robot.name),
-        "log": cell(one.log_path),
+        "robot": None if one.robot is None else clean(one.robot.id),
+        "robot_name": None if one.robot is None else clean(one.robot.name),
+        "log": clean(one.log_path),
         "sha256": document.log.sha256,
         "mission": one.mission,
         "profile": profile.name if profile else None,
         "profile_version": profile.version if profile else None,
-        "firmware": cell(one.firmware) or None,
+        "firmware": clean(one.firmware) or None,
         "status": remembered_verdict(document).status,
         "cause": causes[0] if causes else None,
         "changes": ", ".join(map(str, fix.changes)) if fix else None,

@@ -17,6 +17,7 @@ from care_core.fleet.shared import FEWEST, Kind, Pattern, Since, Trait, Unit
 from care_core.fleet.sources import INSTALL
 from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
 from care_core.numbers import six_digits
+from care_core.outputs import REMOVE_HINT, check_replaceable
 from care_core.records import field
 from care_core.report.document import estimate, parameter_names, plain_number
 from care_core.report.published import Document, publish
@@ -254,11 +255,13 @@ def _change_entry(one: Suggestion) -> ChangeEntry:
     )
 
 
+KIND = "fleet"
+"""What `outputs` calls such a table."""
+
+
 def check_parquet_path(path: Path) -> None:
     """Refuse, before any log is read, a table that could not be written. Raises UsageError."""
-    from care_core.files import refuse_recording
-
-    refuse_recording(path)
+    check_replaceable(path, kind=KIND, hint=REMOVE_HINT)
     if path.suffix.lower() != parquet.SUFFIX:
         raise UsageError("The table's name ends in .parquet.", hint="Rename it.", where=str(path))
     if not path.parent.is_dir():
@@ -270,7 +273,7 @@ def write_parquet(path: Path, fleet: Fleet) -> None:
     """The rows as a table, whole or not at all: the columns of the document's rows, lists as lists of texts, a column
     `objective.NAME` and `option.NAME` for each. Raises UsageError."""
     rows = [_flat(entry, row) for entry, row in zip(_row_entries(fleet.rows), fleet.rows, strict=True)]
-    parquet.write_parquet(path, rows, dict.fromkeys(name for row in rows for name in row))
+    parquet.write_parquet(path, rows, dict.fromkeys(name for row in rows for name in row), KIND)
 
 
 _NESTED = {"objectives", "explained", "causes", "findings", "change", "off"}

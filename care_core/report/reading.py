@@ -8,11 +8,10 @@ from typing import Any
 
 from care_core import plain_yaml
 from care_core.errors import ConfigError, UsageError
+from care_core.files import read_small_text
 from care_core.records import UnfitError, read
 from care_core.report.document import SCHEMA_ID, ProfileEntry, TriageDocument
 from care_core.text import clean
-
-_MOST_BYTES = 20_000_000
 
 
 def read_report(path: str | Path) -> TriageDocument:
@@ -54,9 +53,7 @@ def profile_of(report: TriageDocument) -> ProfileEntry:
 
 def _load(path: Path) -> Any:
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise ConfigError("Not a report: it is too large.", where=str(path))
-        text = path.read_text(encoding="utf-8-sig")
+        text = read_small_text(path, encoding="utf-8-sig")
     except OSError as err:
         hint = "Check the path."
         raise ConfigError(f"Cannot read the report: {err.strerror}.", hint=hint, where=str(path)) from err

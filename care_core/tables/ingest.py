@@ -6,9 +6,7 @@ so whatever ends the program costs at most the logs that were being read. A line
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import json
 import sys
 import time
@@ -16,17 +14,23 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
+from io import TextIOWrapper
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, TextIO
 
+from care_core import limits
 from care_core.errors import LogError, UsageError
 from care_core.extract.select import fitting_profile, sound_profiles
+from care_core.files import open_regular, open_to_append
 from care_core.logs.opening import open_log
+from care_core.outputs import REMOVE_HINT, write_output
 from care_core.parallel import Failed, each
 from care_core.profile.schema import Schema
 from care_core.profile.store import load_profile
 from care_core.records import Record, Struct, field
 from care_core.tables.rows import TableRow, rows_of
+from care_core.text import csv_table
 
 Report = Callable[[str, float], None]
 
@@ -46,6 +50,8 @@ class Ingested(Struct, eq=False):
     resumed: int = 0
 
 
+_LONGEST_LINE = limits.SMALL_FILE_BYTES
+"""Bytes of a line of a journal: a log of a thousand missions has so many."""
 _PACE_LOGS = 5
 """So many logs say how long the rest will take."""
 
@@ -94,10 +100,7 @@ def ingest(
 
 def failures_table(failures: Sequence[Failure]) -> str:
     """The failures as CSV with the columns log and reason."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerows([("log", "reason"), *((str(failure.path), failure.reason) for failure in failures)])
-    return stream.getvalue()
+    return csv_table([("log", "reason"), *((str(failure.path), failure.reason) for failure in failures)])
 
 
 def by_reason(failures: Sequence[Failure]) -> list[tuple[str, int, Path]]:
@@ -161,30 +164,30 @@ def _line(key: str, answer: list[TableRow] | Failed) -> str:
 def _read_journal(path: Path, purpose: Mapping[str, str]) -> dict[str, list[TableRow] | Failed]:
     """What an interrupted run had done; nothing where there is no journal, or one of another profile."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
+        with open_regular(path) as stream:
+            if _entry(stream.readline(_LONGEST_LINE)) != purpose:
+                return {}
+            entries = list(takewhile(bool, map(_entry, iter(partial(stream.readline, _LONGEST_LINE), b""))))
+    except OSError:
         return {}
-    entries: list[Any] = []
-    for line in lines:
-        try:
-            entries.append(json.loads(line))
-        except ValueError:  # cut off
-            break
-    if not entries or entries[0] != purpose:
-        return {}
-    return {e["log"]: _shared(e["rows"]) if "rows" in e else Failed(e["failure"], is_final=True) for e in entries[1:]}
+    return {e["log"]: _shared(e["rows"]) if "rows" in e else Failed(e["failure"], is_final=True) for e in entries}
+
+
+def _entry(line: bytes) -> Any:
+    """What a line of the journal says; None where it was cut off."""
+    try:
+        return json.loads(line)
+    except ValueError:
+        return None
 
 
 @contextmanager
 def _writing(path: Path, purpose: Mapping[str, str], known: Mapping[str, list[TableRow] | Failed]) -> Iterator[TextIO]:
     """The journal, opened to append to what is known. Raises UsageError where it cannot be written."""
-    fresh = path.with_name(f".{path.name}.new")
     try:
-        with fresh.open("w", encoding="utf-8") as stream:
-            stream.write(json.dumps(purpose) + "\n")
-            stream.writelines(_line(key, answer) for key, answer in known.items())
-            stream.flush()
-            fresh.replace(path)
+        begun = [json.dumps(purpose) + "\n", *(_line(key, answer) for key, answer in known.items())]
+        write_output(path, "".join(begun), hint=REMOVE_HINT)
+        with open_to_append(path) as raw, TextIOWrapper(raw, encoding="utf-8") as stream:
             yield stream
     except OSError as err:
         raise UsageError(

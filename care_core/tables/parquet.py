@@ -8,8 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from care_core import limits
 from care_core.errors import UsageError
-from care_core.files import replace_file
+from care_core.files import open_regular
+from care_core.outputs import PARQUET_KEY, REMOVE_HINT, write_binary
 
 SUFFIX = ".parquet"
 
@@ -20,20 +22,19 @@ def check_parquet(install: str) -> None:
         raise UsageError("Parquet cannot be written here.", hint=install)
 
 
-def write_parquet(path: Path, rows: Sequence[Mapping[str, Any]], columns: Iterable[str]) -> None:
-    """Write rows, which may lack columns, whole or not at all; NaN becomes null. Raises UsageError."""
+def write_parquet(path: Path, rows: Sequence[Mapping[str, Any]], columns: Iterable[str], kind: str) -> None:
+    """Write rows, which may lack columns, whole or not at all; NaN becomes null. Raises UsageError.
+
+    Args:
+        kind: of the rows, which the file is marked with: only a table of the same kind is replaced.
+    """
     import pyarrow as pa
     from pyarrow import parquet
 
     content = io.BytesIO()
     table = pa.table({name: pa.array([row.get(name) for row in rows], from_pandas=True) for name in columns})
-    parquet.write_table(table, content)
-    try:
-        replace_file(path, content.getvalue())
-    except OSError as err:
-        raise UsageError(
-            f"Cannot write the table: {err.strerror}.", hint="Choose another place.", where=str(path)
-        ) from err
+    parquet.write_table(table.replace_schema_metadata({f"{PARQUET_KEY}{kind}": "1"}), content)
+    write_binary(path, content.getvalue(), kind, hint=REMOVE_HINT)
 
 
 def read_parquet(path: Path) -> list[dict[str, Any]]:
@@ -45,5 +46,6 @@ def read_parquet(path: Path) -> list[dict[str, Any]]:
     """
     from pyarrow import parquet
 
-    rows: list[dict[str, Any]] = parquet.read_table(path).to_pylist()
+    with open_regular(path, most=limits.TABLE_BYTES) as stream:
+        rows: list[dict[str, Any]] = parquet.read_table(stream).to_pylist()
     return rows

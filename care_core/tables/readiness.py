@@ -5,9 +5,12 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from io import StringIO
 from pathlib import Path
 
+from care_core import limits
 from care_core.errors import UsageError
+from care_core.files import read_small_text
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.tables.parquet import SUFFIX, read_parquet
@@ -103,8 +106,8 @@ def read_columns(path: Path, schema: Schema) -> tuple[dict[str, list[float | Non
 
 
 def _csv_rows(path: Path) -> list[dict[str, object]]:
-    with path.open(encoding="utf-8", newline="") as stream:
-        return [dict(row) for row in csv.DictReader(stream)]
+    text = read_small_text(path, encoding="utf-8-sig", as_it_is=True, most=limits.TABLE_BYTES)
+    return [dict(row) for row in csv.DictReader(StringIO(text, newline=""))]
 
 
 def _parquet_rows(path: Path) -> list[dict[str, object]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,12 +10,16 @@ from care_core.ecosystems.registry import run_model
 from care_core.errors import UsageError
 from care_core.extract.read import read_runs
 from care_core.logs.opening import open_log
+from care_core.outputs import REMOVE_HINT, check_replaceable, write_output
 from care_core.profile.schema import Schema
 from care_core.run import Run, Setting, is_known
 from care_core.tables import parquet
+from care_core.text import csv_table
 
 ABOUT = ("log", "mission", "log_format", "log_start", "log_sha256")
 """The columns before the variables."""
+KIND = "runs"
+"""What `outputs` calls such a table."""
 CONDITIONS = "conditions"
 """A column that a table may have: runs with one value in it met the same conditions, others did not."""
 INSTALL_LEARN = "Install what it needs with: pip install 'care-tui[learn]'"
@@ -49,31 +51,27 @@ def _as_text(path: Path) -> str:
 
 
 def write_table(path: Path, rows: Sequence[TableRow], schema: Schema) -> None:
-    """Write the table as CSV or Parquet, by suffix; whole or not at all."""
-    write_rows(path, rows, [*ABOUT, *schema.variables])
+    """Write the table as CSV or Parquet, by suffix; whole or not at all. Raises UsageError."""
+    write_rows(path, rows, [*ABOUT, *schema.variables], KIND)
 
 
-def write_rows(path: Path, rows: Sequence[TableRow], columns: list[str]) -> None:
-    """Write rows as CSV or Parquet, by suffix; whole or not at all. A row may lack columns."""
+def write_rows(path: Path, rows: Sequence[TableRow], columns: Sequence[str], kind: str) -> None:
+    """Write rows as CSV or Parquet, by suffix; whole or not at all, over a table of the same kind only.
+
+    A row may lack columns. Raises UsageError.
+    """
     if path.suffix.lower() == parquet.SUFFIX:
-        parquet.write_parquet(path, rows, columns)
-        return
-    from care_core.files import write_atomically
-
-    stream = io.StringIO()
-    writer = csv.DictWriter(stream, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write_atomically(path, stream.getvalue())
+        parquet.write_parquet(path, rows, columns, kind)
+    else:
+        text = csv_table([columns, *([row.get(name) for name in columns] for row in rows)])
+        write_output(path, text, hint=REMOVE_HINT)
 
 
-def check_table_path(path: Path) -> None:
+def check_table_path(path: Path, kind: str = KIND) -> None:
     """Refuse, before any log is read, a table that could not be written. Raises UsageError."""
     if path.suffix.lower() not in (".csv", parquet.SUFFIX):
         raise UsageError("A table of runs ends in .csv or .parquet.", hint="Rename it.", where=str(path))
-    from care_core.files import refuse_recording
-
-    refuse_recording(path)
+    check_replaceable(path, kind=kind, hint=REMOVE_HINT)
     if not path.parent.is_dir():
         raise UsageError("The folder does not exist.", hint="Make it first.", where=str(path.parent))
     if path.suffix.lower() == parquet.SUFFIX:

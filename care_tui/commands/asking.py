@@ -65,7 +65,8 @@ def whatif(
     with Progress() as progress:
         question = read_case(request, progress).question
     answer = question.ask(dict(parse_change(text, question.schema) for text in set_))
-    emit((whatif_json if json or is_json(out) else whatif_text)(question, answer), out, force=force)
+    as_json = json or is_json(out)
+    emit((whatif_json if as_json else whatif_text)(question, answer), out, force=force, is_plain=not as_json)
 
 
 @app.command()
@@ -103,5 +104,6 @@ def verify(
     if not no_history:
         verified = document.plain()
         mention(remember(lambda history: history.add_verification(verified)))
-    emit((verify_json if json or is_json(out) else verify_text)(document), out, force=force)
+    as_json = json or is_json(out)
+    emit((verify_json if as_json else verify_text)(document), out, force=force, is_plain=not as_json)
     raise typer.Exit(EXIT_CODES[document.verdict])

@@ -40,7 +40,7 @@ def baseline(
     else:
         emit(baseline_json(found) if json else baseline_text(found))
         if out is not None and any(proposal.limit is not None for proposal in found.proposals):
-            emit(site_text(found, out), out, force=force)
+            emit(site_text(found, out), out, force=True)  # it keeps what the file holds
             if out.resolve() != site_path():
                 say(f"judge by it with --site {out}, or always as {site_path()}")
         elif out is not None:

@@ -49,18 +49,18 @@ def bundle(
     """
     from care_core.application.bundling import bundle_of
     from care_core.application.sharing import Sharing
-    from care_core.files import check_bundle, write_bundle
+    from care_core.outputs import check_replaceable, write_binary
 
     target = out or Path("run.care.zip" if anonymous else f"{clean(log.stem)}.care.zip")
     check_place(target)
-    check_bundle(target, force=force)
+    check_replaceable(target, kind="bundle", force=force)
     request = Request(log, profile, tuple(config or ()), thresholds=bounds(threshold or ()), site=site, mission=mission)
     sharing = Sharing(positions=bool(positions), anonymous=anonymous)
     with Progress() as progress:
         case = care_core.triage(request, progress)
         progress("packing", 0.9)
         packed = bundle_of(case, sharing, __version__)
-    write_bundle(target, packed.content, force=force)
+    write_binary(target, packed.content, "bundle", force=force)
     emit("".join(f"{size:>9,}  {name}\n" for name, size in packed.files.items()))
     left_out = "" if sharing.positions else ", without positions"
     say(f"wrote {target}: {len(packed.content):,} bytes{left_out}{', anonymous' if anonymous else ''}")

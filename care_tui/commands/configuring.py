@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -117,7 +118,7 @@ def lint(
     elif as_json or is_json(out):
         emit(lint_document(found, target).to_json(), out, force=force)
     else:
-        emit(lint_text(found), out, force=force)
+        emit(lint_text(found), out, force=force, is_plain=True)
     say(counted(found))
     severe = [one for file in found for one in file.problems if one.severity is not Severity.NOTE]
     raise typer.Exit(ExitCode.FAULT if severe else ExitCode.OK)
@@ -137,21 +138,17 @@ def _told(edited: Sequence[EditedFile]) -> Iterator[str]:
 
 
 def _write_or_print(text: str, out: Path | None, *, force: bool) -> None:
-    from care_core.files import check_replaceable, write_atomically
+    from care_core.outputs import signed
 
-    if out is None:
-        emit(text)
-        return
-    if not force:
-        check_replaceable(out, text)
-    write_atomically(out, text)
-    say(f"wrote {out}: load it after the other files")
+    emit(text if out is None else signed(text, parameters=True), out, force=force)
+    if out is not None:
+        say("load it after the other files")
 
 
 def _replace(file: EditedFile) -> None:
     from care_core.files import write_atomically
 
-    backup = next(path for path in _backups(file.path) if not path.exists())
+    backup = next(path for path in _backups(file.path) if not os.path.lexists(path))
     write_atomically(backup, file.before, file.path.stat().st_mode & 0o777)
     _write_checked(file, file.path)
     say(f"wrote {file.path}, the old one is {backup}")
@@ -166,7 +163,7 @@ def _backups(path: Path) -> Iterator[Path]:
 
 
 def _write_to(out: Path, edited: Sequence[EditedFile], *, force: bool) -> None:
-    from care_core.files import check_replaceable
+    from care_core.outputs import check_replaceable
 
     targets = [out / file.path.name if len(edited) > 1 or out.is_dir() else out for file in edited]
     if len(set(targets)) < len(targets):
@@ -176,8 +173,7 @@ def _write_to(out: Path, edited: Sequence[EditedFile], *, force: bool) -> None:
     if len(edited) > 1:
         out.mkdir(parents=True, exist_ok=True)
     for target, file in zip(targets, edited, strict=True):
-        if not force:
-            check_replaceable(target, file.after)
+        check_replaceable(target, file.after.encode(), force=force)
         _write_checked(file, target)
         say(f"wrote {target}")
 
@@ -185,10 +181,10 @@ def _write_to(out: Path, edited: Sequence[EditedFile], *, force: bool) -> None:
 def _write_checked(file: EditedFile, target: Path) -> None:
     """Write an edited file and read it again; where it does not hold the changes, what was there before is put back."""
     from care_core.configs.edit import check_written
-    from care_core.files import replace_file, write_atomically
+    from care_core.files import read_small_bytes, replace_file, write_atomically
 
     mode = file.path.stat().st_mode & 0o777
-    before = target.read_bytes() if target.is_file() else None
+    before = read_small_bytes(target) if target.is_file() else None
     write_atomically(target, file.after, mode)
     if not target.is_file():  # a pipe, which says nothing of what it took
         return

@@ -97,7 +97,8 @@ def triage(
         case = care_core.triage(request, progress)
     if not no_history:
         mention(remember_triage(case.diagnosis))
-    emit(_written(case, format, sharing, to_file=out is not None), out, force=force)
+    text = _written(case, format, sharing, to_file=out is not None)
+    emit(text, out, force=force, is_plain=format is None)
     raise typer.Exit(verdict_of(case.diagnosis).exit_code)
 
 

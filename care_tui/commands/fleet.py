@@ -84,5 +84,5 @@ def fleet(
         from care_tui.render.fleet import fleet_text
 
         text = fleet_text(found)
-        emit(text if out else painted(text), out, force=force)
+        emit(text if out else painted(text), out, force=force, is_plain=True)
     raise typer.Exit(found.exit_code)

@@ -50,6 +50,7 @@ def params(
     from care_core.configs.driven import differing, remark
     from care_core.configs.formats import format_for, write_params
     from care_core.logs.opening import open_log
+    from care_core.outputs import signed
 
     opened = open_log(log)
     histories = opened.settings()
@@ -64,7 +65,8 @@ def params(
         histories = chosen
     remarks = {name: remark(history, source=sources) for name, history in histories.items() if changed or sources}
     settings = {name: history[-1] for name, history in histories.items()}
-    emit(write_params(settings, format_for(opened.format.name, settings), remarks), out, force=force)
+    text = write_params(settings, format_for(opened.format.name, settings), remarks)
+    emit(text if out is None else signed(text, parameters=True), out, force=force)
 
 
 @app.command()
@@ -82,6 +84,7 @@ def ingest(
     4 none could be read.
     """
     from care_core.logs.finding import find_logs
+    from care_core.outputs import REMOVE_HINT, check_replaceable
     from care_core.profile.store import load_profile
     from care_core.tables import ingest as ingesting
     from care_core.tables.rows import check_table_path, write_table
@@ -89,6 +92,7 @@ def ingest(
     check_table_path(out)
     if failures is not None:
         check_writable(failures)
+        check_replaceable(failures, kind="failures", hint=REMOVE_HINT)
     paths = find_logs(logs)
     journal = ingesting.journal_of(out)
     try:
@@ -102,7 +106,7 @@ def ingest(
         say(f"{found.resumed} of {len(paths)} logs were read before the interruption")
     _say_failures(found.failures)
     if failures is not None:
-        emit(ingesting.failures_table(found.failures), failures)
+        emit(ingesting.failures_table(found.failures), failures, hint=REMOVE_HINT)
     if not found.rows:
         journal.unlink(missing_ok=True)
         raise LogError(f"None of the {len(paths)} logs could be read.", hint="Look at one with 'care inspect'.")

@@ -60,14 +60,16 @@ def history(
     if robot is not None:
         triages = _of_robot(triages, robot)
     if export is not None:
-        from care_core.report.exporting import export_history
+        from care_core.report.exporting import KIND, export_history
         from care_core.tables.rows import check_table_path
 
-        check_table_path(export)
+        check_table_path(export, KIND)
         say(f"wrote {export}: {export_history(export, triages)} runs")
         return
     document = history_document(triages, store.verifications(profile), limit)
-    emit(history_json(document) if json or is_json(out) else history_text(document, ascii=ascii), out, force=force)
+    as_json = json or is_json(out)
+    text = history_json(document) if as_json else history_text(document, ascii=ascii)
+    emit(text, out, force=force, is_plain=not as_json)
 
 
 def _of_robot(triages: tuple[Triaged, ...], name: str) -> tuple[Triaged, ...]:

@@ -14,7 +14,7 @@ import jsonschema
 import pytest
 
 from care_core.configs.loading import read_config
-from care_core.errors import ConfigError
+from care_core.errors import ConfigError, UsageError
 from care_core.files import write_atomically
 from tests.conftest import Care
 
@@ -66,12 +66,16 @@ def test_a_report_is_not_overwritten_by_its_own_verification(care: Care, log: Pa
     assert json.loads((tmp_path / "v.json").read_text())["schema"] == "care.verify/1"
 
 
-def test_a_link_stays_one_and_a_device_too(tmp_path: Path) -> None:
+def test_a_link_is_not_written_through_and_a_device_stays_one(tmp_path: Path) -> None:
     (tmp_path / "real.yaml").write_text("old")
     (tmp_path / "link.yaml").symlink_to("real.yaml")
-    write_atomically(tmp_path / "link.yaml", "new")
-    assert (tmp_path / "link.yaml").is_symlink()
-    assert (tmp_path / "real.yaml").read_text() == "new"
+    (tmp_path / "nowhere.yaml").symlink_to("new.yaml")
+    for name in ("link.yaml", "nowhere.yaml"):
+        with pytest.raises(UsageError, match="links are not written through"):
+            write_atomically(tmp_path / name, "new")
+        assert (tmp_path / name).is_symlink()
+    assert (tmp_path / "real.yaml").read_text() == "old"
+    assert not (tmp_path / "new.yaml").exists()
     write_atomically(Path(os.devnull), "gone")
     assert Path(os.devnull).is_char_device()
 
@@ -110,7 +114,7 @@ def bomb(first: str, rest: str) -> str:
         ("a:\t1\n\tb: 2\n", "Not valid YAML: found a tab character"),
         ("a: 1\n---\nb: 2\n", "expected a single document in the stream but found another document"),
         ("- 1\n", "no mapping of names"),
-        ("a: " + "1" * 1_000_000, "Too large"),
+        ("a: " + "1" * 1_000_000, "larger than 1 MB"),
     ],
 )
 def test_yaml_that_is_no_configuration(tmp_path: Path, text: str, words: str) -> None:

@@ -22,7 +22,8 @@ from care_core.application.bundling import LARGEST, bundle_of
 from care_core.application.case import Case
 from care_core.application.sharing import Sharing
 from care_core.application.signals import signals_of
-from care_core.files import bundled, write_bundle
+from care_core.files import bundled
+from care_core.outputs import write_binary
 from care_core.report.document import json_schema
 from tests.conftest import Care
 
@@ -139,17 +140,17 @@ def test_the_command_writes_beside_the_operator_and_leaves_the_log(
 def test_only_a_bundle_is_replaced(tmp_path: Path) -> None:
     made = bundling._packed({"README.txt": "x"})
     target = tmp_path / "a.zip"
-    write_bundle(target, made)
-    write_bundle(target, made)
+    write_binary(target, made, "bundle")
+    write_binary(target, made, "bundle")
     with zipfile.ZipFile(target, "w") as archive:
         archive.writestr("holiday.jpg", "precious")
     precious = target.read_bytes()
     with pytest.raises(care_core.errors.UsageError, match="never overwritten"):
-        write_bundle(target, made, force=True)
+        write_binary(target, made, "bundle", force=True)
     assert target.read_bytes() == precious
     target.write_text("notes")
     with pytest.raises(care_core.errors.UsageError, match="another kind"):
-        write_bundle(target, made)
-    write_bundle(target, made, force=True)
+        write_binary(target, made, "bundle")
+    write_binary(target, made, "bundle", force=True)
     assert target.read_bytes() == made
     assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["a.zip"]
