@@ -112,6 +112,19 @@ class Extract(Record):
     args: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
 
+class Typical(Record):
+    """What a vehicle like those of the training has of a context, by what else its run shows: the name of a formula,
+    and how many times that a value may be to be believed as the vehicle's own."""
+
+    kind: str
+    at_least: float = 0.0
+    at_most: float | None = None
+
+    def believes(self, value: float, usual: float) -> bool:
+        """Whether a vehicle of which `usual` is expected may have this value."""
+        return value >= self.at_least * usual and (self.at_most is None or value <= self.at_most * usual)
+
+
 class Events(Record):
     """The like parts of a mission, each with noise of its own: the context that counts them, and the metric that holds
     the standard deviation of the logarithm of what each took."""
@@ -142,6 +155,8 @@ class Variable(Record):
     reboot_required: bool = False
     modes: tuple[str, ...] = ()
     """The modes that read an option; empty where every mode does, or nothing is known."""
+    phase: str = ""
+    """The part of a mission that reads an option, as the mission's kind names it; empty where all of it does."""
     safety: bool = False
     ceiling: bool = False
     """How fast the robot may go at most: less than the reference's is no fault but what this robot can or is to do."""
@@ -153,6 +168,8 @@ class Variable(Record):
     """Share of an objective's value within which a log tells it."""
     about: About = "world"
     """What a context tells of."""
+    typical: Typical | None = None
+    """What a context about the vehicle is held against before a limit rests on it."""
     nominal: Extract | None = None
     """What physics says the value is: the name of a formula, and the variables that are its arguments."""
     events: Events | None = None

@@ -45,6 +45,19 @@ def in_force(history: Sequence[Setting], at_s: float) -> Setting:
     return before[-1] if before else history[0]
 
 
+def prevailing(history: Sequence[Setting], start_s: float, end_s: float) -> Setting:
+    """The value in force for most of a span of the log: one that was put back before its end is not what was driven."""
+    values = [in_force(history, start_s), *(changes_between(history, start_s, end_s)[1:])]
+    if len(values) == 1:
+        return values[0]
+    since = [start_s, *(max(one.changed_at_s or start_s, start_s) for one in values[1:]), end_s]
+    lasted: dict[float | str, float] = {}
+    for one, begins, ends in zip(values, since, since[1:], strict=False):
+        lasted[one.value] = lasted.get(one.value, 0.0) + ends - begins
+    longest = max(lasted, key=lasted.__getitem__)
+    return next(one for one in reversed(values) if one.value == longest)
+
+
 def changes_between(history: Sequence[Setting], start_s: float, end_s: float) -> tuple[Setting, ...]:
     """The value in force at `start_s` and those that followed it until `end_s`; empty when none did."""
     later = [one for one in history[1:] if one.changed_at_s is not None and start_s < one.changed_at_s <= end_s]

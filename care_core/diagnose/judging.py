@@ -8,8 +8,9 @@ from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model, Summary
 from care_core.configs.driven import readable, same_value
 from care_core.configs.loading import ConfigFile, resolve
+from care_core.diagnose.limits import limits_of
 from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, Status
-from care_core.diagnose.reference import Good, Reference, need_of, reference_of
+from care_core.diagnose.reference import Good, Reference, reference_of
 from care_core.ecosystems.base import RunModel
 from care_core.errors import UsageError, nearest
 from care_core.extract.plain import read_plain_runs
@@ -19,15 +20,11 @@ from care_core.profile.schema import Schema
 from care_core.profile.store import Profile
 from care_core.records import Record, field, replace
 from care_core.run import Check, Run, Setting, Unavailable, Value, is_known
-from care_core.text import figures
 from care_core.variables import Role, Threshold, Variable
 
 _YES = Threshold("==", 1.0)
 _FEW = 10
 """As many names can be listed in a sentence."""
-UNLIKE = 4.0
-"""A length that the mission asks for may be so many times larger or smaller than any that training saw: as far as that
-what physics says of the rest is believed, where the profile fits only in part."""
 
 
 class Judged(Record, eq=False):
@@ -164,29 +161,11 @@ def judge(
         )
         return Judged(run, bounds, own, tuple(results), tuple(map(_judge_check, run.checks)))
     reference = reference_of(run, schema, model, good)
-    query = CounterfactualQuery(
-        model,
-        {**reference.config, **run.config},
-        {**run.metrics, **run.objectives},
-        bounds,
-        reference=reference.config,
-        variables=schema.variables,
-    )
-    needs: dict[str, Need] = {}
-    unlike: dict[str, Value] = {}
-    for objective in schema.objectives:
-        if objective.relative is None or objective.name in bounds or not _has_inputs(objective, run, schema):
-            continue
-        if another := beyond_training(run, schema, model):
-            hint = f"give this mission's bound with --threshold {objective.name}=VALUE"
-            unlike[objective.name] = Unavailable(f"no mission of the training is like this one: {another}", hint)
-            continue
-        need = need_of(objective.name, query)
-        if need is not None:
-            needs[objective.name] = need
-            bounds[objective.name] = objective.relative.for_need(need.value)
+    limits = limits_of(run, schema, model, reference, bounds)
+    bounds, needs = {**bounds, **limits.bounds}, limits.needs
     past = _past_their_limits(run, so_far, schema, bounds, needs)
-    run = replace(run, objectives={**run.objectives, **past, **unlike})
+    unknown = {name: why for name, why in limits.unknown.items() if is_known(run.objectives.get(name))}
+    run = replace(run, objectives={**run.objectives, **past, **unknown})
     results = (
         _judge_one(
             objective,
@@ -234,26 +213,6 @@ def unread_options(schema: Schema, run: Run) -> frozenset[str]:
         for option in schema.options
         if option.modes and not entered & {mode.casefold() for mode in option.modes}
     )
-
-
-def _has_inputs(objective: Variable, run: Run, schema: Schema) -> bool:
-    """Whether the run tells what physics needs to know of its mission and vehicle."""
-    nominal = schema.nominal_of(objective.name)
-    needed = () if nominal is None else nominal.inputs
-    return all(is_known(run.context.get(name)) for name in needed if schema.variables[name].role is Role.CONTEXT)
-
-
-def beyond_training(run: Run, schema: Schema, model: Model) -> str:
-    """In what this mission is so unlike all that were trained on that what the reference needs for it is not known;
-    empty where it is like them."""
-    for variable in schema.contexts:
-        value, summary = run.context.get(variable.name), model.summaries.get(variable.name)
-        if variable.about != "mission" or variable.unit != "m" or summary is None or not is_known(value):
-            continue
-        if not summary.low / UNLIKE <= value <= summary.high * UNLIKE:
-            seen = f"{figures(summary.low)} to {figures(summary.high)}"
-            return f"{variable.doc or variable.name} {figures(value)} {variable.unit}".rstrip() + f", {seen} there"
-    return ""
 
 
 def _past_their_limits(

@@ -36,7 +36,8 @@ def _changed_on_the_way(schema: Schema, run: Run) -> Iterator[str]:
             if first is not None:
                 steps = ", ".join(f"to {shown(one.value)} at {clock(one.changed_at_s)}" for one in later)
                 changes = f"from {shown(first.value)} {steps}"
-                yield f"{option.name} was changed during the mission {changes}; the last value is judged"
+                judged = f"{shown(run.settings[parameter].value)}, as in most of the {option.phase or 'mission'}"
+                yield f"{option.name} was changed during the mission {changes}; judged is {judged}"
 
 
 def _from_files(schema: Schema, run: Run, files: Sequence[ConfigFile]) -> Iterator[str]:

@@ -79,6 +79,8 @@ class ObjectiveResult(Record):
         need = f"{figures(self.need.value)} {self.variable.unit}".rstrip()
         if self.threshold.value == self.variable.relative.at_least or self.variable.relative.ratio == 1:
             return f"the reference configuration needs {need} for this mission"
+        if self.threshold != self.variable.relative.for_need(self.need.value):
+            return f"the reference configuration needs {need} for this mission, one time in ten as much as this limit"
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"
 
 

@@ -1,4 +1,4 @@
-"""The configuration that a run is judged against, and what it would need for the mission of this run.
+"""The configuration that a run is judged against.
 
 It is the operator's: a good run or a file where one was named, else the defaults that the vehicle itself recorded, else
 those of the profile. A vehicle that was tuned for its frame is judged by its own tune where its operator names it, and
@@ -9,12 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 
-import numpy as np
-
-from care_core.causal.counterfactual import Config, CounterfactualQuery
+from care_core.causal.counterfactual import Config
 from care_core.causal.model import Model
 from care_core.configs.driven import option_setting, option_value, same_value
-from care_core.diagnose.records import Need
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.run import Run, Setting, is_known
@@ -118,12 +115,3 @@ def _by_default(setting: Setting) -> Setting | None:
     if setting.source != FIRMWARE or setting.default is None:
         return None
     return replace(setting, value=setting.default)
-
-
-def need_of(name: str, query: CounterfactualQuery) -> Need | None:
-    """What the reference configuration would need of an objective in this run's place; None where nothing tells."""
-    if name not in query.model.outcomes:
-        return None
-    p = query.predict(name, [query.reference])
-    value, low, high = (float(part[0]) for part in (p.value, p.low, p.high))
-    return Need(value, low, high) if np.isfinite((value, low, high)).all() and value > 0 else None

@@ -141,6 +141,10 @@ class MissionKind(ABC):
         """What any run is judged by where no profile fits: by what its robot says of itself, and by no limit."""
         return ()
 
+    def span(self, mission: Mission, phase: str) -> tuple[float, float] | None:
+        """Start and end in the log of a part of the mission, by its name; None where the mission has no such part."""
+        return None
+
     def modes(self, mission: Mission) -> tuple[str, ...]:
         """The modes in force during the mission, by name; none where the log does not say."""
         return ()

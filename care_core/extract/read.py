@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from care_core.configs.driven import changes_between, configuration, in_force
+from care_core.configs.driven import changes_between, configuration, prevailing, readable
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, check_args, find_extractor
 from care_core.ecosystems.plausible import clock_doubt, dead_sources
@@ -157,11 +157,9 @@ class _Source(Record, eq=False):
     def run(self, index: int, overrides: Mapping[str, Setting]) -> Run:
         found = self.missions[index]
         found = replace(found, ended=found.ended and not _cut_short(found, self.log))
-        driven = {name: in_force(history, found.end_s) for name, history in self.settings.items()}
+        driven = self._driven(found)
         config, sources, settings = configuration(self.schema.options, driven, overrides)
-        mission = replace(
-            found, facts=self.log.facts, settings={name: setting.value for name, setting in driven.items()}
-        )
+        mission = self._with_settings(found, driven)
         mismatch = self.schema.learned_elsewhere or self.kind.mismatch(mission)
         context = self._values(Role.CONTEXT, mission, self.doubts[index])
         return Run(
@@ -189,6 +187,24 @@ class _Source(Record, eq=False):
             checks=() if self.doubts[index] else self._checks(mission),
             modes=self.kind.modes(mission),
         )
+
+    def _with_settings(self, found: Mission, driven: Mapping[str, Setting]) -> Mission:
+        return replace(found, facts=self.log.facts, settings={name: one.value for name, one in driven.items()})
+
+    def _driven(self, found: Mission) -> dict[str, Setting]:
+        """The configuration as driven: where a parameter was changed on the way, its value for most of the part of the
+        mission that reads it."""
+        driven = {name: prevailing(history, found.start_s, found.end_s) for name, history in self.settings.items()}
+        changed = [
+            (option.phase, name)
+            for option in self.schema.options
+            for name in readable(option)
+            if option.phase and changes_between(self.settings.get(name, ()), found.start_s, found.end_s)
+        ]
+        for phase, name in changed:
+            if span := self.kind.span(self._with_settings(found, driven), phase):
+                driven[name] = prevailing(self.settings[name], *span)
+        return driven
 
     def _is_requested(self, context: str) -> bool:
         extract = self.schema.variables[context].extract

@@ -126,6 +126,13 @@ class Schema(Record):
     def nominal_of(self, name: str) -> Nominal | None:
         """What physics says a variable is, None where the profile names no formula for it."""
         declared = self.variables[name].nominal
-        if declared is None:
-            return None
-        return nominal(declared.kind, declared.args, {v.name: v.unit for v in self.variables.values()})
+        return None if declared is None else nominal(declared.kind, declared.args, self._units)
+
+    def typical_of(self, name: str) -> Nominal | None:
+        """What a context about the vehicle usually is, None where the profile names no formula for it."""
+        declared = self.variables[name].typical
+        return None if declared is None else nominal(declared.kind, {}, self._units)
+
+    @property
+    def _units(self) -> dict[str, str]:
+        return {v.name: v.unit for v in self.variables.values()}

@@ -28,6 +28,7 @@ from care_core.variables import (
     Op,
     Role,
     Threshold,
+    Typical,
     ValueType,
     Variable,
     is_parameter_name,
@@ -70,6 +71,12 @@ class Bound(Strict):
         return Threshold(self.op, self.value, self.ratio, self.at_least)
 
 
+class _Typical(Strict):
+    kind: str
+    at_least: float = Field(default=0.0, ge=0)
+    at_most: float | None = Field(default=None, gt=0)
+
+
 class _Variable(Strict):
     role: Role
     type: ValueType = "float"
@@ -81,12 +88,14 @@ class _Variable(Strict):
     parameter: str | list[str] = Field(default_factory=list)
     reboot_required: bool = False
     modes: list[str] = Field(default_factory=list)
+    phase: str = ""
     safety: bool = False
     ceiling: bool = False
     kind: Kind | None = None
     threshold: Bound | None = None
     grows: bool = False
     about: About = "world"
+    typical: _Typical | None = None
     nominal: dict[str, str] | None = None
     accuracy: float = Field(default=0.0, ge=0, lt=1)
     events: dict[str, str] | None = None
@@ -100,6 +109,12 @@ class _Variable(Strict):
             if not is_parameter_name(name):
                 raise ValueError(f"no parameter is called '{clean(name)}': letters, digits and _ . / - ~ make a name")
         return names
+
+    @model_validator(mode="after")
+    def _fits_what_it_is_about(self) -> _Variable:
+        if self.about != "vehicle" and self.typical is not None:
+            raise ValueError("only contexts about the vehicle have a 'typical' value")
+        return self
 
     @model_validator(mode="after")
     def _fits_role(self) -> _Variable:
@@ -121,8 +136,8 @@ class _Variable(Strict):
             raise ValueError("'events' has a 'count' and a 'variation', and belongs to a 'nominal'")
         if self.role is not Role.OPTION and self.parameter:
             raise ValueError("only options have a 'parameter'")
-        if self.role is not Role.OPTION and self.modes:
-            raise ValueError("only options have 'modes', those that read it")
+        if self.role is not Role.OPTION and (self.modes or self.phase):
+            raise ValueError("only options have 'modes' and a 'phase', those that read it")
         if self.role is not Role.OPTION and self.ceiling:
             raise ValueError("only options are a 'ceiling'")
         if self.safety and self.default is None:
@@ -238,6 +253,8 @@ class _Profile(Strict):
         for variable in self.variables.values():
             if variable.nominal is not None:
                 nominal(variable.nominal["kind"], _arguments(variable.nominal), units)
+            if variable.typical is not None:
+                nominal(variable.typical.kind, {}, units)
             if variable.events is not None:
                 _declared(variable.events.values(), met, "'events' names the context or metric")
         return self
@@ -351,12 +368,14 @@ def _to_variable(name: str, v: _Variable) -> Variable:
         parameters=(v.parameter,) if isinstance(v.parameter, str) else tuple(v.parameter),
         reboot_required=v.reboot_required,
         modes=tuple(v.modes),
+        phase=v.phase,
         safety=v.safety,
         ceiling=v.ceiling,
         kind=v.kind,
         threshold=None if v.threshold is None else v.threshold.threshold(),
         grows=v.grows,
         about=v.about,
+        typical=None if v.typical is None else Typical(**v.typical.model_dump()),
         accuracy=v.accuracy,
         events=None if v.events is None else Events(**v.events),
         nominal=None if v.nominal is None else Extract(v.nominal["kind"], _arguments(v.nominal)),

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from care_core.causal.model import Model
-from care_core.diagnose.judging import beyond_training, judge, unread_options, verdict
+from care_core.diagnose.judging import judge, unread_options, verdict
+from care_core.diagnose.limits import beyond_training
 from care_core.ecosystems.ardupilot.measures.modes import mode_names
 from care_core.ecosystems.measures import Mission
 from care_core.profile.reading import read_schema

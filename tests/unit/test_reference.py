@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import pytest
 
 from care_core.diagnose.judging import judge
+from care_core.diagnose.limits import limit
+from care_core.diagnose.records import Need
 from care_core.diagnose.reference import Good
 from care_core.profile.store import Profile
 from care_core.records import replace
@@ -32,6 +36,29 @@ def test_the_bound_is_a_multiple_of_what_the_reference_needs(planted: Profile) -
     assert fine.need.value == pytest.approx(fine.value, rel=0.1)
     assert "1.3 x the" in slow.wanted
     assert slow.is_sure
+
+
+def test_what_a_mission_needs_is_known_before_the_run(planted: Profile) -> None:
+    run = planted_run()
+    slow = replace(run, objectives={**run.objectives, "time": 10 * cast("float", run.objectives["time"])})
+    unknown = replace(slow, config={})
+    needs = [judge(one, TRAVELLING, planted.model).results[1].need for one in (run, slow, unknown)]
+    assert needs[0] == needs[1] == needs[2] is not None
+
+
+def test_what_one_in_ten_runs_of_the_reference_exceeds_is_no_fault() -> None:
+    sure, unsure = Need(10.0, 9.0, 11.0), Need(10.0, 6.0, 16.0)
+    assert limit(RATIO, sure) == Threshold("<=", 13.0)
+    assert limit(RATIO, unsure) == Threshold("<=", 16.0)
+    assert limit(Threshold(">=", ratio=0.8), unsure) == Threshold(">=", 6.0)
+
+
+def test_the_speed_of_a_robot_that_nothing_tells_gives_no_limit(planted: Profile) -> None:
+    own = with_variable(TRAVELLING, replace(SCHEMA.variables["speed"], parameters=("SPEED",), ceiling=True))
+    run = planted_run(speed=0.4)
+    result = judge(replace(run, config={"accel": 1.5}), own, planted.model).results[1]
+    assert result.status == "not_evaluated"
+    assert "nothing gives SPEED" in result.reason
 
 
 def test_a_robot_that_is_slower_is_judged_by_its_own_speed_unless_its_operator_says_otherwise(planted: Profile) -> None:

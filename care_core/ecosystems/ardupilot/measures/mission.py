@@ -21,6 +21,7 @@ from care_core.ecosystems.ardupilot.measures.events import (
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse, waypoint_offsets
 from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, is_armed, mode_names
 from care_core.ecosystems.ardupilot.measures.outcome import HEIGHTS, WAYPOINT_TOLERANCE_M, plain_checks
+from care_core.ecosystems.ardupilot.measures.phases import span_of_phase
 from care_core.ecosystems.ardupilot.measures.requested import mission_held
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric, points
@@ -94,6 +95,10 @@ class ArduPilotFlight(MissionKind):
         asked_for = any(one.was_tried for one in flight_of(mission).refusals)
         never = 0.0 if asked_for else Unavailable("the vehicle never armed, and nobody asked it to")
         return (Check("armed", never, "the vehicle armed", "arming was refused"),)
+
+    def span(self, mission: Mission, phase: str) -> tuple[float, float] | None:
+        span = span_of_phase(mission, {"phase": phase})
+        return None if isinstance(span, Unavailable) else span
 
     def modes(self, mission: Mission) -> tuple[str, ...]:
         return mode_names(mission)
