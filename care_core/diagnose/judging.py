@@ -8,6 +8,7 @@ from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model, Summary
 from care_core.configs.driven import readable, same_value
 from care_core.configs.loading import ConfigFile, resolve
+from care_core.diagnose.implied import implied
 from care_core.diagnose.limits import limits_of
 from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, Status
 from care_core.diagnose.reference import Good, Reference, reference_of
@@ -182,8 +183,8 @@ def judge(
 
 
 def query_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> CounterfactualQuery:
-    """This run, ready to be asked. Options that no source holds are taken to be at their reference, and so are those
-    that were never read: their value changed nothing.
+    """This run, ready to be asked. Options that no source holds are taken to be at their reference, or at what the run
+    speaks for; those that were never read at their reference: their value changed nothing.
 
     Args:
         kept: options that stay as they are.
@@ -192,7 +193,11 @@ def query_of(judged: Judged, profile: Profile, kept: Iterable[str] = ()) -> Coun
     unread = unread_options(profile.schema, run)
     return CounterfactualQuery(
         profile.model,
-        {**reference, **{name: value for name, value in run.config.items() if name not in unread}},
+        {
+            **reference,
+            **{name: one.value for name, one in implied(run, profile.schema, profile.model, reference).items()},
+            **{name: value for name, value in run.config.items() if name not in unread},
+        },
         {**run.metrics, **run.objectives},
         judged.bounds,
         [{**other.run.metrics, **other.run.objectives} for other in judged.repeats],

@@ -27,6 +27,7 @@ from care_core.diagnose.fixes import (
     to_fix,
 )
 from care_core.diagnose.hypotheses import explain, speaking, unasked
+from care_core.diagnose.implied import implied
 from care_core.diagnose.judging import Judged, check_wishes, query_of, unread_options
 from care_core.diagnose.ranking import (
     Suspect,
@@ -284,7 +285,8 @@ def _as_in_fix(case: _Case, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
 
 def _confidence(case: _Case, result: ObjectiveResult, suspect: Suspect, in_support: bool, support: float) -> Confidence:
     """High where the option explains most of a fault that is one wherever in its interval the threshold lies, nearly
-    every resample gives it a path there, and no option that the training runs cannot judge is off its reference too.
+    every resample gives it a path there, the log holds its value, and no option that the training runs cannot judge is
+    off its reference too.
 
     A check that refused this run and reads the option's value is worth more than a doubt about the model.
     """
@@ -297,7 +299,8 @@ def _confidence(case: _Case, result: ObjectiveResult, suspect: Suspect, in_suppo
         # Operators chose the options: no table can rule a hidden reason out.
         return "low" if suspect.effect is None or suspect.effect.doubtful == 1.0 else "medium"
     is_rivalled = bool(case.unranked[suspect.path.nodes[-1]])
-    if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled and result.is_sure:
+    is_recorded = suspect.option not in case.query.assumed
+    if support >= HIGH_SUPPORT and contribution >= SURE and not is_rivalled and result.is_sure and is_recorded:
         return "high"
     return "medium"
 
@@ -516,8 +519,9 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None) -> t
     if unread:
         named = ", ".join(option.name for option in case.profile.schema.options if option.name in unread)
         notes.append(f"no suspect, as no mode that reads it was entered: {named}")
-    if case.query.assumed:
-        names = sorted(case.query.assumed)
+    spoken_for = implied(case.run, case.profile.schema, case.profile.model, case.query.reference)
+    notes += map(str, spoken_for.values())
+    if names := sorted(case.query.assumed - spoken_for.keys()):
         shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
         notes.append(f"not in the log, taken to be at their reference: {shown}")
     return tuple(notes)

@@ -6,6 +6,7 @@ from typing import cast
 
 import pytest
 
+from care_core.diagnose.implied import implied
 from care_core.diagnose.judging import judge
 from care_core.diagnose.limits import limit
 from care_core.diagnose.records import Need
@@ -145,3 +146,15 @@ def test_a_tuned_value_beyond_the_range_is_not_off_a_reference_that_has_it(plant
     assert judge(run, schema, planted.model, good=good).reference.config["speed"] == 99.0
     other = judge(planted_run(speed=1.5), schema, planted.model, good=good).reference
     assert other.config["speed"] == DEFAULTS["speed"]
+
+
+def test_a_parameter_that_the_log_lacks_is_read_off_what_it_alone_moves(planted: Profile) -> None:
+    slow = planted_run(speed=1.5)
+    lacking = replace(slow, config={name: value for name, value in slow.config.items() if name != "speed"})
+    (spoken,) = implied(lacking, SCHEMA, planted.model, DEFAULTS).values()
+    assert spoken.option.name == "speed"
+    assert spoken.value == pytest.approx(1.5, rel=0.25)
+    assert str(spoken).startswith("speed is not in the log: mean_speed ")
+    assert not implied(slow, SCHEMA, planted.model, DEFAULTS)
+    usual = planted_run()
+    assert not implied(replace(usual, config={}), SCHEMA, planted.model, DEFAULTS)
