@@ -80,7 +80,9 @@ class ObjectiveResult(Record):
         if self.threshold.value == self.variable.relative.at_least or self.variable.relative.ratio == 1:
             return f"the reference configuration needs {need} for this mission"
         if self.threshold != self.variable.relative.for_need(self.need.value):
-            return f"the reference configuration needs {need} for this mission, one time in ten as much as this limit"
+            return (
+                f"the reference configuration needs {need} for this mission, and one time in ten as much as this limit"
+            )
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"
 
 

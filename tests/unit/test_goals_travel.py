@@ -62,8 +62,8 @@ def test_a_drive_at_the_reference_is_fine_on_other_goals(tmp_path: Path, profile
     assert set(verdicts(found).values()) == {"ok"}
     time = next(result for result in found.results if result.variable.name == "mission_time")
     assert time.need is not None
-    assert time.need.value == pytest.approx(3 * (GOAL_S + 6 / 0.5), rel=0.2)
-    assert "1.3 x the" in time.basis
+    assert time.need.value == pytest.approx(3 * (GOAL_S + 6 / 0.5), rel=0.3)
+    assert "the reference configuration needs" in time.basis
 
 
 def test_a_slow_drive_is_laid_to_the_speed_with_low_confidence(tmp_path: Path, profile: Profile) -> None:

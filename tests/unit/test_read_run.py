@@ -154,13 +154,23 @@ def test_a_run_holds_what_the_log_drove_and_its_provenance(log: MadeLog) -> None
     assert log.reads == 1
 
 
-def test_the_value_in_force_when_the_mission_ends_counts(log: MadeLog) -> None:
+@pytest.mark.parametrize(("changed_at_s", "driven"), [(9.0, 3.0), (2.0, 4.0), (-1.0, 4.0)])
+def test_the_value_in_force_for_most_of_the_mission_counts(log: MadeLog, changed_at_s: float, driven: float) -> None:
     log.known = as_driven(
         Setting("SPEED", 3.0, "PARM"),
-        Setting("SPEED", 4.0, "PARM", changed_at_s=9.0),
+        Setting("SPEED", 4.0, "PARM", changed_at_s=changed_at_s),
         Setting("SPEED", 5.0, "PARM", changed_at_s=11.0),
     )
-    assert read_run(run_model(log), made_schema()).config["speed"] == 4.0
+    assert read_run(run_model(log), made_schema()).config["speed"] == driven
+
+
+def test_a_value_that_comes_back_counts_for_all_of_its_time(log: MadeLog) -> None:
+    log.known = as_driven(
+        Setting("SPEED", 3.0, "PARM"),
+        Setting("SPEED", 4.0, "PARM", changed_at_s=3.5),
+        Setting("SPEED", 3.0, "PARM", changed_at_s=8.0),
+    )
+    assert read_run(run_model(log), made_schema()).config["speed"] == 3.0
 
 
 def test_any_parameter_of_an_option_will_do(log: MadeLog) -> None:
