@@ -1,8 +1,10 @@
 """The configuration that a run is judged against.
 
 It is the operator's: a good run or a file where one was named, else the defaults that the vehicle itself recorded, else
-those of the profile. A vehicle that was tuned for its frame is judged by its own tune where its operator names it, and
-a robot that is slower than the profile's by its own speed: nothing says that it can go faster.
+those of the profile. A default in the log that no release of the firmware has is its vendor's, who may have set it
+wrong: then the firmware's own is the reference. A vehicle that was tuned for its frame is judged by its own tune where
+its operator names it, and a robot that is slower than the profile's by its own speed: nothing says that it can go
+faster.
 """
 
 from __future__ import annotations
@@ -12,12 +14,16 @@ from collections.abc import Collection, Iterator, Mapping
 from care_core.causal.counterfactual import Config
 from care_core.causal.model import Model
 from care_core.configs.driven import option_setting, option_value, same_value
+from care_core.ecosystems.vehicles import vehicle_of
+from care_core.metadata.ardupilot import firmware_default
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.run import Run, Setting, is_known
 
 FIRMWARE = "PARM"
 """The record in which a vehicle's log tells its parameters with the firmware's defaults."""
+_RELEASES_DIFFER = 2.0
+"""The most by which one release's default of an option was a multiple of another's (PSC_VELXY_D of 4.5 and 4.6)."""
 
 
 class Good(Record):
@@ -52,7 +58,8 @@ def profile_config(schema: Schema, model: Model) -> dict[str, float]:
 def reference_of(run: Run, schema: Schema, model: Model, good: Good | None = None) -> Reference:
     """The reference configuration for a run: a context is met, not set."""
     config = profile_config(schema, model)
-    named, recorded = _named(schema, good), _recorded(run, schema)
+    named, recorded, vendors = _named(schema, good), _recorded(run, schema), _vendors(run, schema)
+    recorded |= {name: ours for name, (_, ours) in vendors.items()}
     for name, value in {**recorded, **named}.items():
         # A value that may not be suggested is no reference, but where it is driven it is none to be off either.
         if schema.variables[name].accepts(value) or (name in named and _is_same(value, run.config.get(name))):
@@ -60,8 +67,35 @@ def reference_of(run: Run, schema: Schema, model: Model, good: Good | None = Non
     lower = {name: own for name, own in _ceilings(run, schema) if name not in named and own < config.get(name, own)}
     config.update(lower)
     config.update({name: value for name, value in run.context.items() if is_known(value)})
+    others = [
+        f"{name} {theirs:g} (the firmware's {ours:g})" for name, (theirs, ours) in vendors.items() if name not in named
+    ]
+    vendor = f", but not what a vendor made the default, {', '.join(others)}" if others else ""
     slower = f", {', '.join(lower)} as low as this robot's" if lower else ""
-    return Reference(config, _whose(named, recorded, good) + slower)
+    return Reference(config, _whose(named, recorded, good) + vendor + slower)
+
+
+def _vendors(run: Run, schema: Schema) -> dict[str, tuple[float, float]]:
+    """Options whose default in the log no release of the firmware has, with the firmware's."""
+    kind = vehicle_of(run.log.facts, {name: (setting,) for name, setting in run.settings.items()}).kind
+    found: dict[str, tuple[float, float]] = {}
+    for option in schema.options:
+        setting = option_setting(option, run.settings)
+        recorded = None if setting is None else _by_default(setting)
+        own = None if recorded is None else firmware_default(recorded.name, kind)
+        if recorded is None or own is None or not isinstance(recorded.value, (int, float)):
+            continue
+        theirs, ours = (option_value(option, replace(recorded, value=value)) for value in (recorded.value, own))
+        if theirs is not None and ours is not None and not _may_be_a_release(float(recorded.value), own):
+            found[option.name] = theirs, ours
+    return found
+
+
+def _may_be_a_release(recorded: float, firmware: float) -> bool:
+    """Whether a default may be that of another release: those differ by less than so much."""
+    if firmware == 0 or recorded == 0:
+        return recorded == firmware
+    return 1 / _RELEASES_DIFFER <= recorded / firmware <= _RELEASES_DIFFER
 
 
 def _ceilings(run: Run, schema: Schema) -> Iterator[tuple[str, float]]:

@@ -13,6 +13,7 @@ from care_core.metadata.words import word_of
 from care_core.records import Record
 
 _TABLE = Path(__file__).with_name("ardupilot.tsv")
+_DEFAULTS = Path(__file__).with_name("ardupilot_defaults.tsv")
 SOURCE = "ArduPilot's parameter list"
 VEHICLES: Mapping[str, str] = {
     "copter": "C", "heli": "C", "plane": "P", "quadplane": "P", "rover": "R", "sub": "S", "tracker": "T", "blimp": "B",
@@ -74,6 +75,19 @@ def fact_of(name: str, kind: str, version: tuple[int, ...] | None = None) -> Fac
         if found:
             return max(found, key=lambda fact: _newest(fact.releases))
     return None
+
+
+def firmware_default(name: str, kind: str) -> float | None:
+    """The firmware's own default of a parameter that a bundled profile models, as the parameter counts it; None where
+    it is not known."""
+    return _defaults().get((name, VEHICLES.get(kind, "")))
+
+
+@cache
+def _defaults() -> Mapping[tuple[str, str], float]:
+    lines = _DEFAULTS.read_text(encoding="utf-8").splitlines()
+    rows = (line.split("\t") for line in lines if not line.startswith(("#", "name\t")))
+    return {(name, vehicle): float(value) for name, vehicle, value in rows}
 
 
 def _newest(releases: str) -> tuple[int, ...]:

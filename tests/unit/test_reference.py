@@ -158,3 +158,23 @@ def test_a_parameter_that_the_log_lacks_is_read_off_what_it_alone_moves(planted:
     assert not implied(slow, SCHEMA, planted.model, DEFAULTS)
     usual = planted_run()
     assert not implied(replace(usual, config={}), SCHEMA, planted.model, DEFAULTS)
+
+
+@pytest.mark.parametrize(("default", "reference"), [(1200.0, 50.0), (0.0, 50.0), (35.0, 35.0), (50.0, 50.0)])
+def test_a_default_that_no_release_of_the_firmware_has_is_the_vendors(
+    planted: Profile, default: float, reference: float
+) -> None:
+    option = replace(SCHEMA.variables["speed"], parameters=("LAND_SPEED",), range=(0.0, 2000.0))
+    own = with_variable(TRAVELLING, option)
+    setting = Setting("LAND_SPEED", default, "PARM", default=default)
+    run = replace(planted_run(), config={**planted_run().config, "speed": default}, settings={"LAND_SPEED": setting})
+    run = replace(run, log=replace(run.log, facts={"firmware": "ArduCopter V4.5.4"}))
+    found = judge(run, own, planted.model).reference
+    assert found.config["speed"] == reference
+    said = f"not what a vendor made the default, speed {default:g} (the firmware's 50)"
+    assert (said in found.source) is (reference != default)
+    strange = judge(replace(run, log=replace(run.log, facts={})), own, planted.model).reference
+    assert strange.config["speed"] == default
+    named = Good({"LAND_SPEED": replace(setting, value=70.0)}, "good.param")
+    vouched = judge(run, own, planted.model, good=named).reference
+    assert (vouched.config["speed"], "vendor" in vouched.source) == (70.0, False)
