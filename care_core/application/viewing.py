@@ -112,9 +112,9 @@ def past_runs() -> list[Past]:
 
 def _past(triaged: Triaged) -> Past:
     from care_core.report.document import remembered_verdict
-    from care_core.report.reading import document_of
+    from care_core.report.reading import remembered
 
-    document = document_of(triaged.document)
+    document = remembered(triaged.document)
     causes = [cause.option for fault in document.faults for cause in fault.causes]
     return Past(
         at=triaged.at,

@@ -5,10 +5,12 @@ from __future__ import annotations
 import errno
 import gc
 import re
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from care_core import limits
 from care_core.configs.formats import format_of
 from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.ros.dialect import ROS1_YAML
@@ -16,8 +18,11 @@ from care_core.errors import ConfigError
 from care_core.files import read_small_text
 from care_core.records import Record
 from care_core.run import Find, Setting
+from care_core.text import clean
 
 _LARGEST_BYTES = 1_000_000
+_LARGEST = sys.float_info.max
+_MANY_DIGITS = re.compile(rf"[+-]?[0-9_]{{{limits.INTEGER_DIGITS},}}")
 
 
 class ConfigFile(Record):
@@ -54,8 +59,26 @@ def read_text(text: str, path: Path, namespace: str = "") -> ConfigFile:
         )
     with _no_collector():
         if not namespace:
-            return ConfigFile(str(path), format, format.functions.read(text, path))
-        return ConfigFile(f"{namespace}={path}", format, format.functions.read(text, path, namespace), namespace)
+            read = ConfigFile(str(path), format, format.functions.read(text, path))
+        else:
+            settings = format.functions.read(text, path, namespace)
+            read = ConfigFile(f"{namespace}={path}", format, settings, namespace)
+    _check_numbers(read)
+    return read
+
+
+def _check_numbers(file: ConfigFile) -> None:
+    """Refuse a number that no robot's software can hold: it would be endless here. Raises ConfigError."""
+    for setting in file.settings.values():
+        value = setting.value
+        if isinstance(value, str):
+            is_too_large = _MANY_DIGITS.fullmatch(value) is not None
+        else:  # YAML has a word for endless
+            is_too_large = not -_LARGEST <= value <= _LARGEST and not (file.format.is_yaml and isinstance(value, float))
+        if is_too_large:
+            raise ConfigError(
+                f"{clean(setting.name)} is larger than any number can be.", hint="Correct it.", where=setting.source
+            )
 
 
 @contextmanager

@@ -11,19 +11,24 @@ import os
 import sqlite3
 import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from datetime import datetime, timezone
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from care_core import limits
 from care_core.errors import CareError
-from care_core.records import Record, field, plain
+from care_core.files import open_regular
+from care_core.records import Record, Struct, UnfitError, field, plain, read
 from care_core.run import Robot
+from care_core.text import clean
 
 SWITCH = "CARE_HISTORY"
 """Environment variable: `off`, or the file to use instead."""
 
 _VERSION = 2
+_OWN_FILE, _OWN_FOLDER = 0o600, 0o700
 _WAIT_S = 30.0
 """How long a process waits for others that are writing: each takes milliseconds, a slow card may stop for seconds."""
 
@@ -92,16 +97,48 @@ class Verified(Record):
     document: Mapping[str, Any]
 
 
+class _Log(Struct):
+    start: str | None = None
+
+
+class _Profile(Struct):
+    name: str
+
+
+class _Need(Struct):
+    value: float | None = None
+
+
+class _Limit(Struct):
+    op: str
+
+
+class _Objective(Struct):
+    name: str
+    unit: str = ""
+    value: float | None = None
+    needs: _Need | None = None
+    threshold: _Limit | None = None
+
+
+class _Searched(Struct):
+    """What is looked up in a remembered document before it is read as a whole."""
+
+    log: _Log
+    profile: _Profile | None
+    objectives: list[_Objective]
+    config: dict[str, float]
+
+
+R = TypeVar("R", bound=Record)
+
+
 def history_path() -> Path | None:
     """Where the store is, None when it is switched off."""
     wanted = os.environ.get(SWITCH, "")
     if wanted.casefold() in ("off", "0", "no", "false"):
         return None
-    if wanted:
-        return Path(wanted)
-    from platformdirs import user_data_path
-
-    return user_data_path("care", appauthor=False) / "history.sqlite3"
+    return Path(wanted) if wanted else _own_path()
 
 
 class History(Record):
@@ -135,8 +172,7 @@ class History(Record):
             (profile, profile, limit),
         )
         return tuple(
-            Triaged(at, path, mission, self._document(text), *self._about(about), self._settings(settings))
-            for at, path, mission, text, about, settings in rows
+            self._triaged(at, path, mission, text, about, settings) for at, path, mission, text, about, settings in rows
         )
 
     def triage_of(self, sha256: str) -> Triaged | None:
@@ -145,11 +181,7 @@ class History(Record):
             "select at, log_path, mission, document, about from triages where log_sha256 = ? order by id desc limit 1",
             (sha256,),
         )
-        return next(
-            (Triaged(at, path, mission, self._document(text), *self._about(about))
-             for at, path, mission, text, about in rows),
-            None,
-        )  # fmt: skip
+        return next((self._triaged(at, path, mission, text, about) for at, path, mission, text, about in rows), None)
 
     def verifications(self, profile: str | None = None) -> tuple[Verified, ...]:
         """The remembered verifications, the latest first. Raises HistoryError."""
@@ -158,31 +190,48 @@ class History(Record):
             " order by id desc",
             (profile, profile),
         )
-        return tuple(
-            Verified(at, name, version, p, None if worked is None else bool(worked), self._document(text))
-            for at, name, version, p, worked, text in rows
-        )
+        return tuple(self._verified(at, name, version, p, worked, text) for at, name, version, p, worked, text in rows)
 
-    def _about(self, text: str) -> tuple[Robot | None, Mapping[str, float], str]:
-        about = self._document(text)
-        robot = about.get("robot")
+    def _triaged(
+        self, at: str, path: str, mission: int, text: str, about: str, settings: bytes | None = None
+    ) -> Triaged:
+        said = {"robot": None, "asked": {}, "firmware": "", **self._document(about), "settings": {}}
+        if settings is not None:
+            said["settings"] = self._document(self._unpacked(settings))
+        known = self._checked(About, *(said[name] for name in About.__struct_fields__))
+        document = self._document(text)
         try:
-            return None if robot is None else Robot(**robot), about.get("asked", {}), about.get("firmware", "")
-        except TypeError as err:
+            read(_Searched, {name: document.get(name) for name in _Searched.__struct_fields__})
+        except (UnfitError, OverflowError) as err:
+            raise self._unusable("a record in it is damaged") from err
+        told = (getattr(known, name) for name in About.__struct_fields__)
+        return self._checked(Triaged, at, path, mission, document, *told)
+
+    def _verified(self, at: str, name: str, version: str, p: float, worked: int | None, text: str) -> Verified:
+        did_work = None if worked is None else bool(worked)
+        return self._checked(Verified, at, name, version, p, did_work, self._document(text))
+
+    def _checked(self, kind: type[R], *values: Any) -> R:
+        """A record of these values, each of the type that the record declares."""
+        try:
+            return read(kind, dict(zip(kind.__struct_fields__, values, strict=False)))
+        except (UnfitError, OverflowError) as err:
             raise self._unusable("a record in it is damaged") from err
 
-    def _settings(self, packed: bytes | None) -> Mapping[str, float | str]:
-        if packed is None:
-            return {}
+    def _unpacked(self, packed: bytes) -> str:
         try:
-            return self._document(zlib.decompress(packed).decode())
-        except (zlib.error, UnicodeDecodeError) as err:
+            unpacker = zlib.decompressobj()
+            text = unpacker.decompress(packed, limits.SMALL_FILE_BYTES)
+            if unpacker.unconsumed_tail:
+                raise self._unusable("a record in it is too large")
+            return text.decode()
+        except (zlib.error, UnicodeDecodeError, TypeError) as err:
             raise self._unusable("a record in it is damaged") from err
 
-    def _document(self, text: str) -> Mapping[str, Any]:
+    def _document(self, text: str) -> dict[str, Any]:
         try:
             document = json.loads(text)
-        except ValueError as err:
+        except (ValueError, TypeError, RecursionError) as err:
             raise self._unusable("a record in it is damaged") from err
         if not isinstance(document, dict):
             raise self._unusable("a record in it is damaged")
@@ -217,11 +266,12 @@ class History(Record):
     @contextmanager
     def _opened(self) -> Iterator[sqlite3.Connection]:
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._make_private()
             connection = sqlite3.connect(self.path, timeout=_WAIT_S)
-        except (OSError, sqlite3.Error) as err:
+        except (OSError, ValueError, sqlite3.Error) as err:
             raise self._unusable(getattr(err, "strerror", None) or str(err)) from err
         try:
+            connection.execute("pragma trusted_schema = off")
             self._prepare(connection)
             yield connection
         except sqlite3.Error as err:
@@ -229,23 +279,77 @@ class History(Record):
         finally:
             connection.close()
 
+    def _make_private(self) -> None:
+        """Have a file, and a folder of the program's own, that nobody else can look into: it says where a robot was and
+        whose. SQLite's own files beside it get the mode of the file. Raises OSError."""
+        self.path.parent.mkdir(mode=_OWN_FOLDER, parents=True, exist_ok=True)
+        if self.path == _own_path():
+            _restrict(self.path.parent, _OWN_FOLDER)
+        try:
+            os.close(os.open(self.path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, _OWN_FILE))
+        except FileExistsError:
+            open_regular(self.path).close()
+            _restrict(self.path, _OWN_FILE)
+
     def _prepare(self, connection: sqlite3.Connection) -> None:
         """Make the tables of a new store; leave one of a later version of this program alone."""
         (version,) = connection.execute("pragma user_version").fetchone()
-        if version > _VERSION:
+        if not 0 <= version <= _VERSION:
             raise self._unusable("a later version of this program wrote it")
         if version < _VERSION:
             connection.execute("begin immediate")
             (version,) = connection.execute("pragma user_version").fetchone()  # another process may have been quicker
-            for needed in (_TABLES, _SINCE_2)[version:]:
-                for statement in filter(str.strip, needed.split(";")):
-                    connection.execute(statement)
-            connection.execute(f"pragma user_version = {_VERSION}")
+            self._check_schema(connection, version)
+            _bring_up_to_date(connection, version)
             connection.commit()
+        self._check_schema(connection, _VERSION)
+
+    def _check_schema(self, connection: sqlite3.Connection, version: int) -> None:
+        """Refuse a file whose tables are not the program's own: a view or a trigger computes what its maker wants."""
+        for kind, name, made in set(_schema_of(connection)) ^ _schema(version):
+            which = f"a {kind} that this program did not make" if made else "a table of another shape"
+            raise self._unusable(f"it is not this program's own ('{clean(str(name))}' is {which})")
 
     def _unusable(self, why: str) -> HistoryError:
         hint = f"Move the file away, or switch the history off with {SWITCH}=off."
         return HistoryError(f"The history cannot be used: {why}.", hint=hint, where=str(self.path))
+
+
+def _own_path() -> Path:
+    from platformdirs import user_data_path
+
+    return user_data_path("care", appauthor=False) / "history.sqlite3"
+
+
+def _restrict(path: Path, mode: int) -> None:
+    """Take from others what they may do with a file or folder of ours; what is somebody else's stays as it is."""
+    found = path.stat()
+    if found.st_mode & 0o777 & ~mode and found.st_uid == os.geteuid():
+        path.chmod(found.st_mode & mode)
+
+
+def _bring_up_to_date(connection: sqlite3.Connection, version: int) -> None:
+    for needed in (_TABLES, _SINCE_2)[version:]:
+        for statement in filter(str.strip, needed.split(";")):
+            connection.execute(statement)
+    connection.execute(f"pragma user_version = {_VERSION}")
+
+
+_SCHEMA = "select type, name, sql from sqlite_master where name not like 'sqlite\\_%' escape '\\'"
+
+
+def _schema_of(connection: sqlite3.Connection) -> list[tuple[str, str, str]]:
+    """Kind, name and definition of everything in a database but what SQLite makes by itself."""
+    return [(str(kind), str(name), "".join(str(sql).split())) for kind, name, sql in connection.execute(_SCHEMA)]
+
+
+@cache
+def _schema(version: int) -> frozenset[tuple[str, str, str]]:
+    """What `_schema_of` finds in a store of a version that this program made."""
+    with closing(sqlite3.connect(":memory:")) as connection:
+        for needed in (_TABLES, _SINCE_2)[:version]:
+            connection.executescript(needed)
+        return frozenset(_schema_of(connection))
 
 
 def insert_triage(connection: sqlite3.Connection, document: Mapping[str, Any], mission: int, about: About) -> None:

@@ -85,7 +85,7 @@ def firmware_default(name: str, kind: str) -> float | None:
 
 @cache
 def _defaults() -> Mapping[tuple[str, str], float]:
-    lines = _DEFAULTS.read_text(encoding="utf-8").splitlines()
+    lines = read_small_text(_DEFAULTS).splitlines()
     rows = (line.split("\t") for line in lines if not line.startswith(("#", "name\t")))
     return {(name, vehicle): float(value) for name, vehicle, value in rows}
 

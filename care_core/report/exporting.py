@@ -7,7 +7,7 @@ from pathlib import Path
 
 from care_core.history.store import Triaged
 from care_core.report.document import remembered_verdict
-from care_core.report.reading import document_of
+from care_core.report.reading import remembered
 from care_core.tables.rows import TableRow, write_rows
 from care_core.text import clean
 
@@ -36,7 +36,7 @@ def export_history(path: Path, triages: Sequence[Triaged]) -> int:
 
 
 def _row(one: Triaged) -> TableRow:
-    document = document_of(one.document)
+    document = remembered(one.document)
     causes = [cause.option for fault in document.faults for cause in fault.causes]
     profile, fix = document.profile, document.fix
     row: TableRow = {

@@ -13,7 +13,7 @@ from care_core.history.trends import LEAST_RUNS, Direction, RobotRuns, Since, Tr
 from care_core.records import field
 from care_core.report.document import remembered_verdict
 from care_core.report.published import Document, publish, publishable
-from care_core.report.reading import document_of
+from care_core.report.reading import remembered
 from care_core.run import FitVerdict, Robot
 from care_core.text import clean, wrapped
 
@@ -131,7 +131,7 @@ def history_document(
 
 
 def _past(triaged: Triaged) -> PastTriage:
-    document = document_of(triaged.document)
+    document = remembered(triaged.document)
     causes = [cause.option for fault in document.faults for cause in fault.causes]
     fix = document.fix
     return PastTriage(
@@ -150,7 +150,7 @@ def _past(triaged: Triaged) -> PastTriage:
 
 def robots_of(triages: Sequence[Triaged]) -> tuple[RobotRuns, ...]:
     """The past by robot and mission, with its trends."""
-    verdicts = (remembered_verdict(document_of(one.document)) for one in triages)
+    verdicts = (remembered_verdict(remembered(one.document)) for one in triages)
     return by_robot(triages, {place: verdict.status == "fault" for place, verdict in enumerate(verdicts)})
 
 

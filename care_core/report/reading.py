@@ -9,6 +9,7 @@ from typing import Any
 from care_core import plain_yaml
 from care_core.errors import ConfigError, UsageError
 from care_core.files import read_small_text
+from care_core.history.store import SWITCH, HistoryError
 from care_core.records import UnfitError, read
 from care_core.report.document import SCHEMA_ID, ProfileEntry, TriageDocument
 from care_core.text import clean
@@ -42,6 +43,15 @@ def document_of(values: Mapping[str, Any]) -> TriageDocument:
     """
     known = set(TriageDocument.__struct_encode_fields__)
     return read(TriageDocument, {key: value for key, value in values.items() if key in known})
+
+
+def remembered(document: Mapping[str, Any]) -> TriageDocument:
+    """The document of a triage that the history holds. Raises HistoryError for a damaged one."""
+    try:
+        return document_of(document)
+    except UnfitError as err:
+        hint = f"Move its file away, or switch the history off with {SWITCH}=off."
+        raise HistoryError(f"The history cannot be used: a record in it is damaged, {err}.", hint=hint) from err
 
 
 def profile_of(report: TriageDocument) -> ProfileEntry:

@@ -12,7 +12,7 @@ from care_core.diagnose.verdict import STATUS_WORDS, RunStatus
 from care_core.records import field
 from care_core.report.document import remembered_verdict
 from care_core.report.published import Document, publish
-from care_core.report.reading import document_of
+from care_core.report.reading import remembered
 from care_core.run import FitVerdict, Robot
 from care_core.text import clean
 
@@ -60,7 +60,7 @@ def judged_entry(
     is_new: bool = True,
 ) -> WatchEntry:
     """The entry of a triage, by its document `care.triage/1` as it is remembered."""
-    document = document_of(past)
+    document = remembered(past)
     verdict = remembered_verdict(document)
     return WatchEntry(
         number=number,
