@@ -6,7 +6,7 @@ acts on it and brings it back, its value is read off the metric: a landing that 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -86,7 +86,7 @@ def _spoken_for(
             yield float(abs(off)), Implied(option, value, metric, seen, expected)
 
 
-def _off(mechanism: Mechanism, seen: float, configs: list[dict[str, float]]) -> FloatArray:
+def _off(mechanism: Mechanism, seen: float, configs: Sequence[Mapping[str, float]]) -> FloatArray:
     """How far a value is from what each configuration gives, in standard deviations of single runs; shape (m,)."""
     x = columns(configs, mechanism.inputs)
     there = mechanism.posterior(x)

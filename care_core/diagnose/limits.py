@@ -69,8 +69,11 @@ def need_of(name: str, reference: Reference, schema: Schema, model: Model) -> Ne
 
 
 def limit(relative: Threshold, need: Need) -> Threshold:
-    """The bound of a multiple of a need: what one in ten runs of the reference configuration exceeds is no fault."""
+    """The bound of a multiple of a need: what one in ten runs of the reference configuration exceeds is no fault, unless
+    the operator gave the multiple."""
     usual = relative.for_need(need.value)
+    if relative.source is not None:
+        return usual
     worst = need.high if usual.op in ("<=", "<") else need.low
     return usual if usual.met(worst) else Threshold(usual.op, float(f"{worst:.4g}"))
 

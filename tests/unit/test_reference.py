@@ -51,6 +51,7 @@ def test_what_one_in_ten_runs_of_the_reference_exceeds_is_no_fault() -> None:
     sure, unsure = Need(10.0, 9.0, 11.0), Need(10.0, 6.0, 16.0)
     assert limit(RATIO, sure) == Threshold("<=", 13.0)
     assert limit(RATIO, unsure) == Threshold("<=", 16.0)
+    assert limit(replace(RATIO, source="site.yaml"), unsure) == Threshold("<=", 13.0)
     assert limit(Threshold(">=", ratio=0.8), unsure) == Threshold(">=", 6.0)
 
 
