@@ -13,7 +13,8 @@ from textual_serve.app_service import AppService
 from textual_serve.server import Server
 
 HOST = "127.0.0.1"
-COOKIE = "care_token"
+COOKIE = "care_session"
+"""With the port behind it, so that two servers of one machine do not log each other's browser out."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -27,15 +28,17 @@ _END_S = 5.0
 
 
 class TokenServer(Server):
-    """Answers nobody without the token: given once in the address, then kept in a cookie of the browser.
+    """Answers nobody without the token: given once in the address, for which the browser gets a cookie.
 
-    Cookies do not mind ports, so a page of another server on this machine could drive the app with the operator's own:
+    The cookie holds a value of its own, drawn for this server and forgotten with it: whoever reads the browser's cookies
+    learns no token. Cookies do not mind ports, so a page of another server on this machine could drive the app with the operator's own:
     a request must name this server as its host, and where it comes from a page, be from this server's.
     """
 
     def __init__(self, command: str, port: int, token: str) -> None:
         super().__init__(command, host=HOST, port=port, title="care")
-        self._token = token
+        self._token, self._session = token, secrets.token_urlsafe(24)
+        self._cookie = f"{COOKIE}_{port}"
         self._hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
         self._sessions: dict[web.WebSocketResponse, AppService] = {}
 
@@ -60,11 +63,11 @@ class TokenServer(Server):
         origin = request.headers.get("Origin")
         if origin is not None and origin.removeprefix("http://") not in self._hosts:
             raise web.HTTPForbidden(text="Only the app's own page may use it.\n")
-        if self._is_token(request.query.get("token", "")):
+        if _is_same(request.query.get("token", ""), self._token):
             answer = web.HTTPFound("/")
-            answer.set_cookie(COOKIE, self._token, httponly=True, samesite="Strict")
+            answer.set_cookie(self._cookie, self._session, httponly=True, samesite="Strict")
             raise answer
-        if not self._is_token(request.cookies.get(COOKIE, "")):
+        if not _is_same(request.cookies.get(self._cookie, ""), self._session):
             raise web.HTTPForbidden(text="Open the address that 'care serve' printed: it holds the token.\n")
         if request.path == "/ws":
             self._check_session(request)
@@ -76,9 +79,6 @@ class TokenServer(Server):
             raise web.HTTPBadRequest(text=f"A page has at most {_WIDEST} columns and {_HIGHEST} rows.\n")
         if len(self._sessions) >= _MOST_SESSIONS:
             raise web.HTTPServiceUnavailable(text=f"{_MOST_SESSIONS} pages are open already: close one.\n")
-
-    def _is_token(self, given: str) -> bool:
-        return secrets.compare_digest(given.encode(), self._token.encode())
 
     async def _process_messages(self, websocket: web.WebSocketResponse, app_service: AppService) -> None:
         """Pass on what the page sends, as far as it is what a page sends."""
@@ -106,6 +106,11 @@ class TokenServer(Server):
 
     def initialize_logging(self) -> None:
         """Leave the terminal to the command."""
+
+
+def _is_same(given: str, secret: str) -> bool:
+    """Compares in a time that does not tell how much was right."""
+    return secrets.compare_digest(given.encode("utf-8", "surrogatepass"), secret.encode())
 
 
 async def _pass_on(envelope: Any, websocket: web.WebSocketResponse, service: AppService) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import http.client
 import shutil
 import signal
 import socket
@@ -68,6 +69,52 @@ def test_only_who_has_the_token_is_let_in(address: str) -> None:
     with browser.open(address) as page:
         assert page.url == f"{base}/", "the token does not stay in the address"
         assert "/ws" in page.read().decode()
+
+
+def _login(address: str) -> dict[str, str]:
+    """The cookie that a browser gets for the token, by name."""
+    jar = CookieJar()
+    urllib.request.build_opener(urllib.request.HTTPCookieProcessor(jar)).open(address).close()
+    return {cookie.name: cookie.value or "" for cookie in jar}
+
+
+def test_the_cookie_holds_no_token_and_is_good_for_this_server_alone(address: str) -> None:
+    base, token = address.split("/?token=")
+    ((name, value),) = _login(address).items()
+    assert len(value) >= 32
+    assert token not in value
+    assert value not in token
+    port = base.rpartition(":")[2]
+    assert name == f"care_session_{port}"
+    for wrong in (f"{name}={token}", f"care_token={token}", f"{name}=", f"{name}={value[:-1]}", f"care_session={value}"):
+        with pytest.raises(urllib.error.HTTPError) as refused:
+            urllib.request.urlopen(urllib.request.Request(base, headers={"Cookie": wrong}))
+        assert refused.value.code == 403, wrong
+    with pytest.raises(urllib.error.HTTPError) as refused:  # nor is what the cookie holds a token
+        urllib.request.urlopen(f"{base}/?token={value}")
+    assert refused.value.code == 403
+    other, its_address = serve()
+    with other:
+        try:
+            ((its_name, its_value),) = _login(its_address).items()
+            assert its_name != name
+            assert its_value != value
+            its_base = its_address.split("/?token=")[0]
+            with pytest.raises(urllib.error.HTTPError) as refused:
+                urllib.request.urlopen(urllib.request.Request(its_base, headers={"Cookie": f"{its_name}={value}"}))
+            assert refused.value.code == 403
+        finally:
+            other.terminate()
+
+
+def test_no_page_reads_the_cookie_and_no_other_site_sends_it(address: str) -> None:
+    host = address.removeprefix("http://").partition("/")[0]
+    connection = http.client.HTTPConnection(host)
+    connection.request("GET", f"/?{address.rpartition('?')[2]}")
+    said = connection.getresponse().getheader("Set-Cookie") or ""
+    connection.close()
+    assert {"HttpOnly", "SameSite=Strict", "Path=/"} <= {part.strip() for part in said.split(";")}
+    assert address.rpartition("=")[2] not in said
 
 
 def test_the_app_runs_behind_the_socket(address: str) -> None:
@@ -172,9 +219,10 @@ async def _causes_in(socket_address: str, address: str) -> bytes:
 
 
 def _status(address: str, path: str, **headers: str) -> int:
-    """The answer to a request with the token's cookie."""
-    base, token = address.split("/?token=")
-    request = urllib.request.Request(base + path, headers={"Cookie": f"care_token={token}"} | headers)
+    """The answer to a request of a browser that was let in."""
+    base = address.split("/?token=", maxsplit=1)[0]
+    cookie = "; ".join(f"{name}={value}" for name, value in _login(address).items())
+    request = urllib.request.Request(base + path, headers={"Cookie": cookie} | headers)
     try:
         with urllib.request.urlopen(request) as answer:
             return int(answer.status)
@@ -208,9 +256,9 @@ def test_sessions_end_with_the_server(tmp_path: Path, number: signal.Signals) ->
     hostile = ("[]", "5", "{}", '["resize", {"width": 99999999, "height": 1}]', '["resize"]', '["stdin", 5]')
 
     async def talk() -> list[int]:
-        base, token = address.split("/?token=")
+        base = address.split("/?token=", maxsplit=1)[0]
         async with (
-            aiohttp.ClientSession(cookies={"care_token": token}) as session,
+            aiohttp.ClientSession(cookies=_login(address)) as session,
             session.ws_connect(f"{base}/ws?width=80&height=24") as page,
         ):
             for text in hostile:
