@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from care_core.files import read_small_text
+from care_core.folders import entries_in, files_in
 from care_core.records import Record
 
 PLACES = (
@@ -56,14 +57,10 @@ def logs_in(folder: Path, deep: int = DEEP) -> Iterator[Path]:
     """The logs and recordings in a folder, and in those so deep below it."""
     from care_core.logs.finding import is_log, is_recorder_folder
 
-    try:
-        inside = list(folder.iterdir())
-    except OSError:  # not ours to look into
-        return
-    for path in inside:
-        if is_log(path) or (path.is_dir() and is_recorder_folder(path)):
+    for path, is_folder in entries_in(folder):
+        if is_recorder_folder(path) if is_folder else is_log(path):
             yield path
-        elif path.is_dir() and deep > 1 and not path.is_symlink():
+        elif is_folder and deep > 1:
             # The working folder may be anything: what lies in its folders counts only where a recorder made it.
             inside_it = logs_in(path, deep - 1 if folder != Path() else 1)
             yield from (log for log in inside_it if folder != Path() or log.is_dir() or _is_recorded(path))
@@ -76,7 +73,7 @@ def _is_recorded(folder: Path) -> bool:
 
 def files_of(path: Path) -> list[Path]:
     """The files of a log; a recording may be a folder of them."""
-    return [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
+    return files_in(path) if path.is_dir() else [path]
 
 
 def written_s(path: Path) -> float:
@@ -151,7 +148,7 @@ def entries(typed: str) -> list[Path]:
         entry
         for entry in inside
         if entry.name.casefold().startswith(start) and (start.startswith(".") or not entry.name.startswith("."))
-        if entry.is_dir() or is_openable(entry)
+        if os.path.isdir(entry) or is_openable(entry)
     ]
     return sorted(found, key=lambda entry: (is_openable(entry), entry.name.casefold()))
 
@@ -160,4 +157,4 @@ def is_openable(path: Path) -> bool:
     """Whether this may be a log, or a recording that is a folder."""
     from care_core.logs.finding import is_log, is_recorder_folder
 
-    return is_log(path) or (path.is_dir() and is_recorder_folder(path))
+    return is_log(path) or is_recorder_folder(path)

@@ -5,11 +5,12 @@ Readers need files, so a log behind a URL is copied into a temporary folder wher
 
 from __future__ import annotations
 
+import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from glob import glob, has_magic
+from contextlib import contextmanager, suppress
+from glob import has_magic
 from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import urlsplit
@@ -88,12 +89,28 @@ def fetched(source: Source) -> Iterator[Path]:
 def _here(place: str) -> list[Source]:
     path = Path(place)
     if not path.exists() and has_magic(place):
-        matching = [Path(name) for name in sorted(glob(place, recursive=True))]
-        logs = [one for one in matching if is_log(one) or (one.is_dir() and is_recorder_folder(one))]
+        logs = [one for one in _matching(path) if is_log(one) or is_recorder_folder(one)]
         if not logs:
             raise UsageError("No log is named like that.", hint=_endings(), where=place)
         return [Source(str(log), log) for log in find_logs(logs)]
     return [Source(str(log), log) for log in find_logs([path])]
+
+
+def _matching(pattern: Path) -> list[Path]:
+    """What a pattern names, by name. `**` goes into no link, which may lead in a circle; hidden is what begins with a
+    dot, unless the pattern says it."""
+    first = next(place for place, part in enumerate(pattern.parts) if has_magic(part))
+    root, parts = Path(*pattern.parts[:first]), [*pattern.parts[first:]]
+    parts = [part if part == "**" else re.sub(r"\*+", "*", part) for part in parts]
+    if parts[-1] == "**":
+        parts.append("*")
+    says_hidden = any(part.startswith(".") for part in parts)
+    found = []
+    with suppress(OSError):  # a folder that cannot be listed holds none
+        for one in root.glob("/".join(parts)):
+            if says_hidden or not any(part.startswith(".") for part in one.relative_to(root).parts):
+                found.append(one)
+    return sorted(found)
 
 
 def _behind_url(url: str) -> list[Source]:
@@ -103,16 +120,18 @@ def _behind_url(url: str) -> list[Source]:
         raise UsageError("URLs cannot be opened here.", hint=f"{INSTALL}.", where=shown(url)) from err
     try:
         store, path = url_to_fs(url)
+        if _is_local(store):
+            return _here(path)
         names = sorted(store.glob(path) if has_magic(path) else [path])
         is_file = len(names) == 1 and not store.isdir(names[0])
         files = names if is_file else [name for one in names for name in _below(store, one)]
+    except UsageError:
+        raise
     except ImportError as err:
         raise UsageError(f"URLs of this kind cannot be opened here: {err}.", hint="", where=shown(url)) from err
     except Exception as err:  # every kind of store has errors of its own
         why = str(err).strip().partition("\n")[0].rstrip(".") or type(err).__name__
         raise UsageError(f"It cannot be listed: {why}.", hint="Check the URL.", where=shown(url)) from err
-    if _is_local(store):
-        return [Source(str(path), path) for path in find_logs(map(Path, files))] if files else _nothing(url)
     if is_file and not store.exists(files[0]):
         raise UsageError("No such file or folder.", hint="Check the URL.", where=shown(url))
     sources = _recordings(url, store, files if is_file else [name for name in files if _looks_like_a_log(name)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from typing import BinaryIO
 from care_core import limits
 from care_core.errors import LogError
 from care_core.files import open_regular
+from care_core.folders import files_in
 from care_core.logs.opening import cannot_open
 
 Sha256 = Callable[[], str]
@@ -35,7 +37,9 @@ def log_digest(path: str | Path, stopped: Event | None = None) -> str:
     path = Path(path)
     digest = hashlib.sha256()
     try:
-        files = sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+        files = files_in(path) if path.is_dir() else [path]
+        if not files:
+            raise FileNotFoundError(errno.ENOENT, "there is no file in it", str(path))
         is_whole = sum(file.stat().st_size for file in files) <= limits.WHOLE_BYTES
         for file in files:
             with open_regular(file, buffering=0) as stream:

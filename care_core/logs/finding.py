@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
 from care_core.errors import LogError, UsageError
+from care_core.folders import Entry, entries_in, may_list
 from care_core.logs.formats import log_suffixes
 from care_core.logs.opening import sniff
 
@@ -25,9 +27,12 @@ def find_logs(places: Iterable[Path]) -> tuple[Path, ...]:
 
     found: dict[Path, None] = {}
     for place in places:
-        if not place.exists():
+        if not os.path.exists(place):
             raise UsageError("No such file or folder.", hint="Check the path.", where=str(place))
-        inside = map(whole_recording, logs_below(place)) if place.is_dir() else [place]
+        is_folder = os.path.isdir(place)
+        if is_folder and not may_list(place):
+            raise UsageError("You may not look into this folder.", hint="Ask whose it is.", where=str(place))
+        inside = map(whole_recording, logs_below(place)) if is_folder else [place]
         found.update(dict.fromkeys(inside))
     if not found:
         raise UsageError("There is no log there.", hint=f"Logs end in {', '.join(log_suffixes())}.")
@@ -35,27 +40,30 @@ def find_logs(places: Iterable[Path]) -> tuple[Path, ...]:
 
 
 def logs_below(folder: Path) -> list[Path]:
-    """Every log in a folder and in those below it, by name; the folder itself where it is one recording."""
-    if is_recorder_folder(folder):
-        return [folder]
+    """Every log in a folder and in those below it, by name; the folder itself where it is one recording.
+
+    What cannot be looked at is left out, and so are links to folders.
+    """
     found: list[Path] = []
-    for path in sorted(folder.iterdir()):
-        if path.is_dir() and not path.is_symlink():
-            found += logs_below(path)
-        elif is_log(path):
+    left = [Entry(folder, is_folder=True)]
+    while left:
+        path, is_folder = left.pop()
+        if is_folder and not is_recorder_folder(path):
+            left += reversed(entries_in(path))
+        elif is_folder or is_log(path):
             found.append(path)
     return found
 
 
 def is_recorder_folder(folder: Path) -> bool:
     """Whether a ROS 2 recorder made this folder."""
-    return (folder / "metadata.yaml").is_file()
+    return os.path.isfile(folder / "metadata.yaml")
 
 
 def is_log(path: Path) -> bool:
     """Whether a file in a folder is a log, by its ending, and by its beginning where others end like that too."""
     suffix = path.suffix.lower()
-    if suffix not in log_suffixes() or not path.is_file():
+    if suffix not in log_suffixes() or not os.path.isfile(path):
         return False
     return suffix != SHARED_SUFFIX or begins_like_a_log(path)
 

@@ -10,9 +10,11 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from care_core.files import open_regular, read_small_text
+from care_core.folders import entries_in
 from care_core.logs.finding import SHARED_SUFFIX, begins_like_a_log
 from care_core.logs.formats import log_suffixes
 from care_core.logs.recording import ROS1_SUFFIXES, ROS2_SUFFIXES, parse_part
@@ -90,10 +92,11 @@ def is_as_it_was(sight: FileStatus) -> bool:
 
 
 def _below(folder: Path) -> Iterator[FileStatus]:
-    below: list[Path] = []
-    yield from _in(folder, below)
-    for inner in below:
-        yield from _below(inner)
+    left = [folder]
+    while left:
+        below: list[Path] = []
+        yield from _in(left.pop(), below)
+        left += reversed(below)
 
 
 def _in(folder: Path, below: list[Path]) -> Iterator[FileStatus]:
@@ -101,24 +104,22 @@ def _in(folder: Path, below: list[Path]) -> Iterator[FileStatus]:
     files: dict[str, _File] = {}
     hidden: list[str] = []
     folders = []
-    try:
-        with os.scandir(folder) as entries:
-            for entry in entries:
-                if entry.name.startswith("."):  # the trash of a memory card, halves of files from a Mac
-                    hidden.append(entry.name)
-                elif entry.is_dir(follow_symlinks=False):
-                    folders.append(folder / entry.name)
-                elif entry.is_file():
-                    about = entry.stat()
-                    files[entry.name] = _File(entry.name, about.st_size, about.st_mtime_ns)
-    except OSError:  # gone, unplugged, or not ours to look into
-        return
+    for path, is_folder in entries_in(folder):
+        name = path.name
+        if name.startswith("."):  # the trash of a memory card, halves of files from a Mac
+            hidden.append(name)
+        elif is_folder:
+            folders.append(path)
+        else:
+            with suppress(OSError):  # gone meanwhile
+                about = path.stat()
+                files[name] = _File(name, about.st_size, about.st_mtime_ns)
     logs = {name: file for name, file in files.items() if Path(name).suffix.lower() in log_suffixes()}
     whole = _one_recording(folder, files, logs)
     if whole is not None:
         yield whole
         return
-    below += sorted(folders)
+    below += folders
     for name, file in logs.items():
         yield FileStatus(folder / name, _stamp([file]), _open_by(file, [*files, *hidden]))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from care_core.errors import LogError
 from care_core.files import read_small_text
+from care_core.folders import files_in, may_list
 from care_core.logs.ros_log import Flaw
 from care_core.logs.ros_metadata import FILE_NAME, Metadata, parse_metadata
 from care_core.records import Record, field
@@ -61,7 +62,9 @@ def whole_recording(path: Path) -> Path:
 
 
 def _in_folder(folder: Path) -> Recording:
-    names = sorted((path.name for path in folder.iterdir() if path.is_file()), key=_natural)
+    if not may_list(folder):
+        raise LogError("You may not look into this folder.", hint="Ask whose it is.", where=str(folder))
+    names = sorted((path.name for path in files_in(folder)), key=_natural)
     bags = [name for name in names if name.lower().endswith(ROS1_SUFFIXES)]
     stores = [name for name in names if name.lower().endswith(ROS2_SUFFIXES)]
     if stores:

@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 from care_core.diagnose.verdict import fit_text
 from care_core.ecosystems.findings import Health
 from care_core.extract.coverage import Missed, Trial
+from care_core.folders import files_in
 from care_core.logs.base import Log
 from care_core.records import field
 from care_core.report.entries import (
@@ -164,7 +165,7 @@ def inspection_schema() -> dict[str, Any]:
 
 
 def _log(log: Log) -> LogEntry:
-    files = [path for path in log.path.rglob("*") if path.is_file()] if log.path.is_dir() else [log.path]
+    files = files_in(log.path) if log.path.is_dir() else [log.path]
     size = sum(path.stat().st_size for path in files)
     return LogEntry(
         path=clean(str(log.path)),

@@ -23,6 +23,7 @@ from care_core import limits
 from care_core.errors import LogError, UsageError
 from care_core.extract.select import fitting_profile, sound_profiles
 from care_core.files import open_regular, open_to_append
+from care_core.folders import files_in
 from care_core.logs.opening import open_log
 from care_core.outputs import REMOVE_HINT, write_output
 from care_core.parallel import Failed, each
@@ -148,7 +149,7 @@ def _purpose(schema: Schema) -> dict[str, str]:
 
 def _key(path: Path) -> str:
     """A log as it is now: a file that grew or was replaced is another one."""
-    files = sorted(inside for inside in path.rglob("*") if inside.is_file()) if path.is_dir() else [path]
+    files = files_in(path) if path.is_dir() else [path]
     try:
         stats = [file.stat() for file in files]
     except OSError:  # reading it says what is wrong

@@ -101,7 +101,7 @@ def test_a_log_that_is_gone_says_so(store: Any) -> None:
         ("memory://none.BIN", "No such file"),
         ("memory://none/*.BIN", "There is no log there"),
         ("nosuch://a/b.BIN", "cannot be listed"),
-        ("file:///no/such/*.BIN", "There is no log there"),
+        ("file:///no/such/*.BIN", "No log is named like that"),
     ],
 )
 def test_a_place_without_logs_is_said(place: str, says: str, store: Any) -> None:
