@@ -30,9 +30,10 @@ _END_S = 5.0
 class TokenServer(Server):
     """Answers nobody without the token: given once in the address, for which the browser gets a cookie.
 
-    The cookie holds a value of its own, drawn for this server and forgotten with it: whoever reads the browser's cookies
-    learns no token. Cookies do not mind ports, so a page of another server on this machine could drive the app with the operator's own:
-    a request must name this server as its host, and where it comes from a page, be from this server's.
+    The cookie holds a value of its own, drawn for this server and forgotten with it: whoever reads the browser's
+    cookies learns no token. Cookies do not mind ports, so a page of another server on this machine could drive the app
+    with the operator's own: a request must name this server as its host, and where it comes from a page, be from this
+    server's.
     """
 
     def __init__(self, command: str, port: int, token: str) -> None:

@@ -86,7 +86,13 @@ def test_the_cookie_holds_no_token_and_is_good_for_this_server_alone(address: st
     assert value not in token
     port = base.rpartition(":")[2]
     assert name == f"care_session_{port}"
-    for wrong in (f"{name}={token}", f"care_token={token}", f"{name}=", f"{name}={value[:-1]}", f"care_session={value}"):
+    for wrong in (
+        f"{name}={token}",
+        f"care_token={token}",
+        f"{name}=",
+        f"{name}={value[:-1]}",
+        f"care_session={value}",
+    ):
         with pytest.raises(urllib.error.HTTPError) as refused:
             urllib.request.urlopen(urllib.request.Request(base, headers={"Cookie": wrong}))
         assert refused.value.code == 403, wrong
