@@ -69,8 +69,8 @@ def need_of(name: str, reference: Reference, schema: Schema, model: Model) -> Ne
 
 
 def limit(relative: Threshold, need: Need) -> Threshold:
-    """The bound of a multiple of a need: what one in ten runs of the reference configuration exceeds is no fault, unless
-    the operator gave the multiple."""
+    """The bound of a multiple of a need. What one in ten runs of the reference configuration exceeds is no fault,
+    unless the multiple is the operator's."""
     usual = relative.for_need(need.value)
     if relative.source is not None:
         return usual
