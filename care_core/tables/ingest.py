@@ -171,7 +171,10 @@ def _read_journal(path: Path, purpose: Mapping[str, str]) -> dict[str, list[Tabl
             entries = list(takewhile(bool, map(_entry, iter(partial(stream.readline, _LONGEST_LINE), b""))))
     except OSError:
         return {}
-    return {e["log"]: _shared(e["rows"]) if "rows" in e else Failed(e["failure"], is_final=True) for e in entries}
+    try:
+        return {e["log"]: _shared(e["rows"]) if "rows" in e else Failed(e["failure"], is_final=True) for e in entries}
+    except (TypeError, LookupError, AttributeError):  # nobody's journal
+        return {}
 
 
 def _entry(line: bytes) -> Any:

@@ -61,10 +61,13 @@ def fleet(
     3 not all evaluated, 4 none readable.
     """
     from care_core.application.fleet import Cluster, survey
+    from care_core.outputs import check_replaceable
     from care_core.report.fleet import check_parquet_path, fleet_json, write_parquet
 
     if parquet is not None:
         check_parquet_path(parquet)
+    if out is not None:
+        check_replaceable(out, kind="care.fleet" if json or is_json(out) else "text", force=force)
     asked = Request(
         Path(),
         profile,

@@ -12,6 +12,7 @@ from care_core.errors import ExitCode, UsageError
 from care_core.files import bundled, read_small_bytes
 from care_core.outputs import check_replaceable, kind_of, signed, write_output
 from care_core.run import Setting
+from care_core.tables import ingest as ingesting
 from care_core.tables.ingest import failures_table
 from care_core.tables.rows import ABOUT, write_rows
 from tests.conftest import Care
@@ -173,3 +174,18 @@ def test_a_formula_in_a_log_is_text_in_every_table(tmp_path: Path) -> None:
     from care_core.tables.ingest import Failure
 
     assert failures_table([Failure(Path("=a.BIN"), "=1+1")]) == "log,reason\n'=a.BIN,'=1+1\n"
+
+
+def test_a_fleet_is_not_read_for_a_file_that_is_kept(care: Care, tmp_path: Path) -> None:
+    path = tmp_path / "fleet.json"
+    path.write_text('{"my": "notes"}\n')
+    code, _, err = care("fleet", tmp_path / "nothing.BIN", "--out", path)
+    assert (code, "another kind" in err) == (ExitCode.USAGE, True)
+
+
+@pytest.mark.parametrize("line", ["[]", "5", '{"rows": []}', '{"log": "a"}', '{"log": [], "rows": 5}', "{"])
+def test_a_journal_that_nobody_wrote_is_begun_anew(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "runs.csv.part"
+    purpose = {"journal": "care.ingest/1"}
+    path.write_text(f'{{"journal": "care.ingest/1"}}\n{line}\n')
+    assert ingesting._read_journal(path, purpose) == {}
