@@ -113,6 +113,13 @@ class LogInfo(Record):
     """What the log says of its robot: firmware, frame, distro."""
     robot: Robot | None = None
     """Whose log it is, None where nothing says so."""
+    recording: str = ""
+    """What copies of a recording share, whatever their files are called and how long they are."""
+
+    @property
+    def identity(self) -> str:
+        """What tells this run from others: its recording, else its file."""
+        return self.recording or self.sha256
 
 
 FitVerdict = Literal["fits", "partly", "no"]

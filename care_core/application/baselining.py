@@ -50,11 +50,15 @@ def baseline(places: Sequence[Path], profile: str | None, progress: Progress) ->
                     continue
                 fit = fitting(log, profile if chosen is None else str(chosen[0].path))
                 good, bad = _runs_of(log, fit[0])
+                recording = next((one.run.log.identity for one in good), sha256())
+                if recording in seen:
+                    refused.append(Refused(path, None, f"the same recording as {seen[recording].name}"))
+                    continue
         except CareError as err:
             errors.append(err)
             refused.append(Refused(path, None, err.message.rstrip(".")))
             continue
-        seen[sha256()] = path
+        seen |= {sha256(): path, recording: path}
         chosen = chosen or fit
         runs += good
         refused += [replace(one, log=path) for one in bad]

@@ -194,7 +194,7 @@ def _plainly(model: RunModel, choice: ProfileChoice, health: Health, request: Re
     if judged is not None:
         return without_profile(judged, choice, health)
     settings = {name: history[-1] for name, history in model.log.settings().items()}
-    return unjudged(log_info(model.log, sha256()), settings, choice, health)
+    return unjudged(log_info(model, sha256()), settings, choice, health)
 
 
 def _read(

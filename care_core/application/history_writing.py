@@ -42,4 +42,4 @@ def about_run(run: Run) -> About:
     from care_core.history.store import About
 
     settings = {name: setting.value for name, setting in run.settings.items() if not is_self_written(name)}
-    return About(run.log.robot, dict(run.mission.asked), run.log.facts.get("firmware", ""), settings)
+    return About(run.log.robot, dict(run.mission.asked), run.log.facts.get("firmware", ""), settings, run.log.recording)

@@ -119,11 +119,11 @@ def verdict(judged: Judged) -> MissionVerdict:
 
 def with_repeats(first: Judged, others: Sequence[Judged]) -> Judged:
     """A run and others that repeat it. Raises UsageError: another configuration, or a log given twice."""
-    seen = {first.run.log.sha256}
+    seen = {first.run.log.identity}
     for other in others:
-        if other.run.log.sha256 in seen:
+        if other.run.log.identity in seen:
             raise UsageError("The same log is no repeat.", hint="Name it once.", where=other.run.log.path)
-        seen.add(other.run.log.sha256)
+        seen.add(other.run.log.identity)
         for name in sorted(first.run.config.keys() & other.run.config.keys()):
             mine, theirs = first.run.config[name], other.run.config[name]
             if not same_value(mine, theirs):

@@ -31,7 +31,7 @@ def compare(judged: Judged, good: Log, profile: Profile) -> Since:
     try:
         other = read_and_judge(run_model(good), profile, thresholds=judged.own)
     except CareError as err:
-        info = log_info(good, log_digest(good.path))
+        info = log_info(run_model(good), log_digest(good.path))
         before = {name: history[-1] for name, history in good.settings().items()}
         return Since(str(good.path), _changes(run, before, profile), (*_strange(run, info, before), err.message))
     before = dict(other.run.settings)

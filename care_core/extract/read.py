@@ -14,9 +14,10 @@ from care_core.ecosystems.measures import MISSION_KINDS, Mission, MissionKind, c
 from care_core.ecosystems.plausible import clock_doubt, dead_sources
 from care_core.ecosystems.registry import ecosystem_of, register_measures
 from care_core.errors import NoMissionError, ProfileError, UsageError, nearest
-from care_core.logs.base import Log, merge_needs
+from care_core.logs.base import merge_needs
 from care_core.logs.digest import Sha256, hashing
 from care_core.logs.formats import format_named
+from care_core.logs.identity import recording_of
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.run import Check, LogInfo, MissionInfo, Run, Setting, Unavailable, Value, is_known
@@ -98,8 +99,9 @@ def reading_plan(schema: Schema) -> dict[str, tuple[str, ...]]:
     return merge_needs(needs)
 
 
-def log_info(log: Log, sha256: str) -> LogInfo:
+def log_info(model: RunModel, sha256: str) -> LogInfo:
     """The record of where a run came from."""
+    log = model.log
     return LogInfo(
         path=str(log.path),
         format=log.format.name,
@@ -108,6 +110,7 @@ def log_info(log: Log, sha256: str) -> LogInfo:
         sha256=sha256,
         damage=tuple(log.damage),
         facts=dict(log.facts),
+        recording=recording_of(log, model.tables),
     )
 
 
@@ -152,7 +155,9 @@ class _Source(Record, eq=False):
             )
         dictionary = ecosystem_of(log.format).messages()
         doubts = tuple(clock_doubt(dictionary, tables, one.start_s, one.end_s) for one in missions)
-        return cls(schema, kind, log_info(log, sha256()), settings, missions, dead_sources(dictionary, tables), doubts)
+        return cls(
+            schema, kind, log_info(model, sha256()), settings, missions, dead_sources(dictionary, tables), doubts
+        )
 
     def run(self, index: int, overrides: Mapping[str, Setting]) -> Run:
         found = self.missions[index]

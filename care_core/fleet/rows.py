@@ -78,6 +78,8 @@ class Row(Record):
     """ISO 8601 in UTC, None where the log has no wall clock."""
     duration_s: float = 0.0
     sha256: str = ""
+    recording: str = ""
+    """What copies of it share."""
     mission: int = 0
     kind: str = ""
     """What sort of robot it is: only robots of one sort are compared."""
@@ -141,6 +143,7 @@ def row_of(log: str, diagnosis: Diagnosis, query: CounterfactualQuery | None = N
         start=run.log.start,
         duration_s=run.log.duration_s,
         sha256=run.log.sha256,
+        recording=run.log.identity,
         mission=run.mission.index,
         kind=clean(next((facts[name] for name in _SORTS if facts.get(name)), run.log.format)),
         firmware=clean(facts.get("firmware") or facts.get("distro") or ""),
@@ -177,9 +180,18 @@ def unreadable(log: str, reason: str) -> Row:
 
 def distinct(rows: Sequence[Row]) -> tuple[Row, ...]:
     """The rows without copies: the same recording under two names is one run."""
-    return tuple({(row.sha256, row.mission) if row.sha256 else (row.log, 0): row for row in reversed(rows)}.values())[
-        ::-1
-    ]
+    return tuple({_of_run(row): row for row in reversed(rows)}.values())[::-1]
+
+
+def copies_of(rows: Sequence[Row]) -> dict[int, str]:
+    """By the place of a row that is the same recording as an earlier one: that one's log."""
+    first = {_of_run(row): row for row in distinct(rows)}
+    return {place: first[_of_run(row)].log for place, row in enumerate(rows) if first[_of_run(row)] is not row}
+
+
+def _of_run(row: Row) -> tuple[str, int]:
+    recording = row.recording or row.sha256
+    return (recording, row.mission) if recording else (row.log, 0)
 
 
 def by_folder(row: Row) -> Row:

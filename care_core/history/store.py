@@ -68,6 +68,8 @@ class About(Record):
     asked: Mapping[str, float] = field(default_factory=dict)
     firmware: str = ""
     settings: Mapping[str, float | str] = field(default_factory=dict)
+    recording: str = ""
+    """What copies of its log share."""
 
 
 class Triaged(Record):
@@ -84,6 +86,8 @@ class Triaged(Record):
     firmware: str = ""
     settings: Mapping[str, float | str] = field(default_factory=dict)
     """All parameters that somebody sets, as driven; empty where the log holds none."""
+    recording: str = ""
+    """What copies of its log share; empty where that is not known."""
 
 
 class Verified(Record):
@@ -165,15 +169,19 @@ class History(Record):
         )
 
     def triages(self, profile: str | None = None, limit: int = -1) -> tuple[Triaged, ...]:
-        """The remembered triages, the latest first: by order, for a robot's clock may jump. Raises HistoryError."""
+        """The remembered triages, the latest first: by order, for a robot's clock may jump. Of copies of one recording
+        the latest counts. Raises HistoryError."""
         rows = self._read(
             "select at, log_path, mission, document, about, settings from triages where ? is null or profile = ?"
             " order by id desc limit ?",
             (profile, profile, limit),
         )
-        return tuple(
-            self._triaged(at, path, mission, text, about, settings) for at, path, mission, text, about, settings in rows
-        )
+        newest: dict[tuple[str, int, str], Triaged] = {}
+        for number, row in enumerate(rows):
+            triaged = self._triaged(*row)
+            of_profile = (triaged.document["profile"] or {}).get("name", "")
+            newest.setdefault((triaged.recording or str(number), triaged.mission, of_profile), triaged)
+        return tuple(newest.values())
 
     def triage_of(self, sha256: str) -> Triaged | None:
         """The last triage of a log by what it holds, None where there is none. Raises HistoryError."""
@@ -195,7 +203,7 @@ class History(Record):
     def _triaged(
         self, at: str, path: str, mission: int, text: str, about: str, settings: bytes | None = None
     ) -> Triaged:
-        said = {"robot": None, "asked": {}, "firmware": "", **self._document(about), "settings": {}}
+        said = {"robot": None, "asked": {}, "firmware": "", "recording": "", **self._document(about), "settings": {}}
         if settings is not None:
             said["settings"] = self._document(self._unpacked(settings))
         known = self._checked(About, *(said[name] for name in About.__struct_fields__))
@@ -356,7 +364,7 @@ def insert_triage(connection: sqlite3.Connection, document: Mapping[str, Any], m
     """Put a triage into the store, in the transaction of whoever has more to write with it."""
     log, profile = document["log"], document["profile"] or {"name": "", "version": ""}
     robot = None if about.robot is None else plain(about.robot)
-    told = {"robot": robot, "asked": about.asked, "firmware": about.firmware}
+    told = {"robot": robot, "asked": about.asked, "firmware": about.firmware, "recording": about.recording}
     settings = zlib.compress(json.dumps(about.settings).encode()) if about.settings else None
     connection.execute(
         "insert into triages (at, profile, version, log_sha256, log_path, mission, document, robot, about, settings)"

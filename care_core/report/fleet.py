@@ -12,7 +12,7 @@ from care_core.diagnose.verdict import RunStatus
 from care_core.ecosystems.findings import FindingKind, Severity
 from care_core.errors import UsageError
 from care_core.fleet.fleet_report import Fleet
-from care_core.fleet.rows import Explained, Row, distinct
+from care_core.fleet.rows import Explained, Row, copies_of, distinct
 from care_core.fleet.shared import FEWEST, Kind, Pattern, Since, Trait, Unit
 from care_core.fleet.sources import INSTALL
 from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
@@ -206,15 +206,6 @@ def _row_entry(row: Row, copy_of: str | None) -> RowEntry:
         p_fixed=estimate(row.p_fixed),
         off={} if row.asked is None else {name: plain_number(row.asked.config[name]) for name in row.off},
     )
-
-
-def copies_of(rows: Sequence[Row]) -> dict[int, str]:
-    """By the place of a row that is the same recording as an earlier one: that one's log."""
-    kept = {id(row) for row in distinct(rows)}
-    first = {(row.sha256, row.mission): row.log for row in distinct(rows)}
-    return {
-        place: first[row.sha256, row.mission] for place, row in enumerate(rows) if row.sha256 and id(row) not in kept
-    }
 
 
 def _pattern_entry(one: Pattern) -> PatternEntry:

@@ -10,8 +10,8 @@ from rich.text import Text
 
 from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.fleet.fleet_report import Fleet
-from care_core.fleet.rows import Row
-from care_core.report.fleet import copies_of, counted, main_words, run_name, shared_lines, short_names, suggestion_lines
+from care_core.fleet.rows import Row, copies_of
+from care_core.report.fleet import counted, main_words, run_name, shared_lines, short_names, suggestion_lines
 from care_core.text import WIDTH, clean
 
 MOST_ROWS = 60

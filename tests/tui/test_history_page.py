@@ -23,7 +23,7 @@ from tests.tui.test_walk import hints, items, text, title
 def run_of(number: int, mission_time: float, land_speed: float) -> Diagnosis:
     """One of several runs: another log, another time, another landing speed."""
     run = sample.RUN
-    log = replace(run.log, path=f"/flights/{number:08}.BIN", sha256=f"{number:064}")
+    log = replace(run.log, path=f"/flights/{number:08}.BIN", sha256=f"{number:064}", recording=f"{number}")
     return replace(
         sample.faulty(),
         run=replace(run, log=log, config={**run.config, "LAND_SPEED": land_speed}),

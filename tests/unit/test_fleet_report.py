@@ -22,7 +22,7 @@ def made_row(number: int, status: Status = "fault") -> Row:
     """The row of a diagnosis whose every text tries to steer a terminal."""
     diagnosis = made_diagnosis()
     robot = Robot(f"id {number}", f"robot {number}", "made", is_sure=True)
-    log = replace(diagnosis.run.log, robot=robot, sha256=f"{number}", start="2026-11-12T09:00:00+00:00")
+    log = replace(diagnosis.run.log, robot=robot, recording=f"{number}", start="2026-11-12T09:00:00+00:00")
     row = row_of(f"{number}{HOSTILE}.BIN", replace(diagnosis, run=replace(diagnosis.run, log=log)))
     return replace(row, status=status, profile="")
 

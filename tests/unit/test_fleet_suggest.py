@@ -42,7 +42,7 @@ def on(robot: str, row: Row, **config: float) -> Row:
     """The same flight, of another robot with these values."""
     assert row.asked is not None
     asked = replace(row.asked, config={**row.asked.config, **config})
-    return replace(row, robot=robot, sha256=f"of {robot}", log=f"{robot}.BIN", asked=asked)
+    return replace(row, robot=robot, recording=f"of {robot}", log=f"{robot}.BIN", asked=asked)
 
 
 def only(rows: list[Row]) -> Suggestion | Silence:
@@ -104,7 +104,7 @@ def test_no_change_where_it_helps_no_majority_or_one_robot_alone(failed: Row, fi
     found = only([on("a", failed), on("b", failed), *broken])
     assert isinstance(found, Silence)
     assert "2 of the 4 robots that fail" in found.reason
-    alone = only([on("a", failed), replace(on("a", failed), sha256="again"), on("good", fine)])
+    alone = only([on("a", failed), replace(on("a", failed), recording="again"), on("good", fine)])
     assert isinstance(alone, Silence)
     assert "only one robot fails" in alone.reason
     assert suggest([on("good", fine)]) == ()
@@ -112,7 +112,7 @@ def test_no_change_where_it_helps_no_majority_or_one_robot_alone(failed: Row, fi
 
 def test_a_robot_is_helped_where_most_of_its_failures_are(failed: Row) -> None:
     parts = (Explained("hardware", "motor 2 lost thrust", 0.9, "motor"),)
-    again = [replace(on("a", failed), sha256=f"{n}", explained=parts) for n in range(2)]
+    again = [replace(on("a", failed), recording=f"{n}", explained=parts) for n in range(2)]
     found = only([on("a", failed), *again, on("b", failed), on("c", failed)])
     assert isinstance(found, Suggestion)
     assert [one.name for one in found.having("helped")] == ["b", "c"]
@@ -148,7 +148,7 @@ def test_what_another_version_of_the_profile_judged_is_not_asked(failed: Row) ->
         replace(failed, asked=lacking),
         replace(failed, version="0", causes=(renamed, *failed.causes)),
     ):
-        found = only([replace(strange, robot=name, sha256=name) for name in "ab"])
+        found = only([replace(strange, robot=name, recording=name) for name in "ab"])
         assert isinstance(found, Silence)
         assert found.best is not None
         assert [one.why for one in found.best.outlooks] == ["no model can be asked about its runs"] * 2
