@@ -171,6 +171,9 @@ def weigh(
             key = _WHAT[finding.suspect], finding.title
             share = LATE if _is_late(finding, by_setting) else 1.0
             weights[key] = max(weights.get(key, 0.0), share * _lost_by(finding, other))
+        for name in finding.parameters:
+            named = finding.probability * _mission_lost(finding) / len(finding.parameters)
+            weights["parameter", name] = max(weights.get(("parameter", name), 0.0), named)
     return _normalised(weights)
 
 

@@ -74,6 +74,8 @@ class Finding(Record):
     truth is known where there are any."""
     mission_lost: float | None = None
     """How likely a mission fails with it (0 to 1), where the training flights tell; None: as its severity says."""
+    parameters: tuple[str, ...] = ()
+    """Parameters that it names by itself, whatever any profile knows of them."""
     after_impact: bool = False
     consequences: tuple[Finding, ...] = ()
     """Later findings that this one led to, by physical steps each forwards in time."""

@@ -92,7 +92,8 @@ def _rank(finding: Finding) -> tuple[bool, int, bool, bool]:
 def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
     """Whether a finding is of the course of events that another began."""
     return (
-        not (finding.severity == "info" and finding.suspect == "parameter")  # it was set so before anything failed
+        not finding.parameters  # somebody changed them
+        and not (finding.severity == "info" and finding.suspect == "parameter")  # it was set so before anything failed
         and finding.kind in reach.get(root.kind, frozenset())
         and root.onset_s <= finding.onset_s + SLACK_S
         and root.end_s >= finding.onset_s - OVER_S
@@ -113,8 +114,8 @@ def _led_to(root: Finding, others: Iterable[Finding], explains: Explains) -> lis
 
 
 def _only_set(cause: Finding, finding: Finding) -> bool:
-    """Whether a setting is to have broken a part that surely failed: both are told."""
-    return cause.suspect == "parameter" and finding.suspect == "hardware"
+    """Whether a setting is to have broken a part that surely failed: both are told, unless it was changed just then."""
+    return cause.suspect == "parameter" and not cause.parameters and finding.suspect == "hardware"
 
 
 def _closure(explains: Explains) -> dict[FindingKind, frozenset[FindingKind]]:

@@ -66,7 +66,7 @@ def parameter_changes(
     """Parameters changed while armed one by one, those changed on the ground together."""
     ground: dict[str, tuple[float, str]] = {}
     for name, history in settings.items():
-        if is_self_written(name) or _TELEMETRY_RATE.match(name):
+        if is_self_written(name) or is_telemetry_rate(name):
             continue
         for before, after in pairwise(history):
             t = after.changed_at_s
@@ -83,6 +83,11 @@ def parameter_changes(
         what = "parameter changed" if len(named) == 1 else f"{len(named)} parameters changed"
         text = f"{what} while disarmed: {', '.join(change for _, change in named[:_CHANGES_NAMED])}{more}"
         yield Event(named[0][0], "parameter", text, source)
+
+
+def is_telemetry_rate(name: str) -> bool:
+    """Whether a ground station sets a parameter by itself, for the rate of what it is sent."""
+    return _TELEMETRY_RATE.match(name) is not None
 
 
 def gaps(tables: Iterable[Table], armed: Sequence[Span]) -> Iterator[Event]:

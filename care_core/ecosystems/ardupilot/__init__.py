@@ -57,6 +57,7 @@ class ArduPilot(Ecosystem):
 
     def missions(self, channels: tuple[Channel, ...]) -> Iterator[Mapping[str, Any]]:
         yield {"kind": "ardupilot_flight"}
+        yield {"kind": "ardupilot_unrecorded_arming"}
 
     def messages(self) -> Dictionary:
         from care_core.ecosystems.ardupilot.messages import MESSAGES

@@ -6,15 +6,19 @@ Nothing here needs a message at a rate: logs come thinned to one record in two s
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterator
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.recorded import UNKNOWN_MODE
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts, runs
+from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
-from care_core.numbers import pieces
+from care_core.numbers import median, pieces
 
 READS: Wanted = {
     "CTUN": ("ThO", "Alt", "BAlt", "DAlt"),
@@ -45,12 +49,32 @@ _STRUCK_S = 1.0
 """A blow so shortly before control was lost is what took it."""
 _SHOCK = 30.0
 """m/s^2: three times gravity is no flight."""
+HIT_MS = 3.0
+"""Speed of a fall from half a metre: LAND_SPEED is at most 2 m/s, a simulated landing says "SIM Hit ground at 0.5"."""
+_BEFORE_HIT_S, _SWAYS_S, _BLOW = 1.0, 0.2, 2.0
+"""Its descent is that of the second before; a blow is so many times what it felt until shortly before."""
+_REST_S, _REST_M, _ROLLS_MS, _LOW_M = 4.0, 2.0, 3.0, 5.0
+"""What hit the ground rests for so long, within so much height, no faster and no higher than this."""
+_HIT_LOST_S = 10.0
+"""What left its demand so shortly before it hit the ground, and was not back since, had lost control."""
+_FAST_MS, _STILL = 5.0, 2.0
+"""A walk is slower; what lies still feels gravity within so many m/s^2, and a motor that turns shakes it more."""
+_SIMULATED_HIT = re.compile(r"SIM Hit ground at (\d+(?:\.\d+)?) m/s")
 _WINGED = frozenset(("plane", "quadplane"))
 _TUMBLING_DEG, _TUMBLES_S = 45.0, 2.0
 _ROLLS = frozenset((UNKNOWN_MODE, 0, 3, 4, 23))
 """Plane modes in which the pilot may roll it over: manual, training, acro, QAcro; any where the log does not say."""
-_ACRO = frozenset((1, 13, 14))
+ACRO = frozenset((1, 13, 14))
 """Copter modes in which any attitude is meant: acro, sport, flip."""
+
+
+class Hit(NamedTuple):
+    """A contact with the ground at a speed that no landing has."""
+
+    time_s: float
+    speed_ms: float
+    said: str
+    """What says so, in a clause."""
 
 
 class Airborne(Armed):
@@ -135,13 +159,24 @@ class Airborne(Armed):
             until = start + _CRASH_CHECK_S if fell_s is None else fell_s
             stays = off[(t >= start) & (t <= until)].mean() > 0.6  # else it swings
             brief = end - start < 0.5 and end < t[-1] - 2.0 and end < self.armed[-1][1] - 2.0
-            if not stays or (brief and fell_s is None):
+            if not self._hits_after(start, end) and (not stays or (brief and fell_s is None)):
                 continue
             rest = held[flying & (t > end)]
             flew_on = sum(max(b - max(a, end), 0.0) for a, b in up) > 2 * _BACK_S and rest.mean() > 0.15
             if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
                 return start
         return None
+
+    @cached_property
+    def left_demand(self) -> tuple[float, ...]:
+        """Each time that a copter in the air left its attitude demand by what the firmware's crash check allows, in a
+        mode in which not every attitude is meant; whether it came back or not."""
+        off_demand = self.lean_error
+        if off_demand is None or not self.is_copter:
+            return ()
+        t, error = off_demand
+        off = (error > _OUT_OF_CONTROL_DEG) & during(self.airborne, t) & self._is_driven(t)
+        return tuple(start for start, end in runs(t, off, gap_s=_BACK_S) if end > start)
 
     @cached_property
     def _tumbled_s(self) -> float | None:
@@ -166,18 +201,80 @@ class Airborne(Armed):
             return None
         return next((b for a, b in self.airborne if a <= start <= b < start + _CRASH_CHECK_S), None)
 
+    def _hits_after(self, start: float, end: float) -> bool:
+        return self.hit is not None and start <= self.hit.time_s <= end + _HIT_LOST_S
+
     def _is_driven(self, t: Floats) -> Mask:
         """Where the motors were to lift it, in a mode in which not every attitude is meant."""
         driven, throttle = during(self.armed, t), self.throttle
         for rows in pieces(len(t)):
-            driven[rows] &= ~np.isin(self.modes_at(t[rows]), tuple(_ACRO))
+            driven[rows] &= ~np.isin(self.modes_at(t[rows]), tuple(ACRO))
             if throttle is not None:
                 driven[rows] &= np.interp(t[rows], *throttle) > _LIFTING
         return driven
 
     @cached_property
+    def hit(self) -> Hit | None:
+        """The first time that it hit the ground at speed, whatever its attitude: by its simulator's own word, or by a
+        blow at the end of a fast descent after which it rests. None where it did not."""
+        said = ((t, text, _SIMULATED_HIT.match(text)) for t, text in self.messages)
+        simulated = (Hit(t, float(match[1]), f"the simulator says: {text}") for t, text, match in said if match)
+        hits = [one for one in simulated if one.speed_ms > HIT_MS and any(a <= one.time_s <= b for a, b in self.armed)]
+        return min((*hits, *self._struck_ground()), key=lambda hit: hit.time_s, default=None)
+
+    def _struck_ground(self) -> Iterator[Hit]:
+        table = self.one("IMU", "AccX", "AccY", "AccZ")
+        if table is None or not flies(self.kind):
+            return
+        t, felt = table.t, np.sqrt(table["AccX"] ** 2 + table["AccY"] ** 2 + table["AccZ"] ** 2)
+        for at in t[(felt > _SHOCK) & during(self.armed, t)].tolist():
+            blow = float(np.max(felt[(t >= at) & (t <= at + _STRUCK_S)]))
+            usual = felt[(t >= at - _REST_S) & (t < at - _SWAYS_S)]
+            if len(usual) and blow <= _BLOW * float(np.max(usual)):
+                continue
+            fell, flew = self._fell_ms(at), self._flew_ms(at)
+            after = felt[(t > at + _REST_S / 2) & (t < at + _REST_S)]
+            is_still = len(after) > 2 and float(np.ptp(after)) < _STILL
+            if fell > HIT_MS and self._rests_after(at):
+                yield Hit(at, fell, f"it came down at {fell:.1f} m/s into a blow of {blow:.0f} m/s^2")
+                return
+            if flew > _FAST_MS and blow > 2 * _SHOCK and is_still:
+                yield Hit(at, flew, f"a blow of {blow:.0f} m/s^2 stopped it dead from {flew:.1f} m/s")
+                return
+
+    def _fell_ms(self, at: float) -> float:
+        """How fast it came down in the second before."""
+        if self.height is None:
+            return 0.0
+        return float(np.interp(at - _BEFORE_HIT_S, *self.height) - np.interp(at, *self.height)) / _BEFORE_HIT_S
+
+    def _flew_ms(self, at: float) -> float:
+        """How fast it moved over ground in the seconds before."""
+        moved = self.one("GPS", "Spd")
+        speeds = np.empty(0) if moved is None else moved["Spd"][(moved.t > at - _REST_S / 2) & (moved.t < at)]
+        return float(median(speeds)) if len(speeds) else 0.0
+
+    def _rests_after(self, at: float) -> bool:
+        """Whether it neither rises, falls nor moves on after a blow, low or with its motors down; what the log does not
+        tell of that does not count."""
+        height, throttle = _after(self.height, at), _after(self.throttle, at)
+        moved = self.one("GPS", "Spd")
+        speeds = _after(None if moved is None else (moved.t, moved["Spd"]), at)
+        is_down = float(np.min(height, initial=0.0)) < _LOW_M or float(np.max(throttle, initial=0.0)) < _LIFTING
+        return (
+            is_down
+            and float(np.ptp(height) if len(height) else 0.0) < _REST_M
+            and (not len(speeds) or float(median(speeds)) < _ROLLS_MS)
+        )
+
+    @cached_property
     def impact_s(self) -> float | None:
         """When it hit something, or its firmware found it crashed; None where neither happened."""
+        hits = () if self.hit is None else (self.hit.time_s,)
+        return min((t for t in (*hits, self._impact_of_lost_s) if t is not None), default=None)
+
+    @property
+    def _impact_of_lost_s(self) -> float | None:
         crash = min((t for t, code in self.errors(_ERR_CRASH) if code > 0), default=None)
         lost = self.lost_control_s
         if crash is None and lost is None:
@@ -231,6 +328,14 @@ class Airborne(Armed):
         if lost is not None:
             shock = self.shock_after(lost - _STRUCK_S)
         return lost is not None and shock is not None and shock < lost
+
+
+def _after(series: tuple[Floats, Floats] | None, at: float) -> Floats:
+    """The values of a series while what was struck rests."""
+    if series is None:
+        return np.empty(0)
+    t, values = series
+    return values[(t > at + _BEFORE_HIT_S) & (t < at + _REST_S)]
 
 
 def _off_demand(part: Table) -> Floats:

@@ -30,6 +30,8 @@ STANDS_MS = 0.5
 _LEANS_DEG, _HELD_S = 15.0, 10.0
 """A lean of 15 degrees speeds a copter up by 2.6 m/s^2, to 26 m/s in 10 s, and ANGLE_MAX allows 30 or 45 as shipped. A
 gale holds such a lean still as well, but strikes nothing."""
+_STANDS_S, _WALKS_MS, _IDLES = 5.0, 1.5, 0.1
+"""What stood for so long, no faster than a receiver's speed wanders, with less throttle than taxiing takes."""
 _REFUSED_S = 30.0
 """The firmware repeats its complaints at least as often (AP_Arming: every 30 s)."""
 _ERR_BATTERY = 6
@@ -81,6 +83,16 @@ class Flight(Airborne):
     def watch(self, t: Floats) -> Mask:
         """Which of these times are watched."""
         return during(self.watched, t)
+
+    @cached_property
+    def stands_at_end(self) -> bool:
+        """Whether a vehicle of whose disarming nothing is recorded stands still at the end, with its motor down."""
+        moved, driven = self.one("GPS", "Spd"), self.throttle
+        if self.arm_changes or moved is None or driven is None:
+            return False
+        last = moved["Spd"][moved.t > moved.t[-1] - _STANDS_S]
+        down = driven[1][driven[0] > driven[0][-1] - _STANDS_S]
+        return float(np.max(last)) < _WALKS_MS and float(np.max(down)) < _IDLES
 
     @cached_property
     def flown(self) -> tuple[Span, ...]:

@@ -6,6 +6,7 @@ from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, Finding
 from care_core.ecosystems.px4 import checks, timeline
 from care_core.ecosystems.px4 import flight as flights
 from care_core.ecosystems.px4.flight import STATUS, Px4Flight
+from care_core.ecosystems.px4.upset import hit
 from care_core.ecosystems.ranking import rank_findings
 from care_core.ecosystems.vehicles import vehicle_of
 from care_core.logs.base import Wanted, merge_needs
@@ -23,7 +24,8 @@ def reads() -> Wanted:
 def examine(flight: Px4Flight) -> Health:
     """What happened in a ULog."""
     tables = flight.tables(reads())
-    findings = rank_findings(_findings(flight))
+    impact = hit(flight)
+    findings = rank_findings(_findings(flight), None if impact is None else impact.time_s)
     is_readable = STATUS in tables and flight.end_s >= _TOO_SHORT_S
     too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
     title = vehicle_of(flight.log.facts, flight.log.settings()).title

@@ -11,9 +11,12 @@ from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Event
+from care_core.ecosystems.px4.attitude import ATTITUDE, WANTED, Lean, lean_of
+from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
 from care_core.logs.base import Log, Table, Wanted
 
 Span = tuple[float, float]
@@ -32,8 +35,8 @@ READS: Wanted = {
     "sensor_combined": ("gyro_rad[0]",),
 }
 
-ROVER = 3
-"""vehicle_type of a rover (vehicle_status.msg: VEHICLE_TYPE_ROVER)."""
+ROTARY, ROVER = 1, 3
+"""vehicle_type of what hovers and of a rover (vehicle_status.msg: VEHICLE_TYPE_ROTARY_WING, VEHICLE_TYPE_ROVER)."""
 TERMINATION = 13
 """nav_state in which the failure detector has ended the flight (vehicle_status.msg)."""
 AIRBORNE_M = 2.0
@@ -147,6 +150,24 @@ class Px4Flight(RunModel):
         armed_s = max((start for start, _ in self.armed if start <= t), default=0.0)
         heights = self.heights((armed_s, math.inf))
         return None if heights is None else float(np.interp(t, heights.t, heights["height"]))
+
+    @cached_property
+    def lean(self) -> Lean | None:
+        """How it leaned and was to lean, None where the log lacks its attitude."""
+        tables = self.tables(ATTITUDE_READS)
+        return lean_of(tables.get(ATTITUDE), tables.get(WANTED))
+
+    @property
+    def hovers(self) -> bool:
+        """Whether it never flew as a wing or drove."""
+        table = self.table(STATUS, "vehicle_type")
+        return table is None or bool(np.all(np.isin(table["vehicle_type"], (0, ROTARY))))
+
+    @staticmethod
+    def spans(t: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[Span]:
+        """From the first to the last time of each run of a mask."""
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+        return list(zip(t[edges[::2]].tolist(), t[edges[1::2] - 1].tolist(), strict=True))
 
     @cached_property
     def modes(self) -> tuple[tuple[float, int], ...]:

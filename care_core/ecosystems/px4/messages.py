@@ -76,6 +76,14 @@ MESSAGES: Dictionary = {
         "lon": Field("deg", "longitude", plausible=_LONGITUDE, is_position=True),
         "alt": Field("m", "height above the sea", is_position=True),
     }),
+    "vehicle_attitude": Message({f"q[{n}]": Field(label=f"attitude, quaternion {n}") for n in range(4)}),
+    "vehicle_attitude_setpoint": Message({
+        f"q_d[{n}]": Field(label=f"attitude wanted, quaternion {n}") for n in range(4)
+    }),
+    "actuator_motors": Message({
+        f"control[{n}]": Field(label=f"command of motor {n + 1}", plausible=(-1.0, 1.0)) for n in range(12)
+    }),
+    "actuator_outputs": Message({f"output[{n}]": Field(label=f"output {n + 1}") for n in range(16)}),
     "vehicle_angular_velocity": Message(_along("xyz", "rad/s", "rotation rate")),
     "vehicle_acceleration": Message(_along("xyz", "m/s2", "acceleration")),
     "vehicle_rates_setpoint": Message({

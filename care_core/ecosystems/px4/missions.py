@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind
+from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.checks.kill_switch import killed_aloft_s
 from care_core.ecosystems.px4.flight import (
     AIRBORNE_M,
@@ -26,6 +27,8 @@ from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.logs.base import Table, Wanted
 from care_core.run import Check, Evidence, Unavailable, Value
 
+_SOON_S = 1.0
+"""What falls is disarmed as it hits the ground."""
 _BARELY_M = 0.5
 """Rise below which a vehicle never left the ground."""
 _CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
@@ -100,8 +103,19 @@ def _no_crash(flight: Px4Flight, span: Span) -> Check:
     killed_s = flight.killed_s(span)
     gave_up = flight.gave_up((span[0], min(span[1], math.inf if killed_s is None else killed_s)))
     was_cut = not gave_up and killed_aloft_s(flight, span) is not None
-    how = "the kill switch cut its motors in the air" if was_cut else "the failure detector acted"
-    return Check("no_crash", float(not (gave_up or was_cut)), "the failure detector stayed silent", how)
+    hit, lost = upset.hit(flight), upset.lost_control(flight)
+    how = (
+        "the kill switch cut its motors in the air" if was_cut
+        else f"it hit the ground at {hit.speed_ms:.1f} m/s" if hit is not None and _is_in(span, hit.time_s)
+        else "control was lost in the air" if lost is not None and _is_in(span, lost.time_s)
+        else "the failure detector acted" if gave_up
+        else ""
+    )  # fmt: skip
+    return Check("no_crash", float(not how), "the failure detector stayed silent", how)
+
+
+def _is_in(span: Span, t: float) -> bool:
+    return span[0] <= t <= span[1] + _SOON_S
 
 
 def _took_off(flight: Px4Flight, span: Span) -> Value:

@@ -7,7 +7,14 @@ from care_core.ecosystems.vehicles.arming import method_words, unrecorded_change
 from care_core.ecosystems.vehicles.errors import FAILSAFE, error_kind, error_words, is_over
 from care_core.ecosystems.vehicles.events import event_words
 from care_core.ecosystems.vehicles.modes import Way, mode_name, mode_number, reason_words, way_of
-from care_core.ecosystems.vehicles.motors import Motor, is_skid_steered, motor_outputs, motors_of
+from care_core.ecosystems.vehicles.motors import (
+    Motor,
+    is_skid_steered,
+    motor_outputs,
+    motors_at,
+    motors_of,
+    switched_off,
+)
 from care_core.ecosystems.vehicles.parameters import ParameterAlias, alias_in, aliases_of, renamed
 from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.ecosystems.vehicles.vehicle import UNLIKE_ROVERS, Kind, Vehicle, flies, vehicle_of
@@ -33,9 +40,11 @@ __all__ = [
     "mode_name",
     "mode_number",
     "motor_outputs",
+    "motors_at",
     "motors_of",
     "reason_words",
     "renamed",
+    "switched_off",
     "unrecorded_changes",
     "vehicle_of",
     "way_of",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from care_core.ecosystems.vehicles.frames import Arm, arms_of, frame_of
 from care_core.ecosystems.vehicles.settings import Driven, code
@@ -12,6 +13,7 @@ from care_core.records import Record
 _FUNCTIONS = {**{32 + n: n for n in range(1, 9)}, **{73 + n: n for n in range(9, 13)}}
 """SERVOn_FUNCTION -> motor number: k_motor1 to k_motor8 are 33 to 40, k_motor9 to k_motor12 are 82 to 85
 (SRV_Channel.h)."""
+_ARDUPILOT_FUNCTION, _PX4_FUNCTION = re.compile(r"SERVO\d+_FUNCTION"), re.compile(r"\w+_FUNC\d+")
 _OUTPUTS = 32
 _ON_AXIS_DEG = 10.0
 
@@ -41,6 +43,17 @@ def motor_outputs(settings: Driven) -> dict[int, int]:
     return outputs
 
 
+def switched_off(parameter: str, before: float | str, after: float | str) -> int | None:
+    """The motor that a change of an output's function leaves without one, None where it is none: SERVOn_FUNCTION of
+    ArduPilot, and of PX4 PWM_MAIN_FUNCn and its like, where Motor1 to Motor12 are 101 to 112."""
+    if not isinstance(before, (int, float)) or before == after:
+        return None
+    if _ARDUPILOT_FUNCTION.fullmatch(parameter):
+        return _FUNCTIONS.get(int(before))
+    is_motor = _PX4_FUNCTION.fullmatch(parameter) is not None and before in range(101, 113)
+    return int(before) - 100 if is_motor else None
+
+
 def is_skid_steered(settings: Driven) -> bool | None:
     """Whether a ground vehicle steers by driving its sides apart (SRV_Channel.h: k_throttleLeft 73, k_throttleRight
     74), rather than by a steered wheel or rudder (k_steering 26); None where no parameter says."""
@@ -67,6 +80,13 @@ def motors_of(settings: Driven, motors: int | None = None) -> tuple[Motor, ...]:
         Motor(number, outputs[number], arm.angle_deg, arm.roll, arm.pitch, arm.yaw, places[number])
         for number, arm in sorted(arms.items())
     )
+
+
+def motors_at(angles_deg: Sequence[float]) -> tuple[Motor, ...]:
+    """Motors of which no more is known than where they sit, clockwise from the nose; outputs in their order."""
+    arms = {n: Arm((angle + 180) % 360 - 180, 0.0, 0.0, 0.0) for n, angle in enumerate(angles_deg, start=1)}
+    places = _places(arms)
+    return tuple(Motor(n, n, arm.angle_deg, 0.0, 0.0, 0.0, places[n]) for n, arm in arms.items())
 
 
 def _places(arms: Mapping[int, Arm]) -> dict[int, str]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.airborne import UPSIDE_DOWN_DEG
+from care_core.ecosystems.ardupilot.airborne import ACRO, UPSIDE_DOWN_DEG
 from care_core.ecosystems.ardupilot.checks.thrust import saturated
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts
@@ -127,7 +127,8 @@ def _far(flight: Flight) -> Iterator[Finding]:
     if flight.lean_error is None:
         return
     t, error = flight.lean_error
-    spans = lasting(t, (error > FAR_DEG) & during(flight.flown, t), _LASTS_S)
+    levels = during(flight.flown, t) & ~np.isin(flight.modes_at(t), tuple(ACRO))
+    spans = lasting(t, (error > FAR_DEG) & levels, _LASTS_S)
     if spans:
         worst = top(error[(t >= spans[0][0]) & (t <= spans[-1][1])], 0.9)
         severity: Severity = "critical" if flight.impact_s is not None else "warning"

@@ -1,47 +1,73 @@
-"""Parameters that were changed in the air and that act on control at once."""
+"""Parameters that were changed in the air: those after which it was upset, and those that act on control at once."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+from care_core.ecosystems import changed_in_flight
+from care_core.ecosystems.ardupilot.checks import attitude, crash
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.base import Check
+from care_core.ecosystems.changed_in_flight import LIMITS, Change, Upset
 from care_core.ecosystems.findings import Finding
-from care_core.logs.base import Wanted
+from care_core.ecosystems.vehicles import motors_of
+from care_core.logs.base import Wanted, merge_needs
+from care_core.run import shown
 
-READS: Wanted = {}
+READS: Wanted = merge_needs((attitude.READS, crash.READS))
 
-_RISKY = ("ATC_", "PSC_", "RATE_", "STB_", "INS_", "EK2_", "EK3_", "EKF_", "AHRS_", "COMPASS_", "MOT_", "FRAME", 
+_RISKY = ("ATC_", "PSC_", "RATE_", "STB_", "INS_", "EK2_", "EK3_", "EKF_", "AHRS_", "COMPASS_", "MOT_", "FRAME",
           "SERVO", "ARMING_", "FS_", "MIXMODE", "BRD_")  # fmt: skip
-LIMITS = Limits()
-_PROBABILITY = LIMITS.add("probability that a change in the air harms", 0.2, "", "a choice: few changes do")
+_HARMS = LIMITS.add("probability that a change in the air harms", 0.2, "", "a choice: few changes do")
 _NAMED = 5
 _LEARNED = ("MOT_THST_HOVER", "COMPASS_OFS", "COMPASS_DEC", "INS_GYR", "STAT_", "_CAL", "_ID")
 """What the firmware itself writes while it flies."""
+_AUTOTUNE = range(30, 38)
+"""EV records of a tune, which changes gains by itself."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """One finding for all of them."""
-    changed = sorted(
-        (at, name, one.value)
-        for name, values in flight.settings.items()
-        if name.startswith(_RISKY) and not any(word in name for word in _LEARNED)
-        for one in values
-        if (at := one.changed_at_s) is not None and any(start < at < end for start, end in flight.airborne)
-    )
-    if changed and not flight.events(*range(30, 38)):  # autotune changes gains by itself
+    """One finding for the changes before an upset, and one for all others that act on control."""
+    if flight.events(*_AUTOTUNE):
+        return
+    flown = flight.airborne if flight.is_copter else flight.armed
+    changed = [
+        one
+        for one in changed_in_flight.changes(flight.settings, flown)
+        if not any(word in one.name for word in _LEARNED)
+    ]
+    if not changed:
+        return
+    is_lost = flight.lost_control_s is not None or flight.impact_s is not None
+    motors = motors_of(flight.settings, flight.motor_outputs) if flight.is_copter else ()
+    found = list(changed_in_flight.find(changed, _upsets(flight), motors, is_lost=is_lost, source="PARM"))
+    yield from found
+    named = {name for one in found for name in one.parameters}
+    yield from _noted([one for one in changed if one.name.startswith(_RISKY) and one.name not in named])
+
+
+def _upsets(flight: Flight) -> Iterator[Upset]:
+    """When it did not follow its demand, swung, was lost or hit the ground."""
+    for left_s in flight.left_demand:
+        yield Upset(left_s, "its attitude was 30 degrees off its target")
+    for one in (*attitude.find(flight), *crash.find(flight)):
+        yield Upset(one.onset_s, one.title)
+
+
+def _noted(changed: list[Change]) -> Iterator[Finding]:
+    if changed:
         yield Finding(
             kind="tuning",
             title="parameters were changed in the air",
-            onset_s=changed[0][0],
-            end_s=changed[-1][0],
+            onset_s=changed[0].time_s,
+            end_s=changed[-1].time_s,
             severity="info",
-            evidence=", ".join(f"{name}={value}" for _, name, value in changed[:_NAMED])
+            evidence=", ".join(f"{one.name}={shown(one.after)}" for one in changed[:_NAMED])
             + (", ..." if len(changed) > _NAMED else ""),
             source="PARM",
             suspect="parameter",
-            probability=_PROBABILITY,
+            probability=_HARMS,
         )
 
 
-CHECK = Check("changes", "parameters changed in the air that act on control at once", READS, LIMITS, find)
+CHECK = Check("changes", "parameters changed in the air, above all shortly before an upset", READS, LIMITS, find)

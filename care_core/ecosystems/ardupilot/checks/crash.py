@@ -30,7 +30,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     told = min((t for t, code in flight.errors(_ERR_CRASH) if code > 0), default=None)
     said = min((t for t, text in flight.messages if text.startswith(("Crash: ", "Crash!"))), default=None)
     lost, impact = flight.lost_control_s, flight.impact_s
-    begin = min((t for t in (told, said, lost) if t is not None), default=None)
+    begin = min((t for t in (told, said, lost, impact) if t is not None), default=None)
     if begin is None:
         yield from _stranded(flight)
     elif _tipped(flight, lost if lost is not None else begin):
@@ -52,27 +52,32 @@ def find(flight: Flight) -> Iterator[Finding]:
     elif told is not None or said is not None or impact is not None:
         first = min(t for t in (told, said, impact) if t is not None)
         steered = _steered(flight, first)
-        what = "it hit something" if flight.was_struck else "it crashed"
-        what = "it flew into the ground as steered" if steered else what
+        is_said = told is not None or said is not None
+        shown = (
+            "the firmware says: crash" if is_said else "control was lost, then it hit" if lost is not None else "",
+            "" if flight.hit is None else flight.hit.said,
+            steered,
+            "a blow came before control was lost" if flight.was_struck else "",
+        )
         yield Finding(
             kind="crash",
-            title=what,
+            title=_what(flight, steered),
             onset_s=first,
             end_s=first,
             severity="critical",
-            evidence=(
-                (
-                    "the firmware says: crash"
-                    if told is not None or said is not None
-                    else "control was lost, then it hit"
-                )
-                + (f"; {steered}" if steered else "")
-                + ("; a blow came before control was lost" if flight.was_struck else "")
-            ),
-            source="ERR 12, MSG, ATT, IMU",
+            evidence="; ".join(filter(None, shown)),
+            source="ERR 12, MSG, ATT, IMU, height",
             suspect="operation" if steered else "hardware",
             probability=_CRASHED,
         )
+
+
+def _what(flight: Flight, steered: str) -> str:
+    if steered:
+        return "it flew into the ground as steered"
+    if flight.was_struck:
+        return "it hit something"
+    return "it crashed" if flight.hit is None else f"it hit the ground at {flight.hit.speed_ms:.1f} m/s"
 
 
 def _stranded(flight: Flight) -> Iterator[Finding]:

@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems import lost_motor
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, means, records
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.lost_motor import Commands, driven_hardest
 from care_core.ecosystems.vehicles import Motor, motors_of
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median, pieces, quantile
@@ -30,7 +32,7 @@ READS: Wanted = {
     "ESC": ("RPM",),
 }
 
-LIMITS = Limits()
+LIMITS = Limits(lost_motor.LIMITS)
 ALONE = LIMITS.add(
     "output of one motor above its peers", 0.08, "of the range",
     "in nine of ten healthy training flights none is 0.02 above; a twisted arm or an uneven load moves motors in pairs",
@@ -55,6 +57,7 @@ _TOWARDS = LIMITS.add("share of a motor in that direction", 0.15, "", "a choice:
 _ASKED = LIMITS.add("output of a motor that gave nothing", 0.6, "of the range", "a choice: asked for much, and clearly")
 _CLEARLY = LIMITS.add("that output above its peers", 0.15, "of the range", "a choice")
 _MOSTLY = LIMITS.add("share of records in which it is the highest", 0.6, "", "a choice: else motors take turns")
+_LEANS_S = LIMITS.add("time over which its lean is taken", 0.3, "s", "a choice: then it turns")
 _FALL_S = LIMITS.add("fall to the side that lost it", 1.2, "s", "a choice: then it tumbles")
 _AT_LIMIT = LIMITS.add("output at its limit", 0.97, "of the range", "a choice: outputs are rounded")
 _LIMITED = LIMITS.add("critical share of the time at its limit", 0.2, "", "a choice: nothing is left to give")
@@ -108,7 +111,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     outputs = _outputs(flight)
     if outputs is None:
         return
-    for test in (_stopped, _fell_towards, _weak, _reported):
+    for test in (_stopped, _fell_towards, _driven_hardest, _weak, _reported):
         found = next(iter(test(flight, outputs)), None)
         if found is not None:
             yield found
@@ -273,6 +276,37 @@ def _fell_towards(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
         f"{roll:+.0f} degrees of roll and {pitch:+.0f} of pitch off the demand",
         f"{_SOURCE}, and ATT", _GAVE_NOTHING if near[0].sum() > 3 else _PERHAPS,
     )  # fmt: skip
+
+
+def _driven_hardest(flight: Flight, outputs: _Outputs) -> Iterator[Finding]:
+    """The motor that was driven hardest, alone, just before control was lost, and was the first near its limit."""
+    lost, table = flight.lost_control_s, flight.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+    if lost is None or table is None or not flight.airborne or flight.was_struck or not _was_calm(flight, lost):
+        return
+    rows = (table.t >= lost) & (table.t <= lost + _LEANS_S)
+    around = np.abs(outputs.t - lost) < _FALL_S + _WINDOW_S
+    if not rows.any() or not around.any():
+        return
+    # Nose up is a fall backwards, right side down one to the right.
+    fall = (
+        -float(np.mean((table["Pitch"] - table["DesPitch"])[rows])),
+        float(np.mean((table["Roll"] - table["DesRoll"])[rows])),
+    )
+    numbers = tuple(motor.number for motor in outputs.motors)
+    commands = Commands(outputs.t[around], outputs.share(around), numbers)
+    arms = {motor.number: motor.angle_deg for motor in outputs.motors if motor.place}
+    hardest = driven_hardest(commands, lost, fall, arms)
+    if hardest is not None:
+        yield Finding(
+            kind="motor",
+            title=hardest.title(outputs.motors),
+            onset_s=min(hardest.near_s, lost),
+            end_s=lost,
+            severity="critical",
+            evidence=hardest.evidence,
+            source=f"{_SOURCE}, and ATT",
+            probability=lost_motor.PROBABILITY,
+        )
 
 
 def _was_calm(flight: Flight, lost: float) -> bool:

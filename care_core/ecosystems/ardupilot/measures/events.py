@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+from care_core.ecosystems.ardupilot.airborne import Hit
 from care_core.ecosystems.ardupilot.armed import ArmChange
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, SAID_AFTER_S, analyse
 from care_core.ecosystems.ardupilot.measures.modes import flight_of, is_armed
@@ -62,6 +63,7 @@ def _arm_changes(mission: Mission) -> list[ArmChange]:
 
 
 CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
+UNRECORDED = Unavailable("the log records no arming", "set LOG_DISARMED to 1", "ARM")
 NOT_FLOWN = Unavailable("the vehicle never armed", "see why arming was refused")
 _EVENTS: Wanted = {name: NEEDS[name] for name in ("MSG", "ARM", "EV", "ERR")}
 
@@ -82,9 +84,27 @@ def _in_flight(mission: Mission, kind: str, about: str = "") -> Value:
     return has_event(mission, kind, about) if is_armed(mission) else NOT_FLOWN
 
 
+def crash_of(mission: Mission) -> str:
+    """What says that the vehicle crashed, in a clause; empty where nothing does."""
+    if has_event(mission, "crash"):
+        return "the autopilot reported a crash"
+    if (hit := hit_of(mission)) is not None:
+        return f"it hit the ground at {hit.speed_ms:.1f} m/s"
+    impact_s = flight_of(mission).impact_s
+    is_own = impact_s is not None and mission.start_s <= impact_s <= mission.end_s + SAID_AFTER_S
+    return "control was lost, then it hit" if is_own else ""
+
+
+def hit_of(mission: Mission) -> Hit | None:
+    """The contact with the ground at speed that ended the mission, None where there was none."""
+    hit = flight_of(mission).hit
+    return hit if hit is not None and mission.start_s <= hit.time_s <= mission.end_s + SAID_AFTER_S else None
+
+
 def failed(mission: Mission) -> bool:
     """Whether something ended the flight for good: no landing after it makes the mission a success."""
-    return forced(mission) or bool(has_event(mission, "crash")) or bool(has_event(mission, "failsafe"))
+    crashed = bool(has_event(mission, "crash")) or hit_of(mission) is not None
+    return forced(mission) or crashed or bool(has_event(mission, "failsafe"))
 
 
 def is_over(mission: Mission) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from care_core.ecosystems.ardupilot.flight import as_flight
+from care_core.ecosystems.ardupilot.flight import Flight, as_flight
 from care_core.ecosystems.ardupilot.measures.events import (
     errors,
     failed,
@@ -50,8 +50,7 @@ class ArduPilotFlight(MissionKind):
         spans = [(start, end, end in disarmed) for start, end in flight.recorded_armed if start in armed]
         if not flight.arm_changes and flight.refusals:
             spans = [(0.0, flight.end_s, True)]
-        sound = {name: flight.sound_table(name, table) for name, table in tables.items()}
-        kept = {name: table for name, table in sound.items() if table is not None}
+        kept = _sound(flight, tables)
         return tuple(Mission(model, kept, start_s, end_s, has_ended, spec) for start_s, end_s, has_ended in spans)
 
     def mismatch(self, mission: Mission) -> str:
@@ -104,4 +103,26 @@ class ArduPilotFlight(MissionKind):
         return mode_names(mission)
 
 
+class UnrecordedArming(ArduPilotFlight):
+    """A flight whose arming no record tells of: a log that begins or is written while armed, or of old firmware. It is
+    armed as its status or its throttle says, and over where a disarming is recorded or where it stands at the end."""
+
+    name = "ardupilot_unrecorded_arming"
+
+    def missions(self, model: RunModel, tables: Mapping[str, Table], spec: Args) -> tuple[Mission, ...]:
+        flight = as_flight(model)
+        disarmed = {one.time_s for one in flight.arm_changes if not one.is_armed}
+        kept = _sound(flight, tables)
+        return tuple(
+            Mission(model, kept, start_s, end_s, end_s in disarmed or flight.stands_at_end, spec)
+            for start_s, end_s in flight.armed
+        )
+
+
+def _sound(flight: Flight, tables: Mapping[str, Table]) -> dict[str, Table]:
+    sound = {name: flight.sound_table(name, table) for name, table in tables.items()}
+    return {name: table for name, table in sound.items() if table is not None}
+
+
 MISSION_KINDS[ArduPilotFlight.name] = ArduPilotFlight()
+MISSION_KINDS[UnrecordedArming.name] = UnrecordedArming()

@@ -19,8 +19,10 @@ def modes_in_force(mission: Mission) -> tuple[Mode, ...]:
 
 
 def is_armed(mission: Mission) -> bool:
-    """Whether the vehicle was armed before the mission's end."""
-    return any(change.is_armed and change.time_s <= mission.end_s for change in flight_of(mission).arm_changes)
+    """Whether the vehicle was armed before the mission's end, by its records or by what else shows it."""
+    flight = flight_of(mission)
+    is_recorded = any(change.is_armed and change.time_s <= mission.end_s for change in flight.arm_changes)
+    return is_recorded or any(start <= mission.start_s < end for start, end in flight.armed)
 
 
 def mode_names(mission: Mission) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.measures.events import CUT, failed, forced, has_event, is_over
+from care_core.ecosystems.ardupilot.measures.events import CUT, UNRECORDED, crash_of, failed, forced, has_event, is_over
 from care_core.ecosystems.ardupilot.measures.flown_mission import (
     AIRBORNE_M,
     NEEDS,
@@ -58,7 +58,8 @@ def _nothing_to_judge(mission: Mission, flown: FlownMission) -> Unavailable | No
 
 def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Check]:
     """What a flight or drive is judged by that no limit belongs to; with its mission, where one was begun."""
-    crashed = bool(has_event(mission, "crash"))
+    crash = crash_of(mission)
+    crashed = bool(crash)
     yield Check("armed", 1.0, "the vehicle armed")
     kind = flight_of(mission).mode_kind
     if flies(kind):
@@ -69,7 +70,7 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Che
     if and_mission and any(mode.way == "mission" for mode in modes_in_force(mission)):
         done = _mission_done(mission)
         yield Check("mission_success", done, "every waypoint of the mission was reached", short_of(mission))
-    yield Check("no_crash", 1.0 - crashed, "the autopilot reported no crash", "the autopilot reported a crash")
+    yield Check("no_crash", 1.0 - crashed, "the autopilot reported no crash, and none shows", crash)
     acted = has_event(mission, "failsafe")
     yield Check("no_failsafe", 1.0 - acted, "no failsafe acted", "a failsafe acted")
     if flies(kind):
@@ -78,6 +79,8 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Che
     elif done == 1.0 and not mission.ended:
         return  # what stands on the ground when all is done comes to no harm by staying armed
     at_end: Value = 1.0 - forced(mission) if mission.ended else CUT
+    if mission.ended and not flight_of(mission).arm_changes:
+        at_end = UNRECORDED
     yield Check("disarmed", at_end, "it was disarmed, and not by force in flight", "it was disarmed by force")
 
 
@@ -135,7 +138,7 @@ def _landed(mission: Mission) -> Value:
         return CUT
     heights = _heights(mission)
     low = bool(heights[-1] <= AIRBORNE_M) if len(heights) else _detected(mission, _LANDED)
-    low = low or _touched_down(mission)
+    low = low or _touched_down(mission) or flight_of(mission).stands_at_end
     if not low and flight_of(mission).kind in _GLIDES:
         return Unavailable(f"it was disarmed {heights[-1]:.0f} m above home" if len(heights) else "nothing says so")
     return float(low)

@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from care_core.ecosystems.base import Check
-from care_core.ecosystems.px4.checks import arming, estimator, flags, kill_switch
+from care_core.ecosystems.px4.checks import arming, changes, crash, estimator, flags, kill_switch, motor
 from care_core.ecosystems.px4.flight import Px4Flight
 
-CHECKS: tuple[Check[Px4Flight], ...] = (flags.CHECK, estimator.CHECK, kill_switch.CHECK, arming.CHECK)
+CHECKS: tuple[Check[Px4Flight], ...] = (
+    flags.CHECK,
+    estimator.CHECK,
+    motor.CHECK,
+    changes.CHECK,
+    crash.CHECK,
+    kill_switch.CHECK,
+    arming.CHECK,
+)

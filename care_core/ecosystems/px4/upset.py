@@ -1,0 +1,128 @@
+"""When a multicopter under PX4 lost control in the air, and when it hit the ground."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.base import Limits
+from care_core.ecosystems.px4 import attitude
+from care_core.ecosystems.px4.flight import LANDED, POSITION, ROTARY, STATUS, Px4Flight
+from care_core.logs.base import Wanted, merge_needs
+
+_COMBINED = "sensor_combined"
+_FORCES = tuple(f"accelerometer_m_s2[{n}]" for n in range(3))
+READS: Wanted = merge_needs((attitude.READS, {_COMBINED: _FORCES, POSITION: ("z",), LANDED: ("landed",)}))
+
+LIMITS = Limits()
+LEFT_DEG = LIMITS.add("thrust direction off its demand", 30.0, "deg", "ArduCopter's crash check; PX4 has none")
+_TIPPED_DEG = LIMITS.add(
+    "lean where no demand is recorded", 60.0, "deg", "FD_FAIL_R and FD_FAIL_P as shipped; MPC_TILTMAX_AIR is 45"
+)
+_HELD_DEG = LIMITS.add("thrust direction that is held", 15.0, "deg", "a choice: half of the first")
+_BACK_S = LIMITS.add("time held after which it was back", 2.0, "s", "a choice: a gust")
+_LASTS_S = LIMITS.add("shortest time off its demand", 0.2, "s", "a choice: a step of the demand is over sooner")
+_ALOFT_M = LIMITS.add("height in the air", 1.0, "m", "a choice: below, a landing leg may tip it")
+_HIT_MS = LIMITS.add("descent into the ground", 3.0, "m/s", "a fall from half a metre; MPC_LAND_SPEED is 0.7")
+_FALLS_S = LIMITS.add("time over which it is taken", 0.5, "s", "a choice: what tumbles falls unsteadily")
+_SHOCK = LIMITS.add("blow", 30.0, "m/s^2", "three times gravity is no flight")
+_OVER_USUAL = LIMITS.add("blow over what it felt before", 2.0, "", "a choice: vibration is no blow")
+_USUAL_S = LIMITS.add("time before a blow", 4.0, "s", "a choice")
+_ENDED_S = LIMITS.add("time in which it is on the ground or disarmed", 10.0, "s", "COM_DISARM_LAND: 2 s, and margin")
+_ACRO = 10
+"""nav_state of acro, in which every attitude is meant (vehicle_status.msg)."""
+
+
+class Hit(NamedTuple):
+    """A contact with the ground at a speed that no landing has."""
+
+    time_s: float
+    speed_ms: float
+    blow: float
+    """m/s^2."""
+
+
+class Lost(NamedTuple):
+    """A loss of control."""
+
+    time_s: float
+    fall: tuple[float, float]
+    """Forward and right parts of where it leaned, off what was wanted."""
+    most_deg: float
+    """How far off its demand it came."""
+
+
+def hit(flight: Px4Flight) -> Hit | None:
+    """The first time that it hit the ground at speed: a blow at the end of a fast descent that ended the flight."""
+    table, position = flight.table(_COMBINED, *_FORCES), flight.table(POSITION, "z")
+    if table is None or position is None:
+        return None
+    felt = np.sqrt(sum(table[name] ** 2 for name in _FORCES))
+    known = np.isfinite(position["z"])
+    if not known.any():
+        return None
+    t, z = position.t[known], position["z"][known]
+    for at in table.t[felt > _SHOCK].tolist():
+        if not any(start <= at <= end + 1.0 for start, end in flight.armed):
+            continue
+        speed = float(np.interp(at, t, z) - np.interp(at - _FALLS_S, t, z)) / _FALLS_S
+        blow = float(np.max(felt[(table.t >= at) & (table.t <= at + 1.0)]))
+        usual = felt[(table.t >= at - _USUAL_S) & (table.t < at - 0.2)]
+        is_blow = not len(usual) or blow > _OVER_USUAL * float(np.max(usual))
+        if speed > _HIT_MS and is_blow and _ends_after(flight, at):
+            return Hit(at, speed, blow)
+    return None
+
+
+def _ends_after(flight: Px4Flight, at: float) -> bool:
+    """Whether the flight is over soon after."""
+    landed = flight.during(LANDED, "landed", (at, at + _ENDED_S))
+    return (
+        not any(start <= at and end > at + _ENDED_S for start, end in flight.armed)
+        or flight.end_s < at + _ENDED_S
+        or (landed is not None and bool(np.any(landed["landed"] == 1)))
+    )
+
+
+def lost_control(flight: Px4Flight) -> Lost | None:
+    """When a multicopter in the air stopped following its attitude demand and was not back before it was down."""
+    lean = flight.lean
+    if lean is None or not flight.armed:
+        return None
+    off = np.where(np.isfinite(lean.error_deg), lean.error_deg > LEFT_DEG, False)
+    if not np.isfinite(lean.error_deg).any():
+        off = lean.tilt_deg > _TIPPED_DEG
+    impact = hit(flight)
+    for start, end in flight.spans(lean.t, off):
+        falls = impact is not None and start <= impact.time_s <= end + _ENDED_S
+        if end - start < _LASTS_S or not _is_aloft(flight, start) or not (falls or _stays(flight, lean, end)):
+            continue
+        now = (lean.t >= start) & (lean.t <= start + _LASTS_S)
+        fall = lean.off[:, now].mean(axis=1)
+        until = end if impact is None else min(max(end, start + _LASTS_S), impact.time_s)
+        error = np.where(np.isfinite(lean.error_deg), lean.error_deg, lean.tilt_deg)
+        most = float(np.max(error[(lean.t >= start) & (lean.t <= max(until, end))]))
+        return Lost(start, (float(fall[0]), float(fall[1])), most)
+    return None
+
+
+def _is_aloft(flight: Px4Flight, at: float) -> bool:
+    """Whether it hovered, armed and above the ground, in a mode in which not every attitude is meant."""
+    height = flight.height_m(at)
+    mode = [mode for t, mode in flight.modes if t <= at][-1:]
+    return (
+        any(start < at <= end for start, end in flight.armed)
+        and flight.last(STATUS, "vehicle_type", at) in (ROTARY, None)
+        and flight.last(LANDED, "landed", at - 2.0) in (0, None)
+        and (height is None or height > _ALOFT_M)
+        and mode != [_ACRO]
+    )
+
+
+def _stays(flight: Px4Flight, lean: attitude.Lean, since: float) -> bool:
+    """Whether it was not back within limits, while armed, after a time."""
+    until = next((end for start, end in flight.armed if start <= since <= end), since)
+    held: NDArray[np.bool_] = (lean.error_deg < _HELD_DEG) & (lean.t > since) & (lean.t <= until)
+    return not any(end - start > _BACK_S for start, end in flight.spans(lean.t, held))
