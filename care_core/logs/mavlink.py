@@ -159,7 +159,14 @@ class MavlinkLog:
         others = [sender for sender in self._senders[1:] if sender.system != self.vehicle.system]
         if others:
             facts["others"] = ", ".join(self._called(sender) for sender in others)
+        if vehicles := [self._called(sender) for sender in others if self._is_vehicle(sender)]:
+            facts["vehicles"] = ", ".join(vehicles)
         return facts
+
+    def _is_vehicle(self, who: Sender) -> bool:
+        """Whether it is an autopilot that drives or flies something: no station, camera, tracker or transponder."""
+        kind, autopilot = self._said.get(who, (-1, -1))
+        return kind in _VEHICLES and autopilot != _AUTOPILOT_NONE
 
     @cached_property
     def start(self) -> str | None:

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from care_core.ecosystems.examine import examine
+from care_core.ecosystems.registry import run_model
 from care_core.errors import LogError
 from care_core.logs.mavlink import MavlinkLog
 from care_core.logs.opening import open_log
@@ -250,3 +252,24 @@ def test_zeros_that_a_log_begins_with_do_not_hide_it(tmp_path: Path) -> None:
     path.write_bytes(bytes(10_000))
     with pytest.raises(LogError, match="nothing but zeros"):
         open_log(path)
+
+
+def test_a_second_vehicle_is_told_and_a_camera_or_a_transponder_is_none(tmp_path: Path) -> None:
+    def heard(*others: tuple[int, int, int, int]) -> list[str]:
+        path = tmp_path / "two.tlog"
+        senders = {(1, 1): (2, 3), **{(system, part): (kind, pilot) for system, part, kind, pilot in others}}
+        packets = []
+        for t in range(20):
+            for sender, (kind, pilot) in senders.items():
+                beat = mavlink.MAVLink_heartbeat_message(kind, pilot, 0x51, 0, 4, 3)
+                stamp = 1_700_000_000_000_000 + t * 1_000_000
+                packets.append(struct.pack(">Q", stamp) + beat.pack(mavlink.MAVLink(None, *sender)))
+            for _ in range(2):  # the vehicle sends most
+                attitude = mavlink.MAVLink_attitude_message(t * 1000, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+                stamp = 1_700_000_000_000_000 + t * 1_000_000 + 1000
+                packets.append(struct.pack(">Q", stamp) + attitude.pack(mavlink.MAVLink(None, 1, 1)))
+        path.write_bytes(b"".join(packets))
+        return [one.title for one in examine(run_model(open_log(path))).findings if "another" in one.title]
+
+    assert heard((2, 1, 1, 3)) == ["another vehicle is in this telemetry: 2.1 (fixed wing)"]
+    assert heard((255, 190, 6, 8), (1, 154, 26, 8), (42, 156, 27, 8), (1, 191, 18, 8)) == []

@@ -32,9 +32,27 @@ _ENDS = LIMITS.add("probability of an end in the air", 0.4, "", "a choice: recor
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """Holes in all of the steady messages at once, and a log that ends before the landing."""
+    """Holes in all of the steady messages at once, a log that ends before the landing, and one of several vehicles."""
     yield from _holes(flight)
     yield from _ends_in_the_air(flight)
+    yield from _other_vehicles(flight)
+
+
+def _other_vehicles(flight: Flight) -> Iterator[Finding]:
+    """Telemetry of several vehicles: each message is told of the one whose autopilot sent most."""
+    others = flight.log.facts.get("vehicles")
+    if others:
+        yield Finding(
+            kind="log",
+            title=f"another vehicle is in this telemetry: {others}",
+            onset_s=0.0,
+            end_s=flight.end_s,
+            severity="warning",
+            evidence=f"all that is told is of vehicle {flight.log.facts.get('system', '')}",
+            source="HEARTBEAT",
+            suspect="operation",
+            probability=_HOLE,
+        )
 
 
 def _holes(flight: Flight) -> Iterator[Finding]:
