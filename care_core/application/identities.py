@@ -38,7 +38,7 @@ PLACES = re.compile(
     | ///[^\W\d_]+\.[^\W\d_]+\.[^\W\d_]+
     | \b(?:[a-r]{{2}}\d{{2}}[a-x]{{2}}(?:\d{{2}})?)\b                               # Maidenhead
     | \b(?:elevation|amsl|msl)\b\W{{0,3}}(?:set|is|at)?\W{{0,3}}{_NUMBER}           # a height above the sea
-    | {_NUMBER}\s?m?\s?\b(?:amsl|msl)\b
+    | {_NUMBER}\s?m?\s?\b(?:amsl|msl|(?:above|over)\s(?:mean\s)?sea)\b
     """,
     re.VERBOSE | re.IGNORECASE,
 )
@@ -76,8 +76,9 @@ IDENTITIES = re.compile(
     | (?<![\w.])\d{{6,}}\b(?!\s?baud\b)
     | (?<![\w-])[0-9a-f]{{2,12}}(?:-[0-9a-f]{{2,12}}){{3,8}}\b       # UUID
     | \+\d[\d ()/.-]{{7,}}\d | \(?\b0\d{{1,4}}\)?[ /-]\d{{2,}}(?:[ /-]?\d{{2,}})+\b            # telephone
-    | \b(?:serial|s/n|sn|ser|asset|imei|imsi|iccid|icao|squawk|call\s?sign|tail|registration|reg|ssid|wi-?fi|wlan|hotspot|password|passwd|passphrase|pwd|psk|token|secret|api[\s_-]?key|host|hostname|user|username|login|owner|operator|customer|phone|tel|mobile|addr|address)\b
+    | \b(?:serial|s/n|sn|ser|asset|imei|imsi|iccid|icao|squawk|call\s?sign|tail|registration|reg|ssid|wi-?fi|wlan|hotspot|password|passwd|passphrase|pwd|psk|token|secret|api[\s_-]?key|host|hostname|user|username|login|owner|operator|customer|phone|tel|mobile|addr|address|uuid|guid|uid)\b
       [\s:=#._]*(?:(?:no|nr|num|number|id|name|key|code|is|was|of|to|mode)\b[\s:=#._]*){{0,2}}[^\s,;]+
+    | \b(?:pilot|crew|team|name|driver|site|farm|club|company|unit|vehicle|robot|drone|aircraft)\s?[:=]\s?[^,;]+
     """,  # noqa: E501 - a class a line
     re.VERBOSE | re.IGNORECASE,
 )

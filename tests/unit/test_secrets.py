@@ -25,7 +25,7 @@ PLACES = (
     "47.3977N 8.5455E", "N47.39 E8.54", "S33 51 31 W151 12 33", "47\N{DEGREE SIGN}23'51\"N 8\N{DEGREE SIGN}32'44\"E",
     "47-23-51N 008-32-44E", "n47 23 51, e8 32 44", "-33.86/151.20", "32T 465123 5248765", "32T MT 65120 45678",
     "32TMT6512045", "465123 5248765", "8FVC9G8F+6X", "9G8F+6X", "JN47gh", "///filled.count.soap", "lat 47 lon 8",
-    "elevation 488m", "488 m AMSL", "[47.39, 8.54]", "47.39|8.54", "472351N 0083244E",
+    "elevation 488m", "alt 488 m above sea level", "488 m AMSL", "[47.39, 8.54]", "47.39|8.54", "472351N 0083244E",
 )  # fmt: skip
 DAYS = (
     "started 21.11.26 08:45", "21.11.2026", "21. Nov 2026", "21nov26", "Nov 21", "November 21st, 2026", "Nov 2026",
@@ -42,6 +42,7 @@ SERIALS = (
     "serial no 4711", "S/N: 4711", "SN 4711", "serial number is 4711", "tail N123AB", "ICAO 4B1A3C", "squawk 7123",
     "IMEI 35", "asset 12", "SSID Cube", "WiFi: Cube", "password will", "owner: will", "call sign mission", "unit 4711",
     "0036003A 3133510B", "4B1A3C", "123e4567-e89b-12d3-a456-426614174000", "user will", "host server",
+    "UUID 1234", "pilot: Mark", "robot=home", "site: North field",
 )  # fmt: skip
 NAMES = (
     "host robot7", "robot7 lost", "/husky_07/odom", "node /husky_07/odom gone", "uav12", "cart_3_left", "R2D2",
