@@ -92,7 +92,7 @@ def serve_made() -> None:
         diff=lambda _case, _fix, _side: "-a\n+b\n",
         report=lambda _diagnosis, format: f"report {format}\n" * 100,
         commands=lambda _diagnosis: [],
-        remember=lambda _diagnosis: None,
+        remember=lambda _diagnosis, _request: None,
     )
     CareApp(Request(Path("/logs/many.BIN")), engine=engine, settings=Settings(places=())).run()
 

@@ -83,7 +83,7 @@ class Engine(Record):
     report: Callable[[Case, str], str] = report_of
     commands: Callable[[Diagnosis], list[str]] = commands_of
     save: Callable[[Path, str], None] = save_text
-    remember: Callable[[Diagnosis], CareError | None] = remember_triage
+    remember: Callable[[Diagnosis, Request], CareError | None] = remember_triage
 
 
 def as_care_error(err: Exception) -> CareError:

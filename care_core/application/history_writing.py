@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from care_core.errors import CareError
 
 if TYPE_CHECKING:
+    from care_core.application.case import Request
     from care_core.diagnose.records import Diagnosis
     from care_core.history.store import About, History
     from care_core.run import Run
@@ -27,13 +29,32 @@ def remember(record: Callable[[History], None]) -> CareError | None:
     return None
 
 
-def remember_triage(diagnosis: Diagnosis) -> CareError | None:
-    """Put a triage into the history; answers what was in the way."""
+def remember_triage(diagnosis: Diagnosis, request: Request | None = None) -> CareError | None:
+    """Put a triage into the history, with what was asked of it; answers what was in the way."""
+    from care_core.records import replace
     from care_core.report.document import build_document
     from care_core.report.writers import published
 
     document, about = published(build_document(diagnosis)), about_run(diagnosis.run)
+    about = replace(about, terms="" if request is None else terms_of(request))
     return remember(lambda history: history.add_triage(document, diagnosis.run.mission.index, about))
+
+
+def terms_of(request: Request) -> str:
+    """What a log is judged by where that is not the profile alone, as a digest: the operator's bounds, the site file
+    as it is now, another reference. Empty where nothing is."""
+    from care_core.files import read_small_bytes
+    from care_core.profile.site import site_path
+
+    try:
+        site = read_small_bytes(request.site or site_path())
+    except OSError:  # there is none, or reading it for the triage says what is wrong
+        site = b""
+    asked = (
+        request.profile, request.configs, request.keep, sorted(request.thresholds.items()), request.mission,
+        request.repeats, request.since, request.reference, site,
+    )  # fmt: skip
+    return hashlib.sha256(repr(asked).encode()).hexdigest()[:16] if any(asked) else ""
 
 
 def about_run(run: Run) -> About:

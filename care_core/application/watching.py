@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from care_core.application.case import Request, open_case
-from care_core.application.history_writing import about_run
+from care_core.application.history_writing import about_run, terms_of
 from care_core.diagnose.verdict import exit_code
 from care_core.errors import CareError, ExitCode
 from care_core.history.store import About, History, HistoryError
@@ -78,6 +78,10 @@ class Watcher(Struct, eq=False, dict=True):
     @cached_property
     def _patience(self) -> StabilityTimeout:
         return StabilityTimeout(self.task.quiet_s, self.task.abandoned_s)
+
+    @cached_property
+    def _terms(self) -> str:
+        return terms_of(_request(Path(), self.task))
 
     def look(self) -> Iterator[WatchEntry]:
         """One look at the folders."""
@@ -163,7 +167,7 @@ class Watcher(Struct, eq=False, dict=True):
             self.known += 1
             return None
         history = self.history
-        past = None if history is None else self._ask(lambda _: history.triage_of(sha256), None)
+        past = None if history is None else self._ask(lambda _: history.triage_of(sha256, self._terms), None)
         if past is None:
             return None
         entry = judged_entry(self._next(), _now(), past.document, past.robot, is_new=False)
@@ -178,7 +182,7 @@ class Watcher(Struct, eq=False, dict=True):
         if self.history is None:
             return without
         try:
-            return question(WatchBook(self.history))
+            return question(WatchBook(self.history, self._terms))
         except HistoryError as err:
             self.tell(f"care: {err}")
             return without
@@ -199,9 +203,12 @@ def triage_one(path: Path, *, task: Task) -> Triage:
     from care_core.report.document import build_document
     from care_core.report.writers import published
 
-    request = Request(path, task.profile, thresholds=task.thresholds, site=task.site, robot=task.robot)
-    diagnosis = open_case(request, lambda _step, _share: None).diagnosis
+    diagnosis = open_case(_request(path, task), lambda _step, _share: None).diagnosis
     return published(build_document(diagnosis)), diagnosis.run.mission.index, about_run(diagnosis.run)
+
+
+def _request(path: Path, task: Task) -> Request:
+    return Request(path, task.profile, thresholds=task.thresholds, site=task.site, robot=task.robot)
 
 
 def overall_code(entries: Sequence[WatchEntry], waiting: int) -> ExitCode:

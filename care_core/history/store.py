@@ -57,6 +57,15 @@ create index watched_stamp on watched (stamp);
 """What version 2 added: whose runs they are, what was asked, all parameters; and what `care watch` has done."""
 
 
+JUDGED_BY = "log_sha256 = ? and (instr(about, ?) > 0 or (? = '' and instr(about, '\"terms\": ') = 0))"
+"""A triage of this log by these terms; those of earlier versions do not tell theirs and count as the usual ones."""
+
+
+def judged_by(sha256: str, terms: str) -> tuple[str, str, str]:
+    """The values of JUDGED_BY."""
+    return sha256, f'"terms": {json.dumps(terms)}', terms
+
+
 class HistoryError(CareError):
     """The store cannot be used; the work it would have recorded is not affected."""
 
@@ -70,6 +79,8 @@ class About(Record):
     settings: Mapping[str, float | str] = field(default_factory=dict)
     recording: str = ""
     """What copies of its log share."""
+    terms: str = ""
+    """What it was judged by where that was not the profile alone, as a digest."""
 
 
 class Triaged(Record):
@@ -183,11 +194,12 @@ class History(Record):
             newest.setdefault((triaged.recording or str(number), triaged.mission, of_profile), triaged)
         return tuple(newest.values())
 
-    def triage_of(self, sha256: str) -> Triaged | None:
-        """The last triage of a log by what it holds, None where there is none. Raises HistoryError."""
+    def triage_of(self, sha256: str, terms: str = "") -> Triaged | None:
+        """The last triage of a log by what it holds, judged by these terms; None where there is none. Raises
+        HistoryError."""
         rows = self._read(
-            "select at, log_path, mission, document, about from triages where log_sha256 = ? order by id desc limit 1",
-            (sha256,),
+            f"select at, log_path, mission, document, about from triages where {JUDGED_BY} order by id desc limit 1",
+            judged_by(sha256, terms),
         )
         return next((self._triaged(at, path, mission, text, about) for at, path, mission, text, about in rows), None)
 
@@ -364,7 +376,10 @@ def insert_triage(connection: sqlite3.Connection, document: Mapping[str, Any], m
     """Put a triage into the store, in the transaction of whoever has more to write with it."""
     log, profile = document["log"], document["profile"] or {"name": "", "version": ""}
     robot = None if about.robot is None else plain(about.robot)
-    told = {"robot": robot, "asked": about.asked, "firmware": about.firmware, "recording": about.recording}
+    told = {
+        "robot": robot, "asked": about.asked, "firmware": about.firmware, "recording": about.recording,
+        "terms": about.terms,
+    }  # fmt: skip
     settings = zlib.compress(json.dumps(about.settings).encode()) if about.settings else None
     connection.execute(
         "insert into triages (at, profile, version, log_sha256, log_path, mission, document, robot, about, settings)"

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from care_core.files import read_small_text
-from care_core.history.store import About, History, insert_triage
-from care_core.records import Record
+from care_core.history.store import JUDGED_BY, About, History, insert_triage, judged_by
+from care_core.records import Record, replace
 
 Claim = Literal["mine", "done", "taken"]
 """What became of a claim: it is granted; the log is done already; another watcher is at it."""
@@ -28,23 +28,28 @@ class WatchBook(Record):
     """The book that the watchers of a history keep. Every call may raise HistoryError."""
 
     history: History
+    terms: str = ""
+    """What this watcher judges by beside the profile, as `About.terms`: what another judged otherwise is not done."""
 
     def is_done(self, stamp: str) -> bool:
         """Whether a log was dealt with that lay in the same place, as long and as old: told without reading it."""
         with self.history.reading() as connection:
             rows = connection.execute(
                 "select 1 from watched where stamp = ? and (state in ('done', 'failed') or attempts >= ?) limit 1",
-                (_storable(stamp), MOST_ATTEMPTS),
+                (self._own(_storable(stamp)), MOST_ATTEMPTS),
             )
             return rows.fetchone() is not None
 
     def claim(self, sha256: str, path: Path, stamp: str, valid_s: float) -> Claim:
         """Ask for a log. `valid_s`: how long a claim of a process on another computer is believed, in seconds."""
+        key = self._own(sha256)
         with self.history.writing() as connection:
             row = connection.execute(
-                "select state, attempts, holder, until from watched where log_sha256 = ?", (sha256,)
+                "select state, attempts, holder, until from watched where log_sha256 = ?", (key,)
             ).fetchone()
-            known = connection.execute("select 1 from triages where log_sha256 = ? limit 1", (sha256,)).fetchone()
+            known = connection.execute(
+                f"select 1 from triages where {JUDGED_BY} limit 1", judged_by(sha256, self.terms)
+            ).fetchone()
             state, attempts, holder, until = row or ("new", 0, "", 0.0)
             if state == "claimed" and holder != _holder() and _is_at_work(holder, until):
                 return "taken"
@@ -54,14 +59,14 @@ class WatchBook(Record):
                 "insert or replace into watched values (?, ?, ?, ?, ?, ?, ?, coalesce("
                 "(select reason from watched where log_sha256 = ?), ''))",
                 (
-                    sha256,
+                    key,
                     _storable(str(path)),
-                    _storable(stamp),
+                    self._own(_storable(stamp)),
                     new,
                     attempts + (not done),
                     _holder(),
                     time.time() + valid_s,
-                    sha256,
+                    key,
                 ),
             )
             return "done" if done else "mine"
@@ -71,22 +76,26 @@ class WatchBook(Record):
         with self.history.writing() as connection:
             connection.execute(
                 "update watched set state = 'left', attempts = attempts - 1 where log_sha256 = ? and holder = ?",
-                (sha256, _holder()),
+                (self._own(sha256), _holder()),
             )
 
     def done(self, document: Mapping[str, Any], mission: int, about: About) -> None:
         """Remember a triage and that its log is done: both or neither."""
         with self.history.writing() as connection:
-            insert_triage(connection, document, mission, about)
-            connection.execute("update watched set state = 'done' where log_sha256 = ?", (document["log"]["sha256"],))
+            insert_triage(connection, document, mission, replace(about, terms=self.terms))
+            key = self._own(document["log"]["sha256"])
+            connection.execute("update watched set state = 'done' where log_sha256 = ?", (key,))
 
     def failed(self, sha256: str, reason: str, *, is_final: bool) -> None:
         """Remember that a log could not be read. Where the log itself is not at fault, a later start tries again."""
         with self.history.writing() as connection:
             connection.execute(
                 "update watched set state = ?, reason = ? where log_sha256 = ?",
-                ("failed" if is_final else "left", reason, sha256),
+                ("failed" if is_final else "left", reason, self._own(sha256)),
             )
+
+    def _own(self, text: str) -> str:
+        return f"{text};{self.terms}" if self.terms else text
 
 
 def _storable(name: str) -> str:

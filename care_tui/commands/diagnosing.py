@@ -96,7 +96,7 @@ def triage(
     with Progress() as progress:
         case = care_core.triage(request, progress)
     if not no_history:
-        mention(remember_triage(case.diagnosis))
+        mention(remember_triage(case.diagnosis, request))
     text = _written(case, format, sharing, to_file=out is not None)
     emit(text, out, force=force, is_plain=format is None)
     raise typer.Exit(verdict_of(case.diagnosis).exit_code)
@@ -114,7 +114,7 @@ def _write_junit(
         for log in (request.log, *request.repeats):
             found.append(suite_of_log(replace(request, log=log, repeats=()), sharing, progress))
             if found[-1].case is not None and not no_history:
-                mention(remember_triage(found[-1].case.diagnosis))
+                mention(remember_triage(found[-1].case.diagnosis, request))
     emit(to_junit([one.suite for one in found]), out, force=force)
     return exit_code(*(one.status for one in found))
 

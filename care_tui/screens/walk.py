@@ -285,7 +285,7 @@ class WalkScreen(PanesScreen):
 
         case = self.engine.diagnose(request, report)
         remember(request.log)
-        return case, self.engine.remember(case.diagnosis)
+        return case, self.engine.remember(case.diagnosis, request)
 
     @on(Progressed)
     def _show_progress(self, event: Progressed) -> None:

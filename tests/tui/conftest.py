@@ -64,7 +64,9 @@ def fake_commands(diagnosis: Diagnosis) -> list[str]:
 
 
 def fake_engine(diagnose: Callable[..., Case]) -> Engine:
-    return Engine(diagnose, fake_predict, fake_diff, fake_report, fake_commands, remember=lambda _diagnosis: None)
+    return Engine(
+        diagnose, fake_predict, fake_diff, fake_report, fake_commands, remember=lambda _diagnosis, _request: None
+    )
 
 
 @pytest.fixture

@@ -327,3 +327,26 @@ def test_a_command_that_fails_hangs_or_is_not_there_costs_a_sentence() -> None:
         (Notifier((sys.executable, "-c", hang), limit_s=0.2), "took longer than 0.2 s"),
     ):
         assert said in notifier.tell(entry_of())
+
+
+def test_what_was_judged_by_other_limits_is_judged_again(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bounds, the profile and the site file count; a watcher that judges alike does nothing twice."""
+
+    def seen(**asked: Any) -> int:
+        bench.watcher = Watcher(
+            Task((bench.folder,), quiet_s=5.0, **asked), bench.history, bench.told.append, lambda: bench.now_s, judge
+        )
+        return len(bench.looks())
+
+    bench.put("1.BIN", "good")
+    site = bench.folder.parent / "site.yaml"
+    site.write_text("{}")
+    ways: tuple[dict[str, Any], ...] = (
+        {"thresholds": {"energy": 5.0}}, {"thresholds": {"energy": 9.0}}, {}, {"profile": "mine"}, {"site": site},
+    )  # fmt: skip
+    assert [seen(**way) for way in ways] == [1] * 5
+    assert [seen(**way) for way in ways] == [0] * 5
+    site.write_text("{} # another")
+    assert seen(site=site) == 1
+    bench.put("again.BIN", "good")
+    assert [seen(**way) for way in ways] == [0] * 5
