@@ -44,15 +44,24 @@ Message = tuple[float, str, str, Any]
 
 
 def drive(
-    path: Path, goals: Sequence[Goal], speed: float = 0.5, *, without: Sequence[str] = (), **options: float
+    path: Path,
+    goals: Sequence[Goal],
+    speed: float = 0.5,
+    *,
+    without: Sequence[str] = (),
+    silent: Mapping[str, tuple[float, float]] | None = None,
+    **options: float,
 ) -> Path:
-    """Write the bag of a robot that starts at the origin and reaches every goal in `GOAL_S` and its way at `speed`."""
+    """Write the bag of a robot that starts at the origin and reaches every goal in `GOAL_S` and its way at `speed`;
+    topics are `silent` between two times."""
+    pauses = silent or {}
     messages = sorted(_messages(goals, speed, {"max_vel_trans": speed, **options}), key=lambda one: one[0])
     writer = Writer(path)
     with writer:
         connections: dict[str, Any] = {}
         for time_s, topic, kind, message in messages:
-            if topic in without:
+            start_s, end_s = pauses.get(topic, (0.0, 0.0))
+            if topic in without or start_s < time_s < end_s:
                 continue
             if topic not in connections:
                 connections[topic] = writer.add_connection(topic, kind, typestore=STORE)

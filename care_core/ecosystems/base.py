@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
 from care_core.ecosystems.dialect import Dialect
-from care_core.ecosystems.dictionary import Dictionary, Field, find_field
+from care_core.ecosystems.dictionary import Dictionary, Field, find_field, find_message
 from care_core.ecosystems.findings import Event, Finding, Health
 from care_core.logs import formats
 from care_core.logs.base import Channel, Log, Table, Wanted, merge_needs
@@ -81,6 +81,10 @@ class RunModel:
         """One pass over the log."""
         return self.log.read(wanted)
 
+    def repeats(self, channel: str) -> tuple[tuple[float, float], ...]:
+        """Spans in which a source only repeats itself while the robot moves: it is frozen, and measures nothing."""
+        return ()
+
     def _lacks(self, plan: Wanted) -> bool:
         return any(field not in self._read.get(name, ()) for name, fields in plan.items() for field in fields)
 
@@ -128,6 +132,11 @@ class Ecosystem(ABC):
     def field(self, channel: Channel, name: str) -> Field | None:
         """What a field of a channel means, None where that is not known."""
         return find_field(self.messages(), channel.name, name)
+
+    def speaks_at_times(self, log: Log, channel: str) -> bool:
+        """Whether a channel is silent by its nature while there is nothing to say."""
+        known = find_message(self.messages(), channel)
+        return known is not None and known.at_times
 
     @abstractmethod
     def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:

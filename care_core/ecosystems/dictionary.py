@@ -39,6 +39,9 @@ class Message(Record):
     """Longest usual time between two messages of a sensor, also in thinned logs."""
     in_bursts: bool = False
     """Whether a vehicle writes them as fast as they come: parameters, mission items."""
+    at_times: bool = False
+    """Whether it is written only while there is something to say, so that its silence is no hole: commands,
+    controllers that steer, texts."""
     how_to_record: str = ""
     """What to do to have it in the next log: "set 'GPS' (4) in LOG_BITMASK"."""
 

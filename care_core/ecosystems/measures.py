@@ -7,10 +7,12 @@ never raises on poor data. New platforms are YAML files that combine these, not 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import wraps
 from typing import Any, TypeGuard, TypeVar
 
 from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.coverage import Samples, doubt
 from care_core.errors import ProfileError, nearest
 from care_core.logs.base import Table, Wanted
 from care_core.records import Record, field
@@ -92,6 +94,8 @@ class Mission(Record, eq=False):
 
 
 Compute = Callable[[Mission, Args], Value]
+RestsOn = Callable[[Mission, Args], Iterable[Samples]]
+"""The samples that a measure is made of: where they do not cover what it measures, it answers no number."""
 
 
 class Extractor(Record):
@@ -161,16 +165,33 @@ def extractor(
     unit: str,
     args: Mapping[str, str] | None = None,
     parts: Sequence[str] = (),
+    rests_on: RestsOn | None = None,
 ) -> Callable[[Compute], Compute]:
-    """Register a function as the extractor `name`; its docstring becomes the documentation."""
+    """Register a function as the extractor `name`; its docstring becomes the documentation. What rests on no samples,
+    such as what the log's events say, needs no `rests_on`."""
 
-    def register(compute: Compute) -> Compute:
+    def register(measure: Compute) -> Compute:
+        compute = measure if rests_on is None else resting(measure, rests_on)
         find_needs = needs if callable(needs) else lambda _args: needs
         doc = " ".join((compute.__doc__ or "").split())
         EXTRACTORS[name] = Extractor(name, compute, find_needs, unit, doc, args or {}, tuple(parts))
         return compute
 
     return register
+
+
+def resting(measure: Compute, rests_on: RestsOn) -> Compute:
+    """The measure where its samples cover what it measures, why not where they do not."""
+
+    @wraps(measure)
+    def compute(mission: Mission, args: Args) -> Value:
+        value = measure(mission, args)
+        if isinstance(value, Unavailable):
+            return value
+        doubts = (doubt(samples) for samples in rests_on(mission, args))
+        return next((one for one in doubts if one is not None), value)
+
+    return compute
 
 
 def find_extractor(kind: str, where: str = "") -> Extractor:

@@ -7,18 +7,23 @@ They serve robots whose missions no other kind finds. What a field means, and it
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.coverage import EXTREME, MEAN, Samples
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, extractor, missing, numeric, one_of
+from care_core.ecosystems.registry import ecosystem_of
 from care_core.logs.base import Table, Wanted
+from care_core.numbers import median, quantile
 from care_core.records import replace
 from care_core.run import Evidence, Unavailable, Value
 
 KIND = "recording"
+_FEWEST, _MOST, _STEADY = 10, 0.9, 3.0
+"""Pauses that tell whether a channel comes steadily: nine in ten are below so many times the middle one."""
 _WHOLE = "record the whole mission"
 STATISTICS = ("mean", "min", "max", "std", "rms", "first", "last", "change")
 
@@ -93,6 +98,27 @@ def outcome(mission: Mission, args: Args) -> Value:
     return 1.0 if unknown is None else replace(unknown, hint=unknown.hint or _WHOLE)
 
 
+def _signal_samples(mission: Mission, args: Args) -> Iterator[Samples]:
+    """The messages of the mission in which the field is a number, of a channel that comes steadily."""
+    channel, stat = str(args.get("channel", "")), str(args.get("stat", "mean"))
+    table = mission.tables.get(channel)
+    values = None if table is None else _numbers(table, str(args.get("field", "")))
+    if table is None or values is None or not _comes_steadily(mission, channel, table):
+        return
+    start_s, end_s = mission.start_s, mission.end_s
+    moments = {"first": [start_s], "last": [end_s], "change": [start_s, end_s]}.get(stat, [])
+    bears = EXTREME if stat in ("min", "max") else MEAN
+    t, dead = table.t[np.isfinite(values)], mission.model.repeats(channel)
+    yield Samples(channel, t, () if moments else [(start_s, end_s)], bears, moments, dead)
+
+
+def _comes_steadily(mission: Mission, channel: str, table: Table) -> bool:
+    """Whether a channel sends all the time, so that its silence is a hole: most do, but not what tells of events."""
+    pauses = np.diff(table.t)
+    is_steady = len(pauses) >= _FEWEST and quantile(pauses, _MOST) <= _STEADY * float(median(pauses))
+    return is_steady and not ecosystem_of(mission.model.log.format).speaks_at_times(mission.model.log, channel)
+
+
 @extractor(
     "signal",
     needs=lambda args: {str(args["channel"]): (str(args.get("field", "")),)} if "channel" in args else {},
@@ -105,6 +131,7 @@ def outcome(mission: Mission, args: Args) -> Value:
         "scale": numeric("what the statistic is multiplied by, 1 unless given"),
         "offset": numeric("what is added then, 0 unless given"),
     },
+    rests_on=_signal_samples,
 )
 def signal(mission: Mission, args: Args) -> Value:
     """A statistic of one number of a channel during the mission; values that are no numbers are left out."""

@@ -11,11 +11,12 @@ from functools import cached_property
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot import airborne, armed, recorded
+from care_core.ecosystems.ardupilot import airborne, armed, recorded, sources
 from care_core.ecosystems.ardupilot.airborne import AIRBORNE_M, FOLLOWED_DEG, Airborne
 from care_core.ecosystems.ardupilot.battery import Battery
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, runs
 from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.liveness import Frozen
 from care_core.logs.base import Wanted, merge_needs
 
 READS: Wanted = merge_needs((
@@ -99,6 +100,14 @@ class Flight(Airborne):
         """Spans in the air before it was lost."""
         lost = min((t for t in (self.lost_control_s, self.impact_s) if t is not None), default=math.inf)
         return tuple((start, min(end, lost)) for start, end in self.airborne if start < lost)
+
+    @cached_property
+    def frozen(self) -> tuple[Frozen, ...]:
+        """Stretches in which a source only repeats itself while the vehicle moves."""
+        return tuple(sources.frozen(self, self.flown if self.is_copter else self.watched))
+
+    def repeats(self, channel: str) -> tuple[Span, ...]:
+        return tuple(one.span for one in self.frozen if one.channel == channel)
 
     @cached_property
     def batteries(self) -> tuple[Battery, ...]:

@@ -67,6 +67,7 @@ def _along(axis: str, end: str, *, is_position: bool) -> Message:
             f"TA{end}": Field("m/s2", f"acceleration {axis} wanted"),
             f"DA{end}": Field("m/s2", f"acceleration {axis} planned"),
         },
+        at_times=True,
         how_to_record=_NAVIGATION,
     )
 
@@ -129,7 +130,8 @@ _FLIGHT: Dictionary = {
     "NTUN": Message({name: _placed("", "") for name in ("DPosX", "DPosY", "PosX", "PosY")}),
     "AHR2": Message(_PLACE),
     "ORGN": Message(
-        {"Lat": _placed("deg", "latitude", _LATITUDE), "Lng": _placed("deg", "longitude", _LONGITUDE)}, in_bursts=True
+        {"Lat": _placed("deg", "latitude", _LATITUDE), "Lng": _placed("deg", "longitude", _LONGITUDE)},
+        in_bursts=True, at_times=True,
     ),
     "CMD": Message(
         {
@@ -137,11 +139,12 @@ _FLIGHT: Dictionary = {
             "Lng": Field("deg", plausible=_LONGITUDE),
             "Alt": Field("m", plausible=_HEIGHT_M),
         },
-        in_bursts=True, how_to_record=_set(256, "mission commands"),
+        in_bursts=True, at_times=True, how_to_record=_set(256, "mission commands"),
     ),
-    "MODE": Message({"ModeNum": Field(former=("Mode",))}),
+    "MODE": Message({"ModeNum": Field(former=("Mode",))}, at_times=True),
+    **{name: Message({}, at_times=True) for name in ("ARM", "ERR", "EV", "MISE")},
     "PM": Message({"NL": Field(former=("NLoop",))}),
-    **{name: Message({}, in_bursts=True) for name in ("PARM", "MSG", "RALY", "FNCE")},
+    **{name: Message({}, in_bursts=True, at_times=True) for name in ("PARM", "MSG", "RALY", "FNCE")},
     **{name: Message({}, fastest_hz=_GYROS_HZ, how_to_record=_PID) for name in ("PIDR", "PIDP", "PIDY")},
     "MOTB": Message({}, how_to_record=_set(131072, "motors")),
 }  # fmt: skip

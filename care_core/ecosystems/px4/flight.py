@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Event
+from care_core.ecosystems.liveness import Frozen
+from care_core.ecosystems.px4 import sources
 from care_core.ecosystems.px4.attitude import ATTITUDE, WANTED, Lean, lean_of
 from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
 from care_core.logs.base import Log, Table, Wanted
@@ -168,6 +170,27 @@ class Px4Flight(RunModel):
         """From the first to the last time of each run of a mask."""
         edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
         return list(zip(t[edges[::2]].tolist(), t[edges[1::2] - 1].tolist(), strict=True))
+
+    @cached_property
+    def aloft(self) -> tuple[Span, ...]:
+        """From where it rose to where it came down for the last time, of each span armed; of what drives, all of it."""
+        found = []
+        for span in self.armed:
+            heights = self.heights(span)
+            up = heights.t[heights["height"] > AIRBORNE_M] if heights is not None else np.empty(0)
+            if len(up):
+                found.append((float(up[0]), float(up[-1])))
+            elif self.last(STATUS, "vehicle_type", span[1]) == ROVER:
+                found.append(span)
+        return tuple(found)
+
+    @cached_property
+    def frozen(self) -> tuple[Frozen, ...]:
+        """Stretches in which a source only repeats itself while the vehicle moves."""
+        return tuple(sources.frozen(self, self.aloft))
+
+    def repeats(self, channel: str) -> tuple[Span, ...]:
+        return tuple(one.span for one in self.frozen if one.channel == channel)
 
     @cached_property
     def modes(self) -> tuple[tuple[float, int], ...]:

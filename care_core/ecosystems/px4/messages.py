@@ -44,7 +44,7 @@ MESSAGES: Dictionary = {
         "failure_detector_status": Field(label="failures detected, as bits"),
         "vehicle_type": Field(label="kind of vehicle"),
     }),
-    "logged_messages": Message({"level": Field(label="level"), "message": Field(label="message")}),
+    "logged_messages": Message({"level": Field(label="level"), "message": Field(label="message")}, at_times=True),
     "vehicle_land_detected": Message({"landed": Field(label="on the ground", plausible=_SHARE)}),
     "mission_result": Message({
         "finished": Field(label="mission finished", plausible=_SHARE),
@@ -53,7 +53,11 @@ MESSAGES: Dictionary = {
         "seq_total": Field(label="items of the mission"),
         "mission_id": Field(label="number of the mission"),
         "instance_count": Field(label="number of the mission"),
-    }),
+    }, at_times=True),
+    **{
+        topic: Message({}, at_times=True)
+        for topic in ("event", "home_position", "parameter_update", "vehicle_command", "vehicle_command_ack")
+    },
     "vehicle_local_position": Message({
         "x": Field("m", "position north", is_position=True),
         "y": Field("m", "position east", is_position=True),
@@ -99,6 +103,8 @@ MESSAGES: Dictionary = {
         "baro_alt_meter": Field("m", "height by the barometer"),
         "baro_pressure_pa": Field("Pa", "air pressure"),
     }),
+    "vehicle_magnetometer": Message(_along("magnetometer_ga", "Gauss", "magnetic field")),
+    "airspeed": Message({"indicated_airspeed_m_s": Field("m/s", "indicated airspeed")}),
     "battery_status": Message({
         "voltage_v": Field("V", "battery voltage", plausible=_RATIO),
         "current_a": Field("A", "battery current"),

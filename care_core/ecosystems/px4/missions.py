@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+import numpy as np
+
 from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.coverage import SUM, Samples, doubt
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind
 from care_core.ecosystems.px4 import upset
 from care_core.ecosystems.px4.checks.kill_switch import killed_aloft_s
@@ -15,6 +18,7 @@ from care_core.ecosystems.px4.flight import (
     LANDED,
     MESSAGES,
     POSITION,
+    READS,
     RESULT,
     RESULT_FIELDS,
     ROVER,
@@ -25,6 +29,7 @@ from care_core.ecosystems.px4.flight import (
 from care_core.ecosystems.px4.flown_mission import mission_outcome
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.logs.base import Table, Wanted
+from care_core.records import replace
 from care_core.run import Check, Evidence, Unavailable, Value
 
 _SOON_S = 1.0
@@ -89,13 +94,21 @@ def _checks(flight: Px4Flight, span: Span, *, ended: bool) -> Iterator[Check]:
         yield Check(
             "mission_success", mission_outcome(flight, span), "the mission was flown to its end", "the mission failed"
         )
-    yield _no_crash(flight, span)
+    silent: Value = _lost_events(flight, span) or 1.0
+    no_crash = _no_crash(flight, span)
+    yield replace(no_crash, value=silent) if no_crash.value == 1.0 else no_crash
     failsafe = flight.ever(STATUS, "failsafe", 1, span)
-    yield Check("no_failsafe", float(not failsafe), "no failsafe acted", "a failsafe acted")
+    yield Check("no_failsafe", 0.0 if failsafe else silent, "no failsafe acted", "a failsafe acted")
     if flies:
         landed = _on_ground(flight, span, ended=ended)
         yield Check("landed", landed, "it was on the ground at the end", "it was disarmed in the air")
     yield Check("disarmed", 1.0 if ended else _CUT, "it was disarmed at the end")
+
+
+def _lost_events(flight: Px4Flight, span: Span) -> Unavailable | None:
+    """Why what the log does not say may have happened all the same; None where it holds the whole flight."""
+    streams = [table.t for topic, table in flight.tables(READS).items() if topic not in (MESSAGES, RESULT)]
+    return doubt(Samples("the flight", np.concatenate(streams), [span], SUM)) if streams else None
 
 
 def _no_crash(flight: Px4Flight, span: Span) -> Check:

@@ -81,6 +81,11 @@ class Ros(Ecosystem):
 
         return find_field(self.messages(), type_of(channel), name)
 
+    def speaks_at_times(self, log: Log, channel: str) -> bool:
+        from care_core.ecosystems.ros.messages import speaks_at_times, type_of
+
+        return any(speaks_at_times(type_of(one)) for one in log.channels() if one.name == channel)
+
     def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:
         """An MCAP may be of either ROS: only in ROS 2 have names of parameters a dot, after the node."""
         names = list(parameters) if format is MCAP else []

@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Severity
+from care_core.ecosystems.liveness import Frozen
 from care_core.ecosystems.plausible import STAMP
+from care_core.ecosystems.ros import sources
 from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, actionlib_goals, nav2_goals
 from care_core.ecosystems.ros.messages import (
     ACTION_GOAL,
@@ -21,6 +24,7 @@ from care_core.ecosystems.ros.messages import (
     BATTERY,
     DIAGNOSTICS,
     FRAME,
+    LOCALISED,
     MESSAGES,
     ODOMETRY,
     ROSOUT,
@@ -83,6 +87,7 @@ class Drive(RunModel):
         self._looked_at: Wanted = {}
         self._samples: dict[str, Table] = {}
         self._prepared: dict[tuple[Prepare[Any], str], Any] = {}
+        self._repeats: dict[str, tuple[tuple[float, float], ...]] = {}
 
     # The recording
 
@@ -193,9 +198,10 @@ class Drive(RunModel):
 
     @cached_property
     def odometry(self) -> Odometry | None:
-        """The odometry of the base: of several the one named so, which others are made from."""
+        """The odometry of the base while it lives: of several the one named so, which others are made from."""
         read = (odometry_of(topic, table) for topic, table in self.of(ODOMETRY))
-        found = [steady for one in read if one is not None and (steady := one.advancing()) is not None]
+        told = (one.where(~inside(self._dead(one.topic), one.recorded_s)) for one in read if one is not None)
+        found = [steady for one in told if (steady := one.advancing()) is not None]
         return min(found, key=lambda one: (not one.tells_speed, *_plainness(one.topic, "odom")), default=None)
 
     @cached_property
@@ -223,6 +229,35 @@ class Drive(RunModel):
         if odometry is None or commands is None or len(commands.t) < FEWEST_COMMANDS or not odometry.tells_speed:
             return None
         return following(odometry, commands)
+
+    @cached_property
+    def frozen(self) -> tuple[Frozen, ...]:
+        """Stretches in which a source only repeats itself while the robot drives, of the samples of every topic."""
+        tables = {topic: table for kind in sources.TYPES for topic, table in self.of(kind)}
+        return tuple(one for topic, table in tables.items() for one in self._frozen(topic, table, tables))
+
+    def repeats(self, channel: str) -> tuple[tuple[float, float], ...]:
+        """As the base says; of every message of the topics that were read whole."""
+        if channel not in self._repeats:
+            tables = {**self._samples, **self._tables}
+            table = tables.get(channel)
+            found = () if table is None else self._frozen(channel, table, tables)
+            self._repeats[channel] = tuple(one.span for one in found)
+        return self._repeats[channel]
+
+    def _dead(self, topic: str) -> list[tuple[float, float]]:
+        """Where a topic only repeats itself, by its samples."""
+        return [one.span for one in self.frozen if one.channel == topic]
+
+    def _frozen(self, topic: str, table: Table, tables: Mapping[str, Table]) -> Iterator[Frozen]:
+        types = {channel.name: type_of(channel) for channel in self.channels}
+        placed = [name for name in tables if name != topic and types.get(name) in (ODOMETRY, LOCALISED)]
+        own = [name for name in placed if _namespace(name) == _namespace(topic)]
+        is_alone = types.get(topic) != ODOMETRY and len(set(map(_namespace, placed))) == 1
+        others = {name: tables[name] for name in own or (placed if is_alone else ())}
+        for source in sources.SOURCES:
+            if source.message == types.get(topic):
+                yield from sources.frozen(source, topic, table, others)
 
     def moved_between(self, start_s: float, end_s: float) -> float:
         """Distance that odometry went in a time, m; nan where there is none."""
@@ -316,6 +351,11 @@ def way_through(goals: Iterable[Goal], commands: Commands | None) -> float:
 
 def _spoken(topic: str, table: Table) -> tuple[LogMessage, ...] | None:
     return log_messages(table) if {"level", "name", "msg"} <= set(table.columns) else None
+
+
+def _namespace(topic: str) -> str:
+    """Of several robots each has its own."""
+    return topic.rpartition("/")[0]
 
 
 def _plainness(topic: str, name: str) -> tuple[bool, int, str]:

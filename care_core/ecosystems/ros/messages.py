@@ -51,6 +51,19 @@ WITHOUT_STREAM = (
 )  # fmt: skip
 """Types whose channels are empty, or stop, without anything being wrong."""
 
+AT_TIMES = (
+    *COMMANDS,
+    *GOALS,
+    *ROSOUT,
+    LOCALISED,
+    TREE,
+    RECOVERY,
+    TRANSITION,
+    "nav_msgs/Path",
+    "geometry_msgs/PoseStamped",
+)
+"""Types that are sent only while there is something to say: commands while somebody commands, poses that were found."""
+
 FRAME = "header.frame_id"
 """The frame in which a message gives places: text, so read only where places are compared."""
 
@@ -140,7 +153,7 @@ MESSAGES: Mapping[str, RosMessage] = {
         *(f"{_TARGET}.pose.{part}" for part in _PARTS),
     ),
     ACTION_RESULT: _reads("status.goal_id.id", "status.status", "status.text"),
-    LOCALISED: RosMessage(_POSE, label="poses"),
+    LOCALISED: RosMessage(_POSE, reads=tuple(_POSE), at_most=20_000, label="poses"),
     **dict.fromkeys(("geometry_msgs/PoseStamped", "geometry_msgs/TransformStamped"), _reads(label="poses")),
     "sensor_msgs/NavSatFix": _reads(label="satellite positions"),
     **dict.fromkeys(("sensor_msgs/Image", "sensor_msgs/CompressedImage"), _reads(label="images")),
@@ -160,6 +173,11 @@ def type_of(channel: Channel) -> str:
     """The key of `MESSAGES` for a channel, its short type where there is none."""
     name = short_name(channel.type.partition(",")[0])
     return next((ending for ending in (ACTION_GOAL, ACTION_RESULT) if name.endswith(ending)), name)
+
+
+def speaks_at_times(type: str) -> bool:
+    """Whether a type's silence is no hole."""
+    return type in AT_TIMES or type in WITHOUT_STREAM
 
 
 def holds(table: Table, type: str) -> bool:

@@ -94,6 +94,10 @@ class Odometry(Record, eq=False):
         good[1:] &= np.diff(self.t) > 0
         if np.count_nonzero(good) < _FEWEST:
             return None
+        return self.where(good)
+
+    def where(self, good: Bools) -> Odometry:
+        """The samples of a mask."""
         if good.all():
             return self
         columns = ("recorded_s", "t", "clock", "x", "y", "yaw", "speed", "sideways", "turn")

@@ -18,6 +18,7 @@ from care_core.ecosystems.ardupilot.checks import (
     motor,
     prearm,
     radio,
+    recorded,
     thrust,
     vibration,
 )
@@ -34,6 +35,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     cpu.CHECK,
     crash.CHECK,
     estimator.CHECK,
+    recorded.CHECK,
     gps.CHECK,
     imu.CHECK,
     log.CHECK,

@@ -22,6 +22,7 @@ from care_core.ecosystems.ardupilot.statistics import (
     smooth,
 )
 from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
@@ -172,7 +173,8 @@ def _drift(flight: Flight, first: Table) -> Floats | None:
     gps = flight.one("GPS", "Status", "Alt", "NSats")
     if gps is None:
         return None
-    good = gps.where((gps["Status"] >= _FIX) & (gps["NSats"] >= _GOOD_SATS) & flight.watch(gps.t))
+    live = flight.watch(gps.t) & ~inside(flight.repeats("GPS"), gps.t)
+    good = gps.where((gps["Status"] >= _FIX) & (gps["NSats"] >= _GOOD_SATS) & live)
     if len(good) < 10:
         return None
     apart = first["Alt"] - aligned(first.t, good.t, good["Alt"])

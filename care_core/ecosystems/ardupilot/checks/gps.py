@@ -16,6 +16,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting
 from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import quantile
@@ -24,12 +25,9 @@ READS: Wanted = {
     "GPS": ("Status", "NSats", "HDop", "Lat", "Lng", "Spd", "GCrs", "GMS"),
     "GPA": ("HAcc", "SAcc"),
     "XKF4": ("SP", "SV"),
-    "POS": ("Lat", "Lng"),
 }
 
 LIMITS = Limits()
-FROZEN_RECORDS = LIMITS.add("records of one position", 20, "", "a choice: a live receiver's last digit moves")
-MOVED_M = LIMITS.add("way of the estimate meanwhile", 20.0, "m", "4 times the glitch radius")
 JUMP_M = LIMITS.add("jump that the velocity does not explain", 5.0, "m", "AP_GPS_Glitch: GPSGLITCH_RADIUS")
 ACCELERATION = LIMITS.add("acceleration that explains more", 10.0, "m/s^2", "AP_GPS_Glitch: GPSGLITCH_ACCEL")
 _TIMES_USUAL = LIMITS.add("jump over the usual ones", 5.0, "", "a choice: a velocity that never fits tells nothing")
@@ -64,7 +62,6 @@ _LOST = LIMITS.add(
     "probability that few satellites cost the mission", 0.15, "",
     "4 of 11 such training flights failed, of those without a failed part 48 % (a warning counts as four flights)",
 )  # fmt: skip
-_FROZEN = LIMITS.add("probability of a dead receiver", 0.9, "", "a choice: nothing else repeats a position")
 _NO_FIX = LIMITS.add("probability of a lost fix", 0.9, "", "the receiver's own word")
 _GLITCHED = LIMITS.add("probability of a reported glitch", 0.6, "", "a choice: the firmware's word, without the size")
 _DOUBTS = LIMITS.add("probability where it is only inaccurate", 0.4, "", "a choice: buildings and trees do that")
@@ -76,8 +73,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     if table is None:
         yield from _reported(flight)
         return
-    own = table.where(flight.watch(table.t))
-    yield from _frozen(flight, own)
+    own = table.where(flight.watch(table.t) & ~inside(flight.repeats("GPS"), table.t))
     jumped = list(_jumps(flight, own))
     yield from jumped
     if not jumped:
@@ -87,34 +83,6 @@ def find(flight: Flight) -> Iterator[Finding]:
     if not lost:
         yield from _few(flight, own)
         yield from _inaccurate(flight)
-
-
-def _frozen(flight: Flight, table: Table) -> Iterator[Finding]:
-    """A position that stays the same to the last digit while the estimate moves: whoever estimates has it elsewhere."""
-    place = flight.one("POS", "Lat", "Lng")
-    if place is None or len(place) < 2 or not {"Lat", "Lng"} <= table.columns.keys():
-        return
-    fixed = table.where(table["Status"] >= _FIX)
-    if len(fixed) < FROZEN_RECORDS or np.ptp(fixed["Lat"]) > 0 or np.ptp(fixed["Lng"]) > 0:
-        return
-    start, end = float(fixed.t[0]), float(fixed.t[-1])
-    moved = place.between(start, end)
-    if not len(moved):
-        return
-    north_m = float(np.ptp(moved["Lat"])) * _METRES
-    east_m = float(np.ptp(moved["Lng"])) * _METRES * float(np.cos(np.radians(moved["Lat"][0])))
-    moved_m = float(np.hypot(north_m, east_m))
-    if moved_m > MOVED_M:
-        yield Finding(
-            kind="gps",
-            title="the GPS position never changes",
-            onset_s=start,
-            end_s=end,
-            severity="warning",
-            evidence=f"the same in {len(fixed)} records with a fix, while the estimate went {moved_m:.0f} m",
-            source="GPS.Lat, Lng against POS.Lat, Lng",
-            probability=_FROZEN,
-        )
 
 
 def _jumps(flight: Flight, table: Table) -> Iterator[Finding]:

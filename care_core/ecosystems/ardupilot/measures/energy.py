@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -11,8 +12,10 @@ from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, span_of_phase
+from care_core.ecosystems.ardupilot.measures.samples import samples, whole
 from care_core.ecosystems.ardupilot.measures.series import MIN_ROWS, series, statistic
-from care_core.ecosystems.measures import Args, Mission, extractor, has, missing
+from care_core.ecosystems.coverage import EXTREME, SUM, Bears, Samples
+from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, has, missing
 from care_core.ecosystems.plausible import is_alive
 from care_core.logs.base import Table, Wanted, merge_needs
 from care_core.run import Unavailable, Value, is_known
@@ -27,7 +30,21 @@ _AGREE, _ENOUGH_FOR_DOUBT = 2.0, 20
 _NO_VOLTAGE = Unavailable("BAT says the same voltage throughout, or none", "is BATT_MONITOR one that measures voltage?")
 
 
-@extractor("energy_used", needs=merge_needs((NEEDS, _BATTERY)), unit="Wh", args=PHASE_ARGS)
+def _throughout(bears: Bears) -> RestsOn:
+    """The battery from arming to disarming, or in a phase."""
+
+    def rests_on(mission: Mission, args: Args) -> Iterator[Samples]:
+        span = span_of_phase(mission, args) if "phase" in args else whole(mission)
+        yield samples(mission, "BAT", ("Volt",), [] if isinstance(span, Unavailable) else [span], bears)
+
+    return rests_on
+
+
+def _at_start(mission: Mission, args: Args) -> Iterator[Samples]:
+    yield samples(mission, "BAT", ("Volt",), (), SUM, [mission.start_s])
+
+
+@extractor("energy_used", needs=merge_needs((NEEDS, _BATTERY)), unit="Wh", args=PHASE_ARGS, rests_on=_throughout(SUM))
 def energy_used(mission: Mission, args: Args) -> Value:
     """Energy drawn between arming and disarming, or in a part of it: the monitor's counter, else voltage times current
     over time."""
@@ -98,7 +115,7 @@ def _known(table: Table, *fields: str) -> Table:
     return table.where(np.logical_and.reduce([np.isfinite(table[field]) for field in fields]))
 
 
-@extractor("min_voltage", needs=merge_needs((NEEDS, _BATTERY)), unit="V")
+@extractor("min_voltage", needs=merge_needs((NEEDS, _BATTERY)), unit="V", rests_on=_throughout(EXTREME))
 def min_voltage(mission: Mission, args: Args) -> Value:
     """The lowest battery voltage between arming and disarming."""
     if not is_armed(mission):
@@ -110,7 +127,7 @@ def min_voltage(mission: Mission, args: Args) -> Value:
     return volts if isinstance(volts, Unavailable) else statistic(volts["Volt"], "min")
 
 
-@extractor("start_voltage", needs=merge_needs((NEEDS, _BATTERY)), unit="V")
+@extractor("start_voltage", needs=merge_needs((NEEDS, _BATTERY)), unit="V", rests_on=_at_start)
 def start_voltage(mission: Mission, args: Args) -> Value:
     """Battery voltage in the last second before the motors were armed."""
     table = mission.tables.get("BAT")

@@ -9,6 +9,7 @@ from care_core.ecosystems.ardupilot.airborne import Hit
 from care_core.ecosystems.ardupilot.armed import ArmChange
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, SAID_AFTER_S, analyse
 from care_core.ecosystems.ardupilot.measures.modes import flight_of, is_armed
+from care_core.ecosystems.ardupilot.measures.samples import everything
 from care_core.ecosystems.ardupilot.recorded import ErrorRecord
 from care_core.ecosystems.ardupilot.texts import Refusal, refusal_of
 from care_core.ecosystems.measures import Args, Mission, extractor, missing
@@ -124,31 +125,37 @@ def arming_refused(mission: Mission, args: Args) -> Value:
     return float(any(word in one.text.casefold() for one in last_refusals(mission)))
 
 
-@extractor("failsafe", needs=_EVENTS, unit="", args={"about": "battery, radio, EKF, ...; any when not given"})
+@extractor(
+    "failsafe",
+    needs=_EVENTS,
+    unit="",
+    args={"about": "battery, radio, EKF, ...; any when not given"},
+    rests_on=everything,
+)
 def failsafe(mission: Mission, args: Args) -> Value:
     """1 when a failsafe acted in flight, else 0."""
     return _in_flight(mission, "failsafe", str(args.get("about", "")))
 
 
-@extractor("crash", needs=_EVENTS, unit="")
+@extractor("crash", needs=_EVENTS, unit="", rests_on=everything)
 def crash(mission: Mission, args: Args) -> Value:
     """1 when the autopilot's crash check disarmed the vehicle, else 0."""
     return _in_flight(mission, "crash")
 
 
-@extractor("thrust_loss", needs=_EVENTS, unit="")
+@extractor("thrust_loss", needs=_EVENTS, unit="", rests_on=everything)
 def thrust_loss(mission: Mission, args: Args) -> Value:
     """1 when the autopilot reported that thrust could not hold attitude or height, else 0."""
     return _in_flight(mission, "thrust")
 
 
-@extractor("ekf_trouble", needs=_EVENTS, unit="")
+@extractor("ekf_trouble", needs=_EVENTS, unit="", rests_on=everything)
 def ekf_trouble(mission: Mission, args: Args) -> Value:
     """1 when the estimator reported variance, a lane switch or a yaw reset in flight, else 0."""
     return _in_flight(mission, "ekf")
 
 
-@extractor("forced_disarm", needs=_EVENTS, unit="")
+@extractor("forced_disarm", needs=_EVENTS, unit="", rests_on=everything)
 def forced_disarm(mission: Mission, args: Args) -> Value:
     """1 when the operator disarmed the vehicle by force, else 0."""
     if not is_armed(mission):

@@ -18,6 +18,8 @@ from care_core.ecosystems.ardupilot.measures.flown_mission import (
 from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, is_armed, modes_in_force
 from care_core.ecosystems.ardupilot.measures.requested import mission_held
 from care_core.ecosystems.ardupilot.measures.route import landing_error
+from care_core.ecosystems.ardupilot.measures.samples import lost_events, samples
+from care_core.ecosystems.coverage import SUM, doubt
 from care_core.ecosystems.measures import Args, Mission, extractor, has
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Wanted
@@ -70,9 +72,11 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Che
     if and_mission and any(mode.way == "mission" for mode in modes_in_force(mission)):
         done = _mission_done(mission)
         yield Check("mission_success", done, "every waypoint of the mission was reached", short_of(mission))
-    yield Check("no_crash", 1.0 - crashed, "the autopilot reported no crash, and none shows", crash)
+    silent: Value = lost_events(mission) or 1.0
+    no_crash = 0.0 if crashed else silent
+    yield Check("no_crash", no_crash, "the autopilot reported no crash, and none shows", crash)
     acted = has_event(mission, "failsafe")
-    yield Check("no_failsafe", 1.0 - acted, "no failsafe acted", "a failsafe acted")
+    yield Check("no_failsafe", 0.0 if acted else silent, "no failsafe acted", "a failsafe acted")
     if flies(kind):
         landed = Unavailable("it crashed") if crashed else _landed(mission)
         yield Check("landed", landed, "it was on the ground at the end", "it was disarmed above the ground")
@@ -101,7 +105,7 @@ def _mission_done(mission: Mission) -> Value:
         return CUT
     last = modes_in_force(mission)[-1]
     if last.way == "mission":
-        return 0.0
+        return lost_events(mission) or 0.0
     return Unavailable(
         f"{short_of(mission)}, and the last mode was {last.name}", "judge a run that ends in its mission"
     )
@@ -137,11 +141,21 @@ def _landed(mission: Mission) -> Value:
     if not mission.ended:
         return CUT
     heights = _heights(mission)
+    if _touched_down(mission):
+        return 1.0
+    if len(heights) and (unseen := _unseen_end(mission)) is not None:
+        return unseen
     low = bool(heights[-1] <= AIRBORNE_M) if len(heights) else _detected(mission, _LANDED)
-    low = low or _touched_down(mission) or flight_of(mission).stands_at_end
+    low = low or flight_of(mission).stands_at_end
     if not low and flight_of(mission).kind in _GLIDES:
         return Unavailable(f"it was disarmed {heights[-1]:.0f} m above home" if len(heights) else "nothing says so")
     return float(low)
+
+
+def _unseen_end(mission: Mission) -> Unavailable | None:
+    """Why the last height that is known is not that of the end."""
+    channel = next((name for name in HEIGHTS if has(mission.table(name), *HEIGHTS[name][:1])), "")
+    return doubt(samples(mission, channel, (), (), SUM, [mission.end_s])) if channel else None
 
 
 def _heights(mission: Mission) -> Floats:
@@ -189,7 +203,7 @@ def _mission_flown(mission: Mission) -> Value:
     if unknown is not None:
         return unknown
     if flown.reached < len(flown.waypoints):
-        return 0.0
+        return lost_events(mission) or 0.0
     if flown.drive is not None:
         return float(flown.completed)
     if flown.end is None:

@@ -29,7 +29,9 @@ from care_core.ecosystems.ardupilot.held_missions import (
 )
 from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures.modes import flight_of, is_armed, modes_in_force
+from care_core.ecosystems.ardupilot.measures.samples import samples, whole
 from care_core.ecosystems.ardupilot.texts import mission_item
+from care_core.ecosystems.coverage import USUAL, Samples
 from care_core.ecosystems.measures import Args, Mission, extractor, has, missing, one_of
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
@@ -258,14 +260,18 @@ def mission_asked(mission: Mission, args: Args) -> Value:
 _BATTERY: Wanted = {"BAT": ("Inst", "Instance", "Volt", "Curr", "Res")}
 
 
-@extractor("hover_power", needs=_BATTERY, unit="W")
+def _battery(mission: Mission, args: Args) -> Iterator[Samples]:
+    yield samples(mission, "BAT", ("Volt",), [whole(mission)], USUAL)
+
+
+@extractor("hover_power", needs=_BATTERY, unit="W", rests_on=_battery)
 def hover_power(mission: Mission, args: Args) -> Value:
     """Median electric power while airborne: what the vehicle takes to stay up, with its load."""
     table = _in_the_air(mission, "Volt", "Curr")
     return table if isinstance(table, Unavailable) else float(median(table["Volt"] * table["Curr"]))
 
 
-@extractor("internal_resistance", needs=_BATTERY, unit="ohm")
+@extractor("internal_resistance", needs=_BATTERY, unit="ohm", rests_on=_battery)
 def internal_resistance(mission: Mission, args: Args) -> Value:
     """Median of the battery's resistance while airborne, as the battery monitor estimates it."""
     table = _in_the_air(mission, "Res")

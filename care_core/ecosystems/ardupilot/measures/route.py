@@ -6,12 +6,14 @@ import math
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.modes import is_armed
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission, span_of_phase
 from care_core.ecosystems.ardupilot.measures.requested import requested_mission
 from care_core.ecosystems.ardupilot.measures.series import statistic
+from care_core.ecosystems.coverage import EXTREME, SUM
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
 from care_core.run import Unavailable, Value
 
@@ -25,7 +27,7 @@ def waypoints_reached(mission: Mission, args: Args) -> Value:
     return float(flown.reached) if flown.waypoints else Unavailable("the log names no waypoints", "record CMD")
 
 
-@extractor("landing_error", needs=NEEDS, unit="m")
+@extractor("landing_error", needs=NEEDS, unit="m", rests_on=rests.landing)
 def landing_error(mission: Mission, args: Args) -> Value:
     """Horizontal distance at the end of the flight from where the mission ends: home, or where it lands."""
     flown = flown_mission(mission)
@@ -38,7 +40,7 @@ def landing_error(mission: Mission, args: Args) -> Value:
     return math.hypot(flown.track.north[-1] - flown.end[0], flown.track.east[-1] - flown.end[1])
 
 
-@extractor("waypoint_miss", needs=NEEDS, unit="m")
+@extractor("waypoint_miss", needs=NEEDS, unit="m", rests_on=rests.position(EXTREME))
 def waypoint_miss(mission: Mission, args: Args) -> Value:
     """The largest, over the waypoints, of the smallest horizontal distance from the waypoint: corners cut."""
     flown = flown_mission(mission)
@@ -56,7 +58,7 @@ def mission_time(mission: Mission, args: Args) -> Value:
     return mission.end_s - mission.start_s if is_armed(mission) else NOT_FLOWN
 
 
-@extractor("phase_time", needs=NEEDS, unit="s", args=PHASE_ARGS)
+@extractor("phase_time", needs=NEEDS, unit="s", args=PHASE_ARGS, rests_on=rests.heights_of_phase)
 def phase_time(mission: Mission, args: Args) -> Value:
     """Duration of one completed part of the flown."""
     span = span_of_phase(mission, args)
@@ -81,7 +83,7 @@ def cruise_speed(mission: Mission, args: Args) -> Value:
     return length_m / moving_s if moving_s > 0 and length_m > 0 else Unavailable("the legs have no length")
 
 
-@extractor("return_height", needs=NEEDS, unit="m")
+@extractor("return_height", needs=NEEDS, unit="m", rests_on=rests.heights_of_phase)
 def return_height(mission: Mission, args: Args) -> Value:
     """The greatest height above home on the way back."""
     span = span_of_phase(mission, {"phase": "return_climb"})
@@ -93,7 +95,7 @@ def return_height(mission: Mission, args: Args) -> Value:
     return float(flown.track.height[flown.track.t >= span[0]].max())
 
 
-@extractor("distance", needs=NEEDS, unit="m")
+@extractor("distance", needs=NEEDS, unit="m", rests_on=rests.position(SUM))
 def distance(mission: Mission, args: Args) -> Value:
     """Length of the way over ground while airborne; of a rover, in its mission."""
     flown = flown_mission(mission)
@@ -105,7 +107,13 @@ def distance(mission: Mission, args: Args) -> Value:
     return float(steps[flown.under_way(flown.track.t)[1:]].sum())
 
 
-@extractor("path_error", needs=NEEDS, unit="m", args={"stat": one_of("max or mean", "max", "mean")})
+@extractor(
+    "path_error",
+    needs=NEEDS,
+    unit="m",
+    args={"stat": one_of("max or mean", "max", "mean")},
+    rests_on=rests.position(EXTREME),
+)
 def path_error(mission: Mission, args: Args) -> Value:
     """Horizontal distance from the legs (home, waypoints, home if it returns) while airborne, or in a rover's
     mission."""

@@ -8,9 +8,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission
 from care_core.ecosystems.ardupilot.measures.series import register, series
+from care_core.ecosystems.coverage import SUM, USUAL
 from care_core.ecosystems.measures import Args, Mission, extractor, one_of
 from care_core.ecosystems.vehicles import is_skid_steered
 from care_core.logs.base import Table, Wanted, merge_needs
@@ -69,6 +71,7 @@ register("lateral_acceleration", _STEERING, "m/s/s", "Acceleration to the side i
     needs=merge_needs((NEEDS, _SPEED, _STEERING)),
     unit="s",
     args={"how": one_of("on the spot, or driving", "spot", "driving"), **PHASE_ARGS},
+    rests_on=rests.all_of(rests.of("STER", "TurnRate", bears=SUM), rests.of("THR", "Speed", bears=SUM)),
 )
 def turning_time(mission: Mission, args: Args) -> Value:
     """Time for which a rover turns faster than 10 degrees a second: on the spot (slower than a fifth of its usual
@@ -102,7 +105,7 @@ def steering_kind(mission: Mission, args: Args) -> Value:
     return Unavailable("no SERVOn_FUNCTION says how it steers") if found is None else float(found)
 
 
-@extractor("full_throttle_speed", needs=merge_needs((NEEDS, _SPEED)), unit="m/s")
+@extractor("full_throttle_speed", needs=merge_needs((NEEDS, _SPEED)), unit="m/s", rests_on=rests.of("THR", bears=USUAL))
 def full_throttle_speed(mission: Mission, args: Args) -> Value:
     """Speed of a rover over its throttle, as it would be at full throttle: median while it is well under way."""
     driven = _steady(mission)
@@ -114,7 +117,12 @@ def full_throttle_speed(mission: Mission, args: Args) -> Value:
     return float(median(pushing["Speed"] / pushing["ThrOut"]) * 100.0)
 
 
-@extractor("energy_per_metre", needs=merge_needs((NEEDS, _SPEED, _BATTERY)), unit="J/m")
+@extractor(
+    "energy_per_metre",
+    needs=merge_needs((NEEDS, _SPEED, _BATTERY)),
+    unit="J/m",
+    rests_on=rests.all_of(rests.of("THR", bears=USUAL), rests.of("BAT", "Volt", "Curr", bears=USUAL)),
+)
 def energy_per_metre(mission: Mission, args: Args) -> Value:
     """Electric power of a rover over its speed: median while it is well under way."""
     driven = _steady(mission)

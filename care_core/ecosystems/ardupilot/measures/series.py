@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.instances import split
+from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS, flown_mission, span_of_phase
 from care_core.ecosystems.measures import Args, Mission, extractor, missing, one_of
@@ -89,4 +90,5 @@ def register(
     compute.__module__ = measure.__module__
     compute.__doc__ = f"{doc} Statistic: {stat} unless `stat` says otherwise."
     described = {"stat": _STATISTIC, **PHASE_ARGS, **(args or {})}
-    extractor(name, needs=merge_needs((NEEDS, wanted)), unit=unit, args=described)(compute)
+    needed = rests.of(channel, *(required if columns is None else ()))
+    extractor(name, needs=merge_needs((NEEDS, wanted)), unit=unit, args=described, rests_on=needed)(compute)

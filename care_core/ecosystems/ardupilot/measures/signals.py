@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.ecosystems.ardupilot.measures import rests
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
 from care_core.ecosystems.ardupilot.measures.phases import PHASE_ARGS
 from care_core.ecosystems.ardupilot.measures.series import register, series, statistic
@@ -115,6 +116,7 @@ register("ekf_position_innovation", {"XKF3": ("C", "IPN", "IPE")}, "m",
         "stat": one_of("mean, max, rms or peak", "mean", "max", "rms", "peak"),
         **PHASE_ARGS,
     },
+    rests_on=rests.of("XKF4"),
 )
 def ekf_innovation(mission: Mission, args: Args) -> Value:
     """Innovation test ratio of the first estimator core (above 1 it rejects the sensor). Mean unless `stat`."""
@@ -123,7 +125,13 @@ def ekf_innovation(mission: Mission, args: Args) -> Value:
     return table if isinstance(table, Unavailable) else statistic(table[field], str(args.get("stat", "mean")))
 
 
-@extractor("mean_lean_angle", needs=merge_needs((NEEDS, _ATTITUDE)), unit="deg", args=PHASE_ARGS)
+@extractor(
+    "mean_lean_angle",
+    needs=merge_needs((NEEDS, _ATTITUDE)),
+    unit="deg",
+    args=PHASE_ARGS,
+    rests_on=rests.of("ATT", "Roll", "Pitch", "Yaw"),
+)
 def mean_lean_angle(mission: Mission, args: Args) -> Value:
     """Angle of the lean averaged over the earth's directions while airborne: what steady wind asks for."""
     table = series(mission, "ATT", ("Roll", "Pitch", "Yaw"), args)
@@ -165,33 +173,34 @@ _HORIZONTAL_ARGS = {
     "stat": one_of("mean, max, rms or peak (95th percentile)", "mean", "max", "rms", "peak"),
     **PHASE_ARGS,
 }
+_BOTH = rests.all_of(rests.of("PSCN"), rests.of("PSCE"))
 
 
-@extractor("velocity_error", needs=_horizontal("TV", "V"), unit="m/s", args=_HORIZONTAL_ARGS)
+@extractor("velocity_error", needs=_horizontal("TV", "V"), unit="m/s", args=_HORIZONTAL_ARGS, rests_on=_BOTH)
 def velocity_error(mission: Mission, args: Args) -> Value:
     """Wanted minus flown horizontal velocity. Statistic: rms unless `stat` says otherwise."""
     return _both_axes(mission, args, lambda of: of("TV") - of("V"), "rms", ("TV", "V"))
 
 
-@extractor("position_error", needs=_horizontal("TP", "P"), unit="m", args=_HORIZONTAL_ARGS)
+@extractor("position_error", needs=_horizontal("TP", "P"), unit="m", args=_HORIZONTAL_ARGS, rests_on=_BOTH)
 def position_error(mission: Mission, args: Args) -> Value:
     """Wanted minus flown horizontal position. Statistic: rms unless `stat` says otherwise."""
     return _both_axes(mission, args, lambda of: of("TP") - of("P"), "rms", ("TP", "P"))
 
 
-@extractor("acceleration_error", needs=_horizontal("TA", "A"), unit="m/s/s", args=_HORIZONTAL_ARGS)
+@extractor("acceleration_error", needs=_horizontal("TA", "A"), unit="m/s/s", args=_HORIZONTAL_ARGS, rests_on=_BOTH)
 def acceleration_error(mission: Mission, args: Args) -> Value:
     """Wanted minus flown horizontal acceleration. Statistic: rms unless `stat` says otherwise."""
     return _both_axes(mission, args, lambda of: of("TA") - of("A"), "rms", ("TA", "A"))
 
 
-@extractor("planned_acceleration", needs=_horizontal("DA"), unit="m/s/s", args=_HORIZONTAL_ARGS)
+@extractor("planned_acceleration", needs=_horizontal("DA"), unit="m/s/s", args=_HORIZONTAL_ARGS, rests_on=_BOTH)
 def planned_acceleration(mission: Mission, args: Args) -> Value:
     """Horizontal acceleration that the path planner asks for. Statistic: peak unless `stat` says otherwise."""
     return _both_axes(mission, args, lambda of: of("DA"), "peak", ("DA",))
 
 
-@extractor("speed", needs=_horizontal("V"), unit="m/s", args=_HORIZONTAL_ARGS)
+@extractor("speed", needs=_horizontal("V"), unit="m/s", args=_HORIZONTAL_ARGS, rests_on=_BOTH)
 def speed(mission: Mission, args: Args) -> Value:
     """Horizontal speed while airborne. Statistic: mean unless `stat` says otherwise."""
     return _both_axes(mission, args, lambda of: of("V"), "mean", ("V",))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from care_core.ecosystems.base import Check
-from care_core.ecosystems.px4.checks import arming, changes, crash, estimator, flags, kill_switch, motor
+from care_core.ecosystems.px4.checks import arming, changes, crash, estimator, flags, kill_switch, motor, recorded
 from care_core.ecosystems.px4.flight import Px4Flight
 
 CHECKS: tuple[Check[Px4Flight], ...] = (
@@ -12,6 +12,7 @@ CHECKS: tuple[Check[Px4Flight], ...] = (
     motor.CHECK,
     changes.CHECK,
     crash.CHECK,
+    recorded.CHECK,
     kill_switch.CHECK,
     arming.CHECK,
 )

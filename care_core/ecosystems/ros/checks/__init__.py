@@ -16,6 +16,7 @@ from care_core.ecosystems.ros.checks import (
     messages,
     odometry,
     planner,
+    recorded,
     timing,
     topics,
 )
@@ -25,6 +26,7 @@ CHECKS: tuple[Check[Drive], ...] = (
     battery.CHECK,
     laser.CHECK,
     odometry.CHECK,
+    recorded.CHECK,
     drive.CHECK,
     blocked.CHECK,
     imu.CHECK,

@@ -7,13 +7,14 @@ looks like: commands to stand or to turn on the spot, reversals of the turn comm
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import wraps
 from typing import TypeVar
 
 import numpy as np
 
-from care_core.ecosystems.measures import Args, Compute, Mission, extractor, missing, numeric, one_of
+from care_core.ecosystems.coverage import EXTREME, MEAN, SUM, Bears, Samples
+from care_core.ecosystems.measures import Args, Compute, Mission, RestsOn, extractor, missing, numeric, one_of
 from care_core.ecosystems.ros.drive import LOG_FIELDS
 from care_core.ecosystems.ros.goals import Goal, Status
 from care_core.ecosystems.ros.measures.goals import log_messages
@@ -24,9 +25,11 @@ from care_core.ecosystems.ros.measures.window import (
     ActiveOdometry,
     DriveWindow,
     angle_between,
+    arrivals,
     goal_server,
     longest,
     no_odometry,
+    resting_on,
     share,
     window,
 )
@@ -137,8 +140,11 @@ def measured(
     unit: str = "",
     args: Mapping[str, str] | None = None,
     parts: tuple[str, ...] = ("goals", "odometry"),
+    bears: Bears = MEAN,
+    rests_on: RestsOn | None = None,
 ) -> Callable[[Callable[[DriveWindow, T, Args], Value]], Compute]:
     """Register an extractor of what is measured on a part of the drive; where the part is missing, that is the answer.
+    It needs its topics throughout, unless it `rests_on` else.
 
     A measure with the argument `per` is a sum over the mission, see `divided`.
     """
@@ -151,9 +157,15 @@ def measured(
             return found if isinstance(found, Unavailable) else measure(drive, found, args)
 
         answer = divided(compute) if args and "per" in args else compute
-        return extractor(name, needs={}, unit=unit, parts=parts, args=args)(answer)
+        needed = rests_on or resting_on(*(part for part in parts if part in ("odometry", "commands")), bears=bears)
+        return extractor(name, needs={}, unit=unit, parts=parts, args=args, rests_on=needed)(answer)
 
     return register
+
+
+def _anything(mission: Mission, args: Args) -> Iterator[Samples]:
+    """Of what measures pauses: they are no holes in it."""
+    return iter(())
 
 
 # Goals and time
@@ -270,7 +282,9 @@ def time_per_metre(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> 
     return drive.active_s / made_m
 
 
-@measured("goals_approached", _ends, args={"within_m": numeric("how near counts, 0.6 m unless given")})
+@measured(
+    "goals_approached", _ends, args={"within_m": numeric("how near counts, 0.6 m unless given")}, rests_on=arrivals
+)
 def goals_approached(drive: DriveWindow, left: _Ends, args: Args) -> Value:
     """Share of the mission's goals that the robot was near to when they ended, reached or not."""
     within_m = float(args.get("within_m", 0.6))
@@ -284,6 +298,7 @@ def goals_approached(drive: DriveWindow, left: _Ends, args: Args) -> Value:
         "how": one_of("given_up, unsettled, crawling or stuck", "given_up", "unsettled", "crawling", "stuck"),
         "within_m": numeric("how near to the goal, 0.6 m unless given"),
     },
+    rests_on=arrivals,
 )
 def first_failure(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """1 when the first goal that was not reached failed in this way, else 0: `given_up` by the stack; out of time
@@ -309,6 +324,7 @@ def _way_of_failing(drive: DriveWindow, odometry: ActiveOdometry, number: int, a
     parts=("goals", "odometry"),
     unit="",
     args={"within_m": numeric("how near counts as passed, 0.6 m unless given")},
+    rests_on=resting_on("odometry", bears=EXTREME),
 )
 def passages_passed(mission: Mission, args: Args) -> Value:
     """Share of the narrow passages listed in the profile's mission section that the robot came near to."""
@@ -326,13 +342,13 @@ def passages_passed(mission: Mission, args: Args) -> Value:
 # Path
 
 
-@measured("path_length", _odometry, unit="m", args=PER_METRE)
+@measured("path_length", _odometry, unit="m", args=PER_METRE, bears=SUM)
 def path_length(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Length of the odometry's path."""
     return float(odometry.step_m.sum())
 
 
-@measured("detour", _placed, unit="m", args=PER_METRE)
+@measured("detour", _placed, unit="m", args=PER_METRE, bears=SUM)
 def detour(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Path driven beyond the way made towards the goals."""
     return float(odometry.step_m.sum()) - sum(_progress(odometry, drive.goals))
@@ -346,19 +362,19 @@ def lateral_error(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> V
     return float(joined.mean()) if len(joined) else _TOO_SHORT
 
 
-@measured("distance_left", _ends, unit="m")
+@measured("distance_left", _ends, unit="m", rests_on=arrivals)
 def distance_left(drive: DriveWindow, left: _Ends, args: Args) -> Value:
     """Largest distance to a goal when it ended: the goal tolerance where all were reached, else where it got stuck."""
     return max(distance for distance, _ in left)
 
 
-@measured("arrival_error", _arrivals, unit="m")
+@measured("arrival_error", _arrivals, unit="m", rests_on=arrivals)
 def arrival_error(drive: DriveWindow, left: _Ends, args: Args) -> Value:
     """Mean distance to the reached goals on arrival."""
     return float(np.mean([distance for distance, _ in left]))
 
 
-@measured("heading_error", _arrivals, unit="rad")
+@measured("heading_error", _arrivals, unit="rad", rests_on=arrivals)
 def heading_error(drive: DriveWindow, left: _Ends, args: Args) -> Value:
     """Mean error of the heading on arrival at the reached goals."""
     return float(np.mean([angle for _, angle in left]))
@@ -421,7 +437,7 @@ def no_way_time(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Val
     return longest(np.abs(odometry.speed) < STANDS_MPS, odometry.dt)
 
 
-@measured("total_turn", _moving, unit="rad", args=PER_METRE)
+@measured("total_turn", _moving, unit="rad", args=PER_METRE, bears=SUM)
 def total_turn(drive: DriveWindow, odometry: ActiveOdometry, args: Args) -> Value:
     """Sum of all turning, left and right alike."""
     return float((np.abs(odometry.turn) * odometry.dt).sum())
@@ -487,6 +503,7 @@ def turn_reversals(drive: DriveWindow, commands: ActiveCommands, args: Args) -> 
     "command_interval",
     _commands,
     parts=("goals", "commands"),
+    rests_on=_anything,
     unit="s",
     args={"percentile": numeric("0 to 100, 50 unless given")},
 )

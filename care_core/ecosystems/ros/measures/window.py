@@ -6,17 +6,25 @@ The mission section of the profile names the topics, see `topics`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.measures import Args, Mission, missing
+from care_core.ecosystems.coverage import MEAN, SUM, Bears, Samples, Span, doubt
+from care_core.ecosystems.measures import Args, Mission, RestsOn, missing
 from care_core.ecosystems.plausible import APART, STAMP, is_simulated, stamps_pace
 from care_core.ecosystems.ros.drive import Drive, way_through
 from care_core.ecosystems.ros.goals import Goal
-from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS, Commands, Odometry, never_moved
+from care_core.ecosystems.ros.motion import (
+    STANDS_MPS,
+    STANDS_RADPS,
+    Commands,
+    Odometry,
+    never_moved,
+    stretches,
+)
 from care_core.ecosystems.ros.recoveries import Recoveries
 from care_core.logs.base import Wanted
 from care_core.numbers import Bools, Floats
@@ -225,9 +233,15 @@ def window(mission: Mission) -> DriveWindow:
 def _untold(drive: Drive, goals: Sequence[Goal], odometry: Odometry | None) -> Unavailable | None:
     last_s = drive.goals_untold_s(goals, odometry)
     if last_s is None:
-        return None
+        return _unheard(drive, [(goal.sent_s, goal.end_s) for goal in goals if goal.status is None])
     reason = f"the recording tells of no goal after {last_s:.0f} s, though the robot drives on"
     return Unavailable(reason, "record the topics of the action to the end")
+
+
+def _unheard(drive: Drive, open_goals: Sequence[Span]) -> Unavailable | None:
+    """Why goals without an answer may have had one: nothing at all was recorded for a time; None where all was."""
+    streams = [drive.times[topic] for topic in drive.streams]
+    return doubt(Samples("the drive", np.concatenate(streams), open_goals, SUM)) if streams and open_goals else None
 
 
 def no_odometry(drive: DriveWindow) -> Unavailable:
@@ -235,6 +249,45 @@ def no_odometry(drive: DriveWindow) -> Unavailable:
     if drive.doubt:
         return Unavailable(drive.doubt, "check the odometry's source and its driver")
     return missing(drive.topics.odometry)
+
+
+def samples_of(mission: Mission, part: str, bears: Bears) -> Iterator[Samples]:
+    """What the log tells of one of the `topics` of a mission, while a goal is active; of the battery, throughout."""
+    drive, channel = drive_of(mission), str(getattr(topics(mission.spec), part))
+    if drive is None:
+        return
+    goals = [(goal.sent_s, goal.end_s) for goal in mission.shared(window).goals]
+    odometry = drive.odometry_on(topics(mission.spec).odometry)
+    dead = drive.repeats(channel)
+    if part == "odometry" and odometry is not None:
+        yield Samples(f"the odometry ({channel})", odometry.recorded_s, goals, bears, dead=dead)
+    if part == "commands" and (commands := drive.commands_on(channel)) is not None and odometry is not None:
+        # What is silent while the robot stands commands nothing.
+        yield Samples(f"the commands ({channel})", commands.t, _moving(odometry, goals), bears, dead=dead)
+    if part == "battery" and (battery := drive.battery_on(channel)) is not None:
+        yield Samples(f"the battery ({channel})", battery.t, [(mission.start_s, mission.end_s)], bears, dead=dead)
+
+
+def _moving(odometry: Odometry, goals: Sequence[Span]) -> list[Span]:
+    """Where it moves on its way to goals, as long as it stands for no longer than a moment."""
+    t = odometry.recorded_s
+    on_its_way = np.zeros(len(t), bool)
+    for start, end in goals:
+        on_its_way |= (t >= start) & (t <= end)
+    moves = (np.hypot(odometry.speed, odometry.sideways) >= STANDS_MPS) | (np.abs(odometry.turn) >= STANDS_RADPS)
+    return stretches(t, np.asarray(on_its_way & moves), _MAX_GAP_S)
+
+
+def resting_on(*parts: str, bears: Bears = MEAN) -> RestsOn:
+    """What is measured on these topics needs them throughout."""
+    return lambda mission, _args: (one for part in parts for one in samples_of(mission, part, bears))
+
+
+def arrivals(mission: Mission, args: Args) -> Iterator[Samples]:
+    """The odometry at the end of each goal."""
+    ends = [goal.end_s for goal in mission.shared(window).goals]
+    for one in samples_of(mission, "odometry", MEAN):
+        yield replace(one, spans=(), moments=ends)
 
 
 def _odometry(whole: Odometry, mission: Mission, goals: Sequence[Goal]) -> ActiveOdometry | None:

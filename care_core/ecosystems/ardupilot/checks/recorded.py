@@ -1,0 +1,26 @@
+"""Sources that were recorded in part, or only repeat themselves while the vehicle moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from care_core.ecosystems import liveness
+from care_core.ecosystems.ardupilot import sources
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.measures.samples import named
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """What froze, and what was recorded in part."""
+    yield from liveness.findings(flight.frozen)
+    messages = dict.fromkeys(source.message for source in sources.SOURCES)
+    recorded = {named(name): table.t for name in messages if (table := flight.one(name)) is not None}
+    yield from liveness.recorded_in_part(recorded, flight.armed)
+
+
+CHECK = Check(
+    "recorded", "sources that were recorded in part, or repeat themselves while the vehicle moves", sources.READS,
+    Limits([*liveness.LIMITS, *sources.LIMITS]), find,
+)  # fmt: skip

@@ -1,0 +1,139 @@
+"""The sources of an ArduPilot vehicle that vary while it moves, and what tells that it does.
+
+In 250 logs of healthy flights and drives, simulated ones among them, inertial sensors and estimates never repeat
+themselves; receivers do for 26 s in a still hover, compasses for 41 s at one heading, barometers for 33 s at one
+height.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.airborne import Airborne
+from care_core.ecosystems.ardupilot.messages import expanded
+from care_core.ecosystems.base import Limits
+from care_core.ecosystems.coverage import Span
+from care_core.ecosystems.liveness import (
+    ASIDE,
+    Frozen,
+    Live,
+    Motion,
+    least,
+    numberless,
+    overlaps,
+    ranged,
+    repeats,
+    turned,
+)
+from care_core.ecosystems.vehicles import flies
+from care_core.logs.base import Table, Wanted, merge_needs
+from care_core.numbers import Floats
+
+LIMITS = Limits()
+_CHOICE = "a choice: several times what any of 250 healthy logs repeats while it moves so far"
+
+
+def _s(name: str, value: float) -> float:
+    return LIMITS.add(f"longest repetition of the {name}", value, "s", _CHOICE)
+
+
+_WAY_M = LIMITS.add("way that shows in a position", 10.0, "m", "a choice: receivers resolve 1 cm")
+_TURN_DEG = LIMITS.add("turn that shows in a compass, an attitude", 20.0, "deg", "a choice: they resolve 0.1 degrees")
+_RISE_M = LIMITS.add("rise that shows in an attitude", 5.0, "m", "a choice: still air moves a vehicle, too")
+_ROSE_M = LIMITS.add("rise that shows in a barometer", 10.0, "m", "a choice: of estimates on the ground some rise 6 m")
+_ANY = least(_WAY_M, _TURN_DEG, _RISE_M)
+
+SOURCES = (
+    Live("GPS", ("Lat", "Lng"), "the GPS", "gps", _s("GPS", 5.0), least(way_m=_WAY_M)),
+    Live("IMU", ("GyrX", "GyrY", "GyrZ"), "the gyro", "imu", _s("gyro", 1.0), _ANY),
+    Live("IMU", ("AccX", "AccY", "AccZ"), "the accelerometer", "imu", _s("accelerometer", 1.0), _ANY),
+    Live("MAG", ("MagX", "MagY", "MagZ"), "the compass", "compass", _s("compass", 3.0), least(turn_deg=_TURN_DEG)),
+    Live("BARO", ("Alt",), "the barometer", "barometer", _s("barometer", 5.0), least(rise_m=_ROSE_M)),
+    Live("ATT", ("Roll", "Pitch", "Yaw"), "the attitude", "estimator", _s("attitude", 3.0), _ANY),
+    Live("POS", ("Lat", "Lng"), "the estimated position", "estimator", _s("position", 5.0), least(way_m=_WAY_M)),
+    Live("POS", ("RelHomeAlt",), "the estimated height", "estimator", _s("height", 5.0), least(rise_m=_ROSE_M)),
+    Live("BAT", ("Volt", "Curr"), "the battery's monitor", "battery", _s("battery", 30.0), _ANY, is_optional=True,
+         mission_lost=ASIDE),
+    Live("ARSP", ("Airspeed",), "the airspeed sensor", "barometer", _s("airspeed", 5.0), _ANY, is_optional=True,
+         mission_lost=ASIDE),
+    Live("RCOU", tuple(f"C{n}" for n in range(1, 15)), "the record of the motor outputs", "motor", _s("outputs", 10.0),
+         _ANY, is_optional=True, mission_lost=ASIDE),
+)  # fmt: skip
+_FIX = 3
+_METRES = 111_319.5
+READS: Wanted = merge_needs((
+    *({source.message: source.fields} for source in SOURCES),
+    {"GPS": ("Alt", "Status"), "CTUN": ("Alt", "BAlt")},
+))  # fmt: skip
+
+
+def frozen(flight: Airborne, moving: Sequence[Span]) -> Iterator[Frozen]:
+    """Every stretch in which a source says the same while others tell that the vehicle moved, in spans in which it
+    does: what stands on the ground moves by its estimate alone."""
+    flight.tables(expanded(READS))
+    for source in SOURCES:
+        if source.message == "RCOU" and not flight.is_copter:
+            continue  # servos and throttles stay where they are
+        for number, table in enumerate(flight.all(source.message, source.fields[0]), start=1):
+            fields = [field for field in source.fields if field in table.columns]
+            own = _fixed(table) if source.message == "GPS" else table
+            name = source.message if number == 1 else f"{source.message} {number}"
+            if not source.is_optional:
+                columns = [own[field] for field in fields]
+                yield from (Frozen(source, name, *one, None) for one in numberless(own.t, columns, source))
+            for span, count in repeats(own.t, [own[field] for field in fields], source):
+                for part in overlaps(span, moving, source.seconds):
+                    motion = motion_of(flight, part, source.message)
+                    if motion.reaches(source.moved):
+                        yield Frozen(source, name, span, count, motion)
+                        break
+
+
+def _fixed(table: Table) -> Table:
+    """Where a receiver has a position: without a fix it repeats the last one, or says 0."""
+    fixed = np.abs(table["Lat"]) + np.abs(table["Lng"]) > 1e-6
+    return table.where(fixed & (table["Status"] >= _FIX) if "Status" in table.columns else fixed)
+
+
+def motion_of(flight: Airborne, span: Span, but: str) -> Motion:
+    """How far the vehicle came in a span, by any source but that of one message."""
+
+    def told(name: str, *fields: str) -> Table | None:
+        table = None if name == but else flight.one(name, *fields)
+        return None if table is None else table.between(*span)
+
+    places = [one for name in ("POS", "GPS") if (one := told(name, "Lat", "Lng")) is not None]
+    angles = told("ATT", "Roll", "Pitch", "Yaw")
+    heights = (
+        []
+        if not flies(flight.mode_kind)
+        else [
+            one[field]
+            for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt"), ("BARO", "Alt"), ("GPS", "Alt"))
+            if (one := told(name, field)) is not None
+        ]
+    )
+    return Motion(
+        max(map(_way_m, places), default=0.0),
+        max((turned(angles[name]) for name in ("Roll", "Pitch", "Yaw")), default=0.0) if angles is not None else
+        _turned_by_gyro(told("IMU", "GyrX", "GyrY", "GyrZ")),
+        max(map(ranged, heights), default=0.0),
+    )  # fmt: skip
+
+
+def _way_m(place: Table) -> float:
+    known = place.where((np.abs(place["Lat"]) > 1e-6) & np.isfinite(place["Lat"] + place["Lng"]))
+    if not len(known):
+        return 0.0
+    across = np.cos(np.radians(known["Lat"][0]))
+    return ranged(known["Lat"] * _METRES, known["Lng"] * _METRES * across)
+
+
+def _turned_by_gyro(imu: Table | None) -> float:
+    """Degrees about the axis that it turned most about."""
+    if imu is None or len(imu) < 2:
+        return 0.0
+    step_s: Floats = np.diff(imu.t)
+    return max(ranged(np.degrees(np.cumsum(imu[name][1:] * step_s))) for name in ("GyrX", "GyrY", "GyrZ"))

@@ -1,0 +1,199 @@
+"""Whether sources live, and were recorded: a sensor that works varies while its vehicle moves, if only by its noise.
+
+Bit-identical samples tell of a sensor, or its driver, that died and is read on. Some repeat themselves rightly: parked
+vehicles, simulators without noise, batteries whose volts are rounded. So a source is called frozen only where another
+one says that the vehicle moved meanwhile, and for far longer than it repeats itself otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from care_core.ecosystems.base import Limits
+from care_core.ecosystems.coverage import Span, unseen, usual_pause
+from care_core.ecosystems.findings import Finding, FindingKind, Severity
+from care_core.numbers import Floats, ascending, distinct, quantile
+from care_core.records import Record
+
+LIMITS = Limits()
+_RECORDS = LIMITS.add("equal samples in a row", 10, "", "a choice: fewer may be chance, or a driver that reads twice")
+_HABIT = LIMITS.add("times as long as it repeats itself usually", 10.0, "", "a choice: what is rounded repeats often")
+_VARIED = LIMITS.add(
+    "different samples besides", 10, "", "a choice: a part that is not fitted says one thing all along"
+)
+_MISSED = LIMITS.add("share of the time that was not recorded", 0.2, "", "a choice: checks say so where they saw less")
+_LASTS_S = LIMITS.add("shortest time of which this is said", 10.0, "s", "a choice: less is over before it is recorded")
+ASIDE = LIMITS.add("probability that what nothing steers by costs the mission", 0.05, "", "a choice: failsafes read it")
+PROBABILITY = LIMITS.add("probability of a dead source", 0.9, "", "a choice: nothing else repeats to the last bit")
+
+
+class Motion(Record):
+    """How far a vehicle came in a time, as others than the source in question tell: m, degrees, m up or down."""
+
+    way_m: float = 0.0
+    turn_deg: float = 0.0
+    rise_m: float = 0.0
+
+    def reaches(self, least: Motion) -> bool:
+        """Whether it went as far, turned as much or rose as high."""
+        return self.way_m >= least.way_m or self.turn_deg >= least.turn_deg or self.rise_m >= least.rise_m
+
+    def __str__(self) -> str:
+        parts = (
+            (self.way_m, "went {:.0f} m"), (self.turn_deg, "turned by {:.0f} degrees"),
+            (self.rise_m, "rose or sank by {:.0f} m"),
+        )  # fmt: skip
+        return " and ".join(words.format(size) for size, words in parts if size >= 1)
+
+
+def least(way_m: float = math.inf, turn_deg: float = math.inf, rise_m: float = math.inf) -> Motion:
+    """The motion of which any part shows in a source that lives."""
+    return Motion(way_m, turn_deg, rise_m)
+
+
+class Live(Record):
+    """A source whose samples vary while its vehicle moves."""
+
+    message: str
+    """By today's name; of ROS, the type."""
+    fields: tuple[str, ...]
+    """What is compared: where any of them varies, it lives."""
+    name: str
+    """As a title has it: "the GPS"."""
+    kind: FindingKind
+    seconds: float
+    """For how long it says the same at least."""
+    moved: Motion
+    """What others must tell meanwhile, any of it."""
+    is_optional: bool = False
+    """Whether saying one thing all along means that it is not fitted."""
+    records: float = _RECORDS
+    mission_lost: float | None = None
+    """As of a finding; little where nothing steers by it."""
+
+
+class Frozen(Record):
+    """A source that said the same for a time, or nothing that is a number."""
+
+    source: Live
+    channel: str
+    """The message or topic, with its number where it is not the first of its kind."""
+    span: Span
+    records: int
+    motion: Motion | None
+    """What others told meanwhile; None where it said no numbers."""
+
+
+def repeats(t: Floats, columns: Sequence[NDArray[Any]], source: Live) -> Iterator[tuple[Span, int]]:
+    """Stretches in which a source says the same for longer than it may, each with its number of samples.
+
+    Args:
+        t: times of the samples, shape (n,), ascending.
+        columns: what they say, each of shape (n,). Samples that are no numbers say nothing.
+    """
+    says = ~np.all([np.isnan(column) for column in columns], axis=0)
+    t, columns = t[says], [column[says] for column in columns]
+    if len(t) < source.records:
+        return
+    if source.is_optional and max(len(distinct(column)) for column in columns) < _VARIED:
+        return
+    alike = np.all([(a[1:] == a[:-1]) | (np.isnan(a[1:]) & np.isnan(a[:-1])) for a in columns], axis=0)
+    starts = np.flatnonzero(np.concatenate(([True], ~alike)))
+    ends = np.append(starts[1:] - 1, len(t) - 1)
+    lasts, counts = t[ends] - t[starts], ends - starts + 1
+    for row in np.flatnonzero((lasts >= source.seconds) & (counts >= source.records)).tolist():
+        others = np.delete(lasts, row)
+        if not len(others) or lasts[row] >= _HABIT * quantile(others, 0.9):
+            yield (float(t[starts[row]]), float(t[ends[row]])), int(counts[row])
+
+
+def numberless(t: Floats, columns: Sequence[NDArray[Any]], source: Live) -> Iterator[tuple[Span, int]]:
+    """Stretches in which a source that says numbers otherwise says none, each with its number of samples."""
+    says_nothing = np.logical_or.reduce([~np.isfinite(column) for column in columns])
+    if not says_nothing.any() or np.count_nonzero(~says_nothing) < source.records:
+        return
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], says_nothing, [False])).astype(np.int8)))
+    for start, end in zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True):
+        if end - start + 1 >= source.records and t[end] - t[start] >= source.seconds:
+            yield (float(t[start]), float(t[end])), end - start + 1
+
+
+def overlaps(span: Span, others: Iterable[Span], least_s: float) -> Iterator[Span]:
+    """What others have in common with a span, where that is so long."""
+    for start, end in others:
+        common = max(span[0], start), min(span[1], end)
+        if common[1] - common[0] >= least_s:
+            yield common
+
+
+def findings(
+    frozen: Iterable[Frozen], severity: Callable[[float], Severity] = lambda _onset_s: "warning"
+) -> Iterator[Finding]:
+    """What is said of sources that died: each once, from where it first did."""
+    found: dict[tuple[str, str], list[Frozen]] = {}
+    for one in frozen:
+        found.setdefault((one.channel, f"{one.source.name} {one.motion is None}"), []).append(one)
+    for (channel, _), stretches in found.items():
+        first, source = stretches[0], stretches[0].source
+        again = f", and {len(stretches) - 1} times more" if len(stretches) > 1 else ""
+        lasted = f"in {first.records} records over {first.span[1] - first.span[0]:.0f} s (limit {source.seconds:g} s)"
+        said = f"the same to the last digit {lasted}, while the vehicle {first.motion}{again}"
+        yield Finding(
+            kind=source.kind,
+            title=f"{source.name} {'has no numbers' if first.motion is None else 'is frozen'}",
+            onset_s=first.span[0],
+            end_s=stretches[-1].span[1],
+            severity="warning" if source.mission_lost is not None else severity(first.span[0]),
+            evidence=f"no numbers {lasted}{again}" if first.motion is None else said,
+            source=f"{channel}: {', '.join(source.fields)}",
+            probability=PROBABILITY,
+            mission_lost=source.mission_lost,
+        )
+
+
+def recorded_in_part(sources: Mapping[str, Floats], spans: Sequence[Span]) -> Iterator[Finding]:
+    """What is said of sources that checks saw only a part of: what they do not find, they do not rule out.
+
+    Args:
+        sources: when each was recorded, shape (n,), by its name.
+        spans: when the vehicle was under way.
+    """
+    total_s = sum(end - start for start, end in spans)
+    parts = []
+    for name, times in sources.items():
+        t = ascending(times)
+        seen_s = total_s - unseen(t, spans, usual_pause(t))
+        if len(t) and seen_s < (1 - _MISSED) * total_s:
+            parts.append((name, f"{seen_s:.0f} of {total_s:.0f} s"))
+    if not parts or total_s < _LASTS_S:
+        return
+    one = f"{parts[0][0]} was recorded for {parts[0][1]}"
+    several = ", ".join(f"{name} {time}" for name, time in parts)
+    yield Finding(
+        kind="log",
+        title=one if len(parts) == 1 else f"{len(parts)} sources were recorded in part",
+        onset_s=spans[0][0],
+        end_s=spans[-1][1],
+        severity="info",
+        evidence=f"{f'{several}; ' if len(parts) > 1 else ''}of the rest no check can say that it was well",
+        source=" and ".join(name for name, _ in parts),
+        suspect="operation",
+        probability=PROBABILITY,
+    )
+
+
+def turned(degrees: Floats) -> float:
+    """The range of an angle, shape (n,) in degrees, over any number of turns."""
+    known = degrees[np.isfinite(degrees)]
+    return float(np.ptp(np.unwrap(known, period=360.0))) if len(known) else 0.0
+
+
+def ranged(*columns: Floats) -> float:
+    """The diagonal of what columns span together, 0 where they say nothing."""
+    known = (column[np.isfinite(column)] for column in columns)
+    return float(math.hypot(*(float(np.ptp(one)) if len(one) else 0.0 for one in known)))

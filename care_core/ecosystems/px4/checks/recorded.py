@@ -1,0 +1,24 @@
+"""Sources that were recorded in part, or only repeat themselves while the vehicle moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from care_core.ecosystems import liveness
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.px4 import sources
+from care_core.ecosystems.px4.flight import Px4Flight
+
+
+def find(flight: Px4Flight) -> Iterator[Finding]:
+    """What froze, and what was recorded in part."""
+    yield from liveness.findings(flight.frozen)
+    recorded = {topic: table.t for topic, table in flight.tables(sources.READS).items()}
+    yield from liveness.recorded_in_part(recorded, flight.armed)
+
+
+CHECK = Check(
+    "recorded", "sources that were recorded in part, or repeat themselves while the vehicle moves", sources.READS,
+    Limits([*liveness.LIMITS, *sources.LIMITS]), find,
+)  # fmt: skip

@@ -1,0 +1,128 @@
+"""The sources of a PX4 vehicle that vary while it moves, and what tells that it does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from care_core.ecosystems.base import Limits, RunModel
+from care_core.ecosystems.coverage import Span
+from care_core.ecosystems.liveness import (
+    ASIDE,
+    Frozen,
+    Live,
+    Motion,
+    least,
+    numberless,
+    overlaps,
+    ranged,
+    repeats,
+    turned,
+)
+from care_core.logs.base import Table, Wanted, merge_needs
+from care_core.numbers import Floats
+
+LIMITS = Limits()
+_CHOICE = "a choice: several times what healthy ArduPilot vehicles repeat while they move so far"
+
+
+def _s(name: str, value: float) -> float:
+    return LIMITS.add(f"longest repetition of the {name}", value, "s", _CHOICE)
+
+
+_WAY_M = LIMITS.add("way that shows in a position", 10.0, "m", "a choice: receivers resolve 1 cm")
+_TURN_DEG = LIMITS.add("turn that shows in a compass, an attitude", 20.0, "deg", "a choice: they resolve 0.1 degrees")
+_RISE_M = LIMITS.add("rise that shows in an attitude", 5.0, "m", "a choice: still air moves a vehicle, too")
+_ROSE_M = LIMITS.add("rise that shows in a barometer", 10.0, "m", "a choice: of estimates on the ground some rise 6 m")
+_ANY = least(_WAY_M, _TURN_DEG, _RISE_M)
+
+
+def _axes(name: str, count: int = 3) -> tuple[str, ...]:
+    return tuple(f"{name}[{number}]" for number in range(count))
+
+
+_PLACES = {
+    "sensor_gps": (("latitude_deg", "longitude_deg"), ("lat", "lon")),
+    "vehicle_gps_position": (("latitude_deg", "longitude_deg"), ("lat", "lon")),
+}
+_GPS = ("latitude_deg", "longitude_deg", "lat", "lon")
+SOURCES = (
+    *(Live(topic, _GPS, "the GPS", "gps", _s(f"GPS ({topic})", 5.0), least(way_m=_WAY_M)) for topic in _PLACES),
+    Live("sensor_combined", _axes("gyro_rad"), "the gyro", "imu", _s("gyro", 1.0), _ANY),
+    Live("sensor_combined", _axes("accelerometer_m_s2"), "the accelerometer", "imu", _s("accelerometer", 1.0), _ANY),
+    Live("vehicle_magnetometer", _axes("magnetometer_ga"), "the compass", "compass", _s("compass", 3.0),
+         least(turn_deg=_TURN_DEG)),
+    Live("vehicle_air_data", ("baro_alt_meter",), "the barometer", "barometer", _s("barometer", 5.0),
+         least(rise_m=_ROSE_M)),
+    Live("vehicle_attitude", _axes("q", 4), "the attitude", "estimator", _s("attitude", 3.0), _ANY),
+    Live("vehicle_local_position", ("x", "y"), "the estimated position", "estimator", _s("position", 5.0),
+         least(way_m=_WAY_M)),
+    Live("vehicle_local_position", ("z",), "the estimated height", "estimator", _s("height", 5.0),
+         least(rise_m=_ROSE_M)),
+    Live("battery_status", ("voltage_v", "current_a"), "the battery's monitor", "battery", _s("battery", 30.0), _ANY,
+         is_optional=True, mission_lost=ASIDE),
+    Live("airspeed", ("indicated_airspeed_m_s",), "the airspeed sensor", "barometer", _s("airspeed", 5.0), _ANY,
+         is_optional=True, mission_lost=ASIDE),
+    Live("actuator_outputs", _axes("output", 8), "the record of the motor outputs", "motor", _s("outputs", 10.0), _ANY,
+         is_optional=True, mission_lost=ASIDE),
+)  # fmt: skip
+_DEGREES = 1e7
+"""Before 1.14 latitudes are integers of 1e-7 degrees."""
+_METRES = 111_319.5
+READS: Wanted = merge_needs({source.message: source.fields} for source in SOURCES)
+
+
+def frozen(model: RunModel, moving: Sequence[Span]) -> Iterator[Frozen]:
+    """Every stretch in which a source says the same while others tell that the vehicle moved, in spans aloft."""
+    tables = model.tables(READS)
+    for source in (one for one in SOURCES if one.message in tables):
+        table = tables[source.message]
+        fields = [field for field in source.fields if field in table.columns]
+        if not fields:
+            continue
+        columns = [table[field] for field in fields]
+        for span, count in () if source.is_optional else numberless(table.t, columns, source):
+            if any(True for _ in overlaps(span, moving, source.seconds)):
+                yield Frozen(source, source.message, span, count, None)
+        for span, count in repeats(table.t, columns, source):
+            for part in overlaps(span, moving, source.seconds):
+                motion = _motion(model, part, source.message)
+                if motion.reaches(source.moved):
+                    yield Frozen(source, source.message, span, count, motion)
+                    break
+
+
+def _motion(model: RunModel, span: Span, but: str) -> Motion:
+    """How far the vehicle came in a span, by any source but one."""
+    tables = {name: table.between(*span) for name, table in model.tables(READS).items() if name != but}
+    ways, turns, rises = [0.0], [0.0], [0.0]
+    for name, pairs in _PLACES.items():
+        ways += [_way_m(tables[name], *pair) for pair in pairs if _holds(tables, name, *pair)]
+    if _holds(tables, "vehicle_local_position", "x", "y", "z"):
+        place = tables["vehicle_local_position"]
+        ways.append(ranged(place["x"], place["y"]))
+        rises.append(ranged(place["z"]))
+    if _holds(tables, "vehicle_air_data", "baro_alt_meter"):
+        rises.append(ranged(tables["vehicle_air_data"]["baro_alt_meter"]))
+    if _holds(tables, "vehicle_attitude", *_axes("q", 4)):
+        turns.append(turned(_yaw_deg(tables["vehicle_attitude"])))
+    elif _holds(tables, "sensor_combined", *_axes("gyro_rad")):
+        gyros, step_s = tables["sensor_combined"], np.diff(tables["sensor_combined"].t)
+        turns += [ranged(np.degrees(np.cumsum(gyros[name][1:] * step_s))) for name in _axes("gyro_rad")]
+    return Motion(max(ways), max(turns), max(rises))
+
+
+def _holds(tables: dict[str, Table], name: str, *fields: str) -> bool:
+    return name in tables and len(tables[name]) > 1 and all(field in tables[name].columns for field in fields)
+
+
+def _way_m(place: Table, lat_name: str, lon_name: str) -> float:
+    scale = 1.0 if lat_name.endswith("_deg") else 1 / _DEGREES
+    lat, lon = place[lat_name] * scale, place[lon_name] * scale
+    return ranged(lat * _METRES, lon * _METRES * np.cos(np.radians(lat[0])))
+
+
+def _yaw_deg(attitude: Table) -> Floats:
+    w, x, y, z = (attitude[name] for name in _axes("q", 4))
+    return np.asarray(np.degrees(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))))
