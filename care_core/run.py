@@ -198,6 +198,8 @@ class Run(Record):
     """What a run is judged by that flew no mission, or that no profile fits; empty where a profile judges it."""
     modes: tuple[str, ...] = ()
     """The modes that were in force during the mission; empty where the log does not say."""
+    shortfall: tuple[str, ...] = ()
+    """What kept the mission from being accomplished, in clauses; empty where it was, or the log does not say."""
     sources: Mapping[str, str] = field(default_factory=dict)
     """Per option of `config` where its value came from: a record or topic of the log, or file:line."""
 

@@ -190,7 +190,7 @@ def _plainly(model: RunModel, choice: ProfileChoice, health: Health, request: Re
     from care_core.diagnose.triage import unjudged, without_profile
     from care_core.extract.read import log_info
 
-    judged = judge_plainly(model, mission=request.mission, sha256=sha256)
+    judged = judge_plainly(model, mission=request.mission, sha256=sha256, findings=health.findings)
     if judged is not None:
         return without_profile(judged, choice, health)
     settings = {name: history[-1] for name, history in model.log.settings().items()}
@@ -221,6 +221,7 @@ def _read(
         mission=request.mission,
         good=good,
         sha256=sha256,
+        findings=health.findings,
     )
     repeats = []
     for path in request.repeats:
@@ -311,7 +312,7 @@ def changes_of(fix: Fix) -> dict[str, float]:
 def predict(case: Case, changes: Mapping[str, float]) -> Fix:
     """These changes with what they would bring; without any, what the same configuration would bring again. What a
     failed part or what the run met explains is taken off, as for the suggestion."""
-    from care_core.diagnose.advice import believed
+    from care_core.diagnose.advice import believed, odds_as_driven
     from care_core.diagnose.records import Fix
 
     if case.reading is None:
@@ -319,4 +320,7 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
     answer = case.reading.question.ask(changes)
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
     (fix,) = believed([Fix(answer.changes, answer.p_ok, predicted)], case.diagnosis.hypotheses)
-    return fix
+    advised = case.diagnosis.fix
+    if advised is not None and advised.shown_by and dict(changes) == changes_of(advised):
+        return advised
+    return fix if changes else replace(fix, p_fixed=odds_as_driven(answer.p_ok, case.diagnosis.hypotheses))

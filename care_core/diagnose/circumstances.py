@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.mechanisms import columns
-from care_core.causal.model import Summary
+from care_core.causal.model import Model, Summary
 from care_core.diagnose.records import Circumstance
 from care_core.profile.schema import Schema, Side
 from care_core.profile.store import Profile
@@ -50,6 +50,16 @@ def unusual(run: Run, profile: Profile) -> tuple[str, ...]:
             what = f"{variable.doc or variable.name} of {figures(value)} {variable.unit}".rstrip()
             found.append(f"{what} is outside the training runs ({_seen(low, high)})")
     return tuple(found)
+
+
+def battery_is_low(run: Run, model: Model, schema: Schema) -> bool | None:
+    """Whether the battery held less before the start than in any training run, None where nothing tells."""
+    found = None
+    for name, side in schema.circumstances.get("battery", {}).items():
+        value, summary = run.context.get(name), model.summaries.get(name)
+        if side == "low" and summary is not None and is_known(value):
+            found = bool(found) or value < summary.low * (1 - NEAR)
+    return found
 
 
 def _seen(low: float, high: float) -> str:

@@ -16,10 +16,10 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Mapping, Sequence
 
 from care_core.causal.counterfactual import CounterfactualQuery
+from care_core.diagnose.parts import is_late, set_wrong
 from care_core.diagnose.ranking import Suspect
 from care_core.diagnose.records import Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
-from care_core.ecosystems.ranking import LIKELY
 from care_core.profile.schema import Schema
 from care_core.records import replace
 from care_core.run import Evidence, FitVerdict
@@ -32,12 +32,9 @@ DOUBT: Mapping[FitVerdict, float] = {"fits": 1.0, "partly": 0.5, "no": 0.0}
 """Share of what the model says that is believed."""
 UNKNOWN = 0.3
 """What an option, and chance, weigh for an objective that too few training missions had to learn from."""
-LATE, LATE_S = 0.1, 5.0
-"""Share of its weight that a part keeps which failed so many seconds after the run was failing already, by a finding
-that speaks of how it was set."""
-SENSED = frozenset(("barometer", "compass", "gps", "vibration"))
-"""Kinds that no setting brings about: on the training flights all 10 that came as critical after a sign of how the
-vehicle was set have that part failing."""
+LATE = 0.1
+"""Share of its weight that a part keeps which failed when the run was failing already, by a finding that speaks of how
+it was set."""
 POINTED, MOST_POINTED = 0.05, 4.0
 """A finding that speaks of how the robot was set, and not of which option, speaks for options that add this much
 together, and raises them by this factor at most."""
@@ -169,7 +166,7 @@ def weigh(
     for finding in seen:
         if finding.suspect in _WHAT:
             key = _WHAT[finding.suspect], finding.title
-            share = LATE if _is_late(finding, by_setting) else 1.0
+            share = LATE if is_late(finding, by_setting) else 1.0
             weights[key] = max(weights.get(key, 0.0), share * _lost_by(finding, other))
         for name in finding.parameters:
             named = finding.probability * _mission_lost(finding) / len(finding.parameters)
@@ -179,19 +176,6 @@ def weigh(
 
 def _mission_lost(finding: Finding) -> float:
     return MISSION_LOST[finding.severity] if finding.mission_lost is None else finding.mission_lost
-
-
-def set_wrong(finding: Finding) -> bool:
-    """Whether a finding speaks of how the robot was set, while it still explains anything."""
-    return finding.suspect == "parameter" and not finding.after_impact and finding.severity != "info"
-
-
-def _is_late(finding: Finding, by_setting: Iterable[Finding]) -> bool:
-    """Whether the run was failing already, by a sign about as sure as this one. What senses does not fail of that."""
-    if finding.kind in SENSED:
-        return False
-    sure = min(finding.probability, LIKELY)
-    return any(one.onset_s + LATE_S < finding.onset_s and one.probability >= sure for one in by_setting)
 
 
 def _raised(options: Mapping[str, float], by_setting: Sequence[Finding]) -> dict[str, float]:

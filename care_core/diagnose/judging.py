@@ -8,11 +8,13 @@ from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import Model, Summary
 from care_core.configs.driven import readable, same_value
 from care_core.configs.loading import ConfigFile, resolve
+from care_core.diagnose.as_found import as_found
 from care_core.diagnose.implied import implied
 from care_core.diagnose.limits import limits_of
 from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, Status
 from care_core.diagnose.reference import Good, Reference, reference_of
 from care_core.ecosystems.base import RunModel
+from care_core.ecosystems.findings import Finding
 from care_core.errors import UsageError, nearest
 from care_core.extract.plain import read_plain_runs
 from care_core.extract.read import mission_number, read_runs
@@ -24,6 +26,8 @@ from care_core.run import Check, Run, Setting, Unavailable, Value, is_known
 from care_core.variables import Role, Threshold, Variable
 
 _YES = Threshold("==", 1.0)
+_ACCOMPLISHED = frozenset(("mission_success", "outcome"))
+"""Extractors that say whether a flight was accomplished."""
 _FEW = 10
 """As many names can be listed in a sentence."""
 
@@ -64,6 +68,7 @@ def read_and_judge(
     mission: int | None = None,
     good: Good | None = None,
     sha256: Sha256 | None = None,
+    findings: Sequence[Finding] = (),
 ) -> Judged:
     """Read one mission of a log and judge it.
 
@@ -73,6 +78,7 @@ def read_and_judge(
         mission: which mission of the log, from 1; the last when None.
         good: the configuration to judge against, where the operator named one.
         sha256: gives the log's digest, where the caller has begun to work it out.
+        findings: what was found in the log; no objective is met that they contradict.
 
     Raises:
         CareError: the log holds no such mission, the profile has no usable model, or no such objective.
@@ -80,7 +86,9 @@ def read_and_judge(
     schema = profile.schema
     check_wishes(schema, (), thresholds or {})
     given = resolve(configs, (parameter for option in schema.options for parameter in readable(option)))
+    accomplished = [o.name for o in schema.objectives if o.extract is not None and o.extract.kind in _ACCOMPLISHED]
     runs = read_runs(model, schema, overrides=given, sha256=sha256)
+    runs = tuple(as_found(run, findings, accomplished) for run in runs)
     judged = [judge(run, schema, profile.model, thresholds, good) for run in runs]
     verdicts = tuple(verdict(one) for one in judged)
     return replace(
@@ -88,15 +96,22 @@ def read_and_judge(
     )
 
 
-def judge_plainly(model: RunModel, *, mission: int | None = None, sha256: Sha256 | None = None) -> Judged | None:
+def judge_plainly(
+    model: RunModel,
+    *,
+    mission: int | None = None,
+    sha256: Sha256 | None = None,
+    findings: Sequence[Finding] = (),
+) -> Judged | None:
     """Judge one run of a log that no profile fits by what its robot says of itself; None where the log holds no run.
 
-    Without a profile there is no limit, so no value of the run is judged, only what it did.
+    Without a profile there is no limit, so no value of the run is judged, only what it did; `findings` as for
+    `read_and_judge`.
 
     Raises:
         CareError: the log holds no such mission.
     """
-    runs = read_plain_runs(model, sha256)
+    runs = [as_found(run, findings) for run in read_plain_runs(model, sha256)]
     if not runs:
         return None
     judged = [Judged(run, {}, {}, (), tuple(map(_judge_check, run.checks))) for run in runs]
@@ -107,9 +122,9 @@ def judge_plainly(model: RunModel, *, mission: int | None = None, sha256: Sha256
 def verdict(judged: Judged) -> MissionVerdict:
     """What became of a mission, in short: what was broken, else why it could not be judged."""
     everything = (*judged.results, *judged.checks)
-    broken = [result.variable.name for result in everything if result.status == "fault"]
+    broken = dict.fromkeys(result.sentence for result in everything if result.status == "fault")
     if broken:
-        return MissionVerdict(judged.run.mission, "fault", ", ".join(broken), everything)
+        return MissionVerdict(judged.run.mission, "fault", "; ".join(broken), everything)
     if judged.checks and judged.results:
         return MissionVerdict(judged.run.mission, "ok", "no mission was flown", everything)
     unknown = [result for result in everything if result.status == "not_evaluated"]
@@ -157,7 +172,9 @@ def judge(
     run = replace(run, objectives=meaningful(run, schema, bounds, own))
     if model is None:
         results = (
-            _judge_one(o, run.objectives.get(o.name), bounds.get(o.name), literal=_is_literal(o, own))
+            _judge_one(
+                o, run.objectives.get(o.name), bounds.get(o.name), literal=_is_literal(o, own), shortfall=run.shortfall
+            )
             for o in schema.objectives
         )
         return Judged(run, bounds, own, tuple(results), tuple(map(_judge_check, run.checks)))
@@ -176,6 +193,7 @@ def judge(
             needs.get(objective.name),
             so_far=objective.name in past,
             literal=_is_literal(objective, own),
+            shortfall=run.shortfall,
         )
         for objective in schema.objectives
     )
@@ -344,8 +362,9 @@ def _judge_one(
     *,
     so_far: bool = False,
     literal: bool = False,
+    shortfall: Sequence[str] = (),
 ) -> ObjectiveResult:
-    """`literal`: the bound is the operator's, who knows how well it can be told."""
+    """`literal`: the bound is the operator's, who knows how well it can be told. `shortfall`: how a mission failed."""
     if value is None:
         reason = "the profile does not say how to read it from a log"
         return ObjectiveResult(objective, None, bound, "not_evaluated", reason, need=need)
@@ -362,6 +381,8 @@ def _judge_one(
     percentile = summary.percentile(value) if summary and objective.kind == "non-functional" else None
     if so_far:
         reason = "so far: the log ends before the mission does"
+    elif status == "fault" and objective.kind == "functional":
+        reason = "; ".join(shortfall)
     return ObjectiveResult(objective, value, bound, status, reason, percentile=percentile, need=need)
 
 

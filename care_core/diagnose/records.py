@@ -46,7 +46,8 @@ class ObjectiveResult(Record):
     @property
     def sentence(self) -> str:
         """What it came to, where it was missed."""
-        return outcome(self.name, self.variable.kind, self.value, self.variable.unit, str(self.threshold or ""))
+        wanted = str(self.threshold or "")
+        return outcome(self.name, self.variable.kind, self.value, self.variable.unit, wanted, self.reason)
 
     @property
     def is_sure(self) -> bool:
@@ -86,10 +87,10 @@ class ObjectiveResult(Record):
         return f"{self.variable.relative.ratio:g} x the {need} that the reference configuration needs for this mission"
 
 
-def outcome(name: str, kind: Kind | None, value: float | None, unit: str, threshold: str) -> str:
-    """An objective that was missed, in a clause: what it came to, and what was wanted."""
+def outcome(name: str, kind: Kind | None, value: float | None, unit: str, threshold: str, reason: str) -> str:
+    """An objective that was missed, in a clause: how it failed, or what it came to and what was wanted."""
     if kind == "functional":
-        return f"{name} not met"
+        return reason or f"{name} not met"
     measured = "unknown" if value is None else f"{value:.4g} {unit}".rstrip()
     wanted = f", wanted {threshold} {unit}".rstrip() if threshold else ""
     return f"{name} {measured}{wanted}"
@@ -182,6 +183,13 @@ class Fix(Record):
     changes: tuple[Change, ...]
     p_fixed: float
     predicted: Mapping[str, Prediction]
+    shown_by: str = ""
+    """The finding of this run that shows its cause, where training says little of it: `p_fixed` is no promise then."""
+
+    @property
+    def odds(self) -> float | None:
+        """What it promises, None where that was not measured."""
+        return None if self.shown_by else self.p_fixed
 
     @property
     def is_guess(self) -> bool:
@@ -269,8 +277,11 @@ class Diagnosis(Record):
     fix: Fix | None
     alternatives: tuple[Fix, ...] = ()
     odds_as_driven: float | None = None
-    """Probability that all objectives are met by the configuration as driven; None where nothing is advised."""
+    """Probability that the next run meets all objectives as driven, given that this one failed; None where nothing
+    failed, or no model can be asked."""
     abstained: str | None = None
+    why_this: str = ""
+    """Why another parameter is changed than the likeliest cause, or why the change adds little; empty where neither."""
     notes: tuple[str, ...] = field(default=())
     since: Since | None = None
     """The comparison with a good log, where one was named."""

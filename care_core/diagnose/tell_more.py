@@ -20,6 +20,11 @@ TELLING = 0.15
 HYPOTHESES = 3
 """Leading causes that are compared in pairs."""
 MOST_METRICS = 3
+AGAIN = "run again"
+SAME_AGAIN = (
+    "run the same configuration again: if it fails again, the cause persists (a parameter outside the profile, or the "
+    "vehicle); if not, it is what this run met"
+)
 MET = "what this run met"
 """The rival of a cause that stands alone."""
 
@@ -31,35 +36,36 @@ def tell_more(
     unranked: Mapping[str, Sequence[Suspect]],
     *,
     observational: bool = False,
+    again: str = AGAIN,
+    nothing_else: str = SAME_AGAIN,
 ) -> tuple[str, ...]:
     """Sentences for an operator, the most useful first; empty where nothing would help.
 
     Args:
         unranked: per objective the options whose effect the training runs cannot tell, the likeliest first.
         observational: operators chose the options of the training runs.
+        again: how a change is tried.
+        nothing_else: what is left to be done where nothing of this would help.
     """
     advice = list(_unrecorded(faults, run))
     for fault in faults:
         objective = fault.objective.variable.name
         advice += [
-            f"{_change_back(query, name)} and run again: the training runs cannot tell what it does to {objective}"
+            f"{_change_back(query, name)} and {again}: the training runs cannot tell what it does to {objective}"
             for name in [suspect.option for suspect in unranked[objective]][:HYPOTHESES]
             if name not in query.kept
         ]
         advice += [
-            f"{_change_back(query, name)} and run again: a change that nobody chose for a reason would settle whether "
+            f"{_change_back(query, name)} and {again}: a change that nobody chose for a reason would settle whether "
             f"{name} causes it"
             for name in (_first(fault) if observational else ())
             if name not in query.kept
         ]
         found = experiment(query, fault)
         if found is not None:
-            advice.append(str(found))
+            advice.append(str(found).replace(AGAIN, again))
     if not advice:
-        advice.append(
-            "run the same configuration again: if it fails again, the cause persists (a parameter outside the profile, "
-            "or the vehicle); if not, it is what this run met"
-        )
+        advice.append(nothing_else)
     return tuple(dict.fromkeys(advice))
 
 

@@ -11,8 +11,20 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import EffectRecord
 from care_core.diagnose import provenance
-from care_core.diagnose.advice import believed, by_chance, falls_short, nearest, outweighed, untried
-from care_core.diagnose.circumstances import circumstances, unusual
+from care_core.diagnose.advice import (
+    NECESSARY,
+    believed,
+    believed_causes,
+    by_chance,
+    explained,
+    falls_short,
+    nearest,
+    no_stand_out,
+    odds_as_driven,
+    outweighed,
+    untried,
+)
+from care_core.diagnose.circumstances import battery_is_low, circumstances, unusual
 from care_core.diagnose.fixes import (
     GAIN_FOR_ONE_MORE,
     MAX_ALTERNATIVES,
@@ -29,6 +41,8 @@ from care_core.diagnose.fixes import (
 from care_core.diagnose.hypotheses import explain, speaking, unasked
 from care_core.diagnose.implied import implied
 from care_core.diagnose.judging import Judged, check_wishes, query_of, unread_options
+from care_core.diagnose.next_step import bench, trial, was_upset
+from care_core.diagnose.parts import mend_first, unmended
 from care_core.diagnose.ranking import (
     Suspect,
     describe_path,
@@ -38,8 +52,8 @@ from care_core.diagnose.ranking import (
 )
 from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Hypothesis, Note, ObjectiveResult
 from care_core.diagnose.since import compare, with_evidence
-from care_core.diagnose.tell_more import tell_more
-from care_core.ecosystems.findings import NOTHING_SEEN, Health
+from care_core.diagnose.tell_more import AGAIN, SAME_AGAIN, tell_more
+from care_core.ecosystems.findings import NOTHING_SEEN, Finding, Health, every_finding
 from care_core.logs.base import Log
 from care_core.profile.store import Profile
 from care_core.records import Record, replace
@@ -125,17 +139,17 @@ def diagnose(
     choice = replace(choice, fit=choice.fit.with_objection(*unusual(run, profile)))
     if not broken:
         missed = any(result.status == "fault" for result in judged.checks)
-        explained = unasked(health.findings, failed=missed, shown=said, verdict=choice.fit.verdict)
+        told = unasked(health.findings, failed=missed, shown=said, verdict=choice.fit.verdict)
         return Diagnosis(
             choice,
             run,
             objectives,
             (),
             None,
-            notes=(*_set_wrong(judged, explained, said), *(() if run.checks else (_reference(judged),))),
+            notes=(*_set_wrong(judged, told, said), *(() if run.checks else (_reference(judged),))),
             missions=judged.missions,
             health=health,
-            hypotheses=explained,
+            hypotheses=told,
         )
     report("ranking the causes", 0.7)
     query = query_of(judged, profile, keep)
@@ -153,14 +167,31 @@ def diagnose(
     )
     hypotheses = explain(query, broken, weighed, run.refused_by, health.findings, said, choice.fit.verdict)
     report("searching for a fix", 0.85)
-    fixes = believed(_fixes(case, {s.option for group in found.values() for s in group}), hypotheses)
+    as_driven = odds_as_driven(float(query.probability([query.config])[0]), hypotheses)
+    held = _failsafes_held(case, health.findings)
+    options = {s.option for group in found.values() for s in group}
+    held_too = held | _leads(faults)
+    found_fixes = _fixes(case, options, held_too)
+    if idle := _idle(case, judged, found_fixes[:1]):
+        found_fixes = _fixes(case, options, held_too | idle)
+    fixes = believed(found_fixes, hypotheses)
     out_of_reach = next(filter(None, unheard.values()), None)
-    abstained = out_of_reach or outweighed(hypotheses, health.findings) or _abstains(case, faults, fixes)
+    part = _part(case, health.findings)
+    abstained = (part and unmended(part)) or out_of_reach or outweighed(hypotheses, health.findings)
     if abstained is None:
-        abstained = falls_short(fixes[0], broken, _odds(query)) or untried(fixes[0], schema.learned_elsewhere)
+        abstained = (
+            _abstains(case, faults, fixes, held, as_driven)
+            or falls_short(fixes[0], broken, _odds(query), as_driven)
+            or untried(fixes[0], schema.learned_elsewhere)
+            or no_stand_out(fixes[0], as_driven, hypotheses, _necessary(case, broken, fixes[0]))
+        )
+        shown = None if abstained is None else _shown_by_run(case, hypotheses)
+        if shown is not None:
+            abstained, fixes = None, (shown,)
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     if abstained is None:
         faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)
+    faults = believed_causes(faults, hypotheses)
     report("done", 1.0)
     return Diagnosis(
         profile=choice,
@@ -169,23 +200,97 @@ def diagnose(
         faults=faults,
         fix=None if abstained else fixes[0],
         alternatives=() if abstained else tuple(fixes[1:]),
-        odds_as_driven=None if abstained else _as_driven(case, hypotheses),
+        odds_as_driven=as_driven,
         abstained=abstained,
-        notes=_notes(case, broken, None if abstained else fixes[0]),
+        why_this="" if abstained or fixes[0].shown_by else explained(fixes[0], as_driven, hypotheses, faults),
+        notes=_notes(case, broken, None if abstained else fixes[0], as_driven),
         missions=judged.missions,
         rivals=circumstances(run, query, schema) if unsure else (),
-        tell_more=tell_more(query, faults, run, unranked, observational=schema.observational)
-        if unsure and not out_of_reach
-        else (),
+        tell_more=_tell_more(case, faults, health) if unsure and not out_of_reach else (),
         health=health,
         hypotheses=hypotheses,
     )
 
 
-def _as_driven(case: _Case, hypotheses: Sequence[Hypothesis]) -> float:
-    """Probability that the same configuration meets every limit in the next run, as the fixes promise theirs."""
-    (again,) = believed([Fix((), float(case.query.probability([case.query.config])[0]), {})], hypotheses)
-    return again.p_fixed
+def _tell_more(case: _Case, faults: tuple[Fault, ...], health: Health) -> tuple[str, ...]:
+    upset = was_upset(case.run, health.findings)
+    return tell_more(
+        case.query,
+        faults,
+        case.run,
+        case.unranked,
+        observational=case.profile.schema.observational,
+        again=f"try it {trial(case.run)}" if upset else AGAIN,
+        nothing_else=bench(case.run) if upset else SAME_AGAIN,
+    )
+
+
+def _shown_by_run(case: _Case, hypotheses: Sequence[Hypothesis]) -> Fix | None:
+    """The parameters that a critical finding of this run names, back at their reference: what it shows is worth a
+    change where training says little of it, though nothing says what that promises. None where none stands above
+    chance."""
+    query, shown = case.query, next((one for one in case.run.evidence if one.kind == "found"), None)
+    if shown is None or case.profile.schema.learned_elsewhere:
+        return None
+    chance = sum(one.probability for one in hypotheses if one.what == "chance")
+    likely = {one.name for one in hypotheses if one.what == "parameter" and one.probability > chance}
+    back = {name: query.reference[name] for name in shown.options if name not in query.kept}
+    if not likely & back.keys() or not all(query.variables[name].accepts(value) for name, value in back.items()):
+        return None
+    fix = to_fix(query, back, float(query.probability([{**query.config, **back}])[0]))
+    return replace(fix, predicted={}, shown_by=shown.text.partition(":")[0])
+
+
+def _part(case: _Case, findings: Sequence[Finding]) -> Finding | None:
+    """The part that comes before any parameter. A battery that is known to be full kept no vehicle from arming."""
+    part = mend_first(findings)
+    is_full = battery_is_low(case.run, case.query.model, case.profile.schema) is False
+    return None if part is not None and part.kind == "prearm" and is_full else part
+
+
+def _failsafes_held(case: _Case, findings: Sequence[Finding]) -> frozenset[str]:
+    """The battery failsafes, where the battery may not have been full or well: they are lowered for no such flight."""
+    suspected = any(
+        one.kind == "battery" and one.suspect != "parameter" and one.severity != "info" and not one.after_impact
+        for one in every_finding(findings)
+    )
+    if not suspected and not battery_is_low(case.run, case.query.model, case.profile.schema):
+        return frozenset()
+    return frozenset(one.name for one in case.profile.schema.options if one.safety and one.unit == "V")
+
+
+def _leads(faults: Sequence[Fault]) -> set[str]:
+    """Options that are only not ruled out: no fix changes them."""
+    causes = [cause for fault in faults for cause in fault.causes]
+    return {one.option.name for one in causes if one.is_lead} - {one.option.name for one in causes if not one.is_lead}
+
+
+def _idle(case: _Case, judged: Judged, fixes: Sequence[Fix]) -> set[str]:
+    """Options that a fix changes beside others for nothing that this run broke: it met all else, as far as can be."""
+    broken = judged.broken
+    if not fixes or any(result.status == "not_evaluated" for result in judged.results):
+        return set()
+    names = {change.option.name for change in fixes[0].changes}
+    return {name for name in names if len(names) > 1 and _necessary(case, broken, fixes[0], names - {name}) < NECESSARY}
+
+
+def _necessary(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix, given: Collection[str] = frozenset()) -> float:
+    """The largest share of the failures of a broken objective that the fix takes away (Pearl's probability of
+    necessity, where a change harms no run), before anything of this run is known.
+
+    Args:
+        given: options of the fix that are changed already.
+    """
+    before = replace(case.query, observed={}, repeats=())
+    changed = {one.option.name: one.suggested for one in fix.changes}
+    first = {name: value for name, value in changed.items() if name in given}
+    configs = [{**before.config, **first}, {**before.config, **changed}]
+    shares = [0.0]
+    for name in (result.variable.name for result in broken):
+        if name in before.model.outcomes:
+            here, there = (float(one) for one in 1.0 - before.p_ok(name, configs))
+            shares.append(1.0 - there / here if here > 0 else 0.0)
+    return max(shares)
 
 
 def _set_wrong(judged: Judged, explained: Sequence[Hypothesis], said: Mapping[str, Evidence]) -> Iterator[str]:
@@ -274,6 +379,8 @@ def _as_in_fix(case: _Case, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
 
     def as_in_fix(cause: Cause) -> Cause:
         value = values.get(cause.option.name, cause.suggested)
+        if fix.shown_by and cause.option.name in values:
+            return replace(cause, suggested=value, predicted=None, p_fixed=None)
         if value is None or value == cause.suggested:
             return cause
         changed = {**case.query.config, cause.option.name: value}
@@ -307,10 +414,11 @@ def _confidence(case: _Case, result: ObjectiveResult, suspect: Suspect, in_suppo
 
 def _cause_notes(case: _Case, suspect: Suspect, in_support: bool, support: float) -> tuple[Note, ...]:
     notes: list[Note] = []
+    left = ": not ruled out" if suspect.weight < MIN_CONTRIBUTION else ""
     if suspect.effect is None:
-        notes.append(Note(f"no effect on {suspect.path.nodes[-1]} was seen in training: not ruled out"))
+        notes.append(Note(f"no effect on {suspect.path.nodes[-1]} was seen in training{left}"))
     elif suspect.contribution < MIN_CONTRIBUTION:
-        notes.append(Note("costs this run little: not ruled out"))
+        notes.append(Note(f"costs this run little, by what training says{left}"))
     if suspect.symptom is not None and suspect.contribution < MIN_CONTRIBUTION <= suspect.weight:
         notes.append(Note(f"this run's {suspect.symptom} points at it"))
     if not in_support:
@@ -336,11 +444,15 @@ def _chosen_by_operators(effect: EffectRecord | None) -> str:
     )
 
 
-def _fixes(case: _Case, options: set[str]) -> list[Fix]:
-    """The suggested fix first, then up to three that trade changes for probability or take another way."""
+def _fixes(case: _Case, options: Collection[str], held: Collection[str]) -> list[Fix]:
+    """The suggested fix first, then up to three that trade changes for probability or take another way.
+
+    Args:
+        held: options that are not changed.
+    """
     # Options off their reference that break another objective matter too once this fault is gone.
-    every = options | {name for name in deviating(case.query.config, case.query.reference) if _has_effect(case, name)}
-    free = sorted(every - case.query.kept)
+    off = deviating(case.query.config, case.query.reference)
+    free = sorted({*options, *(name for name in off if _has_effect(case, name))} - {*held, *case.query.kept})
     found = search(case.query, free)
     if not found:
         return []
@@ -366,7 +478,9 @@ def _has_effect(case: _Case, option: str) -> bool:
     return any(effects[key].identified and effects[key].effect > 0 for key in effects if key[0] == option)
 
 
-def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> str | None:
+def _abstains(
+    case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix], held: Collection[str], as_driven: float
+) -> str | None:
     names = [fault.objective.variable.name for fault in faults]
     unknown = [name for name in names if name not in case.query.model.outcomes]
     if unknown:
@@ -380,10 +494,8 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
     has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
     if has_cause and fixes and fixes[0].p_fixed >= enough:
         return None
-    shown = next((one for one in case.run.evidence if one.kind == "found"), None)
-    if shown is not None:
-        back = " or ".join(f"{name} to {case.query.reference[name]:g}" for name in shown.options)
-        return f"training says little of it, but this run shows it ({shown.text.partition(':')[0]}): bring {back} first"
+    if any(cause.option.name in held for fault in faults for cause in fault.causes if not cause.is_lead):
+        return f"charge or replace the battery first: {', '.join(sorted(held))} is not lowered while it is not full"
     unsafe = needs_unsafe(case.query, enough)
     if unsafe is not None:
         return f"only '{unsafe}' past its default is likely to help, and a safety parameter is never made looser"
@@ -395,7 +507,7 @@ def _abstains(case: _Case, faults: tuple[Fault, ...], fixes: Sequence[Fix]) -> s
     pinned = f", with {', '.join(sorted(case.query.kept))} kept as it is" if case.query.kept else ""
     broken = [fault.objective for fault in faults]
     best = nearest(_resets(case, faults), broken)
-    short = falls_short(best, broken, _odds(case.query)) if best else None
+    short = falls_short(best, broken, _odds(case.query), as_driven) if best else None
     return f"{short or 'no change inside the acceptable ranges is likely enough to meet every limit'}{pinned}"
 
 
@@ -496,9 +608,8 @@ def _if_hidden(case: _Case, fix: Fix) -> str:
     )
 
 
-def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None) -> tuple[str, ...]:
-    notes = list(case.choice.fit.reasons)
-    notes.append(case.reference)
+def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None, as_driven: float) -> tuple[str, ...]:
+    notes = [case.reference]
     for name in (result.variable.name for result in broken):
         unknown = ", ".join(suspect.option for suspect in case.unranked[name])
         if unknown:
@@ -508,10 +619,9 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None) -> t
         for name, rate in case.query.base_rates().items()
     ]
     notes.append(_promise(case.query, [result.variable.name for result in broken]))
-    if fix is not None:
-        now = float(case.query.probability([case.query.config])[0])
-        notes += filter(None, [by_chance(fix, now, _odds(case.query))])
-    if fix is not None and case.profile.schema.observational:
+    if fix is not None and not fix.shown_by:
+        notes += filter(None, [by_chance(fix, as_driven, _odds(case.query))])
+    if fix is not None and not fix.shown_by and case.profile.schema.observational:
         notes.append(_if_hidden(case, fix))
     if not case.run.mission.fits and case.run.mission.mismatch not in notes:
         notes.append(case.run.mission.mismatch)

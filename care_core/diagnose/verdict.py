@@ -5,12 +5,14 @@ It is made of a diagnosis, or of the document of one that was remembered. Needs 
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Collection, Sequence
-from typing import Literal, Protocol
+from typing import Literal, Protocol, TypeVar
 
+from care_core.diagnose.next_step import next_step
 from care_core.diagnose.records import Confidence, Diagnosis, Hypothesis, Status
-from care_core.ecosystems.findings import WHOLE_LOG, FindingKind, Severity
-from care_core.ecosystems.ranking import SYMPTOMS
+from care_core.ecosystems.findings import WHOLE_LOG, FindingKind, Severity, SuspectKind
+from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
 from care_core.records import Record
 from care_core.run import FIT_WORDS, Fit, FitVerdict
@@ -27,9 +29,13 @@ STATUS_WORDS: dict[RunStatus, str] = {
 }
 GUESS = "\u00a0probability\u00a0(a\u00a0guess)"
 NO_LIMIT = "no limit of this mission is known; what happened is told below"
-NO_LIMITS = "no profile fits: no limits for time and energy, no causes by parameters"
+NO_LIMITS = "no limits for time and energy, no causes by parameters"
 MOST_FINDINGS = 2
 """Findings that the sentence names."""
+LINE, LINES = 80, 2
+"""Columns, and lines of a headline: what was missed first and what ended the run; the rest stands below."""
+BUT = "but "
+"""What the sentence of a run begins with that met its objectives while a part of it failed."""
 
 _GRAVEST: tuple[tuple[RunStatus, ExitCode], ...] = (
     ("fault", ExitCode.FAULT),
@@ -68,6 +74,13 @@ class SeenFinding(Protocol):
     def after_impact(self) -> bool: ...
     @property
     def source(self) -> str: ...
+    @property
+    def suspect(self) -> SuspectKind: ...
+    @property
+    def probability(self) -> float | None: ...
+
+
+F = TypeVar("F", bound=SeenFinding)
 
 
 class Reason(Record):
@@ -87,23 +100,25 @@ class Advice(Record):
 
     change: str = ""
     """Empty where nothing is advised."""
-    odds: float = 0.0
-    """Probability that all objectives are met with the change."""
+    odds: float | None = None
+    """Probability that all objectives are met with the change; None where it was not measured."""
     odds_as_driven: float | None = None
     """The same without it; None for a remembered run."""
     is_guess: bool = False
     """Whether a value of the change is one that no training run came near."""
     confidence: Confidence | None = None
     """How sure the cause is that the change mends."""
+    why: str = ""
+    """Why another parameter is changed than the likeliest cause, or why it adds little; empty where neither."""
     refusal: str = ""
     """Why nothing is advised, empty where nothing failed."""
 
     def __str__(self) -> str:
         if not self.change:
             return f"No change advised: {self.refusal}" if self.refusal else ""
-        without = "" if self.odds_as_driven is None else f" ({self.odds_as_driven:.0%} without the change)"
-        sure = f", {self.confidence} confidence in the cause" if self.confidence else ""
-        return f"Change {self.change}: {chance(self.odds, self.is_guess)} that all objectives are met{without}{sure}"
+        sure = f" ({self.confidence} confidence in the cause)" if self.confidence else ""
+        why = f"; {self.why}" if self.why else ""
+        return f"Change {self.change}{sure}: {promise(self.odds, self.odds_as_driven, self.is_guess)}{why}"
 
 
 class Verdict(Record):
@@ -120,8 +135,22 @@ class Verdict(Record):
     next_step: str
 
     @property
+    def word(self) -> str:
+        return STATUS_WORDS[self.status]
+
+    @property
+    def told(self) -> str:
+        """The rest of the headline, from its colon or comma on."""
+        return f", {self.failed}" if self.has_but else f": {self.failed}"
+
+    @property
+    def has_but(self) -> bool:
+        """Whether the run met its objectives while a part of it failed."""
+        return self.failed.startswith(BUT)
+
+    @property
     def headline(self) -> str:
-        return f"{STATUS_WORDS[self.status]}: {self.failed}"
+        return f"{self.word}{self.told}"
 
     @property
     def exit_code(self) -> ExitCode:
@@ -130,7 +159,7 @@ class Verdict(Record):
     @property
     def lines(self) -> tuple[str, ...]:
         """The verdict as every report begins."""
-        lines = (self.fit, self.headline, str(self.advice), f"Next: {self.next_step}" if self.next_step else "")
+        lines = (self.headline, str(self.advice), f"Next: {self.next_step}" if self.next_step else "", self.fit)
         return tuple(filter(None, lines))
 
     @property
@@ -141,19 +170,21 @@ class Verdict(Record):
             return f"{self.reasons[0].probability:.0%} {self.reasons[0].name}"
         if self.status == "fault":
             return f"{self.failed}; no cause stands out"
-        return "" if self.status == "ok" else self.failed
+        return "" if self.status == "ok" and not self.has_but else self.failed
 
 
 def verdict_of(diagnosis: Diagnosis) -> Verdict:
     """The verdict of a diagnosis."""
+    fit, objectives, findings = diagnosis.profile.fit, diagnosis.objectives, diagnosis.health.findings
+    status = status_of({one.status for one in objectives}, {one.severity for one in findings}, fit.verdict)
     return compose(
         diagnosis.profile.title,
-        diagnosis.profile.fit,
-        diagnosis.objectives,
-        diagnosis.health.findings,
+        fit,
+        objectives,
+        findings,
         diagnosis.hypotheses,
         _advice(diagnosis),
-        diagnosis.tell_more,
+        next_step(diagnosis, has_failed=status == "fault"),
     )
 
 
@@ -165,10 +196,11 @@ def _advice(diagnosis: Diagnosis) -> Advice:
     causes = (cause for fault in diagnosis.faults for cause in fault.causes)
     return Advice(
         change=clean(", ".join(map(str, fix.changes))),
-        odds=fix.p_fixed,
+        odds=fix.odds,
         odds_as_driven=diagnosis.odds_as_driven,
         is_guess=fix.is_guess,
         confidence=next((cause.confidence for cause in causes if cause.option.name in changed), None),
+        why=clean(f"{fix.shown_by} with it" if fix.shown_by else diagnosis.why_this),
     )
 
 
@@ -179,17 +211,17 @@ def compose(
     findings: Sequence[SeenFinding],
     hypotheses: Sequence[Hypothesis],
     advice: Advice,
-    tell_more: Sequence[str],
+    next_step: str,
 ) -> Verdict:
     """The verdict out of what was judged and found; `profile` is empty where none fits."""
     status = status_of({one.status for one in objectives}, {one.severity for one in findings}, fit.verdict)
     return Verdict(
-        fit=clean(fit_text(profile, fit)),
+        fit=clean(fit_line(profile, fit)),
         status=status,
         failed=clean(_failed(status, fit.verdict, objectives, findings)),
         advice=advice,
         reasons=tuple(_reason(one, findings) for one in hypotheses),
-        next_step=clean(_next_step(status, fit.verdict, advice, hypotheses, tell_more)),
+        next_step=clean(next_step),
     )
 
 
@@ -214,40 +246,57 @@ def _failed(
     status: Status, fit: FitVerdict, objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding]
 ) -> str:
     if status == "fault":
-        broken = [one for one in objectives if one.status == "fault"]
-        if fit == "no":
-            return "; ".join((*_worst(findings), *(one.reason or one.sentence for one in broken)))
-        return "; ".join([one.sentence for one in broken] or _worst(findings))
+        return _fault(objectives, findings)
     unknown = [one for one in objectives if one.status == "not_evaluated"]
     if fit == "no" and len(unknown) == len(objectives):
         return unjudged(findings)
     if unknown:
         reason = next((f": {one.reason}" for one in unknown if one.reason), "")
-        limits = f" ({NO_LIMITS})" if fit == "no" else ""
-        return f"no fault found, but {', '.join(one.name for one in unknown)} could not be evaluated{reason}{limits}"
+        return f"no fault found, but {', '.join(one.name for one in unknown)} could not be evaluated{reason}"
     if status == "not_evaluated":
-        return f"nothing that could be judged failed ({NO_LIMITS})" if fit == "no" else "nothing could be judged"
-    return "all objectives are within their thresholds"
+        return "nothing that could be judged failed" if fit == "no" else "nothing could be judged"
+    part = next(filter(_is_broken_part, findings), None)
+    return "all objectives are within their thresholds" if part is None else f"{BUT}{_with_time(part)}"
 
 
-def _worst(findings: Sequence[SeenFinding]) -> list[str]:
+def _fault(objectives: Sequence[JudgedObjective], findings: Sequence[SeenFinding]) -> str:
+    """What was missed, and the first critical findings: as much of it as two lines hold."""
+    broken = list(dict.fromkeys(one.sentence for one in objectives if one.status == "fault"))
+    is_refused = any("arming was refused" in sentence for sentence in broken)
+    worst = [one for one in _worst(findings) if one.title not in "; ".join(broken)]
+    found = [_with_time(one) for one in worst if not (is_refused and one.kind == "prearm")]
+    if not found and any(sentence.endswith(" not met") for sentence in broken):
+        found = [_with_time(one) for one in findings if one.severity == "warning"][:1]
+    if objectives and all(one.status == "ok" for one in objectives):
+        found.append("every objective was met")
+    first, *others = [clause for sentence in broken for clause in sentence.split("; ")] or found[:1]
+    clauses = (first, *found, *others)
+    return _in_lines(list(dict.fromkeys(clauses)), LINES * LINE - len(f"{STATUS_WORDS['fault']}: ") - LINE // 8)
+
+
+def _in_lines(clauses: Sequence[str], width: int) -> str:
+    """As many of the clauses, the first always, as have room."""
+    kept = clauses[0]
+    for clause in clauses[1:]:
+        if len(kept) + len(clause) + 2 <= width:
+            kept = f"{kept}; {clause}"
+    return kept
+
+
+def _worst(findings: Sequence[F]) -> list[F]:
     """The first critical findings, those before the impact where there are any."""
     critical = [one for one in findings if one.severity == "critical"]
-    named = [one for one in critical if not one.after_impact] or critical
-    return [f"{one.title} at {seconds(one.onset_s)}" for one in named[:MOST_FINDINGS]]
+    return ([one for one in critical if not one.after_impact] or critical)[:MOST_FINDINGS]
 
 
-def _next_step(
-    status: Status, fit: FitVerdict, advice: Advice, hypotheses: Sequence[Hypothesis], tell_more: Sequence[str]
-) -> str:
-    if advice.change:
-        return "make the change, run again, and check what it brought with 'care verify REPORT LOG'"
-    first = next(iter(hypotheses), None)
-    if first is not None and first.name and first.what in ("hardware", "world"):
-        return f"look at what this names: {first.name}"
-    if status == "fault" and tell_more:
-        return tell_more[0]
-    return "'care inspect LOG' tells what each profile would need" if fit == "no" else ""
+def _with_time(finding: SeenFinding) -> str:
+    return f"{finding.title} at {seconds(finding.onset_s)}"
+
+
+def _is_broken_part(finding: SeenFinding) -> bool:
+    """Whether a part surely failed."""
+    is_sure = finding.probability is not None and finding.probability >= LIKELY
+    return finding.severity == "warning" and finding.suspect == "hardware" and is_sure
 
 
 def unjudged(findings: Sequence[SeenFinding]) -> str:
@@ -263,6 +312,17 @@ def fit_words(profile: str, verdict: FitVerdict) -> str:
     return f"Profile {profile} {FIT_WORDS[verdict]}" if profile else "No profile fits"
 
 
+def fit_line(profile: str, fit: Fit) -> str:
+    """The same in one line: the first reason, and how many more stand below."""
+    if not profile:
+        return f"No profile fits this log: {NO_LIMITS}"
+    if not fit.reasons:
+        return fit_words(profile, fit.verdict)
+    more = f" (and {len(fit.reasons) - 1} more)" if len(fit.reasons) > 1 else ""
+    text = f"{fit_words(profile, fit.verdict)}: {fit.reasons[0]}"
+    return f"{textwrap.shorten(text, LINE - len(more), placeholder=' ...')}{more}"
+
+
 def fit_text(profile: str, fit: Fit) -> str:
     """Which profile (empty: none) fits how well, and what that means for the answer."""
     reasons = f": {'; '.join(fit.reasons)}" if fit.reasons else ""
@@ -273,6 +333,23 @@ def fit_text(profile: str, fit: Fit) -> str:
 def chance(share: float, is_guess: bool = False) -> str:
     """A probability in words. No line is broken before its warning: an operator may read that line alone."""
     return f"{share:.0%}{GUESS if is_guess else ' probability'}"
+
+
+def promise(share: float | None, as_driven: float | None, is_guess: bool = False) -> str:
+    """The odds of a change, where they were measured, beside those of the same run without it."""
+    if share is None:
+        return "odds not measured"
+    return f"{chance(share, is_guess)} that all objectives are met{beside(as_driven)}"
+
+
+def beside(as_driven: float | None) -> str:
+    """What stands behind every promise: the odds as driven, where they are known."""
+    return "" if as_driven is None else f"; as driven {as_driven:.0%}"
+
+
+def alone(share: float, as_driven: float | None) -> str:
+    """The odds where only one cause is changed, beside those without."""
+    return f"{share:.0%} if only this is changed{beside(as_driven)}"
 
 
 def hypothesis_text(one: Hypothesis, findings: Sequence[SeenFinding] = ()) -> str:

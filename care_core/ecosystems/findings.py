@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Literal, Protocol, TypeVar
 
 from care_core.records import Record
@@ -112,10 +112,21 @@ def linked(
     return tuple(link for link in links if link[1])
 
 
+def every_finding(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """The findings and what is folded under them."""
+    for one in findings:
+        yield one
+        yield from every_finding(one.below)
+
+
 WHOLE_LOG = "the whole log"
 """Source of the finding that says no more than that the log holds too little."""
 TOO_SHORT = "too little is recorded to say anything of a run"
 NOT_FLOWN = "the vehicle never armed: no run of it is in this log"
+
+
+UNCHARGED = "the battery was not charged"
+CAME_DOWN = "it came down and could not rise again"
 
 
 class Health(Record):

@@ -133,6 +133,10 @@ class MissionKind(ABC):
     def evidence(self, mission: Mission) -> tuple[Evidence, ...]:
         """Messages that speak about a failure of this mission, in time order."""
 
+    def shortfall(self, mission: Mission) -> tuple[str, ...]:
+        """What kept the mission from being accomplished, in clauses; asked of one that was not."""
+        return ()
+
     def is_decided(self, mission: Mission) -> bool:
         """Whether the log says how the mission came out: it holds its end, or what made it fail for good."""
         return mission.ended

@@ -191,6 +191,7 @@ class _Source(Record, eq=False):
             changes=_changes(self.settings, mission),
             checks=() if self.doubts[index] else self._checks(mission),
             modes=self.kind.modes(mission),
+            shortfall=() if self.doubts[index] else self.kind.shortfall(mission),
         )
 
     def _with_settings(self, found: Mission, driven: Mapping[str, Setting]) -> Mission:

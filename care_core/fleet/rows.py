@@ -167,7 +167,7 @@ def row_of(log: str, diagnosis: Diagnosis, query: CounterfactualQuery | None = N
             if one.severity != "info" and not one.after_impact
         ),
         change={} if diagnosis.fix is None else {one.option.name: one.suggested for one in diagnosis.fix.changes},
-        p_fixed=None if diagnosis.fix is None else diagnosis.fix.p_fixed,
+        p_fixed=None if diagnosis.fix is None else diagnosis.fix.odds,
         off={} if query is None else {name: query.reference[name] for name in deviating(query.config, query.reference)},
         asked=None if query is None else _asked(query),
     )

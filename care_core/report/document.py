@@ -28,7 +28,7 @@ from care_core.diagnose.records import (
     Status,
     outcome,
 )
-from care_core.diagnose.verdict import Advice, Verdict, chance, compose, verdict_of
+from care_core.diagnose.verdict import Advice, Verdict, alone, chance, compose, promise, verdict_of
 from care_core.numbers import six_digits
 from care_core.records import Meta, field
 from care_core.report.entries import (
@@ -96,7 +96,7 @@ class ObjectiveEntry(Document, kw_only=True):
     @property
     def sentence(self) -> str:
         """What it came to, where it was missed."""
-        return outcome(self.name, self.kind, self.value, self.unit, str(self.threshold or ""))
+        return outcome(self.name, self.kind, self.value, self.unit, str(self.threshold or ""), self.reason or "")
 
     @property
     def measured(self) -> str:
@@ -151,12 +151,11 @@ class CauseEntry(Document, kw_only=True):
         suggested = "" if self.suggested is None else f" → {self.suggested:g}"
         return f"{self.current:g}{ASSUMED if self.assumed else ''}{suggested}"
 
-    @property
-    def worth(self) -> str:
+    def worth(self, as_driven: float | None) -> str:
         """What is to be thought of it, in clauses."""
-        alone = "" if self.p_fixed is None else f"{self.p_fixed:.0%} if only this is changed, "
+        odds = "" if self.p_fixed is None else f", {alone(self.p_fixed, as_driven)}"
         outside = "" if self.in_support else ", outside the training runs"
-        return f"{alone}{self.confidence} confidence{outside}"
+        return f"{self.confidence} confidence{odds}{outside}"
 
 
 class FaultEntry(Document, kw_only=True):
@@ -187,13 +186,23 @@ class FixSet(Document, kw_only=True):
     p_fixed: Share
     guess: bool = False
     """Whether a value is one that no training run came near."""
+    shown_by: str = ""
+    """The finding that shows the cause, where training says little of it: then `p_fixed` is no promise."""
     predicted: dict[str, PredictedObjective]
 
-    def __str__(self) -> str:
-        return f"{', '.join(map(str, self.changes))}: {chance(self.p_fixed, self.guess)}"
+    @property
+    def odds(self) -> float | None:
+        """What it promises, None where that was not measured."""
+        return None if self.shown_by else self.p_fixed
+
+    def sentence(self, as_driven: float | None) -> str:
+        """The changes with what they promise."""
+        return f"{', '.join(map(str, self.changes))}: {promise(self.odds, as_driven, self.guess)}"
 
 
 class FixEntry(FixSet, kw_only=True):
+    why_this: str = ""
+    """Why another parameter is changed than the likeliest cause, or why it adds little."""
     alternatives: list[FixSet]
 
 
@@ -279,6 +288,12 @@ class TriageDocument(Document, kw_only=True):
     rivals: list[CircumstanceEntry] = field(default_factory=list)
     tell_more: list[str] = field(default_factory=list)
     dismissed: list[Dismissal] = field(default_factory=list)
+    odds_as_driven: float | None = None
+    """Probability that the next run meets all objectives as driven; null where nothing failed, or no model tells."""
+    headline: str = ""
+    """The verdict in a sentence."""
+    next_step: str = ""
+    """What to do next, empty where there is nothing to be done."""
 
 
 class Report(TriageDocument, kw_only=True):
@@ -298,6 +313,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
     """The document of a diagnosis. Text is cleaned; what is not a finite number becomes null."""
     run, log, fix = diagnosis.run, diagnosis.run.log, diagnosis.fix
     warnings = [clean(warning) for warning in diagnosis.profile.fit.reasons]
+    verdict = verdict_of(diagnosis)
     return Report(
         profile=publish(ProfileEntry, diagnosis.profile) if diagnosis.profile.name else None,
         fit=publish(Fit, diagnosis.profile.fit),
@@ -310,8 +326,9 @@ def build_document(diagnosis: Diagnosis) -> Report:
             FaultEntry(objective=fault.objective.name, causes=[_cause(cause, warnings) for cause in fault.causes])
             for fault in diagnosis.faults
         ],
-        fix=None if fix is None else _fix(fix, diagnosis.alternatives),
+        fix=None if fix is None else _fix(fix, diagnosis),
         abstained=publishable(diagnosis.abstained),
+        odds_as_driven=estimate(diagnosis.odds_as_driven),
         notes=list(dict.fromkeys((*warnings, *map(clean, diagnosis.notes)))),
         sources=publishable(run.sources),
         since=None if diagnosis.since is None else _since(diagnosis.since),
@@ -323,7 +340,9 @@ def build_document(diagnosis: Diagnosis) -> Report:
         account=event_entries(diagnosis.health),
         findings=finding_entries(diagnosis.health),
         hypotheses=[publish(Hypothesis, h, probability=six_digits(h.probability)) for h in diagnosis.hypotheses],
-        verdict=verdict_of(diagnosis),
+        headline=verdict.headline,
+        next_step=verdict.next_step,
+        verdict=verdict,
         diff="" if fix is None else unified_diff(run, fix.changes),
         apply=[] if fix is None else apply_commands(fix.changes, format_for(log.format, run.settings)),
     )
@@ -338,7 +357,7 @@ def remembered_verdict(document: TriageDocument) -> Verdict:
         document.findings,
         document.hypotheses,
         _advice(document),
-        document.tell_more,
+        document.next_step,
     )
 
 
@@ -350,9 +369,11 @@ def _advice(document: TriageDocument) -> Advice:
     causes = (cause for fault in document.faults for cause in fault.causes)
     return Advice(
         change=", ".join(map(str, fix.changes)),
-        odds=fix.p_fixed,
+        odds=fix.odds,
+        odds_as_driven=document.odds_as_driven,
         is_guess=fix.guess,
         confidence=next((cause.confidence for cause in causes if cause.option in changed), None),
+        why=f"{fix.shown_by} with it" if fix.shown_by else fix.why_this,
     )
 
 
@@ -446,8 +467,13 @@ def predicted_objective(prediction: Prediction) -> PredictedObjective | None:
     return None if value is None else publish(PredictedObjective, value, status=prediction.status())
 
 
-def _fix(fix: Fix, alternatives: tuple[Fix, ...]) -> FixEntry:
-    return publish(FixEntry, _fix_set(fix), alternatives=[_fix_set(alternative) for alternative in alternatives])
+def _fix(fix: Fix, diagnosis: Diagnosis) -> FixEntry:
+    return publish(
+        FixEntry,
+        _fix_set(fix),
+        why_this=clean(diagnosis.why_this),
+        alternatives=[_fix_set(alternative) for alternative in diagnosis.alternatives],
+    )
 
 
 def _fix_set(fix: Fix) -> FixSet:
@@ -456,6 +482,7 @@ def _fix_set(fix: Fix) -> FixSet:
         changes=[_change(change) for change in fix.changes],
         p_fixed=six_digits(fix.p_fixed),
         guess=fix.is_guess,
+        shown_by=clean(fix.shown_by),
         predicted={name: entry for name, entry in entries.items() if entry is not None},
     )
 

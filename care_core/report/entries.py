@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from care_core.ecosystems.findings import Finding, FindingKind, Health, Severity, linked
+from care_core.ecosystems.findings import Finding, FindingKind, Health, Severity, SuspectKind, linked
 from care_core.records import field
 from care_core.report.published import Document, publish
 from care_core.run import Damage
@@ -36,6 +36,10 @@ class FindingEntry(Document, kw_only=True):
     onset_s: float | None
     end_s: float | None
     severity: Severity
+    suspect: SuspectKind = "hardware"
+    """What it speaks of: a part, what the robot met, how it was set, what its operator did."""
+    probability: float | None = None
+    """How likely the thing named really failed (0 to 1); null in a report of an earlier version."""
     after_impact: bool
     evidence: str
     source: str

@@ -15,7 +15,7 @@ KIND = "history"
 """What `outputs` calls such a table."""
 ABOUT = (
     "at", "start", "robot", "robot_name", "log", "sha256", "mission", "profile", "profile_version", "firmware",
-    "status", "cause", "changes", "p_fixed",
+    "status", "cause", "changes", "p_fixed", "odds_as_driven",
 )  # fmt: skip
 """The columns before those of objectives (`objective.NAME`, with `.limit` and `.status`), contexts, metrics and
 options."""
@@ -53,7 +53,8 @@ def _row(one: Triaged) -> TableRow:
         "status": remembered_verdict(document).status,
         "cause": causes[0] if causes else None,
         "changes": ", ".join(map(str, fix.changes)) if fix else None,
-        "p_fixed": fix.p_fixed if fix else None,
+        "p_fixed": fix.odds if fix else None,
+        "odds_as_driven": document.odds_as_driven,
     }
     for entry in document.objectives:
         name = f"objective.{entry.name}"

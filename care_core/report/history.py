@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from care_core.diagnose.verdict import fit_words
+from care_core.diagnose.verdict import beside, fit_words
 from care_core.history.store import HistoryError, Triaged, Verified
 from care_core.history.track_record import Bin, sparkline, track_record, trends
 from care_core.history.trends import LEAST_RUNS, Direction, RobotRuns, Since, Trend, by_robot
@@ -38,6 +38,8 @@ class PastTriage(Document, kw_only=True):
     cause: str | None
     options: list[str]
     p_fixed: float | None
+    odds_as_driven: float | None = None
+    """Probability that the next run meets all objectives as driven."""
 
 
 class PromiseRecord(Document, kw_only=True):
@@ -144,7 +146,8 @@ def _past(triaged: Triaged) -> PastTriage:
         verdict=remembered_verdict(document).headline,
         cause=causes[0] if causes else None,
         options=[change.option for change in fix.changes] if fix else [],
-        p_fixed=fix.p_fixed if fix else None,
+        p_fixed=fix.odds if fix else None,
+        odds_as_driven=document.odds_as_driven,
     )
 
 
@@ -197,7 +200,8 @@ def _lines(document: HistoryDocument, ascii: bool) -> Iterator[str]:
         yield "No triage is remembered yet."
     for past in document.triages:
         when = past.at[:16].replace("T", " ")
-        fix = "" if past.p_fixed is None else f"  change {', '.join(past.options)} ({past.p_fixed:.0%})"
+        odds = "odds not measured" if past.p_fixed is None else f"{past.p_fixed:.0%}{beside(past.odds_as_driven)}"
+        fix = f"  change {', '.join(past.options)} ({odds})" if past.options else ""
         fit = fit_words(past.profile, past.fit).removeprefix("Profile ")
         yield clean(f"{when}  {Path(past.log).name}  {fit}  {past.verdict}{fix}")
     for robot in document.robots:

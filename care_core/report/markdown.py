@@ -58,7 +58,7 @@ def _sections(report: Report) -> Iterator[Iterable[str]]:
     yield _listed("Findings, the first cause first", told)
     yield _objectives(report.objectives)
     for faults in together(report.faults, lambda fault: [cause.path for cause in fault.causes]):
-        yield _causes([one.objective for one in faults], faults[-1].causes)
+        yield _causes([one.objective for one in faults], faults[-1].causes, report.odds_as_driven)
     if report.fix is not None:
         yield _fix(report, report.fix)
     if report.since is not None:
@@ -73,9 +73,8 @@ def _sections(report: Report) -> Iterator[Iterable[str]]:
 
 def _head(report: Report) -> Iterator[str]:
     yield f"# Triage of {_escape(Path(report.log.path).name)}"
-    fit, headline, *others = report.verdict.lines
-    word, _, failed = headline.partition(": ")
-    for line in (_escape(fit), f"**{word}**: {_escape(failed)}", *map(_escape, others)):
+    verdict = report.verdict
+    for line in (f"**{verdict.word}**{_escape(verdict.told)}", *map(_escape, verdict.lines[1:])):
         yield from ("", f"{line}.")
 
 
@@ -95,14 +94,14 @@ def _objective(one: ObjectiveEntry) -> str:
     return "".join(parts)
 
 
-def _causes(names: list[str], causes: Iterable[CauseEntry]) -> Iterator[str]:
+def _causes(names: list[str], causes: Iterable[CauseEntry], as_driven: float | None) -> Iterator[str]:
     yield from ("", f"## Causes of {listed([f'`{name}`' for name in names])}", "")
-    lines = [line for cause in causes for line in _cause(cause)]
+    lines = [line for cause in causes for line in _cause(cause, as_driven)]
     yield from lines or ["None was found among the parameters of the profile."]
 
 
-def _cause(cause: CauseEntry) -> Iterator[str]:
-    yield f"{cause.rank}. **`{cause.option}`** {cause.change} ({cause.worth})"
+def _cause(cause: CauseEntry, as_driven: float | None) -> Iterator[str]:
+    yield f"{cause.rank}. **`{cause.option}`** {cause.change} ({cause.worth(as_driven)})"
     yield f"   {' → '.join(cause.path)}"
 
 
@@ -115,7 +114,7 @@ def _fix(report: Report, fix: FixEntry) -> Iterator[str]:
     yield from ("", *_fenced("\n".join(report.apply), "sh"))
     if fix.alternatives:
         yield from ("", "Or:", "")
-        yield from (f"- {_escape(str(other))}" for other in fix.alternatives)
+        yield from (f"- {_escape(other.sentence(report.odds_as_driven))}" for other in fix.alternatives)
 
 
 def _since(since: SinceEntry) -> Iterator[str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from care_core.configs.changes import apply_commands, unified_diff
 from care_core.configs.formats import format_for
 from care_core.diagnose.records import Cause, Diagnosis, Fault, PathNode, Prediction
-from care_core.diagnose.verdict import STATUS_WORDS, Verdict, chance, verdict_of
+from care_core.diagnose.verdict import STATUS_WORDS, Verdict, alone, chance, fit_text, promise, verdict_of
 from care_core.report.health import account_lines, finding_lines, reason_lines
 from care_core.report.shared_causes import together
 from care_core.text import listed, wrapped
@@ -32,7 +32,7 @@ def to_text(diagnosis: Diagnosis) -> str:
         _origin(diagnosis),
         _missions(diagnosis),
         _objectives(diagnosis),
-        *(_causes(faults) for faults in _explained(diagnosis)),
+        *(_causes(faults, diagnosis.odds_as_driven) for faults in _explained(diagnosis)),
         _fix(diagnosis),
         _evidence(diagnosis),
         _since(diagnosis),
@@ -58,6 +58,8 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     yield from wrapped(f"{Path(run.log.path).name}{which}, {duration}{facts}", "Log      ")
     if profile.name:
         yield from wrapped(f"{profile.title} {profile.version}: {profile.reason}", "Profile  ")
+        if diagnosis.profile.fit.reasons:
+            yield from wrapped(fit_text(profile.title, diagnosis.profile.fit), "Fit      ")
     elif diagnosis.profile.fit.verdict == "no":
         yield from wrapped("none fits", "Profile  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
@@ -107,27 +109,27 @@ def _paths(fault: Fault) -> list[list[str]]:
     return [[node.name for node in cause.path] for cause in fault.causes]
 
 
-def _causes(faults: Sequence[Fault]) -> Iterator[str]:
+def _causes(faults: Sequence[Fault], as_driven: float | None) -> Iterator[str]:
     yield from wrapped(f"Causes of {listed([fault.objective.variable.name for fault in faults])}")
     fault = faults[-1]
     shown = [cause for cause in fault.causes if not cause.is_lead]
     if not shown:
         yield "  none was found among the parameters of the profile"
     for cause in shown:
-        yield from _cause(cause)
+        yield from _cause(cause, as_driven)
     leads = [f"{c.option.name} ({c.option.driven(c.current, c.is_assumed)})" for c in fault.causes if c.is_lead]
     if leads:
         yield from wrapped(f"not ruled out: {', '.join(leads)}", "  ", "    ")
 
 
-def _cause(cause: Cause) -> Iterator[str]:
+def _cause(cause: Cause, as_driven: float | None) -> Iterator[str]:
     option = cause.option
     change = option.driven(cause.current, cause.is_assumed)
     if cause.suggested is not None:
         change += f" -> {option.show(cause.suggested)}"
     facts = [f"{cause.confidence} confidence"]
     if cause.p_fixed is not None:
-        facts.insert(0, f"{cause.p_fixed:.0%} if only this is changed")
+        facts.append(alone(cause.p_fixed, as_driven))
     if not cause.in_support:
         facts.append("outside the training runs")
     yield from wrapped(f"{option.name}  {change} {option.unit}  ({', '.join(facts)})", f"  {cause.rank}. ")
@@ -149,7 +151,8 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
     fix = diagnosis.fix
     if fix is None:
         return
-    yield from wrapped(f"Fix ({chance(fix.p_fixed, fix.is_guess)} that all objectives are met)")
+    as_driven = diagnosis.odds_as_driven
+    yield from wrapped(f"Fix ({promise(fix.odds, as_driven, fix.is_guess)})")
     for change in fix.changes:
         option = change.option
         restart = ", needs a restart" if option.reboot_required else ""
@@ -161,7 +164,7 @@ def _fix(diagnosis: Diagnosis) -> Iterator[str]:
         if objective.name in fix.predicted:
             yield from wrapped(_prediction(objective, fix.predicted[objective.name], fix.is_guess), "  ", "    ")
     for other in diagnosis.alternatives:
-        likely = chance(other.p_fixed, other.is_guess)
+        likely = promise(other.odds, as_driven, other.is_guess)
         yield from wrapped(f"or {', '.join(map(str, other.changes))}: {likely}", "  ", "     ")
     yield ""
     yield from (f"  {line}" for line in unified_diff(diagnosis.run, fix.changes).splitlines())

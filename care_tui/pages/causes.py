@@ -59,7 +59,7 @@ class CausesPage(DiagnosisPage):
             return hypothesis_item(one.hypothesis, self._finding(one.hypothesis))
         aside = self.session.dismissed.get(one.cause.option.name)
         share = None if one.hypothesis is None else one.hypothesis.probability
-        return cause_item(one.cause, share, aside, self.glyphs)
+        return cause_item(one.cause, share, aside, self.glyphs, self.session.diagnosis.odds_as_driven)
 
     def _finding(self, hypothesis: Hypothesis) -> Finding | None:
         """The finding that an explanation is named after."""

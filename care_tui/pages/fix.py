@@ -66,7 +66,7 @@ class FixPage(DiagnosisPage):
             return Content("No prediction")
         count = len(session.basket.ticked)
         shown = session.fix if count else session.unchanged
-        probability = "..." if shown is None else percent(shown.p_fixed)
+        probability = "..." if shown is None else "not measured" if shown.odds is None else percent(shown.odds)
         again = Content.styled(" unless it happens again", "$text-warning") if session.diagnosis.lost_by else Content()
         if not count:
             return Content.assemble(

@@ -35,10 +35,14 @@ FEW_RESAMPLES = 0.5
 """Edges that fewer bootstrap resamples hold are flagged."""
 
 
-def cause_item(cause: Cause, share: float | None, dismissed: str | None, glyphs: Glyphs) -> tuple[Content, Content]:
+def cause_item(
+    cause: Cause, share: float | None, dismissed: str | None, glyphs: Glyphs, as_driven: float | None = None
+) -> tuple[Content, Content]:
     """One cause of the ranked list: the option with its change, then what it is worth, with its caveats beside it.
 
-    `share` is its probability beside whatever else may explain the failure, None where nothing else was weighed.
+    Args:
+        share: its probability beside whatever else may explain the failure, None where nothing else was weighed.
+        as_driven: the odds that stand beside what its change promises.
     """
     option = cause.option
     head = Content.assemble(
@@ -52,7 +56,8 @@ def cause_item(cause: Cause, share: float | None, dismissed: str | None, glyphs:
         return head, Content(f"{below}set aside: " + clean(dismissed))
     worth = ["not ruled out" if cause.is_lead else f"{cause.confidence} confidence"]
     if cause.p_fixed is not None:
-        worth.append(f"{percent(cause.p_fixed)} if only this is changed")
+        without = "" if as_driven is None else f" (as driven {percent(as_driven)})"
+        worth.append(f"{percent(cause.p_fixed)} if only this is changed{without}")
     caveats = "" if cause.is_lead else "".join(f"  ! {clean(note)}" for note in caveats_of(cause))
     return head, Content(below + ", ".join(worth) + caveats)
 

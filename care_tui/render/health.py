@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from textual.content import Content
 
 from care_core.diagnose.records import Diagnosis, Hypothesis
-from care_core.diagnose.verdict import hypothesis_text, verdict_of
+from care_core.diagnose.verdict import Verdict, hypothesis_text, verdict_of
 from care_core.ecosystems.findings import Event, Finding, Health, Severity
 from care_core.records import Record
 from care_core.report.marks import Mark
@@ -98,7 +98,12 @@ def verdict_line(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
     """What robot this is, and the verdict on its run."""
     health, verdict = diagnosis.health, verdict_of(diagnosis)
     robot = Content(clean(f"{health.robot}: " if health.robot else ""))
-    return Content.assemble(robot, status(verdict.status, glyphs), "  ", (verdict.failed, "bold"))
+    return Content.assemble(robot, status(verdict.status, glyphs), *told(verdict))
+
+
+def told(verdict: Verdict) -> tuple[str, tuple[str, str]]:
+    """What the verdict says behind its word."""
+    return ", " if verdict.has_but else "  ", (verdict.failed, "bold")
 
 
 def standing(diagnosis: Diagnosis, glyphs: Glyphs) -> list[Content]:

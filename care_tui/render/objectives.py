@@ -34,11 +34,15 @@ STRIP_WIDTH = 42
 
 
 def headline(diagnosis: Diagnosis, glyphs: Glyphs) -> Content:
-    """The verdict on the run in one line; it counts all three states, so it never reads as a false all-clear."""
+    """The verdict on the run in one line: what failed, else how many of all three states, so that it never reads as a
+    false all-clear."""
+    verdict = verdict_of(diagnosis)
+    if verdict.status == "fault":
+        return Content.assemble(status(verdict.status, glyphs), "  ", (verdict.failed, "bold"))
     statuses = [objective.status for objective in diagnosis.objectives]
     faults, unknown = statuses.count("fault"), statuses.count("not_evaluated")
     counts = f"  {faults} outside, {statuses.count('ok')} within, {unknown} not evaluated"
-    return status(verdict_of(diagnosis).status, glyphs) + Content(counts)
+    return status(verdict.status, glyphs) + Content(counts)
 
 
 def objective_item(result: ObjectiveResult, width: int, glyphs: Glyphs) -> Content:

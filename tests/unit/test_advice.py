@@ -5,9 +5,19 @@ from __future__ import annotations
 
 import pytest
 
-from care_core.diagnose.advice import believed, by_chance, falls_short, nearest, outweighed
+from care_core.diagnose.advice import (
+    believed,
+    by_chance,
+    explained,
+    falls_short,
+    nearest,
+    no_stand_out,
+    odds_as_driven,
+    outweighed,
+)
+from care_core.diagnose.parts import mend_first, unmended
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import CAME_DOWN, UNCHARGED, Finding, FindingKind, Severity, SuspectKind
 from care_core.records import replace
 from care_core.variables import Threshold
 from tests.made import LAND_SPEED, TIME, made_diagnosis
@@ -52,7 +62,7 @@ def test_a_change_less_likely_than_not_is_named_and_not_advised() -> None:
 
 
 def test_no_parameter_is_advised_where_a_part_explains_more() -> None:
-    said = "motor 2 lost thrust, which explains this failure better than any parameter: look at it first"
+    said = "motor 2 lost thrust; that explains this failure better than any parameter: look at it first"
     assert outweighed(motor(0.7)) == said
     assert outweighed(motor(0.3)) is None
 
@@ -89,3 +99,106 @@ def test_out_of_reach_is_told_by_the_smallest_change_that_comes_nearest() -> Non
     both = replace(near, changes=(*near.changes, *near.changes))
     assert nearest([far, both, near], [LATE]) is near
     assert nearest([], [LATE]) is None
+
+
+def part(
+    kind: FindingKind,
+    title: str,
+    probability: float,
+    *,
+    onset_s: float = 60.0,
+    severity: Severity = "critical",
+    suspect: SuspectKind = "hardware",
+) -> Finding:
+    return Finding(kind, title, onset_s, 90.0, severity, "", "", suspect, probability)
+
+
+SWINGS = part("tuning", "roll oscillates", 0.85, onset_s=35.0, suspect="parameter")
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        part("motor", "motor 2 lost thrust", 0.3),
+        part("thrust", "too little thrust", 0.3),
+        part("crash", CAME_DOWN, 0.0),
+        part("laser", "the laser falls silent", 0.9),
+        part("battery", UNCHARGED, 0.9, severity="warning"),
+        part("prearm", "arming was refused: Battery 1 low voltage failsafe", 0.3, suspect="parameter"),
+        part("prearm", "arming was refused: Battery below minimum arming voltage", 0.3, suspect="parameter"),
+    ],
+    ids=lambda one: one.title,
+)
+def test_a_part_that_failed_comes_before_any_parameter(broken: Finding) -> None:
+    assert mend_first([broken]) == broken
+    assert "nothing is changed until" in unmended(broken)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        part("imu", "the gyros are noisy", 0.9, severity="warning"),
+        part("battery", "the battery sags under its load", 0.25),
+        part("crash", "it crashed", 0.1),
+        part("prearm", "arming was refused: Battery 1 voltage failsafe critical >= low", 0.3, suspect="parameter"),
+        part("thrust", "too little thrust", 0.1, suspect="parameter"),
+        part("blocked", "something blocks the way", 0.9, suspect="world"),
+        replace(part("motor", "motor 2 lost thrust", 0.9), after_impact=True),
+    ],
+    ids=lambda one: one.title,
+)
+def test_what_is_no_failed_part_does_not(other: Finding) -> None:
+    assert mend_first([other]) is None
+
+
+def test_motors_at_their_limit_for_an_oscillation_are_no_failed_part_but_a_sure_one_is() -> None:
+    assert mend_first([SWINGS, part("motor", "motor 2 lost thrust", 0.3)]) is None
+    sure = part("motor", "motor 2 lost thrust", 0.9)
+    assert mend_first([SWINGS, sure]) == sure
+    assert mend_first([replace(SWINGS, consequences=(part("crash", CAME_DOWN, 0.0),))]) is None
+    fell = part("crash", CAME_DOWN, 0.0)
+    assert mend_first([replace(part("vibration", "strong vibration", 0.3), consequences=(fell,))]) == fell
+
+
+def test_a_battery_is_charged_before_anything_is_changed() -> None:
+    assert "charge or replace the battery" in unmended(part("battery", UNCHARGED, 0.9))
+
+
+def test_a_change_that_adds_little_does_not_stand_out() -> None:
+    said = no_stand_out(fix_with(0.59), 0.49, ALONE, necessary=0.9)
+    assert said == "no parameter stands out: with land_speed 16 -> 50 the odds are 59%, as driven 49%"
+    assert no_stand_out(fix_with(0.8), 0.3, ALONE, necessary=0.0) is None
+
+
+def test_a_change_of_what_does_not_stand_above_chance_is_not_advised() -> None:
+    chance = (Hypothesis("chance", "", 0.6), Hypothesis("parameter", LAND_SPEED.name, 0.4))
+    assert "nothing in this run says that it was the cause" in str(no_stand_out(fix_with(0.9), 0.2, chance, 0.9))
+    unnamed = (Hypothesis("parameter", "other", 0.9), Hypothesis("chance", "", 0.1))
+    assert no_stand_out(fix_with(0.9), 0.2, unnamed, 0.9) is not None
+
+
+def test_another_parameter_than_the_likeliest_cause_is_changed_only_where_it_was_necessary_and_says_why() -> None:
+    others = (
+        Hypothesis("parameter", "other", 0.5),
+        Hypothesis("parameter", LAND_SPEED.name, 0.4),
+        Hypothesis("chance", "", 0.1),
+    )
+    assert no_stand_out(fix_with(0.9), 0.2, others, necessary=0.1) is not None
+    assert no_stand_out(fix_with(0.9), 0.2, others, necessary=0.2) is None
+    assert explained(fix_with(0.9), 0.2, others, ()).startswith("other is the likelier cause (50%), but")
+    assert explained(fix_with(0.9), 0.2, ALONE, ()) == ""
+
+
+def test_a_likely_cause_whose_change_adds_little_is_explained() -> None:
+    said = explained(fix_with(0.6), 0.3, ALONE, ())
+    assert said == "land_speed explains 90%, but a run as driven may go well by chance"
+
+
+def test_as_driven_what_a_parameter_brought_about_happens_again() -> None:
+    assert odds_as_driven(0.45, ALONE) == pytest.approx(0.1)
+    assert odds_as_driven(0.05, ALONE) == pytest.approx(0.05)
+    assert odds_as_driven(0.9, motor(0.7)) == pytest.approx(0.0)
+
+
+def test_the_best_that_falls_short_stands_beside_the_odds_as_driven() -> None:
+    assert "has 40%, as driven 10%" in str(falls_short(fix_with(0.4), [LATE], odds=1.0, as_driven=0.1))

@@ -1,4 +1,4 @@
-"""What holds of every output, whatever its format: the fit comes first, and no number stands without its caveat."""
+"""What holds of every output, whatever its format: the fit stands behind the verdict, no number without its caveat."""
 
 from __future__ import annotations
 
@@ -57,16 +57,19 @@ def outputs(diagnosis: Diagnosis) -> Mapping[str, str]:
 @pytest.mark.parametrize(
     ("verdict", "said"), [("fits", "fits"), ("partly", "partly fits: old firmware"), ("no", "does not fit: a rover")]
 )
-def test_every_output_begins_with_how_well_the_profile_fits(reading: Reading, verdict: FitVerdict, said: str) -> None:
+def test_every_output_says_how_well_the_profile_fits_behind_its_verdict(
+    reading: Reading, verdict: FitVerdict, said: str
+) -> None:
     made = made_diagnosis()
     reasons = (said.partition(": ")[2],) if ": " in said else ()
     choice = replace(made.profile, fit=Fit(verdict, reasons))
     shown = outputs(replace(made, profile=choice))
     expected = f"Profile arducopter {said}"
-    assert shown["text"].startswith(expected)
-    assert shown["yaml"].startswith(f"# {expected}")
-    assert shown["markdown"].split("\n\n")[1].startswith(expected)
-    assert shown["html"].partition("<h1>")[2].partition("<p>")[2].startswith(expected)
+    assert shown["text"].startswith("FAULT: ")
+    assert f"\n{expected}\n" in shown["text"].partition("\n\n")[0] + "\n"
+    assert f"\n# {expected}\n" in shown["yaml"]
+    assert shown["markdown"].split("\n\n")[4].startswith(expected)
+    assert f"<p>{expected}.</p>" in shown["html"].partition("<h1>")[2].partition("<dl")[0]
     assert list(json.loads(shown["json"]))[:2] == ["schema", "fit"]
     assert expected.partition(":")[0].removeprefix("Profile ") in shown["history"].splitlines()[0]
     assert json.loads(shown["history json"])["triages"][0]["fit"] == verdict

@@ -179,7 +179,7 @@ def test_checks_are_judged_and_withhold_what_a_mission_would_mean() -> None:
     ]  # fmt: skip
     assert not judged.broken
     assert "no mission was flown" in next(r.reason for r in judged.results if r.variable.name == "mission_time")
-    assert (verdict(judged).status, verdict(judged).reason) == ("fault", "no_crash")
+    assert (verdict(judged).status, verdict(judged).reason) == ("fault", "no_crash not met")
 
 
 def test_several_missions_are_listed_with_their_verdicts() -> None:

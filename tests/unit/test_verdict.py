@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from html import unescape
 from xml.etree import ElementTree
 
@@ -10,12 +11,20 @@ import pytest
 
 import care_core
 from care_core.application.case import Case
-from care_core.diagnose.verdict import STATUS_WORDS, Verdict, exit_code, verdict_of
+from care_core.diagnose.records import ObjectiveResult
+from care_core.diagnose.verdict import STATUS_WORDS, Advice, Verdict, compose, exit_code, verdict_of
+from care_core.ecosystems.findings import Finding
 from care_core.errors import ExitCode, UsageError
 from care_core.files import bundled
-from care_core.report.document import remembered_verdict
+from care_core.records import replace
+from care_core.report.document import build_document, remembered_verdict
 from care_core.report.formats import FORMATS
 from care_core.report.reading import document_of
+from care_core.report.terminal import to_text
+from care_core.report.writers import to_json
+from care_core.run import FITS, Fit
+from care_core.text import wrapped
+from tests.made import SUCCESS, made_diagnosis
 
 SAMPLES = (
     "arducopter_failed.BIN", "arducopter_motor.BIN", "ardurover_failed.BIN", "move_base_drive.bag", "owlat_failed.bag",
@@ -47,7 +56,7 @@ def test_every_format_says_the_verdict(case: Case) -> None:
 def test_no_other_status_stands_in_front(case: Case) -> None:
     verdict = verdict_of(case.diagnosis)
     word = STATUS_WORDS[verdict.status]
-    assert case.report("text").splitlines()[1].startswith(f"{word}: ") or verdict.fit.count(" ") > 10
+    assert case.report("text").splitlines()[0].startswith(f"{word}: ")
     assert f'<p class="verdict {verdict.status}"><strong>{word}</strong>' in case.report("html")
     assert f"**{word}**: " in case.report("markdown")
     suite = ElementTree.fromstring(case.report("junit"))[0]
@@ -73,12 +82,82 @@ def test_the_exit_code_is_that_of_the_gravest_status() -> None:
 
 def test_advice_names_the_odds_as_driven() -> None:
     verdict: Verdict = verdict_of(care_core.triage(bundled("samples", SAMPLES[0])).diagnosis)
-    assert verdict.advice.odds_as_driven is not None
-    assert verdict.advice.odds_as_driven < verdict.advice.odds
-    assert f"({verdict.advice.odds_as_driven:.0%} without the change)" in str(verdict.advice)
+    odds, as_driven = verdict.advice.odds, verdict.advice.odds_as_driven
+    assert odds is not None
+    assert as_driven is not None
+    assert as_driven < odds
+    assert f"{odds:.0%} probability that all objectives are met; as driven {as_driven:.0%}" in flat(str(verdict.advice))
 
 
 def test_an_unknown_format_is_refused_with_the_nearest() -> None:
     case = care_core.triage(bundled("samples", SAMPLES[0]))
     with pytest.raises(UsageError, match="markdown"):
         case.report("markdwon")
+
+
+def verdict_on(
+    objectives: Sequence[ObjectiveResult], findings: Sequence[Finding] = (), fit: Fit = FITS, profile: str = "copter"
+) -> Verdict:
+    return compose(profile, fit, objectives, findings, (), Advice(), "")
+
+
+MET = ObjectiveResult(SUCCESS, 1.0, SUCCESS.threshold, "ok")
+HOW = "2 of 3 waypoints were reached; battery failsafe at 273.0 s; disarmed by force at 300.0 s"
+LASER = Finding("laser", "the laser falls silent: /scan ends", 35.9, 60.0, "warning", "", "", probability=0.9)
+DRIFTS = Finding("barometer", "the barometer drifts", 166.1, 170.0, "critical", "", "")
+
+
+def test_a_fault_says_what_failed() -> None:
+    failed = ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", HOW)
+    assert verdict_on([failed]).headline == f"FAULT: {HOW}"
+    assert verdict_on([replace(failed, reason="")], [LASER]).failed == f"success not met; {LASER.title} at 35.9 s"
+
+
+def test_the_first_cause_is_told_before_what_followed_and_no_headline_is_longer_than_two_lines() -> None:
+    failed = ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", HOW)
+    said = verdict_on([failed], [DRIFTS, replace(DRIFTS, title="a very long finding " * 4)]).headline
+    assert said.startswith("FAULT: 2 of 3 waypoints were reached; the barometer drifts at 166.1 s; battery failsafe")
+    assert len(wrapped(said)) <= 2
+
+
+def test_a_critical_finding_of_a_run_that_met_its_objectives_is_a_fault_that_says_both() -> None:
+    assert verdict_on([MET], [DRIFTS]).headline == ("FAULT: the barometer drifts at 166.1 s; every objective was met")
+
+
+def test_an_ok_names_the_part_that_surely_failed() -> None:
+    verdict = verdict_on([MET], [LASER])
+    assert verdict.headline == "OK, but the laser falls silent: /scan ends at 35.9 s"
+    assert verdict.exit_code == ExitCode.OK
+    assert verdict.in_short == "but the laser falls silent: /scan ends at 35.9 s"
+    assert verdict_on([MET], [replace(LASER, probability=0.3)]).headline.startswith("OK: all objectives")
+    assert verdict_on([MET], [replace(LASER, suspect="parameter")]).headline.startswith("OK: all objectives")
+
+
+def test_a_refusal_to_arm_is_told_once() -> None:
+    refused = ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", "arming was refused: Compass not healthy")
+    finding = Finding("prearm", "arming was refused: Compass not healthy (2)", 2.0, 9.0, "critical", "", "")
+    assert verdict_on([refused], [finding]).headline == "FAULT: arming was refused: Compass not healthy"
+
+
+def test_the_fit_comes_last_in_one_line_and_names_no_profile_that_does_not_matter() -> None:
+    reasons = ("the log does not say what vehicle it is of, the profile is for a copter", "old firmware", "few topics")
+    verdict = verdict_on([MET], fit=Fit("partly", reasons))
+    assert verdict.lines[-1] == verdict.fit
+    assert len(verdict.fit) <= 80
+    assert verdict.fit.startswith("Profile copter partly fits: the log does not say")
+    assert verdict.fit.endswith("(and 2 more)")
+    none = verdict_on([], fit=Fit("no", ("arducopter: it is for a copter, this is a plane",)), profile="").fit
+    assert none == "No profile fits this log: no limits for time and energy, no causes by parameters"
+
+
+def test_a_change_whose_odds_were_not_measured_says_so() -> None:
+    made = made_diagnosis()
+    assert made.fix is not None
+    shown = replace(made, fix=replace(made.fix, shown_by="pitch oscillates", predicted={}), odds_as_driven=0.05)
+    assert str(verdict_of(shown).advice).endswith(": odds not measured; pitch oscillates with it")
+    document = build_document(shown)
+    assert document.fix is not None
+    assert document.fix.odds is None
+    again = remembered_verdict(document_of(json.loads(to_json(document))))
+    assert str(again.advice) == str(verdict_of(shown).advice)
+    assert "odds not measured" in flat(to_text(shown))

@@ -73,7 +73,7 @@ def test_a_mission_that_the_pilot_broke_off_is_no_failure_of_the_vehicle() -> No
     (mission,) = KIND.missions(*read(flight(MODE=modes, MSG=said((20.0, "Mission: 2 WP"))), 75.0, facts=ROVER), {})
     value = checks(KIND.outcome(mission))["mission_success"]
     assert isinstance(value, Unavailable)
-    assert value.reason == "0 of the mission's 1 waypoints were reached, and the last mode was Hold"
+    assert value.reason == "0 of 1 waypoints were reached, and the last mode was Hold"
 
 
 def test_a_mission_that_a_failsafe_ended_failed() -> None:
@@ -277,7 +277,7 @@ def test_a_failed_run_of_a_stranger_is_a_fault_without_causes_by_parameters(tmp_
     assert verdict_of(fine).exit_code == ExitCode.NOT_EVALUATED
     for text in (to_text(fine), to_markdown(build_document(fine)), to_html(build_document(fine))):
         flat = " ".join(text.split())
-        assert "no profile fits: no limits for time and energy, no causes by parameters" in flat
+        assert "No profile fits this log: no limits for time and energy, no causes by parameters" in flat
     bad = (replace(good[0], value=0.0, status="fault", reason="a failsafe acted"), *good[1:])
     failed = replace(fine, objectives=bad)
     assert verdict_of(failed).exit_code == ExitCode.FAULT

@@ -16,7 +16,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.findings import UNCHARGED, Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median
 
@@ -78,7 +78,7 @@ def _not_charged(flight: Flight, rest: float, cells: int, *, is_low: bool) -> Fi
     severity: Severity = "critical" if failsafe is not None or is_low else "warning" if flight.armed else "info"
     return Finding(
         kind="battery",
-        title="the battery was not charged",
+        title=UNCHARGED,
         onset_s=flight.watched[0][0],
         end_s=flight.watched[-1][1],
         severity=severity,

@@ -8,7 +8,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import CAME_DOWN, Finding
 from care_core.logs.base import Wanted
 
 READS: Wanted = {"RCIN": ("C3",)}
@@ -85,7 +85,7 @@ def _stranded(flight: Flight) -> Iterator[Finding]:
         start, end = flight.stranded
         yield Finding(
             kind="crash",
-            title="it came down and could not rise again",
+            title=CAME_DOWN,
             onset_s=start,
             end_s=end,
             severity="critical",

@@ -20,9 +20,10 @@ from care_core.ecosystems.ardupilot.measures.events import (
 )
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS, analyse, waypoint_offsets
 from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, flight_of, is_armed, mode_names
-from care_core.ecosystems.ardupilot.measures.outcome import HEIGHTS, WAYPOINT_TOLERANCE_M, plain_checks
+from care_core.ecosystems.ardupilot.measures.outcome import HEIGHTS, plain_checks
 from care_core.ecosystems.ardupilot.measures.phases import span_of_phase
 from care_core.ecosystems.ardupilot.measures.requested import mission_held
+from care_core.ecosystems.ardupilot.measures.shortfall import shortfall, tolerance_m
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.measures import MISSION_KINDS, Args, Mission, MissionKind, numeric, points
 from care_core.ecosystems.vehicles import error_kind, error_words
@@ -63,9 +64,8 @@ class ArduPilotFlight(MissionKind):
             return held.reason
         if len(flown) != len(expected):
             return f"the mission has {len(flown)} waypoints, the profile's has {len(expected)}"
-        tolerance_m = float(mission.spec.get("tolerance_m", WAYPOINT_TOLERANCE_M))
         for number, off_m in enumerate(waypoint_offsets(flown, expected), start=1):
-            if off_m > tolerance_m:
+            if off_m > tolerance_m(mission):
                 return f"waypoint {number} is {off_m:.0f} m from where the profile's mission has it"
         return ""
 
@@ -81,6 +81,9 @@ class ArduPilotFlight(MissionKind):
         if forced(mission):
             found.append(Evidence(mission.end_s, "Disarmed by force in flight", "forced"))
         return tuple(sorted(found, key=lambda one: one.time_s))
+
+    def shortfall(self, mission: Mission) -> tuple[str, ...]:
+        return shortfall(mission)
 
     def is_decided(self, mission: Mission) -> bool:
         return is_over(mission) or (is_armed(mission) and failed(mission))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from care_core.ecosystems.ardupilot.measures.events import CUT, UNRECORDED, crash_of, failed, forced, has_event, is_over
+from care_core.ecosystems.ardupilot.measures.events import CUT, UNRECORDED, crash_of, failed, forced, is_over
 from care_core.ecosystems.ardupilot.measures.flown_mission import (
     AIRBORNE_M,
     NEEDS,
@@ -19,6 +19,7 @@ from care_core.ecosystems.ardupilot.measures.modes import flew_automatically, fl
 from care_core.ecosystems.ardupilot.measures.requested import mission_held
 from care_core.ecosystems.ardupilot.measures.route import landing_error
 from care_core.ecosystems.ardupilot.measures.samples import lost_events, samples
+from care_core.ecosystems.ardupilot.measures.shortfall import event_clause, short_of, tolerance_m
 from care_core.ecosystems.coverage import SUM, doubt
 from care_core.ecosystems.measures import Args, Mission, extractor, has
 from care_core.ecosystems.vehicles import flies
@@ -27,7 +28,6 @@ from care_core.run import Check, Unavailable, Value, is_known
 
 Floats = NDArray[np.float64]
 
-WAYPOINT_TOLERANCE_M = 5.0
 _TOOK_OFF, _LANDED = (16, 28), (18,)
 """EV records of the land detector."""
 _DRIVES = frozenset(("rover",))
@@ -74,9 +74,10 @@ def plain_checks(mission: Mission, *, and_mission: bool = False) -> Iterator[Che
         yield Check("mission_success", done, "every waypoint of the mission was reached", short_of(mission))
     silent: Value = lost_events(mission) or 1.0
     no_crash = 0.0 if crashed else silent
-    yield Check("no_crash", no_crash, "the autopilot reported no crash, and none shows", crash)
-    acted = has_event(mission, "failsafe")
-    yield Check("no_failsafe", 0.0 if acted else silent, "no failsafe acted", "a failsafe acted")
+    how = event_clause(mission, "crash") or crash
+    yield Check("no_crash", no_crash, "the autopilot reported no crash, and none shows", how)
+    failsafe = event_clause(mission, "failsafe")
+    yield Check("no_failsafe", 0.0 if failsafe else silent, "no failsafe acted", failsafe)
     if flies(kind):
         landed = Unavailable("it crashed") if crashed else _landed(mission)
         yield Check("landed", landed, "it was on the ground at the end", "it was disarmed above the ground")
@@ -109,11 +110,6 @@ def _mission_done(mission: Mission) -> Value:
     return Unavailable(
         f"{short_of(mission)}, and the last mode was {last.name}", "judge a run that ends in its mission"
     )
-
-
-def short_of(mission: Mission) -> str:
-    flown = mission.shared(analyse)
-    return f"{flown.reached} of the mission's {len(flown.waypoints)} waypoints were reached"
 
 
 def _moved(mission: Mission) -> Value:
@@ -211,4 +207,4 @@ def _mission_flown(mission: Mission) -> Value:
     off_m = landing_error(mission, {})
     if not is_known(off_m):
         return off_m
-    return float(off_m <= float(mission.spec.get("tolerance_m", WAYPOINT_TOLERANCE_M)))
+    return float(off_m <= tolerance_m(mission))

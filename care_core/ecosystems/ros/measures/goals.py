@@ -34,6 +34,7 @@ from care_core.ecosystems.ros.motion import STANDS_MPS
 from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS, Level, LogMessage, kept_its_rate
 from care_core.logs.base import Table, Wanted
 from care_core.run import Check, Evidence, Unavailable, Value
+from care_core.text import seconds
 
 _IDLE_S = 120.0
 """A pause this long between goals ends a mission."""
@@ -108,6 +109,14 @@ class GoalMissions(MissionKind):
         """Failed goals, recoveries, standstill, and warnings of the log: each kind of message once, with its count."""
         found = (*_failed_goals(mission), *_recoveries(mission), *_stuck(mission), *_warnings(mission))
         return tuple(sorted(found, key=lambda one: one.time_s))
+
+    def shortfall(self, mission: Mission) -> tuple[str, ...]:
+        drive = mission.shared(window)
+        wanted = len(drive.listed) or len(drive.goals)
+        if len(drive.goals) > wanted:
+            return (f"{len(drive.goals)} goals were sent, the mission has {wanted}",)
+        failed = [f"{one.text.partition(':')[0]} at {seconds(one.time_s)}" for one in _failed_goals(mission)]
+        return (f"{len(drive.reached)} of {wanted} goals were reached", *failed)
 
     def outcome(self, mission: Mission) -> tuple[Check, ...]:
         """Whether the goals were reached; one that its sender cancelled or replaced is no failure of the robot."""

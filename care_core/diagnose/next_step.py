@@ -1,0 +1,68 @@
+"""What an operator does next. A vehicle that lost thrust, crashed or was upset does not fly the same mission again
+before it was on the bench, in a simulator or in a hover."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from care_core.diagnose.parts import mend_first
+from care_core.diagnose.records import Diagnosis
+from care_core.ecosystems.findings import Finding, FindingKind, every_finding
+from care_core.ecosystems.ranking import SYMPTOMS
+from care_core.ecosystems.vehicles import flies, vehicle_of
+from care_core.logs.formats import format_named
+from care_core.run import Run
+
+UPSETS: frozenset[FindingKind] = frozenset(("attitude", "crash", "motor", "takeoff", "thrust"))
+"""Kinds of findings after which a vehicle may be damaged, or does not do what it is told."""
+_UPSET_MESSAGES = frozenset(("crash", "thrust"))
+
+
+def was_upset(run: Run, findings: Iterable[Finding]) -> bool:
+    """Whether it lost thrust, crashed or was out of control."""
+    return (
+        any(one.kind in UPSETS and one.severity == "critical" for one in every_finding(findings))
+        or any(one.kind in _UPSET_MESSAGES for one in run.evidence)
+        or any(check.name == "no_crash" and check.value == 0.0 for check in run.checks)
+    )
+
+
+def trial(run: Run) -> str:
+    """Where what was upset is tried before it runs its mission again."""
+    is_robot = format_named(run.log.format).ecosystem == "ros"
+    if is_robot or not flies(vehicle_of(run.log.facts, {}).kind):
+        return "in the simulator or at walking pace"
+    return "in the simulator or a low hover"
+
+
+def bench(run: Run) -> str:
+    """What to do where it was upset and nothing says why."""
+    parts = "drive, wheels and wiring" if "walking" in trial(run) else "motors, propellers and wiring"
+    return f"check {parts} on the bench, then try it {trial(run)}, before another mission"
+
+
+def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
+    """The next step in a sentence, empty where there is nothing to be done."""
+    run, findings = diagnosis.run, diagnosis.health.findings
+    upset = was_upset(run, findings)
+    if diagnosis.fix is not None:
+        again = f"try it {trial(run)} first" if upset else "run again"
+        return f"make the change, {again}, and check what it brought with 'care verify REPORT LOG'"
+    name = _named(diagnosis) if has_failed else ""
+    if has_failed and upset:
+        is_symptom = any(one.title == name and one.kind in SYMPTOMS for one in findings)
+        return f"check on the bench: {name}; then try it {trial(run)}" if name and not is_symptom else bench(run)
+    if name:
+        return f"look at what this names: {name}"
+    if has_failed and diagnosis.tell_more:
+        return diagnosis.tell_more[0]
+    return "'care inspect LOG' tells what each profile would need" if diagnosis.profile.fit.verdict == "no" else ""
+
+
+def _named(diagnosis: Diagnosis) -> str:
+    """The part or circumstance to look at, empty where none is named first."""
+    part = mend_first(diagnosis.health.findings)
+    if part is not None:
+        return part.title
+    first = next(iter(diagnosis.hypotheses), None)
+    return first.name if first is not None and first.what in ("hardware", "world") else ""

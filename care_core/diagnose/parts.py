@@ -1,0 +1,72 @@
+"""Parts that failed and come before any parameter, and findings that speak of how the robot was set.
+
+Needs nothing that is slow to import.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+
+from care_core.ecosystems.findings import CAME_DOWN, UNCHARGED, Finding
+from care_core.ecosystems.ranking import LIKELY
+
+LATE_S = 5.0
+"""Seconds after a sign of how the robot was set from which what fails may be of that."""
+SENSED = frozenset(("barometer", "compass", "gps", "vibration"))
+"""Kinds that no setting brings about: on the training flights all 10 that came as critical after a sign of how the
+vehicle was set have that part failing."""
+_VOLTAGE = re.compile(r"batter|voltage", re.IGNORECASE)
+_SET_APART = re.compile(r"critical\s*>=|failsafe critical|capacity", re.IGNORECASE)
+"""A refusal for how two failsafes were set, whatever the voltage."""
+
+
+def set_wrong(finding: Finding) -> bool:
+    """Whether a finding speaks of how the robot was set, while it still explains anything."""
+    return finding.suspect == "parameter" and not finding.after_impact and finding.severity != "info"
+
+
+def is_late(finding: Finding, by_setting: Iterable[Finding]) -> bool:
+    """Whether the run was failing already, by a sign about as sure as this one. What senses does not fail of that."""
+    if finding.kind in SENSED:
+        return False
+    sure = min(finding.probability, LIKELY)
+    return any(one.onset_s + LATE_S < finding.onset_s and one.probability >= sure for one in by_setting)
+
+
+def mend_first(findings: Sequence[Finding]) -> Finding | None:
+    """The part that comes before any parameter, None where no such part failed.
+
+    That is one that surely failed and mattered, a motor or thrust at its limit, what could not rise again, and a
+    battery that was not charged or kept the vehicle from arming; but for what a sign of how the vehicle was set led to.
+    """
+    by_setting = [one for one in findings if set_wrong(one)]
+    stopping = (one for one in _unexplained(findings) if _stops(one))
+    return next((one for one in stopping if one.probability >= LIKELY or not is_late(one, by_setting)), None)
+
+
+def _unexplained(findings: Sequence[Finding]) -> Iterator[Finding]:
+    """The findings, and what those led to that speak of no parameter."""
+    for one in findings:
+        yield one
+        if not set_wrong(one):
+            yield from one.below
+
+
+def _stops(finding: Finding) -> bool:
+    if finding.kind == "prearm":
+        return bool(_VOLTAGE.search(finding.title)) and not _SET_APART.search(finding.title)
+    if finding.after_impact or finding.severity == "info" or finding.suspect in ("parameter", "world"):
+        return False
+    is_sure = finding.probability >= LIKELY
+    if finding.title == UNCHARGED:
+        return is_sure
+    at_limit = finding.kind in ("motor", "thrust") or finding.title == CAME_DOWN
+    return finding.severity == "critical" and (is_sure or at_limit)
+
+
+def unmended(part: Finding) -> str:
+    """Why no parameter is changed while this part has failed."""
+    if part.kind in ("battery", "prearm"):
+        return f"{part.title}: charge or replace the battery; nothing is changed until it is full"
+    return f"{part.title} at {part.onset_s:.0f} s: nothing is changed until that is mended"

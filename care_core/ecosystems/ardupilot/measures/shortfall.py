@@ -1,0 +1,81 @@
+"""How an ArduPilot run fell short of what it set out to do, in clauses that an operator reads first."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from care_core.ecosystems.ardupilot.measures.events import crash_of, errors, forced, last_refusals, telling
+from care_core.ecosystems.ardupilot.measures.flown_mission import analyse
+from care_core.ecosystems.ardupilot.measures.modes import is_armed
+from care_core.ecosystems.ardupilot.measures.route import landing_error
+from care_core.ecosystems.measures import Mission
+from care_core.ecosystems.vehicles import error_kind as kind_of_error
+from care_core.ecosystems.vehicles import error_words
+from care_core.run import is_known
+from care_core.text import seconds
+
+WAYPOINT_TOLERANCE_M = 5.0
+_FAILSAFE_OF = re.compile(r"battery|radio|throttle|GCS|EKF|terrain|fence|leak|GPS|vibration", re.IGNORECASE)
+"""What a failsafe's message speaks of."""
+_LONGEST = 60
+"""Characters of a message that stands in a clause."""
+
+
+def shortfall(mission: Mission) -> tuple[str, ...]:
+    """What kept the mission from being accomplished: what was not reached, then what ended it, in order of time."""
+    if not is_armed(mission):
+        refused = last_refusals(mission)
+        return (f"arming was refused: {refused[-1].why}",) if refused else ("the vehicle never armed",)
+    return tuple(_clauses(mission))
+
+
+def _clauses(mission: Mission) -> Iterator[str]:
+    flown = mission.shared(analyse)
+    if flown.waypoints and flown.reached < len(flown.waypoints):
+        yield short_of(mission)
+    else:
+        off_m = landing_error(mission, {})
+        if is_known(off_m) and off_m > tolerance_m(mission):
+            yield f"it came down {off_m:.0f} m from where the mission ends"
+        elif flown.drive is not None and not flown.completed:
+            yield "it did not say that its mission is complete"
+    crash = event_clause(mission, "crash") or crash_of(mission)
+    yield from filter(None, (crash, event_clause(mission, "failsafe")))
+    if forced(mission):
+        yield f"disarmed by force at {seconds(mission.end_s)}"
+
+
+def tolerance_m(mission: Mission) -> float:
+    """How far from where the mission ends a landing may be."""
+    return float(mission.spec.get("tolerance_m", WAYPOINT_TOLERANCE_M))
+
+
+def short_of(mission: Mission) -> str:
+    """How many of its waypoints a mission reached."""
+    flown = mission.shared(analyse)
+    return f"{flown.reached} of {len(flown.waypoints)} waypoints were reached"
+
+
+def event_clause(mission: Mission, kind: str) -> str:
+    """The first crash or failsafe that the autopilot reported, with its time; empty where it reported none."""
+    found = [
+        (t, error_words(subsystem, code))
+        for t, subsystem, code in errors(mission)
+        if code and kind_of_error(subsystem) == kind
+    ]
+    found += [(t, _spoken(text, kind)) for t, text, known in telling(mission) if known == kind]
+    if not found:
+        return ""
+    time_s, words = min(found, key=lambda one: one[0])
+    return f"{words} at {seconds(time_s)}"
+
+
+def _spoken(text: str, kind: str) -> str:
+    """A message as a clause."""
+    if kind == "crash":
+        return "crash detected"
+    about = _FAILSAFE_OF.search(text)
+    if about is None:
+        return text[:_LONGEST]
+    return f"{about[0] if about[0].isupper() else about[0].lower()} failsafe"

@@ -1,0 +1,253 @@
+"""What no report may say of one run beside something else that it says: each contradiction by a name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from care_core.diagnose.verdict import exit_code, status_of
+from care_core.errors import ExitCode
+from care_core.report.document import Report
+from care_core.report.entries import ConsequenceEntry, FindingEntry
+from care_core.text import wrapped
+
+Check = Callable[[Report], bool]
+CONTRADICTIONS: dict[str, Check] = {}
+_DOWN = ("crash", "takeoff")
+_UPSET = ("attitude", "crash", "motor", "takeoff", "thrust")
+_EXIT = {"OK": ExitCode.OK, "FAULT": ExitCode.FAULT, "NOT EVALUATED": ExitCode.NOT_EVALUATED}
+
+
+def contradictions(report: Report) -> list[str]:
+    """The names of those that hold of a report."""
+    return [name for name, holds in CONTRADICTIONS.items() if holds(report)]
+
+
+def _named(name: str) -> Callable[[Check], Check]:
+    def register(check: Check) -> Check:
+        CONTRADICTIONS[name] = check
+        return check
+
+    return register
+
+
+def _titles(report: Report) -> list[tuple[str, str, str]]:
+    """Kind, severity and title of every finding, consequences too."""
+    found: list[tuple[str, str, str]] = [(one.kind, one.severity, one.title) for one in report.findings]
+    return found + [
+        (one.kind, one.severity, one.title)
+        for root in report.findings
+        for one in (*root.consequences, *root.followed_by)
+    ]
+
+
+def _critical(report: Report) -> list[FindingEntry]:
+    return [one for one in report.findings if one.severity == "critical"]
+
+
+def _objective(report: Report, name: str) -> str:
+    return next((one.status for one in report.objectives if one.name == name), "")
+
+
+def _changed(report: Report) -> list[str]:
+    return [] if report.fix is None else [change.option for change in report.fix.changes]
+
+
+def _crashed(report: Report) -> bool:
+    """Whether a crash of a vehicle is told during the mission that is judged."""
+    if report.log.format.startswith("ros"):
+        return False  # a robot that hit something may reach its goals all the same
+    start, end = next(((one.start_s, one.end_s) for one in report.missions if one.judged), (None, None))
+    found: list[FindingEntry | ConsequenceEntry] = list(report.findings)
+    found += [one for root in report.findings for one in (*root.consequences, *root.followed_by)]
+    return any(
+        one.kind in _DOWN
+        and one.severity == "critical"
+        and (start or 0.0) <= (one.onset_s or 0.0) <= (end or 0.0) + 5.0
+        for one in found
+    )
+
+
+@_named("it crashed, and no crash or a landing is OK")
+def _(report: Report) -> bool:
+    return _crashed(report) and "ok" in (_objective(report, "no_crash"), _objective(report, "landed"))
+
+
+@_named("it crashed, and the mission was accomplished")
+def _(report: Report) -> bool:
+    return _crashed(report) and _objective(report, "mission_success") == "ok"
+
+
+@_named("no crash is not met, and it landed")
+def _(report: Report) -> bool:
+    return _objective(report, "no_crash") == "fault" and _objective(report, "mission_success") == "ok"
+
+
+@_named("a battery failsafe, and no failsafe acted")
+def _(report: Report) -> bool:
+    acted = any(title == "battery failsafe" for _, _, title in _titles(report))
+    return acted and len(report.missions) < 2 and _objective(report, "no_failsafe") == "ok"
+
+
+@_named("arming was refused, and it armed")
+def _(report: Report) -> bool:
+    refused = any(one.kind == "prearm" for one in _critical(report))
+    return refused and _objective(report, "armed") == "ok"
+
+
+@_named("a critical finding, and no FAULT")
+def _(report: Report) -> bool:
+    return bool(_critical(report)) and report.verdict.status != "fault"
+
+
+@_named("a FAULT, and nothing that failed")
+def _(report: Report) -> bool:
+    broken = any(one.status == "fault" for one in report.objectives)
+    return report.verdict.status == "fault" and not broken and not _critical(report)
+
+
+@_named("a FAULT that does not say what failed")
+def _(report: Report) -> bool:
+    return report.verdict.status == "fault" and report.verdict.failed.endswith("not met")
+
+
+@_named("the status is not that of its objectives and findings")
+def _(report: Report) -> bool:
+    statuses, severities = {one.status for one in report.objectives}, {one.severity for one in report.findings}
+    return report.verdict.status != status_of(statuses, severities, report.fit.verdict)
+
+
+@_named("the headline's word is not that of the exit code")
+def _(report: Report) -> bool:
+    code = exit_code(report.verdict.status)
+    return _EXIT[report.verdict.word] != code or not report.headline.startswith(report.verdict.word)
+
+
+@_named("a headline longer than two lines")
+def _(report: Report) -> bool:
+    return report.verdict.status == "fault" and len(wrapped(report.verdict.headline)) > 2
+
+
+@_named("a fit longer than one line")
+def _(report: Report) -> bool:
+    return len(wrapped(report.verdict.fit)) > 1
+
+
+@_named("an OK that keeps a failed part to itself")
+def _(report: Report) -> bool:
+    parts = [
+        one.title
+        for one in report.findings
+        if one.severity != "info" and one.suspect == "hardware" and (one.probability or 0.0) >= 0.5
+    ]
+    return report.verdict.status == "ok" and bool(parts) and not any(one in report.headline for one in parts)
+
+
+@_named("nothing failed, and it is explained")
+def _(report: Report) -> bool:
+    return report.verdict.status != "fault" and bool(report.hypotheses)
+
+
+@_named("a FAULT that nothing explains")
+def _(report: Report) -> bool:
+    return report.verdict.status == "fault" and not report.hypotheses
+
+
+@_named("hypotheses that do not add up to 1, or not in order")
+def _(report: Report) -> bool:
+    odds = [one.probability for one in report.hypotheses]
+    return bool(odds) and (abs(sum(odds) - 1.0) > 1e-3 or odds != sorted(odds, reverse=True))
+
+
+@_named("an explanation by a finding that the page does not have")
+def _(report: Report) -> bool:
+    titles = {title for _, _, title in _titles(report)}
+    return any(one.what in ("hardware", "world") and one.name and one.name not in titles for one in report.hypotheses)
+
+
+@_named("a change, and why none is advised")
+def _(report: Report) -> bool:
+    return report.fix is not None and report.abstained is not None
+
+
+@_named("a broken objective of a profile, and neither a change nor why none")
+def _(report: Report) -> bool:
+    return bool(report.faults) and report.fit.verdict != "no" and report.fix is None and not report.abstained
+
+
+@_named("a refusal that advises a change all the same")
+def _(report: Report) -> bool:
+    return report.fix is None and any(word in (report.abstained or "") for word in ("bring ", " first to "))
+
+
+@_named("a change beside a part that explains more")
+def _(report: Report) -> bool:
+    first = next((one for one in report.hypotheses if one.name), None)
+    return report.fix is not None and first is not None and first.what in ("hardware", "world")
+
+
+@_named("a change beside a part that surely failed")
+def _(report: Report) -> bool:
+    return report.fix is not None and any(
+        one.suspect == "hardware" and (one.probability or 0.0) >= 0.5 and not one.after_impact
+        for one in _critical(report)
+    )
+
+
+@_named("a change of nothing that stands above chance")
+def _(report: Report) -> bool:
+    chance = sum(one.probability for one in report.hypotheses if one.what == "chance")
+    above = {one.name for one in report.hypotheses if one.what == "parameter" and one.probability > chance}
+    return report.fix is not None and not above & set(_changed(report))
+
+
+@_named("a change of what is only not ruled out")
+def _(report: Report) -> bool:
+    entries = [cause for fault in report.faults for cause in fault.causes if cause.option in _changed(report)]
+    leads = {one.option for one in entries if any("not ruled out" in note for note in one.notes)}
+    return bool(leads - {one.option for one in entries if not any("not ruled out" in note for note in one.notes)})
+
+
+@_named("another change than the first cause's, without why")
+def _(report: Report) -> bool:
+    first = next((one.name for one in report.hypotheses if one.what == "parameter"), "")
+    if report.fix is None or first in _changed(report):
+        return False
+    return first not in str(report.verdict.advice)
+
+
+@_named("a promise without the odds as driven")
+def _(report: Report) -> bool:
+    odds = any(word in str(report.verdict.advice) for word in ("as driven", "odds not measured"))
+    return report.fix is not None and not odds
+
+
+@_named("a promise no better than as driven")
+def _(report: Report) -> bool:
+    fix, as_driven = report.fix, report.odds_as_driven
+    return fix is not None and fix.odds is not None and as_driven is not None and fix.odds < as_driven + 0.1
+
+
+@_named("a battery failsafe that is lowered for a battery that may not be full")
+def _(report: Report) -> bool:
+    doubted = any(
+        one.kind == "battery" and one.suspect != "parameter" for one in report.findings if one.severity != "info"
+    )
+    return doubted and "BATT_LOW_VOLT" in _changed(report)
+
+
+@_named("flown again as it was after it was upset")
+def _(report: Report) -> bool:
+    upset = any(kind in _UPSET and severity == "critical" for kind, severity, _ in _titles(report))
+    return upset and any("run again" in text or "run the same" in text for text in _next(report))
+
+
+def _next(report: Report) -> Iterator[str]:
+    yield report.next_step
+    yield from report.tell_more
+
+
+@_named("the mission's row says otherwise")
+def _(report: Report) -> bool:
+    row = next((one for one in report.missions if one.judged), None)
+    broken = any(one.status == "fault" for one in report.objectives)
+    return row is not None and (row.status == "fault") != broken

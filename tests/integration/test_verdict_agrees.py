@@ -1,0 +1,74 @@
+"""The verdict, the objectives, the findings, the explanations and the exit code of a log contradict nowhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain, islice
+from pathlib import Path
+
+import pytest
+
+import care_core
+from benchmarks.wild_logs import wild_files
+from care_core.errors import CareError
+from care_core.files import bundled
+from care_core.report.document import build_document
+from tests.contradictions import contradictions
+from tests.restamped import dataflash_with
+
+DATA = Path(__file__).parents[1] / "data"
+SAMPLES = (
+    "arducopter_failed.BIN", "arducopter_motor.BIN", "ardurover_failed.BIN", "move_base_drive.bag", "nav2_failed.mcap",
+    "nav2_good.mcap", "nav2_stall.mcap", "owlat_failed.bag",
+)  # fmt: skip
+EVERY = 9
+"""Of the recorded runs with known truth so many are looked at one of; all are with 1."""
+
+
+def told_of(path: Path) -> list[str]:
+    """What contradicts in the report of a log, nothing where it is refused."""
+    try:
+        return contradictions(build_document(care_core.triage(path).diagnosis))
+    except CareError:
+        return []
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_a_sample_contradicts_itself_nowhere(name: str) -> None:
+    assert told_of(bundled("samples", name)) == []
+
+
+@pytest.mark.parametrize("name", ["arducopter_good.BIN", "move_base_good.bag"])
+def test_a_good_run_contradicts_itself_nowhere(name: str) -> None:
+    assert told_of(DATA / name) == []
+
+
+@pytest.mark.parametrize("share", [0.4, 0.8, 0.97])
+@pytest.mark.parametrize("name", ["arducopter_motor.BIN", "ardurover_failed.BIN", "nav2_stall.mcap"])
+def test_a_log_that_breaks_off_contradicts_itself_nowhere(tmp_path: Path, name: str, share: float) -> None:
+    whole = bundled("samples", name).read_bytes()
+    cut = tmp_path / name
+    cut.write_bytes(whole[: int(share * len(whole))])
+    assert told_of(cut) == []
+
+
+@pytest.mark.parametrize(("message", "field", "value"), [("BAT", "Volt", 11.2), ("ERR", "Subsys", 12.0)])
+def test_a_log_with_a_planted_fault_contradicts_itself_nowhere(
+    tmp_path: Path, message: str, field: str, value: float
+) -> None:
+    for name in ("arducopter_failed.BIN", "arducopter_motor.BIN"):
+        made = tmp_path / name
+        made.write_bytes(dataflash_with(bundled("samples", name), message, **{field: value}))
+        assert told_of(made) == [], name
+
+
+def test_recorded_logs_contradict_themselves_nowhere(recorded: Path) -> None:
+    found = {path: names for path in _recorded(recorded) if (names := told_of(path))}
+    assert not found
+
+
+def _recorded(folder: Path) -> Iterator[Path]:
+    """Logs from elsewhere, and some of the runs whose truth is known."""
+    known = sorted((*folder.glob("data/**/*.BIN"), *folder.glob("data/**/*.bag")))
+    others = (wild_files(folder / name) for name in ("logs", "logs_known", "attack") if (folder / name).is_dir())
+    yield from chain(chain.from_iterable(others), islice(known, 0, None, EVERY))

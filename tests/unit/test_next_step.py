@@ -1,0 +1,72 @@
+"""What to do next: nothing that lost thrust, crashed or was upset runs its mission again at once."""
+
+from __future__ import annotations
+
+import pytest
+
+from care_core.diagnose.next_step import bench, next_step, trial, was_upset
+from care_core.diagnose.records import Diagnosis, Hypothesis
+from care_core.ecosystems.findings import Finding, Health
+from care_core.records import replace
+from care_core.run import Check, Evidence
+from tests.made import made_diagnosis, made_run
+
+AGAIN = "run the same configuration again: if it fails again, the cause persists"
+THRUST = Finding("thrust", "too little thrust", 50.0, 60.0, "critical", "", "", probability=0.3)
+LATE = Finding("cpu", "the loop is late", 50.0, 60.0, "warning", "", "")
+
+
+def failed(*findings: Finding, fixed: bool = False) -> Diagnosis:
+    made = made_diagnosis()
+    return replace(
+        made, fix=made.fix if fixed else None, health=Health("", (), findings), hypotheses=(), tell_more=(AGAIN,)
+    )
+
+
+@pytest.mark.parametrize("kind", ["attitude", "crash", "motor", "takeoff", "thrust"])
+def test_after_an_upset_comes_the_bench_the_simulator_or_a_hover(kind: str) -> None:
+    upset = replace(THRUST, kind=kind, suspect="parameter")
+    said = next_step(failed(upset), has_failed=True)
+    assert "bench" in said
+    assert "in the simulator or a low hover" in said
+    assert "again" not in said
+    assert "try it in the simulator or a low hover first" in next_step(failed(upset, fixed=True), has_failed=True)
+
+
+def test_messages_and_checks_tell_of_an_upset_as_well() -> None:
+    run = replace(made_run(), evidence=())
+    assert not was_upset(run, [LATE])
+    assert was_upset(replace(run, evidence=(Evidence(60.0, "Potential Thrust Loss (3)", "thrust"),)), ())
+    assert was_upset(replace(run, checks=(Check("no_crash", 0.0, "no crash", "the failure detector acted"),)), ())
+
+
+def test_what_was_not_upset_runs_again() -> None:
+    assert next_step(failed(LATE), has_failed=True) == AGAIN
+    assert "run again" in next_step(failed(LATE, fixed=True), has_failed=True)
+    assert next_step(failed(LATE), has_failed=False) == ""
+
+
+def test_a_part_that_failed_is_what_to_look_at_whatever_explains_more() -> None:
+    assert next_step(failed(THRUST), has_failed=True).startswith("check on the bench: too little thrust; then try it")
+    laser = Finding("laser", "the laser falls silent", 50.0, 60.0, "critical", "", "", probability=0.9)
+    assert next_step(failed(laser), has_failed=True) == "look at what this names: the laser falls silent"
+
+
+def test_what_drives_is_tried_at_walking_pace() -> None:
+    run = made_run()
+    rover = replace(run, log=replace(run.log, facts={"firmware": "ArduRover V4.5.4", "vehicle": "rover"}))
+    drive = replace(run, log=replace(run.log, format="mcap"))
+    assert trial(rover) == trial(drive) == "in the simulator or at walking pace"
+    assert "wheels" in bench(rover)
+    assert "propellers" in bench(run)
+
+
+def test_a_symptom_is_no_part_to_check() -> None:
+    lost = Finding("attitude", "control was lost", 50.0, 60.0, "critical", "", "", probability=0.3)
+    named = replace(failed(lost), hypotheses=(Hypothesis("hardware", lost.title, 0.7), Hypothesis("chance", "", 0.3)))
+    assert next_step(named, has_failed=True) == bench(named.run)
+
+
+def test_where_nothing_failed_no_part_is_named() -> None:
+    empty = Finding("battery", "the battery was not charged", 0.0, 60.0, "warning", "", "", probability=0.9)
+    assert next_step(failed(empty), has_failed=False) == ""
