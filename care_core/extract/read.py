@@ -124,8 +124,8 @@ class _Source(Record, eq=False):
     missions: tuple[Mission, ...]
     dead: Mapping[str, str]
     """Channels that measure nothing, and why."""
-    doubts: tuple[str, ...]
-    """Per mission why its times cannot be right, empty where they can."""
+    doubts: tuple[Unavailable | None, ...]
+    """Per mission why nothing of it can be told: its times cannot be right, or it is of two vehicles."""
 
     @classmethod
     def read(cls, model: RunModel, schema: Schema, sha256: Sha256 | None = None) -> _Source:
@@ -154,7 +154,7 @@ class _Source(Record, eq=False):
                 where=str(log.path),
             )
         dictionary = ecosystem_of(log.format).messages()
-        doubts = tuple(clock_doubt(dictionary, tables, one.start_s, one.end_s) for one in missions)
+        doubts = tuple(_doubt(log.facts, clock_doubt(dictionary, tables, one.start_s, one.end_s)) for one in missions)
         return cls(
             schema, kind, log_info(model, sha256()), settings, missions, dead_sources(dictionary, tables), doubts
         )
@@ -219,9 +219,9 @@ class _Source(Record, eq=False):
     def _checks(self, mission: Mission) -> tuple[Check, ...]:
         return self.kind.checks(mission) if self.schema.objectives else self.kind.outcome(mission)
 
-    def _values(self, role: Role, mission: Mission, doubt: str) -> dict[str, Value]:
-        if doubt:
-            return dict.fromkeys((v.name for v in self.schema.of(role)), Unavailable(doubt, _CLOCK_ADVICE))
+    def _values(self, role: Role, mission: Mission, doubt: Unavailable | None) -> dict[str, Value]:
+        if doubt is not None:
+            return dict.fromkeys((v.name for v in self.schema.of(role)), doubt)
         values = {variable.name: _extract(variable, mission) for variable in self.schema.of(role)}
         return {name: self._explained(value) for name, value in values.items()}
 
@@ -239,6 +239,14 @@ _REQUESTED = ("mission_asked", "goals_asked")
 """Extractors of what a mission asks for."""
 _CLOCK_ADVICE = "judge a log whose messages carry the time at which they were recorded"
 _LOOK = "look at its source with 'care inspect'"
+
+
+def _doubt(facts: Mapping[str, str], clock: str) -> Unavailable | None:
+    """Why nothing of a mission can be told, None where it can."""
+    if shared := facts.get("shared id"):
+        hint = "give each vehicle a system id of its own, and record again"
+        return Unavailable(f"two vehicles speak under one system id: {shared}", hint)
+    return Unavailable(clock, _CLOCK_ADVICE) if clock else None
 
 
 def _changes(settings: Mapping[str, tuple[Setting, ...]], mission: Mission) -> dict[str, tuple[Setting, ...]]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
-from care_core.logs import formats
+from care_core.logs import formats, shared_id
 from care_core.logs.ardupilot import facts_of, history, shortest
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.clock import find_clock
@@ -161,6 +161,8 @@ class MavlinkLog:
             facts["others"] = ", ".join(self._called(sender) for sender in others)
         if vehicles := [self._called(sender) for sender in others if self._is_vehicle(sender)]:
             facts["vehicles"] = ", ".join(vehicles)
+        if why := shared_id.sharing(self.read(shared_id.READS)):
+            facts["shared id"] = why
         return facts
 
     def _is_vehicle(self, who: Sender) -> bool:

@@ -123,10 +123,14 @@ def _next_data(stream: BinaryIO, at: int) -> int:
     """Where a file was written to from here on, its end where nowhere: of a hole of terabytes no byte is read."""
     if not hasattr(os, "SEEK_DATA"):
         return at
+    handle = stream.fileno()
+    here = os.lseek(handle, 0, os.SEEK_CUR)  # the stream's buffer counts on it
     try:
-        return os.lseek(stream.fileno(), at, os.SEEK_DATA)
+        return os.lseek(handle, at, os.SEEK_DATA)
     except OSError as err:
-        return stream.seek(0, os.SEEK_END) if err.errno == errno.ENXIO else at
+        return os.fstat(handle).st_size if err.errno == errno.ENXIO else at
+    finally:
+        os.lseek(handle, here, os.SEEK_SET)
 
 
 def _unpacked(path: Path) -> bytes:

@@ -6,6 +6,7 @@ import math
 import os
 import struct
 from collections import defaultdict
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,16 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from care_core.diagnose.judging import read_and_judge
 from care_core.ecosystems.examine import examine
 from care_core.ecosystems.registry import run_model
 from care_core.errors import LogError
+from care_core.logs.file_windows import FileArray
 from care_core.logs.mavlink import MavlinkLog
+from care_core.logs.mavlink_packets import find_packets
 from care_core.logs.opening import open_log
+from care_core.profile.store import load_profile
+from tests.groundstation import write_tlog
 
 START_US = 1_700_000_000_000_000
 COPTER = (1, 1)
@@ -273,3 +279,29 @@ def test_a_second_vehicle_is_told_and_a_camera_or_a_transponder_is_none(tmp_path
 
     assert heard((2, 1, 1, 3)) == ["another vehicle is in this telemetry: 2.1 (fixed wing)"]
     assert heard((255, 190, 6, 8), (1, 154, 26, 8), (42, 156, 27, 8), (1, 191, 18, 8)) == []
+
+
+@pytest.mark.parametrize("second_boots_s", [40.0, -7.0])
+def test_two_vehicles_under_one_system_id_are_told_and_neither_is_judged(tmp_path: Path, second_boots_s: float) -> None:
+    good, both = Path(__file__).parents[1] / "data" / "arducopter_good.BIN", tmp_path / "both.tlog"
+    one = write_tlog(tmp_path / "one.tlog", good, np.random.default_rng(0))
+    packets = find_packets(FileArray.open(one))
+    raw = one.read_bytes()
+    parts = [raw[start:end] for start, end in zip(packets.start.tolist(), packets.end.tolist(), strict=True)]
+    other = [_booted(part, second_boots_s) for part in parts]
+    both.write_bytes(b"".join(chain.from_iterable(zip(parts, filter(None, other), strict=False))))
+    assert "shared id" not in open_log(one).facts
+    assert "two clocks" in open_log(both).facts["shared id"]
+    found = read_and_judge(run_model(open_log(both)), load_profile("arducopter"))
+    assert {result.status for result in found.results} == {"not_evaluated"}
+    assert "two vehicles speak under one system id" in found.results[0].reason
+    assert "two vehicles speak under one system id" in {f.title for f in examine(run_model(open_log(both))).findings}
+
+
+def _booted(packet: bytes, later_s: float) -> bytes:
+    """A stamped packet of a vehicle that was started so much later; the packet itself where it tells no clock."""
+    (message,) = mavlink.MAVLink(None).parse_buffer(packet[8:]) or [None]
+    if getattr(message, "time_boot_ms", None) is None:
+        return packet
+    message.time_boot_ms = max(0, int(message.time_boot_ms - 1000 * later_s) % 2**32)
+    return packet[:8] + message.pack(mavlink.MAVLink(None, message.get_srcSystem(), message.get_srcComponent()))

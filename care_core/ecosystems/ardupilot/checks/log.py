@@ -39,16 +39,21 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _other_vehicles(flight: Flight) -> Iterator[Finding]:
-    """Telemetry of several vehicles: each message is told of the one whose autopilot sent most."""
-    others = flight.log.facts.get("vehicles")
-    if others:
+    """Telemetry of several vehicles: each message is told of the one whose autopilot sent most, and where two speak
+    under one id, of nobody."""
+    facts = flight.log.facts
+    title = f"another vehicle is in this telemetry: {facts['vehicles']}" if "vehicles" in facts else ""
+    evidence = f"all that is told is of vehicle {facts.get('system', '')}"
+    if "shared id" in facts:
+        title, evidence = "two vehicles speak under one system id", facts["shared id"]
+    if title:
         yield Finding(
             kind="log",
-            title=f"another vehicle is in this telemetry: {others}",
+            title=title,
             onset_s=0.0,
             end_s=flight.end_s,
             severity="warning",
-            evidence=f"all that is told is of vehicle {flight.log.facts.get('system', '')}",
+            evidence=evidence,
             source="HEARTBEAT",
             suspect="operation",
             probability=_HOLE,
