@@ -304,4 +304,4 @@ def _booted(packet: bytes, later_s: float) -> bytes:
     if getattr(message, "time_boot_ms", None) is None:
         return packet
     message.time_boot_ms = max(0, int(message.time_boot_ms - 1000 * later_s) % 2**32)
-    return packet[:8] + message.pack(mavlink.MAVLink(None, message.get_srcSystem(), message.get_srcComponent()))
+    return packet[:8] + bytes(message.pack(mavlink.MAVLink(None, message.get_srcSystem(), message.get_srcComponent())))
