@@ -15,6 +15,7 @@ from care_core.run import Run
 
 UPSETS: frozenset[FindingKind] = frozenset(("attitude", "crash", "motor", "takeoff", "thrust"))
 """Kinds of findings after which a vehicle may be damaged, or does not do what it is told."""
+REFUSED = "arming was refused: "
 _UPSET_MESSAGES = frozenset(("crash", "thrust"))
 
 
@@ -48,6 +49,8 @@ def next_step(diagnosis: Diagnosis, *, has_failed: bool) -> str:
     if diagnosis.fix is not None:
         again = f"try it {trial(run)} first" if upset else "run again"
         return f"make the change, {again}, and check what it brought with 'care verify REPORT LOG'"
+    if has_failed and (undone := _undone(diagnosis)):
+        return f"{undone}, then try it {trial(run)}" if upset else undone
     name = _named(diagnosis) if has_failed else ""
     if has_failed and upset:
         is_symptom = any(one.title == name and one.kind in SYMPTOMS for one in findings)
@@ -66,3 +69,17 @@ def _named(diagnosis: Diagnosis) -> str:
         return part.title
     first = next(iter(diagnosis.hypotheses), None)
     return first.name if first is not None and first.what in ("hardware", "world") else ""
+
+
+def _undone(diagnosis: Diagnosis) -> str:
+    """What can be put right at once, empty where nothing is said to be that."""
+    findings = diagnosis.health.findings
+    part, first = mend_first(findings), next(iter(diagnosis.hypotheses), None)
+    if part is not None:
+        return "charge or replace the battery" if part.kind in ("battery", "prearm") else ""
+    refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
+    if refused is not None:
+        return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"
+    if first is not None and first.what == "parameter" and any(one.title.startswith(first.name) for one in findings):
+        return f"put {first.name} back as the findings say"
+    return ""

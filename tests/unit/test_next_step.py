@@ -70,3 +70,15 @@ def test_a_symptom_is_no_part_to_check() -> None:
 def test_where_nothing_failed_no_part_is_named() -> None:
     empty = Finding("battery", "the battery was not charged", 0.0, 60.0, "warning", "", "", probability=0.9)
     assert next_step(failed(empty), has_failed=False) == ""
+
+
+def test_what_can_be_put_right_at_once_comes_first() -> None:
+    empty = Finding("battery", "the battery was not charged", 0.0, 60.0, "critical", "", "", probability=0.9)
+    assert next_step(failed(empty), has_failed=True) == "charge or replace the battery"
+    refused = Finding("prearm", "arming was refused: Check ANGLE_MAX", 0.0, 9.0, "critical", "", "", "parameter", 0.3)
+    assert next_step(failed(refused), has_failed=True) == "clear what refused arming: Check ANGLE_MAX"
+    title = "SERVO2_FUNCTION was changed in flight, which switched motor 2 off"
+    changed = failed(Finding("motor", title, 17.0, 18.0, "critical", "", "", "parameter", 0.95))
+    told = replace(changed, hypotheses=(Hypothesis("parameter", "SERVO2_FUNCTION", 0.9), Hypothesis("chance", "", 0.1)))
+    said = next_step(told, has_failed=True)
+    assert said == "put SERVO2_FUNCTION back as the findings say, then try it in the simulator or a low hover"
