@@ -28,7 +28,7 @@ def plant(folder: Path, but: Collection[str] = ()) -> Path:
         (folder / name).mkdir(exist_ok=True)
         for file in ("__init__.py", "__main__.py", "start.py"):
             os.link(own, folder / name / file)
-    for name in ("tmux", "git", "python3", "sh", "xdg-open", "env"):
+    for name in ("tmux", "git", "python3", "sh", "xdg-open", "env", "fc-list", "lscpu"):
         program = folder / name
         program.write_text(f"#!/bin/sh\necho {name} >> '{mark}'\n")
         program.chmod(0o755)

@@ -78,6 +78,27 @@ def test_a_campaign_beside_a_strangers_files(care: Path, folder: Path) -> None:
     assert ran.returncode == 0, ran.stderr
 
 
+HELPER = """
+import shutil, subprocess
+if __name__ == "__main__":
+    import care_tui
+    subprocess.run(["fc-list"], check=False) if shutil.which("fc-list") else None
+"""
+
+
+@pytest.mark.parametrize("path", [":{usual}", ".:{usual}", "{usual}::", "../logs:{usual}"])
+def test_what_a_library_starts_by_its_name_is_not_the_strangers(
+    path: str, care: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A plotting library, which one for learning imports, asks `fc-list` for the fonts."""
+    usual = os.environ["PATH"].removeprefix(f".{os.pathsep}")
+    monkeypatch.setenv("PATH", path.format(usual=usual))
+    care.write_text(HELPER)
+    mark = plant(folder)
+    assert call(care, folder).returncode == 0
+    assert what_ran(mark) == []
+
+
 LEARNING = """
 from functools import partial
 from care_core.learn.processes import answers
