@@ -9,9 +9,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-# No pattern begins inside a word, and none repeats without end: a log may hold a text of a million digits.
-_NUMBER = r"(?<!\d)[-+]?\d{1,12}(?:[.,]\d{1,12})?"
-_DECIMAL = r"(?<!\d)[-+]?\d{1,3}[.,]\d{1,12}"
+# No pattern begins inside a word, and none repeats without end but over white space, of which `squeezed` leaves two
+# characters: a log may hold a text of a million digits, or of as many blanks.
+_LONG_GAP = re.compile(r"(\s\s)\s+")
+_POWER = r"(?:e[-+]?\d{1,2})?"
+_NUMBER = rf"(?<!\d)[-+]?\d{{1,12}}(?:[.,]\d{{1,12}})?{_POWER}"
+_DECIMAL = rf"(?<!\d)[-+]?\d{{1,8}}[.,]\d{{1,15}}{_POWER}"
+_APART = r"(?:\s?m)?(?:\s?[,;/|]\s?|[:x]|,?\s(?:and|by|then)\s|\s)"
+"""Between the two numbers of a place that words announce."""
+_NO_UNIT = r"(?![\d.,]*\d|\s?(?:s|ms|min|Hz|%|deg|degC|V|A|mAh|Wh|W|rpm|cm|times)\b|\s?%)"
 _DEGREE = "[\N{DEGREE SIGN}\N{MASCULINE ORDINAL INDICATOR}\N{RING ABOVE}]"
 _TICKS = f"(?:{_DEGREE}|deg|['\"\u2018-\u201f\u2032\u2033:_-])"
 _HEMISPHERE = r"(?:[NSEWO]|north|south|east|west)"
@@ -20,8 +26,11 @@ PLACES = re.compile(
     rf"""
     \(\s*{_NUMBER}\s*[,;]\s*{_NUMBER}(?:\s*[,;]\s*{_NUMBER})?\s*\)                  # (4.2, 0.1)
     | \b(?:lat(?:itude)?|lng|lon(?:g|gitude)?|easting|northing|utm|mgrs|zone)\b\W{{0,3}}{_NUMBER}(?:\s*[NSEW]\b)?
-    | \b[xyz]\s*[:=]\s*{_NUMBER}                                                    # x=4.2
-    | {_DECIMAL}\s*{_DEGREE}?\s*{_HEMISPHERE}?\s*(?:[,;/|]\s*|\s)\s*{_HEMISPHERE}?\s*{_DECIMAL}(?!\s*%)
+    | \b[xyz]\s*[:=]\s*{_NUMBER} | \b[xyz]\s+{_DECIMAL}                           # x=4.2, x 4.2
+    | \bx\W{{0,3}}{_NUMBER}\s?m?\W{{0,3}}y\W{{0,3}}{_NUMBER}                        # x 4 y 2
+    | \b(?:position|pose|goal|home|location|origin|target|cell|coordinates?)\b\W{{0,3}}(?:(?:is|at|to|of)\b\W{{0,3}})?
+      (?:{_DECIMAL}{_APART}{_NUMBER}|{_NUMBER}{_APART}{_DECIMAL}){_NO_UNIT}         # goal at 4.2 by 0
+    | {_DECIMAL}\s*{_DEGREE}?\s*{_HEMISPHERE}?\s*(?:[,;/|:]\s*|\s)\s*{_HEMISPHERE}?\s*{_DECIMAL}(?!\s*%)
       (?:\s*{_DEGREE}?\s*{_HEMISPHERE}\b)?
     | (?<!\d)[-+]?\d{{2,3}}[.,]\d{{5,15}}                                                    # one coordinate in degrees
     | \d{{1,3}}\s*{_DEGREE}\s*\d{{1,2}}(?:[.,]\d+)?\s*(?:{_TICKS}[^,;]{{0,12}}?{_HEMISPHERE}\b)?   # 47° 23' 51" N
@@ -87,10 +96,18 @@ IDENTITIES = re.compile(
 _TOKEN = re.compile(r"\w+")
 _LETTERS = re.compile(r"[^\W\d_]+")
 _UNITS = r"(?!\s?(?:mAh|mV|ms|us|Hz|rpm|baud|cm|mm)\b)"
-_LONG_NUMBER = re.compile(
-    rf"(?<![\w.])\d{{4,}}{_UNITS}(?![\w.])|\b\d{{1,2}}:\d{{2}}(?::\d{{2}})?\b|\b\d{{2,4}}(?:[ -]\d{{2,4}}){{2,}}\b"
+_PRIVATE_NUMBER = re.compile(
+    rf"""
+    (?<![\w.])\d{{4,}}{_UNITS}(?![\w.]) | \b\d{{5,}}[a-f]\b
+    | \b\d{{1,2}}:\d{{2}}(?::\d{{2}})?\b | \b\d{{2,4}}(?:[ -]\d{{2,4}}){{2,}}\b
+    | (?<![\w.#]){_NUMBER}(?:\s?m)?(?:\s?[,;|x]\s?|,?\s(?:and|by|then)\s|\s){_NUMBER}{_NO_UNIT}(?!\w)
+    | \b(?:sys_?id\w*|(?:vehicle|robot|unit|drone|room|dock|floor|hall|bay|building|street)
+      (?:\s?(?:id|no|nr|number))?\b)\W{{0,3}}\d
+    """,
+    re.VERBOSE | re.IGNORECASE,
 )
-"""Of no use in what software wrote, and what a number plate, an identifier or a time of day looks like."""
+"""Of no use in what software wrote, and what a number plate, an identifier, a time of day, two coordinates, a robot's
+number or that of a room look like."""
 _ROS_NAME = re.compile(r"(?<![\w.])/[A-Za-z]\w*(?:/\w+)*")
 
 
@@ -121,7 +138,12 @@ _MOST_UNIT = 4
 
 def has_number(text: str) -> bool:
     """Whether a text that a robot's software wrote has a number that only its own people need."""
-    return _LONG_NUMBER.search(text) is not None
+    return _PRIVATE_NUMBER.search(text) is not None
+
+
+def squeezed(text: str) -> str:
+    """The text without long white space, which patterns of several gaps could share in ever more ways."""
+    return _LONG_GAP.sub(r"\1", text)
 
 
 def private_names(text: str, public: frozenset[str], known: frozenset[str]) -> Iterator[tuple[int, int]]:

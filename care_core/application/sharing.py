@@ -15,7 +15,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TypeVar, cast
 
-from care_core.application.identities import IDENTITIES, PLACES, has_number, private_names
+from care_core.application.identities import IDENTITIES, PLACES, has_number, private_names, squeezed
 from care_core.application.open_run import OpenRun
 from care_core.application.shared_parameters import may_go
 from care_core.diagnose.records import Diagnosis
@@ -68,7 +68,7 @@ EVERYTHING = Sharing()
 
 def without_places(text: str) -> str:
     """The text without coordinates, on the earth or on a map."""
-    return PLACES.sub(NO_PLACE, text)
+    return PLACES.sub(NO_PLACE, squeezed(text))
 
 
 class Redactor(Record):
@@ -83,11 +83,13 @@ class Redactor(Record):
 
     def text(self, text: str) -> str:
         """The text with every such word and number hidden."""
-        kept = text if self.positions else without_places(text)
+        kept = squeezed(text) if self.positions else without_places(text)
         kept = IDENTITIES.sub(HIDDEN, kept)
-        for start, end in sorted(private_names(kept, self.public, self.known), reverse=True):
-            kept = f"{kept[:start]}{HIDDEN}{kept[end:]}"
-        return kept
+        pieces, done = [], 0
+        for start, end in sorted(private_names(kept, self.public, self.known)):
+            pieces += [kept[done:start], HIDDEN]
+            done = end
+        return "".join((*pieces, kept[done:]))
 
     def said(self, text: str) -> str:
         """A text that the robot's software wrote: whole, or not at all."""

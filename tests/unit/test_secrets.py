@@ -14,7 +14,7 @@ import care_core
 from care_core.application.bundling import bundle_of
 from care_core.application.case import Case, Request
 from care_core.application.shared_parameters import may_go
-from care_core.application.sharing import HIDDEN, LEFT_OUT, NO_PLACE, Redactor, Sharing
+from care_core.application.sharing import HIDDEN, LEFT_OUT, NO_PLACE, Redactor, Sharing, without_places
 from care_core.files import bundled
 from tests.rewritten import write_text
 
@@ -26,6 +26,8 @@ PLACES = (
     "47-23-51N 008-32-44E", "n47 23 51, e8 32 44", "-33.86/151.20", "32T 465123 5248765", "32T MT 65120 45678",
     "32TMT6512045", "465123 5248765", "8FVC9G8F+6X", "9G8F+6X", "JN47gh", "///filled.count.soap", "lat 47 lon 8",
     "elevation 488m", "alt 488 m above sea level", "488 m AMSL", "[47.39, 8.54]", "47.39|8.54", "472351N 0083244E",
+    "4.739e+01, 8.545e+00", "goal at x 12.5 y 7.25", "goal x 12 y 7", "x 4663.5", "pose 4663.5, 5249.75",
+    "goal 12.5 by 7.25", "home at 4.2 and 0", "position is 4663.50m, 5249.75m", "goal 12.5:7.2", "x12.5y7.2",
 )  # fmt: skip
 DAYS = (
     "started 21.11.26 08:45", "21.11.2026", "21. Nov 2026", "21nov26", "Nov 21", "November 21st, 2026", "Nov 2026",
@@ -41,7 +43,8 @@ ADDRESSES = (
 SERIALS = (
     "serial no 4711", "S/N: 4711", "SN 4711", "serial number is 4711", "tail N123AB", "ICAO 4B1A3C", "squawk 7123",
     "IMEI 35", "asset 12", "SSID Cube", "WiFi: Cube", "password will", "owner: will", "call sign mission", "unit 4711",
-    "0036003A 3133510B", "4B1A3C", "123e4567-e89b-12d3-a456-426614174000", "user will", "host server",
+    "0036003A 3133510B", "board 36003A", "SYSID 42", "vehicle id 17", "room 12", "to 12 7",
+    "position 12, 7, 0", "4B1A3C", "123e4567-e89b-12d3-a456-426614174000", "user will", "host server",
     "UUID 1234", "pilot: Mark", "robot=home", "site: North field",
 )  # fmt: skip
 NAMES = (
@@ -85,6 +88,18 @@ def test_a_long_text_takes_no_time(part: str) -> None:
     began = time.perf_counter()
     Redactor(frozenset()).said(part * (20_000 // len(part)))
     assert time.perf_counter() - began < 5.0, "linear; it was minutes"
+
+
+@pytest.mark.parametrize("gap", [" ", "\t", "\n", "\N{NO-BREAK SPACE}", " \t"], ids=ascii)
+@pytest.mark.parametrize(
+    "before", ["1.1", "123456", "12C 111111", "47\N{DEGREE SIGN}", "(1", "serial no", "1 of", "x", "N47"]
+)
+def test_long_white_space_takes_no_time_and_parts_nothing(before: str, gap: str) -> None:
+    """A message of 300 characters took days: every gap of a pattern could take any part of it."""
+    began = time.perf_counter()
+    Redactor(frozenset()).said(f"{before}{gap * 20_000}x" * 3)
+    assert time.perf_counter() - began < 5.0
+    assert without_places(f"at 47.39{gap * 300}8.54") == f"at {NO_PLACE}"
 
 
 # Numbers of parameters
