@@ -26,7 +26,8 @@ _FRAME_BLOCK = 1 << 17
 _AT_ONCE = 1 << 20
 """Bytes unpacked at a time of what is slow to unpack: 46 ms of bz2."""
 
-_DISK_MARGIN = 64 << 20
+DISK_MARGIN = 64 << 20
+"""What is left free of the disk of temporary files."""
 
 
 class CannotUnpackError(Exception):
@@ -141,7 +142,7 @@ class PlainFile:
                         hint="Unpack it with 'zstd -d' where there is room for it, and name the unpacked file.",
                         where=str(where),
                     )
-                if shutil.disk_usage(self._folder.name).free < _DISK_MARGIN:
+                if shutil.disk_usage(self._folder.name).free < DISK_MARGIN:
                     raise LogError(
                         "There is no room to unpack the log.",
                         hint="Free some of the temporary folder, or set TMPDIR to a larger one.",

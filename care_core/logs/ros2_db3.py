@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import shutil
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
+from care_core.files import open_regular
 from care_core.logs import formats
-from care_core.logs.compression import ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
+from care_core.logs.compression import DISK_MARGIN, ZSTD_MAGIC, CannotUnpackError, PlainFile, Unpacker
 from care_core.logs.file_windows import opened
 from care_core.logs.message_index import Places
 from care_core.logs.recording import recording_at
@@ -35,6 +38,9 @@ _ASKED = 50_000
 """Rows that one statement names, which may be a megabyte long: a table whose ids are no key is passed seldom."""
 _CACHED_KIB = 24 << 10
 """Pages that SQLite keeps: all small messages of a short recording, which lie between the pictures."""
+_JOURNAL_HEAD, _FRAME_HEAD = 32, 24
+_PAGES = [1 << power for power in range(9, 17)]
+"""Bytes of a write-ahead log's header and of each frame's, and of pages (sqlite.org/fileformat2.html, 4.1)."""
 _NONE = np.empty(0, np.int64)
 _STEPS = 100_000
 """Of SQLite, which walks a whole table by itself, between two chances to be interrupted: some ms."""
@@ -192,8 +198,10 @@ class _Database:
         self._folder = TemporaryDirectory(prefix="care-")
         copy = Path(self._folder.name) / self.path.name
         try:
+            if shutil.disk_usage(self._folder.name).free < self.size + DISK_MARGIN:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             shutil.copyfile(self.path, copy)
-            shutil.copyfile(journal, copy.with_name(journal.name))
+            self.size += _copy_frames(journal, copy.with_name(journal.name))
         except OSError as err:
             raise LogError(
                 f"The log's journal cannot be copied: {err.strerror or err}.",
@@ -201,7 +209,6 @@ class _Database:
                 where=str(journal),
             ) from err
         self.path, self.is_own = copy, True
-        self.size += journal.stat().st_size
 
     def check_size(self) -> None:
         """Raise sqlite3.Error for a file that is cut short: SQLite reads zeros for the missing rest of a page."""
@@ -297,6 +304,24 @@ class _Database:
         finally:
             if not self._stays_open:
                 database.close()
+
+
+def _copy_frames(journal: Path, copy: Path) -> int:
+    """Copy what SQLite reads of a journal, up to the first frame of another writing, and answer its bytes: behind that
+    lies what was there before, or a hole as large as somebody wanted. Raises OSError."""
+    with open_regular(journal) as source, copy.open("wb") as target:
+        head = source.read(_JOURNAL_HEAD)
+        page = int.from_bytes(head[8:12], "big")
+        if page not in _PAGES:
+            return 0
+        target.write(head)
+        left = shutil.disk_usage(copy.parent).free - DISK_MARGIN
+        while len(frame := source.read(_FRAME_HEAD + page)) == _FRAME_HEAD + page and frame[8:16] == head[16:24]:
+            left -= len(frame)
+            if left < 0:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            target.write(frame)
+        return target.tell()
 
 
 def _authorised(action: int, what: str | None, name: str | None, _database: str | None, inside: str | None) -> int:
