@@ -3,6 +3,9 @@ something failed that no parameter repairs."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import pytest
 
 from care_core.diagnose.advice import (
@@ -15,12 +18,16 @@ from care_core.diagnose.advice import (
     odds_as_driven,
     outweighed,
 )
+from care_core.diagnose.circumstances import battery_is_low
 from care_core.diagnose.parts import mend_first, unmended
 from care_core.diagnose.records import Fix, Hypothesis, ObjectiveResult, Prediction
+from care_core.diagnose.triage import _failsafes_held
 from care_core.ecosystems.findings import CAME_DOWN, UNCHARGED, Finding, FindingKind, Severity, SuspectKind
+from care_core.profile.store import load_profile
 from care_core.records import replace
+from care_core.run import Unavailable, Value
 from care_core.variables import Threshold
-from tests.made import LAND_SPEED, TIME, made_diagnosis
+from tests.made import LAND_SPEED, TIME, made_diagnosis, made_run
 
 LATE = ObjectiveResult(TIME, 190.0, Threshold("<=", 100.0), "fault")
 ALONE = (Hypothesis("parameter", "land_speed", 0.9), Hypothesis("chance", "", 0.1))
@@ -202,3 +209,32 @@ def test_as_driven_what_a_parameter_brought_about_happens_again() -> None:
 
 def test_the_best_that_falls_short_stands_beside_the_odds_as_driven() -> None:
     assert "has 40%, as driven 10%" in str(falls_short(fix_with(0.4), [LATE], odds=1.0, as_driven=0.1))
+
+
+@pytest.mark.parametrize(
+    ("volts", "is_low"), [(12.6, False), (12.5, False), (12.2, True), (16.1, False), (Unavailable("no BAT"), None)]
+)
+def test_a_battery_below_what_every_training_flight_began_with_is_not_full(volts: Value, is_low: bool | None) -> None:
+    profile = load_profile("arducopter")
+    run = replace(made_run(), context={"start_voltage": volts})
+    assert battery_is_low(run, profile.model, profile.schema) is is_low
+
+
+@pytest.mark.parametrize(
+    ("volts", "finding", "is_held"),
+    [
+        (12.6, None, False),
+        (12.2, None, True),
+        (12.6, part("battery", "battery failsafe", 0.1, suspect="parameter"), False),
+        (12.6, part("battery", "battery failsafe", 0.1, suspect="operation"), True),
+        (12.6, part("battery", "the battery sags under its load", 0.25), True),
+    ],
+)
+def test_a_battery_failsafe_is_lowered_for_no_battery_that_may_not_be_full(
+    volts: float, finding: Finding | None, *, is_held: bool
+) -> None:
+    profile = load_profile("arducopter")
+    run = replace(made_run(), context={"start_voltage": volts})
+    case = SimpleNamespace(run=run, query=SimpleNamespace(model=profile.model), profile=profile)
+    held = _failsafes_held(cast(Any, case), [] if finding is None else [finding])
+    assert held == (frozenset({"BATT_LOW_VOLT"}) if is_held else frozenset())

@@ -386,6 +386,16 @@ def test_a_failsafe_above_what_a_battery_needs_is_a_parameter() -> None:
     assert "BATT_LOW_VOLT=11.9" in finding.evidence
 
 
+def test_of_a_battery_that_was_not_full_it_is_none() -> None:
+    made = Made()
+    made.settings["BATT_LOW_VOLT"] = 11.9
+    made.rows["ERR"] = [(40.0, {"Subsys": 6.0, "ECode": 1.0})]
+    made.table["BAT"]["Volt"] -= float(made.table["BAT"]["Volt"][0]) - 3 * 4.03
+    finding = first(made)
+    assert (finding.title, finding.suspect) == ("battery failsafe", "operation")
+    assert "not full before take-off: 4.03 V a cell" in finding.evidence
+
+
 def test_a_sagging_battery() -> None:
     made = Made()
     made.table["BAT"]["Volt"][made.after(FAILS_S, DOWN_S)] = 8.7

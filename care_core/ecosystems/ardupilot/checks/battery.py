@@ -26,6 +26,7 @@ LIMITS = Limits()
 _CELLS = "voltages of lithium polymer cells"
 _ADVICE = "ArduPilot, Battery Failsafe"
 NOT_FULL = LIMITS.add("cell at rest, charged", 3.9, "V", _CELLS)
+FULL = LIMITS.add("cell at rest, full", 4.1, "V", _CELLS)
 LOW = LIMITS.add("usual low level of a cell", 3.5, "V", _ADVICE)
 CRITICAL = LIMITS.add("critical level of a cell", 3.3, "V", _ADVICE)
 RUINOUS = LIMITS.add("level that harms a cell", 3.0, "V", _CELLS)
@@ -70,7 +71,7 @@ def _pack(flight: Flight, battery: Battery, table: Table) -> Iterator[Finding]:
         deep = bool(lasting(t, watched & (lowest < RUINOUS), _LASTS_S))
         yield _sags(flight, table, low, float(np.min(lowest[watched])), cells, is_deep=deep)
     elif (failsafe := flight.battery_failsafe_s) is not None:
-        yield _failsafe(flight, failsafe, float(np.interp(failsafe, t, table["Volt"])), cells)
+        yield _failsafe(flight, failsafe, float(np.interp(failsafe, t, table["Volt"])), cells, rest)
 
 
 def _not_charged(flight: Flight, rest: float, cells: int, *, is_low: bool) -> Finding:
@@ -108,11 +109,13 @@ def _sags(flight: Flight, table: Table, low: list[Span], lowest: float, cells: i
     )
 
 
-def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int) -> Finding:
-    """A failsafe of a battery that was well: set too early, or flown until then."""
+def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int, rest: float | None) -> Finding:
+    """A failsafe of a battery that was well: set too early for a full one, or flown until then."""
     limit = flight.setting("BATT_LOW_VOLT", "FS_BATT_VOLTAGE", "LOW_VOLT") or 0.0
     is_early = limit / cells > LOW + _EARLY_V
+    is_full = rest is None or rest / cells >= FULL
     asks = f"; BATT_LOW_VOLT={limit:g} asks for it at {limit / cells:.2f} V a cell, 3.5 is usual" if is_early else ""
+    asks += "" if rest is None or is_full else f"; not full before take-off: {rest / cells:.2f} V a cell"
     return Finding(
         kind="battery",
         title="battery failsafe",
@@ -121,7 +124,7 @@ def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int) -> Find
         severity="critical",
         evidence=f"failsafe at {volts:.1f} V, {volts / cells:.2f} V for each of {cells} cells{asks}",
         source="ERR of the battery failsafe; BAT.Volt",
-        suspect="parameter" if is_early else "operation",
+        suspect="parameter" if is_early and is_full else "operation",
         probability=_FAILSAFE,
     )
 
