@@ -129,7 +129,7 @@ def px4_log(
     **replaced: Table,
 ) -> TablesLog:  # fmt: skip
     """The ULog of a flight; outputs at 10 Hz unless told otherwise."""
-    t, count = fall.t, len(fall.asked)
+    t, count, rng = fall.t, len(fall.asked), np.random.default_rng(0)
     armed_until = END_S if fall.down_s is None else fall.down_s + 1.0
     landed = (t < ARMED_S + 2) | (t > armed_until)
     level = np.tile(np.array([1.0, 0.0, 0.0, 0.0]), (len(t), 1))
@@ -143,8 +143,8 @@ def px4_log(
         "vehicle_attitude": Table(t, {f"q[{n}]": fall.quaternion[:, n] for n in range(4)}),
         "vehicle_attitude_setpoint": Table(t, {f"q_d[{n}]": level[:, n] for n in range(4)}),
         "sensor_combined": Table(t, {
-            "gyro_rad[0]": np.zeros(len(t)),
-            **{f"accelerometer_m_s2[{n}]": -fall.felt if n == 2 else np.zeros(len(t)) for n in range(3)},
+            **{f"gyro_rad[{n}]": rng.normal(0.0, 0.01, len(t)) for n in range(3)},
+            **{f"accelerometer_m_s2[{n}]": -fall.felt if n == 2 else rng.normal(0.0, 0.1, len(t)) for n in range(3)},
         }),
     }  # fmt: skip
     if pwm:

@@ -36,10 +36,11 @@ EXPLAINS: Explains = {
     "laser": frozenset(("laser", "localisation", "planner", "blocked", "control", "tf", "software")),
     "localisation": frozenset(("localisation", "planner", "blocked", "control", "tf")),
     "drive": frozenset(("drive", "planner", "control")),
-    "commands": frozenset(("drive", "planner")),
+    "commands": frozenset(("drive", "planner", "control")),
     "tf": frozenset(("tf", "planner", "control")),
-    "topics": frozenset(("topics", "tf", "planner")),
+    "topics": frozenset(("topics", "tf", "planner", "control")),
     "planner": frozenset(("planner", "control", "tf")),  # one that finds no path keeps the computer busy
+    "control": frozenset(("control", "planner")),  # one that leaves the robot in a corner asks for path after path
     "software": frozenset(("software", "topics")),
     # --- both
     "battery": frozenset(("battery", "thrust", "log", "crash", "drive", "commands", "topics", "laser", "cpu")),
@@ -50,7 +51,7 @@ EXPLAINS: Explains = {
     ),
     "crash": frozenset(
         ("attitude", "log", "vibration", "imu", "estimator", "gps", "compass", "barometer", "localisation", "drive",
-         "planner", "software")
+         "planner", "control", "software")
     ),
 }  # fmt: skip
 """By physics, not by statistics. A compass loses no fix, and a battery makes no gyro noisy."""

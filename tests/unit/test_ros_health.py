@@ -145,10 +145,41 @@ def test_consequences_fold_under_their_cause(tmp_path: Path) -> None:
     assert "planner" in [one.kind for one in health.findings[0].consequences]
 
 
-def test_a_planner_without_a_cause_is_suspected_of_its_parameters(tmp_path: Path) -> None:
-    said = [(20.0 + n, ERROR, "controller_server", "Failed to make progress") for n in range(12)]
+@pytest.mark.parametrize(
+    ("node", "text", "kind"),
+    [
+        ("controller_server", "Failed to make progress", "control"),
+        ("controller_server", "Controller patience exceeded", "control"),
+        ("move_base", "DWA planner failed to produce path.", "control"),
+        ("move_base", "Aborting because a valid control could not be found.",
+         "control"),
+        ("move_base", "Aborting because a valid plan could not be found.",
+         "planner"),
+        ("planner_server", "GridBased: failed to create plan with tolerance 0.50.", "planner"),
+    ],
+)  # fmt: skip
+def test_who_finds_no_way_is_suspected_of_its_parameters(tmp_path: Path, node: str, text: str, kind: str) -> None:
+    said = [(20.0 + n, ERROR, node, text) for n in range(12)]
     health = looked_at(Drive(outcome=ABORTED, said=said), tmp_path)
-    assert [(one.kind, one.suspect) for one in health.findings] == [("planner", "parameter")]
+    assert [(one.kind, one.suspect) for one in health.findings] == [(kind, "parameter")]
+
+
+@pytest.mark.parametrize(
+    ("text", "title"),
+    [
+        ("Control loop missed its desired rate of 20.0000 Hz. Current loop rate is 2.0000 Hz.",
+         "the control loop runs at 2 Hz, its rate is 20 Hz"),
+        ("Control loop missed its desired rate of 20.0000Hz... the loop actually took 0.5000 seconds",
+         "the control loop runs at 2 Hz, its rate is 20 Hz"),
+        ("Control loop missed its desired rate of 20.0000 Hz. Current loop rate is 18.0000 Hz.", None),
+        ("Map update loop missed its desired rate of 5.0000Hz... the loop actually took 2.0000 seconds", None),
+    ],
+)  # fmt: skip
+def test_a_control_loop_at_a_tenth_of_its_rate_is_a_finding(tmp_path: Path, text: str, title: str | None) -> None:
+    said = [(20.0 + n, WARN, "controller_server", text) for n in range(5)]
+    findings = looked_at(Drive(outcome=ABORTED, said=said), tmp_path).findings
+    serious = [one.title for one in findings if one.severity != "info"]
+    assert serious == ([title] if title else [])
 
 
 def test_the_account_tells_goals_and_groups_messages(tmp_path: Path) -> None:

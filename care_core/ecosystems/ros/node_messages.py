@@ -38,6 +38,10 @@ PARTS = {0: "OK", 1: "WARN", 2: "ERROR", 3: "STALE"}
 """Levels of diagnostic_msgs/DiagnosticStatus."""
 
 _RATES = re.compile(r"missed its desired rate of ([\d.]+\d) ?Hz.*current loop rate is ([\d.]+\d) ?Hz", re.IGNORECASE)
+_CONTROL = re.compile(r"control loop", re.IGNORECASE)
+_TOOK = re.compile(
+    r"control loop missed its desired rate of ([\d.]+\d) ?Hz.*loop actually took ([\d.]+\d) ?second", re.IGNORECASE
+)
 _RATE_KEPT = 0.95
 """What Nav2 says of a loop that missed its rate, and from which share of it on it kept it."""
 
@@ -85,6 +89,15 @@ def kept_its_rate(text: str) -> bool:
     """
     found = _RATES.search(text)
     return found is not None and float(found[2]) >= _RATE_KEPT * float(found[1])
+
+
+def control_rate(text: str) -> tuple[float, float] | None:
+    """The rate at which a control loop ran and the one that it is to have, as it says itself (Nav2, move_base)."""
+    found = _RATES.search(text)
+    if found is not None:
+        return (float(found[2]), float(found[1])) if _CONTROL.search(text) else None
+    took = _TOOK.search(text)
+    return (1.0 / float(took[2]), float(took[1])) if took is not None and float(took[2]) > 0 else None
 
 
 def log_messages(table: Table, type: str = "") -> tuple[LogMessage, ...]:

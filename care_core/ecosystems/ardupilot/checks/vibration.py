@@ -36,7 +36,9 @@ READS: Wanted = {
 
 LIMITS = Limits()
 _PAGE = "ArduPilot, Measuring Vibration"
-FELT = LIMITS.add("vibration worth a word", 15.0, "m/s^2", "half of what is acceptable")
+FELT = LIMITS.add(
+    "vibration worth a word", 30.0, "m/s^2", f"{_PAGE}: acceptable below; a real flight with good propellers has 20"
+)
 HIGH = LIMITS.add("acceptable vibration", 30.0, "m/s^2", _PAGE)
 SEVERE = LIMITS.add("severe vibration", 60.0, "m/s^2", _PAGE)
 ROSE = LIMITS.add(

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.base import Check, Limits
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import Finding, FindingKind
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.goals import Goal
 from care_core.ecosystems.ros.messages import COMMANDS, GOALS, ODOMETRY, ROSOUT, reading
@@ -31,6 +31,12 @@ FAILS = re.compile(
     re.IGNORECASE,
 )
 """What move_base, its planners, move_base_flex and Nav2's servers say when they find no way."""
+_OF_CONTROLLER = re.compile(
+    r"make progress|patience|control\b|controller|trajector|dwa|local.?planner|teb\b|rotation cmd|rotating"
+    r"|collision ahead|oscillating",
+    re.IGNORECASE,
+)
+"""Which of these messages are the controller's, that follows a path: where it fails, the planner did find one."""
 
 LIMITS = Limits()
 OFTEN = LIMITS.add("complaints", 10, "", "with fewer, and its goals reached, a planner found a way")
@@ -48,13 +54,19 @@ SAMPLES = LIMITS.add("samples of odometry on a goal", 5, "", "fewer tell of no w
 
 
 def find(drive: Drive) -> Iterator[Finding]:
-    """Messages that no path is found, and goals on which the controller is stuck."""
-    yield from _fails(drive)
+    """Messages that no path is found or followed, and goals on which the controller is stuck."""
+    said = [one for one in drive.log_messages if one.level >= Level.WARN and FAILS.search(one.text)]
+    yield from _fails(drive, [one for one in said if not _is_controllers(one)], "planner", "the planner finds no path")
+    controllers = [one for one in said if _is_controllers(one)]
+    yield from _fails(drive, controllers, "control", "the controller makes no progress on its path")
     yield from _stuck(drive)
 
 
-def _fails(drive: Drive) -> Iterator[Finding]:
-    complaints = [one for one in drive.log_messages if one.level >= Level.WARN and FAILS.search(one.text)]
+def _is_controllers(message: LogMessage) -> bool:
+    return "controller" in message.node or _OF_CONTROLLER.search(message.text) is not None
+
+
+def _fails(drive: Drive, complaints: list[LogMessage], kind: FindingKind, title: str) -> Iterator[Finding]:
     failed = any(goal.failed for goal in drive.goals)
     if not complaints or (drive.goals and not failed and len(complaints) < OFTEN):
         return
@@ -64,8 +76,8 @@ def _fails(drive: Drive) -> Iterator[Finding]:
     text = Counter(message.text for message in complaints).most_common(1)[0][0]
     often = "message" if len(complaints) == 1 else "messages, most often"
     yield Finding(
-        kind="planner",
-        title="the planner finds no path",
+        kind=kind,
+        title=title,
         onset_s=at,
         end_s=complaints[-1].time_s,
         severity=drive.severity(at),
@@ -97,7 +109,7 @@ def _stuck(drive: Drive) -> Iterator[Finding]:
             continue
         forward, turns = shares
         yield Finding(
-            kind="planner",
+            kind="control",
             title=f"the controller is stuck: it commands to {'turn to and fro' if turns > TURNING else 'stand'}",
             onset_s=span[0],
             end_s=span[1],
@@ -134,4 +146,4 @@ def _commanded(commands: Commands, start_s: float, end_s: float) -> tuple[float,
 
 
 READS = reading(*ROSOUT, ODOMETRY, *COMMANDS, *GOALS)
-CHECK = Check("planner", "a planner that finds no path, a controller that is stuck", READS, LIMITS, find)
+CHECK = Check("planner", "a planner that finds no path, a controller that makes no progress", READS, LIMITS, find)

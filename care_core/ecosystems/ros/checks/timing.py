@@ -12,7 +12,7 @@ from care_core.ecosystems.findings import Finding, FindingKind, Severity
 from care_core.ecosystems.plausible import APART, STAMP, is_simulated, stamps_pace
 from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import GOALS, ROSOUT, STAMPED, reading
-from care_core.ecosystems.ros.node_messages import Level, LogMessage, kept_its_rate
+from care_core.ecosystems.ros.node_messages import Level, LogMessage, control_rate, kept_its_rate
 from care_core.ecosystems.timeline import counted
 from care_core.numbers import median
 
@@ -20,6 +20,11 @@ LIMITS = Limits()
 SHARE = LIMITS.add("messages a second", 0.1, "1/s", "loops that miss now and then are no fault")
 FEWEST = LIMITS.add("messages", 3.0, "", "loops that miss now and then are no fault")
 FASTEST = LIMITS.add("ratio of two clocks", APART, "", "a real clock is right to 0.01 %")
+SLOW = LIMITS.add("share of its rate at which a control loop runs", 0.2, "", "a choice: five steps on one command")
+SLOW_SENT = LIMITS.add(
+    "the same, by the commands that are recorded", 0.12, "", "a choice: recordings thinned to 2 Hz have 0.2 and more"
+)
+COMMANDS_LEAST = LIMITS.add("steps between commands", 20, "", "a choice: fewer tell of no rate")
 _LOOPS = re.compile(
     r"(control|map update|planner) loop missed|missed its desired rate|behavior tree.*(tick|loop) rate", re.IGNORECASE
 )
@@ -49,6 +54,7 @@ def is_late(text: str) -> bool:
 def find(drive: Drive) -> Iterator[Finding]:
     """Clocks that run apart, and messages that loops, transforms or sensors are late."""
     yield from _lags(drive)
+    yield from _slow_control(drive)
     for pattern, kind, title in _FAMILIES:
         complaints = [message for message in drive.log_messages if _counts(message, pattern)]
         if not complaints or len(complaints) < max(FEWEST, SHARE * drive.duration_s):
@@ -65,6 +71,46 @@ def find(drive: Drive) -> Iterator[Finding]:
             suspect="parameter",
             probability=0.3,
         )
+
+
+def _slow_control(drive: Drive) -> Iterator[Finding]:
+    """A control loop at a fraction of its rate, by its own word; else by how seldom commands come while it drives."""
+    rates = [
+        (one.time_s, now, wanted)
+        for one in drive.log_messages
+        if (told := control_rate(one.text)) is not None
+        for now, wanted in [told]
+    ]
+    slow = [row for row in rates if row[1] < SLOW * row[2]]
+    if len(slow) >= FEWEST:
+        now, wanted = (float(median([row[n] for row in slow])) for n in (1, 2))
+        yield _slow(drive, slow[0][0], slow[-1][0], now, wanted, f"{counted(len(slow), 'message')} of its own")
+        return
+    setting = next((held[0] for name, held in drive.settings.items() if name.endswith("controller_frequency")), None)
+    if rates or drive.commands is None or setting is None or not isinstance(setting.value, (int, float)):
+        return
+    t, goals = drive.commands.t, [(goal.sent_s, goal.end_s) for goal in drive.goals]
+    steps = np.concatenate([np.empty(0), *(np.diff(t[(t >= start) & (t <= end)]) for start, end in goals)])
+    if len(steps) < COMMANDS_LEAST:
+        return
+    now = 1.0 / max(float(median(steps)), 1e-6)
+    if now < SLOW_SENT * setting.value:
+        evidence = f"commands on {drive.commands.topic} while it had a goal, of {len(steps)} steps"
+        yield _slow(drive, goals[0][0], goals[-1][1], now, float(setting.value), evidence)
+
+
+def _slow(drive: Drive, start_s: float, end_s: float, now: float, wanted: float, evidence: str) -> Finding:
+    return Finding(
+        kind="control",
+        title=f"the control loop runs at {now:.2g} Hz, its rate is {wanted:g} Hz",
+        onset_s=start_s,
+        end_s=end_s,
+        severity="warning" if drive.severity(start_s) == "warning" else "critical" if drive.goals else "warning",
+        evidence=f"{evidence} (limit {SLOW:.0%} of the rate); the computer is too slow for its settings",
+        source="/rosout, commands, controller_frequency",
+        suspect="parameter",
+        probability=0.5,
+    )
 
 
 def _counts(message: LogMessage, pattern: re.Pattern[str]) -> bool:
