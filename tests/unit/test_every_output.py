@@ -112,7 +112,7 @@ def test_a_value_that_no_source_holds_is_shown_as_assumed_in_every_output(readin
     config = {name: value for name, value in judged.run.config.items() if name != OPTION}
     asked = question(replace(judged, run=replace(judged.run, config=config)), reading.profile, reading.choice)
     answer = asked.ask({OPTION: 40.0})
-    assert f"{OPTION}  50 (assumed) -> 40 cm/s" in whatif_text(asked, answer)
+    assert f"{OPTION}  19 (assumed) -> 40 cm/s" in whatif_text(asked, answer)
     assert json.loads(whatif_json(asked, answer))["changes"][0]["assumed"] is True
 
 
@@ -139,3 +139,17 @@ def unwarned(text: str, fix: Fix) -> list[str]:
     """Lines with a probability of this fix that do not say that it is a guess."""
     promised = {f"{fix.p_fixed:.0%}", *(f"{one.p_ok:.0%}" for one in fix.predicted.values() if one.p_ok is not None)}
     return [line for line in text.splitlines() if any(one in line for one in promised) and "guess" not in line]
+
+
+def test_every_promise_stands_beside_the_odds_as_driven() -> None:
+    made = made_diagnosis()
+    assert made.fix is not None
+    diagnosis = replace(made, odds_as_driven=0.05, alternatives=(made.fix,))
+    shown = outputs(diagnosis)
+    for name in ("text", "markdown", "html"):
+        flat = " ".join(shown[name].split())
+        assert flat.count("; as driven 5%") >= 3, f"{name}: headline, cause and alternative"
+    assert "(90%; as driven 5%)" in shown["history"]
+    assert json.loads(shown["json"])["odds_as_driven"] == 0.05
+    cause = diagnosis.faults[0].causes[0]
+    assert "90 % if only this is changed (as driven 5 %)" in cause_item(cause, None, None, UNICODE, 0.05)[1].plain
