@@ -40,7 +40,7 @@ EXPLAINS: Explains = {
     "tf": frozenset(("tf", "planner", "control")),
     "topics": frozenset(("topics", "tf", "planner", "control")),
     "planner": frozenset(("planner", "control", "tf")),  # one that finds no path keeps the computer busy
-    "control": frozenset(("control", "planner")),  # one that leaves the robot in a corner asks for path after path
+    "control": frozenset(("control",)),
     "software": frozenset(("software", "topics")),
     # --- both
     "battery": frozenset(("battery", "thrust", "log", "crash", "drive", "commands", "topics", "laser", "cpu")),

@@ -71,9 +71,10 @@ def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
 
 def _folded(finding: Finding | FindingEntry, indent: str) -> Iterator[str]:
     for words, below in finding.links:
-        titles = list(dict.fromkeys(f"{one.title} ({seconds(one.onset_s)})" for one in below))
-        more = f" and {len(titles) - LED_TO_SHOWN} more" if len(titles) > LED_TO_SHOWN else ""
-        yield from wrapped(f"{words}: {'; '.join(titles[:LED_TO_SHOWN])}{more}", indent)
+        gravest = sorted(below, key=lambda one: one.severity != "critical")[:LED_TO_SHOWN]
+        titles = dict.fromkeys(f"{one.title} ({seconds(one.onset_s)})" for one in below if one in gravest)
+        more = f" and {len(below) - LED_TO_SHOWN} more" if len(below) > LED_TO_SHOWN else ""
+        yield from wrapped(f"{words}: {'; '.join(titles)}{more}", indent)
 
 
 def reason_lines(reasons: Sequence[Reason]) -> Iterator[str]:

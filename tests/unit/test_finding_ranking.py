@@ -11,6 +11,7 @@ from care_core.ecosystems.explains import Explains
 from care_core.ecosystems.findings import Finding, FindingKind, Severity
 from care_core.ecosystems.ranking import OVER_S, SLACK_S, lost_by, rank_findings
 from care_core.records import replace
+from care_core.report.health import finding_lines
 
 EXPLAINS: Explains = {
     "laser": frozenset({"planner"}),
@@ -120,3 +121,10 @@ def test_predictions_know_of_a_broken_objective_and_of_no_part() -> None:
     ]
     assert lost_by(seen, is_judged=True) == ("motor",)
     assert lost_by(seen, is_judged=False) == ("motor", "crash", "tuning")
+
+
+def test_of_many_consequences_the_critical_ones_are_printed() -> None:
+    below = [finding("planner", 2.0 + n, "warning") for n in range(5)]
+    crash = replace(finding("drive", 9.0), title="it crashed")
+    lines = "\n".join(finding_lines([replace(finding("laser", 1.0), consequences=(*below, crash))]))
+    assert "it crashed (9.0 s) and 2 more" in " ".join(lines.split())

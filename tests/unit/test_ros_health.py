@@ -150,6 +150,7 @@ def test_consequences_fold_under_their_cause(tmp_path: Path) -> None:
     [
         ("controller_server", "Failed to make progress", "control"),
         ("controller_server", "Controller patience exceeded", "control"),
+        ("bt_navigator", "Failed to get result for follow_path in node halt!", "control"),
         ("move_base", "DWA planner failed to produce path.", "control"),
         ("move_base", "Aborting because a valid control could not be found.",
          "control"),

@@ -32,7 +32,7 @@ FAILS = re.compile(
 )
 """What move_base, its planners, move_base_flex and Nav2's servers say when they find no way."""
 _OF_CONTROLLER = re.compile(
-    r"make progress|patience|control\b|controller|trajector|dwa|local.?planner|teb\b|rotation cmd|rotating"
+    r"make progress|follow_path|patience|control\b|controller|trajector|dwa|local.?planner|teb\b|rotation cmd|rotating"
     r"|collision ahead|oscillating",
     re.IGNORECASE,
 )
