@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,13 +47,24 @@ def read_file(path: Path, namespace: str = "") -> tuple[ConfigFile, tuple[Proble
     named: list[Named] = []
     if root is not None:
         _walk(root, (), entries, named)
-    return ConfigFile(path, format, text, tuple(entries), tuple(named), namespace), ()
+    held = tuple(entry for entry in entries if not _is_too_large(entry))
+    problems = tuple(_too_large(path, one.line, one.column, one.name) for one in entries if _is_too_large(one))
+    return ConfigFile(path, format, text, held, tuple(named), namespace), problems
+
+
+def _is_too_large(entry: Entry) -> bool:
+    """Whether a whole number, which has no end in YAML, fits into none that a robot's software has."""
+    return isinstance(entry.value, int) and not -sys.float_info.max <= entry.value <= sys.float_info.max
 
 
 def syntax(path: Path, line: int, column: int, parameter: str, text: str, hint: str) -> Problem:
     """A line that cannot be read."""
     source = BY_ID["syntax"].source
     return Problem("syntax", Severity.ERROR, path, line, column, parameter, text, hint or "Correct the line.", source)
+
+
+def _too_large(path: Path, line: int, column: int, name: str) -> Problem:
+    return syntax(path, line, column, name, f"{name} is larger than any number can be.", "")
 
 
 def _walk(node: MappingNode, keys: tuple[str, ...], entries: list[Entry], named: list[Named]) -> None:
@@ -96,8 +109,13 @@ def _of_parameters(path: Path, format: Dialect, text: str) -> tuple[ConfigFile, 
         name, value, column, kind = found
         try:
             held = float(int(value, 16)) if value.lower().startswith("0x") else float(value)
+        except OverflowError:
+            held = math.inf
         except ValueError:
             problems.append(syntax(path, number, column, name, f"The value of {name} is not a number: '{value}'.", ""))
+            continue
+        if math.isinf(held):
+            problems.append(_too_large(path, number, column, name))
             continue
         entries.append(Entry((name,), held, number, column, kind))
     return ConfigFile(path, format, text, tuple(entries)), tuple(problems)

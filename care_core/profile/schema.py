@@ -16,6 +16,10 @@ Side = Literal["low", "high"]
 """On which side of what training saw a value is bad."""
 
 
+_LOOKED_AT = 1000
+"""Characters of a message that rules are held against."""
+
+
 class EvidenceRule(Record):
     """What a message of the log says about a mission: the options that its check reads, or what the run met."""
 
@@ -114,7 +118,7 @@ class Schema(Record):
 
     def pointed(self, evidence: Evidence, config: Mapping[str, float]) -> Evidence:
         """What a run says, with what the rules read out of its text."""
-        rules = [rule for rule in self.evidence if rule.pattern.search(evidence.text)]
+        rules = [rule for rule in self.evidence if rule.pattern.search(evidence.text, 0, _LOOKED_AT)]
         named = [option for rule in rules for option in rule.points_at(self.variables, config)]
         return replace(
             evidence,

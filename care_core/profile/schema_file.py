@@ -18,6 +18,7 @@ from care_core.causal.nominal import nominal
 from care_core.ecosystems.vehicles import Kind as VehicleKind
 from care_core.errors import ProfileError, nearest
 from care_core.logs import formats
+from care_core.profile.patterns import repeats_of
 from care_core.profile.schema import EvidenceRule, Schema, Side
 from care_core.text import clean
 from care_core.variables import (
@@ -35,6 +36,8 @@ from care_core.variables import (
     is_variable_name,
 )
 
+_MOST_REPEATS = 2
+"""One after the other in the regular expression of a rule, which is a stranger's as the message is that it meets."""
 _PROFILE_NAME = re.compile(r"\w[\w .-]*")
 
 
@@ -184,8 +187,14 @@ class _EvidenceRule(Strict):
     def _is_pattern(cls, text: str) -> str:
         try:
             re.compile(text)
-        except re.error as err:
+            repeats = repeats_of(text)
+        except (re.error, RecursionError, OverflowError) as err:
             raise ValueError(f"not a regular expression: {err}") from None
+        if repeats > _MOST_REPEATS:
+            raise ValueError(
+                f"looking for it may take for ever: write at most {_MOST_REPEATS} repetitions (*, +, {{m,n}}) one after"
+                " the other, and neither | nor another inside one"
+            )
         return text
 
 

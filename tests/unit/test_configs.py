@@ -218,6 +218,15 @@ def test_nested_and_joined_node_names_and_dotted_parameters_are_the_same(tmp_pat
     assert list(spaced) == ["/robot1/controller_server.FollowPath.max_vel_x"]
 
 
+def test_a_pattern_of_many_stars_takes_no_time(tmp_path: Path) -> None:
+    """It was a regular expression that tried every way to share a name among its stars."""
+    file = tmp_path / "params.yaml"
+    file.write_text(f"{'/**' * 30}/b: {{ros__parameters: {{x: 1}}}}\n{'/**/a' * 30}: {{ros__parameters: {{y: 2}}}}\n")
+    deep = "/a" * 100
+    found = resolve(read_configs([file]), [f"{deep}.x", f"{deep}/b.x", f"{deep}.y", "/a.y"])
+    assert set(found) == {f"{deep}/b.x", f"{deep}.y"}
+
+
 def test_of_ros_2_nodes_that_fit_the_one_named_last_counts(tmp_path: Path) -> None:
     every = "/**: {ros__parameters: {FollowPath: {max_vel_x: 0.9}}}\n"
     first, second = written(tmp_path, "a.yaml", every + NODE), written(tmp_path, "b.yaml", NODE + every)

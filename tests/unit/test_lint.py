@@ -239,3 +239,13 @@ def test_the_new_name_of_every_renamed_key_is_read_by_its_owner_since_then(
     for one in renamed:
         facts = navigation.known(ros, one.owner, one.new)
         assert any(one.since in navigation.distributions(fact, ros) for fact in facts), one
+
+
+@pytest.mark.parametrize("number", ["9" * 400, "-" + "9" * 400, "0x" + "f" * 5000], ids=len)
+@pytest.mark.parametrize(
+    ("name", "text"), [("a.yaml", "/a: {{ros__parameters: {{x: {}}}}}"), ("a.param", "ANGLE_MAX,{}")]
+)
+def test_a_number_of_hundreds_of_digits_is_a_problem_of_its_line(
+    tmp_path: Path, name: str, text: str, number: str
+) -> None:
+    assert (1, "error") in [(line, kind) for line, _, kind in told(tmp_path, name, f"{text.format(number)}\n")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import time
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from care_core.files import PROFILE_FILE, bundled, own_profiles
 from care_core.profile.reading import parse_schema
 from care_core.profile.store import installed_profile, load_profile
 from care_core.records import replace
+from care_core.run import Evidence
 from care_core.variables import Change, Role, Variable
 from tests.conftest import Care
 from tests.planted import planted_run
@@ -135,3 +137,27 @@ def test_a_profile_from_elsewhere_is_said_to_be_one(care: Care, tmp_path: Path) 
     for name in ("arducopter", "mine"):
         _, out, _ = care("triage", SAMPLE, "--profile", name)
         assert "not CaRE's own" not in out
+
+
+RULE = """
+evidence:
+  - {{text: {text}, options: [x]}}
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["(a+)+", "([a-z ]+)+#", "(a|ab)*c", "(?:a?){30}", "(?i:a*)+", "(?=a*)*", "(a*)*?", ".*.*.*x", "(x*|y)z*w*",
+     "(?P<x>a)((?P=x))*"],
+)  # fmt: skip
+def test_a_rule_that_could_look_for_ever_is_refused(text: str) -> None:
+    with pytest.raises(ProfileError, match="may take for ever"):
+        parse_schema(PROFILE.format(**SOUND) + RULE.format(text=json.dumps(text)), Path("p.yaml"))
+
+
+@pytest.mark.parametrize("text", ["GPS .*(HDOP|not healthy)|Need 3D Fix", "a.*b.*c", "(?:ab)+", "a?b?c?d?", "(a.*b)?"])
+def test_a_rule_with_few_repetitions_is_quick_on_any_message(text: str) -> None:
+    schema = parse_schema(PROFILE.format(**SOUND) + RULE.format(text=json.dumps(text)), Path("p.yaml"))
+    began = time.perf_counter()
+    schema.pointed(Evidence(0.0, "GPS ab" * 50_000, "refusal"), {})
+    assert time.perf_counter() - began < 2.0

@@ -6,9 +6,8 @@ a pattern: `/**.use_sim_time`.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +61,7 @@ def finder(files: Sequence[Mapping[str, Setting]]) -> Find:
     @cache
     def fitting(node: str) -> tuple[str, ...]:
         """The patterns that fit a node, the one that counts most first."""
-        found = [pattern for pattern in wild if _pattern(pattern).fullmatch(node)]
+        found = [pattern for pattern in wild if _fits(pattern, node)]
         return tuple(sorted([*found, node] if node in order else found, key=order.__getitem__, reverse=True))
 
     def find(parameter: str) -> Setting | None:
@@ -72,11 +71,17 @@ def finder(files: Sequence[Mapping[str, Setting]]) -> Find:
     return find
 
 
-@lru_cache(maxsize=1024)
-def _pattern(node: str) -> re.Pattern[str]:
-    """`/*` stands for one part of a name, `/**` for any number of them."""
-    parts = {"**": r"(/\w+)*", "*": r"/\w+"}
-    return re.compile("".join(parts.get(part) or re.escape(f"/{part}") for part in node.strip("/").split("/")))
+def _fits(pattern: str, node: str) -> bool:
+    """Whether a pattern is a node's: `/*` stands for one part of a name, `/**` for any number of them. Each part of the
+    pattern is gone through once, however many stars there are."""
+    parts = [part for part in node.split("/") if part]
+    ends = {0}
+    for part in pattern.strip("/").split("/"):
+        if part == "**":
+            ends = set(range(min(ends, default=len(parts) + 1), len(parts) + 1))
+        else:
+            ends = {end + 1 for end in ends if end < len(parts) and part in ("*", parts[end])}
+    return node.startswith("/") and len(parts) in ends
 
 
 def write(settings: Mapping[str, Setting], remarks: Mapping[str, str] | None = None) -> str:
