@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import re
@@ -139,5 +140,8 @@ def explain(err: Exception) -> ExitCode:
     if isinstance(err, CareError):
         say(f"care: {err}")
         return err.exit_code
+    if isinstance(err, OSError) and err.errno == errno.ENAMETOOLONG:  # wherever a path is first looked at
+        say(f"care: {err.filename}: The name is longer than names of files can be. Check the path.")
+        return ExitCode.USAGE
     say(f"care: unexpected {type(err).__name__}: {err}. Set CARE_DEBUG=1 to see where it comes from.")
     return ExitCode.USAGE

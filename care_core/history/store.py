@@ -215,7 +215,7 @@ class History(Record):
     def _triaged(
         self, at: str, path: str, mission: int, text: str, about: str, settings: bytes | None = None
     ) -> Triaged:
-        said = {"robot": None, "asked": {}, "firmware": "", "recording": "", **self._document(about), "settings": {}}
+        said = {**plain(About()), **self._document(about), "settings": {}}  # an earlier version told less
         if settings is not None:
             said["settings"] = self._document(self._unpacked(settings))
         known = self._checked(About, *(said[name] for name in About.__struct_fields__))

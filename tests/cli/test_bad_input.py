@@ -15,7 +15,7 @@ import pytest
 
 from care_core.configs.loading import read_config
 from care_core.errors import ConfigError, UsageError
-from care_core.files import write_atomically
+from care_core.files import bundled, write_atomically
 from tests.conftest import Care
 
 ROOT = Path(__file__).parents[2]
@@ -181,3 +181,18 @@ def test_summaries_of_commands_are_whole_sentences(care: Care) -> None:
     listing = care("--help").stdout.partition("Commands:")[2]
     assert "..." not in listing
     assert all(line.endswith(".") for line in listing.strip().splitlines())
+
+
+LONG = 300 * "a"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("triage", f"{LONG}.BIN"), ("watch", LONG, "--once"), ("fleet", LONG), ("diff", LONG, LONG),
+     ("bundle", bundled("samples", "arducopter_failed.BIN"), "-o", f"{LONG}.zip")],
+    ids=lambda words: words[0],
+)  # fmt: skip
+def test_a_name_that_no_file_can_have_is_said_to_be_one(care: Care, words: tuple[str, ...]) -> None:
+    ended = care(*words)
+    assert ended.code == 2
+    assert "longer than names of files can be. Check the path." in ended.stderr

@@ -154,3 +154,11 @@ def test_the_history_is_its_owners_alone(tmp_path: Path) -> None:
         assert ((shared / "h.sqlite3").stat().st_mode & 0o777, shared.stat().st_mode & 0o777) == (0o600, 0o755)
     finally:
         os.umask(umask)
+
+
+def test_a_record_of_an_earlier_version_tells_less_and_is_read(history: History) -> None:
+    (before,) = history.triages()
+    with closing(sqlite3.connect(history.path)) as database, database:
+        database.execute("update triages set about = '{}'")
+    assert history.triages() == (before,)
+    assert history.triage_of(DOCUMENT["log"]["sha256"]) is not None
