@@ -10,6 +10,7 @@ from care_core.diagnose.records import Cause, Fault, Fix, Hypothesis, ObjectiveR
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ranking import LIKELY
 from care_core.records import replace
+from care_core.run import FitVerdict
 
 ENOUGH = 0.5
 """A change less likely than this to repair the run is no advice."""
@@ -148,6 +149,14 @@ def untried(fix: Fix, learned_elsewhere: str) -> str | None:
         return None
     suspected = ", ".join(change.option.name for change in fix.changes)
     return f"{learned_elsewhere}, so no change is advised; look at {suspected}, and carry it over with 'care update'"
+
+
+def unrecorded(fix: Fix, verdict: FitVerdict) -> str | None:
+    """Why a fix is not advised that changes what the log does not hold, where the profile fits only in part."""
+    names = [change.option.name for change in fix.changes if change.is_assumed]
+    if verdict == "fits" or not names:
+        return None
+    return f"the log does not hold {', '.join(names)}: record it, or name the configuration with --config"
 
 
 def enough(odds: float) -> float:

@@ -22,6 +22,7 @@ from care_core.diagnose.advice import (
     no_stand_out,
     odds_as_driven,
     outweighed,
+    unrecorded,
     untried,
 )
 from care_core.diagnose.circumstances import battery_is_low, circumstances, unusual
@@ -183,6 +184,7 @@ def diagnose(
             _abstains(case, faults, fixes, held, as_driven)
             or falls_short(fixes[0], broken, _odds(query), as_driven)
             or untried(fixes[0], schema.learned_elsewhere)
+            or unrecorded(fixes[0], choice.fit.verdict)
             or no_stand_out(fixes[0], as_driven, hypotheses, _necessary(case, broken, fixes[0]))
         )
         shown = None if abstained is None else _shown_by_run(case, hypotheses)

@@ -23,4 +23,6 @@ def test_a_finding_that_names_its_options_leads_to_them(recorded: Path) -> None:
     diagnosis = care_core.triage(recorded / "data" / "varied" / "faults" / "h45_12_02.BIN").diagnosis
     assert diagnosis.hypotheses[0].name == diagnosis.faults[0].causes[0].option.name == "ATC_RAT_PIT_D"
     assert any("pitch oscillates" in note.text for note in diagnosis.faults[0].causes[0].notes)
-    assert "bring ATC_RAT_PIT_D to 0.0036 first" in (diagnosis.abstained or "")
+    assert diagnosis.fix is not None
+    assert [str(change) for change in diagnosis.fix.changes] == ["ATC_RAT_PIT_D 0.008471 -> 0.0036"]
+    assert (diagnosis.fix.odds, diagnosis.fix.shown_by) == (None, "pitch oscillates")
