@@ -15,7 +15,7 @@ from care_core.logs.base import Table
 from care_core.logs.telemetry import as_dataflash
 from care_core.run import Unavailable
 from tests.tables import TablesLog
-from tests.unit.test_ardupilot_extract import HOME, KIND, flight, north, only, table, value
+from tests.unit.test_ardupilot_extract import HOME, KIND, METRES, flight, north, only, table, value
 
 Row = tuple[float, int, int, float, float]
 """Time, number, command, latitude, height."""
@@ -211,3 +211,49 @@ def test_a_mission_that_is_cleared_is_held_no_more() -> None:
     link.transfer(5.0, "@255.190", 100)
     link.send("MISSION_CLEAR_ALL@255.190", 40.0)
     assert link.held()[1:] == [(5.0, [100]), (40.0, [])]
+
+
+# What the vehicle says of its waypoints may be lost on the way
+
+
+def said(*texts: tuple[float, str]) -> Table:
+    return table(list(texts), "Message")
+
+
+def track(*path: tuple[float, float]) -> Table:
+    """Where the vehicle was: seconds and metres north, at 20 m until 45 s, then down."""
+    t, way = zip(*path, strict=True)
+    at = np.arange(0.0, 75.0, 0.5)
+    height = np.interp(at, [10, 20, 45, 69], [0, 20, 20, 0])
+    return Table(at, {"Lat": HOME[0] + np.interp(at, t, way) / METRES, "Lng": 0 * at + HOME[1], "RelHomeAlt": height})
+
+
+THERE = track((20, 0), (30, 100), (40, 0))
+SHORT_OF_IT = track((20, 0), (25, 50), (40, 0))
+WENT_ON, BEGUN = (30.0, "Mission: 3 RTL"), (20.0, "Mission: 2 WP")
+
+
+@pytest.mark.parametrize(
+    "texts", [(BEGUN, WENT_ON), (WENT_ON,), (BEGUN,)], ids=["of reaching it", "of all of it", "of all after it began"]
+)
+def test_a_waypoint_that_was_passed_counts_where_the_word_of_it_is_lost(texts: tuple[tuple[float, str], ...]) -> None:
+    mission = only(in_auto(CMD=commands(FLOWN), MSG=said(*texts), POS=THERE))
+    assert value(mission, "mission_success") == 1.0
+    assert value(mission, "waypoints_reached") == 1.0
+
+
+def test_a_waypoint_that_was_skipped_was_not_reached() -> None:
+    mission = only(in_auto(CMD=commands(FLOWN), MSG=said(BEGUN, WENT_ON), POS=SHORT_OF_IT))
+    assert value(mission, "mission_success") == 0.0
+
+
+def test_a_waypoint_that_the_vehicle_never_went_on_from_was_not_reached() -> None:
+    modes = table([(0.0, 0), (12.0, 3), (35.0, 9)], "ModeNum")
+    mission = only(flight(MODE=modes, CMD=commands(FLOWN), MSG=said(BEGUN), POS=THERE))
+    assert value(mission, "mission_success") == 0.0
+
+
+def test_a_waypoint_of_which_neither_word_nor_place_is_known_is_not_judged() -> None:
+    hole = THERE.where((THERE.t < 22) | (THERE.t > 38))
+    mission = only(in_auto(CMD=commands(FLOWN), MSG=said(BEGUN, WENT_ON), POS=hole))
+    assert isinstance(value(mission, "mission_success"), Unavailable)

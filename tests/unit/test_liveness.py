@@ -69,6 +69,23 @@ def test_a_source_that_freezes_in_flight_is_named_with_its_onset(message: str, t
     assert found.onset_s == pytest.approx(30.0, abs=0.2)
 
 
+@pytest.mark.parametrize("stuck_at", [0.0, 20.0])
+def test_a_current_sensor_that_dies_beside_a_living_voltage_is_named(stuck_at: float) -> None:
+    flight = made()
+    flight.table["BAT"]["Curr"][flight.after(30.0)] = stuck_at
+    assert [one.title for one in frozen(flight.find())] == ["the current sensor is frozen"]
+
+
+def test_an_attitude_that_freezes_has_lost_no_control() -> None:
+    flight = made()
+    freeze(flight, "ATT")
+    flight.table["ATT"]["DesPitch"][flight.after(50.0)] = 45.0
+    findings = flight.find()
+    assert [one.title for one in frozen(findings)] == ["the attitude is frozen"]
+    assert flight.flight().lost_control_s is None
+    assert not [one for one in findings if one.kind == "attitude"]
+
+
 def test_a_barometer_that_freezes_on_the_way_down_is_named() -> None:
     flight = made()
     freeze(flight, "BARO", 85.0)

@@ -16,6 +16,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.recorded import UNKNOWN_MODE
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts, runs
+from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import median, pieces
@@ -121,7 +122,7 @@ class Airborne(Armed):
 
     @cached_property
     def _lean_error(self) -> tuple[Table, Floats] | None:
-        table = self.one("ATT", "Roll", "Pitch", "DesRoll", "DesPitch")
+        table = self.living_attitude("Roll", "Pitch", "DesRoll", "DesPitch")
         return None if table is None else (table, np.concatenate([*map(_off_demand, parts(table))]))
 
     @property
@@ -131,8 +132,23 @@ class Airborne(Armed):
 
     @cached_property
     def _tilt(self) -> tuple[Table, Floats] | None:
-        table = self.one("ATT", "Roll", "Pitch")
+        table = self.living_attitude("Roll", "Pitch")
         return None if table is None else (table, np.concatenate([*map(_off_level, parts(table))]))
+
+    def living_attitude(self, *fields: str) -> Table | None:
+        """The attitude without what it only repeats while others tell that the vehicle moves: that follows no demand,
+        and has lost none."""
+        table, dead = self.one("ATT", *fields), self._dead_attitude
+        if table is None or not dead:
+            return table
+        living = table.where(~inside(dead, table.t))
+        return living if len(living) else None
+
+    @cached_property
+    def _dead_attitude(self) -> tuple[Span, ...]:
+        from care_core.ecosystems.ardupilot import sources  # which asks this model what else moved
+
+        return tuple(one.span for one in sources.frozen(self, self.airborne, sources.ATTITUDE))
 
     @cached_property
     def lost_control_s(self) -> float | None:

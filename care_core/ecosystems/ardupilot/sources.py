@@ -56,6 +56,8 @@ SOURCES = (
     Live("POS", ("RelHomeAlt",), "the estimated height", "estimator", _s("height", 5.0), least(rise_m=_ROSE_M)),
     Live("BAT", ("Volt", "Curr"), "the battery's monitor", "battery", _s("battery", 30.0), _ANY, is_optional=True,
          mission_lost=ASIDE),
+    Live("BAT", ("Curr",), "the current sensor", "battery", _s("current sensor", 30.0), _ANY, is_optional=True,
+         mission_lost=ASIDE),
     Live("ARSP", ("Airspeed",), "the airspeed sensor", "barometer", _s("airspeed", 5.0), _ANY, is_optional=True,
          mission_lost=ASIDE),
     Live("RCOU", tuple(f"C{n}" for n in range(1, 15)), "the record of the motor outputs", "motor", _s("outputs", 10.0),
@@ -67,13 +69,15 @@ READS: Wanted = merge_needs((
     *({source.message: source.fields} for source in SOURCES),
     {"GPS": ("Alt", "Status"), "CTUN": ("Alt", "BAlt")},
 ))  # fmt: skip
+ATTITUDE = tuple(source for source in SOURCES if source.message == "ATT")
 
 
-def frozen(flight: Airborne, moving: Sequence[Span]) -> Iterator[Frozen]:
+def frozen(flight: Airborne, moving: Sequence[Span], sources: Sequence[Live] = SOURCES) -> Iterator[Frozen]:
     """Every stretch in which a source says the same while others tell that the vehicle moved, in spans in which it
     does: what stands on the ground moves by its estimate alone."""
-    flight.tables(expanded(READS))
-    for source in SOURCES:
+    flight.tables(expanded(READS if sources is SOURCES else {source.message: source.fields for source in sources}))
+    told: list[Frozen] = []
+    for source in sources:
         if source.message == "RCOU" and not flight.is_copter:
             continue  # servos and throttles stay where they are
         for number, table in enumerate(flight.all(source.message, source.fields[0]), start=1):
@@ -84,11 +88,20 @@ def frozen(flight: Airborne, moving: Sequence[Span]) -> Iterator[Frozen]:
                 columns = [own[field] for field in fields]
                 yield from (Frozen(source, name, *one, None) for one in numberless(own.t, columns, source))
             for span, count in repeats(own.t, [own[field] for field in fields], source):
+                if any(_says(one, name, source, span) for one in told):
+                    continue
                 for part in overlaps(span, moving, source.seconds):
                     motion = motion_of(flight, part, source.message)
                     if motion.reaches(source.moved):
-                        yield Frozen(source, name, span, count, motion)
+                        told.append(Frozen(source, name, span, count, motion))
+                        yield told[-1]
                         break
+
+
+def _says(one: Frozen, channel: str, source: Live, span: Span) -> bool:
+    """Whether what is known to be frozen is a whole of which a source is a part."""
+    is_part = one.channel == channel and set(source.fields) < set(one.source.fields)
+    return is_part and any(overlaps(span, [one.span], source.seconds))
 
 
 def _fixed(table: Table) -> Table:

@@ -147,7 +147,7 @@ def _far(flight: Flight) -> Iterator[Finding]:
 
 
 def _yaw(flight: Flight) -> Iterator[Finding]:
-    table = flight.one("ATT", "Yaw", "DesYaw")
+    table = flight.living_attitude("Yaw", "DesYaw")
     if table is None or flight.lost_control_s is not None or not np.ptp(table["DesYaw"]):
         return
     off = np.abs((table["Yaw"] - table["DesYaw"] + 180) % 360 - 180)

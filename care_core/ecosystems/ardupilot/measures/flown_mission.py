@@ -25,7 +25,9 @@ from care_core.ecosystems.ardupilot.measures.requested import (
     mission_held,
     requested_mission,
 )
+from care_core.ecosystems.ardupilot.measures.samples import samples
 from care_core.ecosystems.ardupilot.messages import expanded
+from care_core.ecosystems.coverage import EXTREME, doubt
 from care_core.ecosystems.measures import Mission, has
 from care_core.logs.base import Wanted, merge_needs
 from care_core.numbers import distinct, known_median, median
@@ -44,6 +46,8 @@ FILL_S = 0.05
 """Spacing to which a thinned track is filled in before distances are taken from it."""
 FILLABLE_S = 0.6
 """Median spacing above which a corner between two positions could be anything, and nothing is filled in."""
+PASSED_M = 5.0
+"""As near to a waypoint it was there: copters and rovers count one as reached within 2 m unless told otherwise."""
 AIRBORNE_M = 2.0
 """Height above home from which a vehicle counts as airborne."""
 
@@ -90,6 +94,14 @@ class Track(Record, eq=False):
     east: Floats
     height: Floats
 
+    def between(self, start_s: float, end_s: float) -> Track | None:
+        """The track from the position before a time to the one after another; None where there are not two."""
+        first = max(int(np.searchsorted(self.t, start_s, side="right")) - 1, 0)
+        part = slice(first, int(np.searchsorted(self.t, end_s, side="left")) + 1)
+        if len(self.t[part]) < 2:
+            return None
+        return Track(self.t[part], self.north[part], self.east[part], self.height[part])
+
     def filled_in(self) -> Track:
         """The same track at `FILL_S` or closer: cubic Hermite between positions, velocities by central differences."""
         steps = np.diff(self.t)
@@ -114,7 +126,10 @@ class FlownMission(Record, eq=False):
     end: tuple[float, float] | None
     """Where the mission ends, None where it says neither to return nor to land."""
     reached: int
-    """How many of the waypoints the autopilot reported as reached."""
+    """How many of the waypoints were reached: the autopilot said so, or went on to the next after it had passed there,
+    for of what it says a radio loses some."""
+    untold: int
+    """How many others it went on from without a word, while nothing tells where it was."""
     track: Track | None
     """None when the log holds no position."""
     phases: Mapping[tuple[str, int], Phase]
@@ -160,17 +175,55 @@ def analyse(mission: Mission) -> FlownMission:
         started.setdefault(numbers[0], drive.start_s)  # named once, before the vehicle may move
     route = np.array([_offset(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
     corners, end = _way(mission.shared(requested_mission))
+    places = dict(zip(numbers, route, strict=True)) if len(route) else {}
+    passed = _passed(mission, track, places, started, reached)
     return FlownMission(
         waypoints=waypoints,
         route=route.astype(np.float64),
         corners=corners,
         end=end,
-        reached=sum(number in reached for number in numbers),
+        reached=sum(number in reached or passed.get(number) is True for number in numbers),
+        untold=sum(number not in reached and number in passed and passed[number] is None for number in numbers),
         track=track,
         phases=_phases(mission, track, numbers, started, reached) if drive is None
         else _drive_phases(mission, drive, numbers, started, reached, complete_s),
         drive=drive,
         completed=complete_s is not None,
+    )  # fmt: skip
+
+
+def _passed(
+    mission: Mission, track: Track | None, places: Mapping[int, Floats], started: Mapping[int, float],
+    reached: Mapping[int, float],
+) -> dict[int, bool | None]:  # fmt: skip
+    """Of each waypoint that was not said to be reached, whether the vehicle went on from it after it had passed there;
+    None where it went on and nothing tells where it was."""
+    told = [*started.items(), *((number + 0.5, t) for number, t in reached.items())]
+    if track is not None and track.height.max() > AIRBORNE_M and _ends_by_itself(mission):
+        told.append((math.inf, mission.end_s))
+    found: dict[int, bool | None] = {}
+    for number, place in places.items():
+        later = [t for at, t in told if at > number + 0.5]
+        if number in reached or not later:
+            continue
+        before = max((t for at, t in told if at <= number), default=mission.start_s)
+        part = None if track is None else track.between(before, min(later))
+        if part is None or doubt(samples(mission, "POS", ("Lat", "Lng"), [(before, min(later))], EXTREME)):
+            found[number] = None
+            continue
+        way = np.column_stack((part.north, part.east))
+        beyond_m = float(distance_to_legs(place[None], way)[0]) - PASSED_M
+        between_m = float(np.hypot(*np.diff(way, axis=0).T).max())  # a corner may lie between two positions
+        found[number] = True if beyond_m <= 0 else None if beyond_m < between_m else False
+    return found
+
+
+def _ends_by_itself(mission: Mission) -> bool:
+    """Whether the vehicle was disarmed in a mission that ends with a landing: what flew went on from every waypoint."""
+    way, modes = mission.shared(requested_mission), modes_in_force(mission)
+    return (
+        mission.ended and not isinstance(way, Unavailable) and way.ending != "open"
+        and bool(modes) and modes[-1].way == "mission"
     )  # fmt: skip
 
 

@@ -43,6 +43,9 @@ HEIGHTS: Wanted = {"POS": ("RelHomeAlt",), "CTUN": ("Alt", "BAlt", "BarAlt")}
 """Where heights are told: above home, else above some other ground."""
 
 
+_UNTOLD = Unavailable("the log does not say whether each waypoint was reached", "record MSG and POS from start to end")
+
+
 def _nothing_to_judge(mission: Mission, flown: FlownMission) -> Unavailable | None:
     """Why a flight says nothing about a mission, None when it does."""
     held = mission.shared(mission_held)
@@ -102,6 +105,8 @@ def _mission_done(mission: Mission) -> Value:
         return 1.0
     if failed(mission):
         return 0.0
+    if flown.untold:
+        return _UNTOLD
     if not mission.ended:
         return CUT
     last = modes_in_force(mission)[-1]
@@ -199,7 +204,7 @@ def _mission_flown(mission: Mission) -> Value:
     if unknown is not None:
         return unknown
     if flown.reached < len(flown.waypoints):
-        return lost_events(mission) or 0.0
+        return (_UNTOLD if flown.untold else None) or lost_events(mission) or 0.0
     if flown.drive is not None:
         return float(flown.completed)
     if flown.end is None:
