@@ -17,7 +17,7 @@ from care_core.causal.model import Model
 from care_core.diagnose.records import Need
 from care_core.diagnose.reference import Reference
 from care_core.profile.schema import Schema
-from care_core.records import Record
+from care_core.records import Record, replace
 from care_core.run import Run, Unavailable, is_known
 from care_core.text import figures
 from care_core.variables import Threshold, Variable
@@ -55,6 +55,8 @@ def limits_of(run: Run, schema: Schema, model: Model, reference: Reference, fixe
             unknown[name] = Unavailable(why, f"give this mission's bound with --threshold {name}=VALUE")
         elif need := need_of(name, reference, schema, model):
             needs[name], bounds[name] = need, limit(relative, need)
+            if why := _excused(objective, run, bounds[name], reference, schema, model):
+                unknown[name] = Unavailable(why, f"give this mission's bound with --threshold {name}=VALUE")
     return Limits(bounds, needs, unknown)
 
 
@@ -76,6 +78,34 @@ def limit(relative: Threshold, need: Need) -> Threshold:
         return usual
     worst = need.high if usual.op in ("<=", "<") else need.low
     return usual if usual.met(worst) else Threshold(usual.op, float(f"{worst:.4g}"))
+
+
+def _excused(
+    objective: Variable, run: Run, bound: Threshold, reference: Reference, schema: Schema, model: Model
+) -> str:
+    """Why an objective meets its bound only because of what the run met and hardly any of the training did: what is
+    needed then was not learned, and it may be no more than a sensor that is off. Empty where it does not."""
+    value, relative = run.objectives.get(objective.name), objective.relative
+    met = {
+        name: (own, usual)
+        for sides in schema.circumstances.values()
+        for name, side in sides.items()
+        if (own := reference.config.get(name)) is not None and name in run.context
+        and (summary := model.summaries.get(name)) is not None
+        and own != (usual := min(own, summary.quantiles[-2]) if side == "high" else max(own, summary.quantiles[1]))
+    }  # fmt: skip
+    if not met or relative is None or not is_known(value) or not bound.met(value):
+        return ""
+    config = {**reference.config, **{name: usual for name, (_, usual) in met.items()}}
+    need = need_of(objective.name, replace(reference, config=config), schema, model)
+    if need is None or limit(relative, need).met(value):
+        return ""
+    far = ", ".join(
+        f"{name} {figures(own)} {schema.variables[name].unit}".rstrip()
+        + f", {'at most' if own > usual else 'at least'} {figures(usual)} in 19 of 20 training runs"
+        for name, (own, usual) in met.items()
+    )
+    return f"it meets its limit only by what the run met: {far}"
 
 
 def _doubts(objective: Variable, run: Run, schema: Schema, model: Model) -> Iterator[str]:

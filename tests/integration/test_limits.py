@@ -126,6 +126,32 @@ def test_a_rover_that_takes_twice_the_energy_a_metre_is_not_judged_by_itself(tmp
     assert results(thirsty, "ardurover")["energy"].status == "not_evaluated"
 
 
+def leaning(source: Path, degrees: float) -> bytes:
+    """A .BIN whose attitude is off by so much to the right, as that of a board that was levelled on a slope."""
+    parts = []
+    for _, record, form in records(source):
+        moved = bytearray(record)
+        for name in ("Roll", "DesRoll") if form.name == "ATT" else ():
+            at = form.fields[name].offset
+            struct.pack_into("<h", moved, at, struct.unpack_from("<h", moved, at)[0] + int(degrees * 100))
+        parts.append(bytes(moved))
+    return b"".join(parts)
+
+
+def test_an_attitude_that_is_off_excuses_no_slow_flight_as_one_in_a_gale(tmp_path: Path) -> None:
+    tilted = tmp_path / "tilted.BIN"
+    tilted.write_bytes(leaning(SLOW, 20.0))
+    time = results(tilted)["mission_time"]
+    assert time.status == "not_evaluated"
+    assert "wind_lean 22.9 deg, at most 13.1 in 19 of 20 training runs" in time.reason
+
+
+def test_a_flight_that_needs_no_excuse_is_judged_whatever_its_attitude_says(tmp_path: Path) -> None:
+    tilted = tmp_path / "tilted.BIN"
+    tilted.write_bytes(leaning(GOOD, 20.0))
+    assert results(tilted)["mission_time"].status == "ok"
+
+
 def changed(source: Path, name: str, *steps: tuple[float, float]) -> bytes:
     """A .BIN with more records of a parameter: (seconds of the log, value)."""
     first, parts, left = _first_stamp(source), [], sorted(steps)
