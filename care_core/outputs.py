@@ -41,7 +41,7 @@ _BEGINNINGS = tuple(
         ("", rb"(?:#[^\n]*\n|\s*\n)*schema: (care\.[\w.]+)/\d"),
         ("SARIF", rb'\{\s*"\$schema": "[^"]*sarif[^"]*",.{,400}"name": "care lint"'),
         ("page", rb'<!doctype html>.{,600}<meta name="generator" content="care">'),
-        ("Markdown", rb"# Triage of [^\n]*\n\n(?:Profile|No profile) "),
+        ("Markdown", rb"# Triage of [^\n]*\n\n(?:\*\*[A-Z ]+\*\*|Profile|No profile)"),
         ("record", rb"# Verified fixes\n\nOf \d+ fixes "),
         ("card", rb"# Model card: [^\n]*\n"),
         ("model", rb'\{\s*"model_version": \d+,\s*"schema_digest": '),

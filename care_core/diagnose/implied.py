@@ -27,6 +27,10 @@ STEPS = 21
 """Values of a parameter that are tried, over its acceptable range."""
 
 
+MOST = 0.25
+"""Share of the parameters that may be lacking: among more, too many would give the same."""
+
+
 class Implied(Record):
     """The value of a parameter that a metric of the run speaks for, and what the reference gives of that metric."""
 
@@ -51,7 +55,7 @@ def implied(run: Run, schema: Schema, model: Model, reference: Mapping[str, floa
         reference: the configuration that the run is judged against, with what it met.
     """
     lacking = [option for option in schema.options if option.name not in run.config]
-    if not lacking:
+    if not lacking or len(lacking) > MOST * len(schema.options):
         return {}
     config = {**reference, **run.config}
     found: dict[str, tuple[float, Implied]] = {}

@@ -127,10 +127,9 @@ def test_yaml_that_is_no_configuration(tmp_path: Path, text: str, words: str) ->
 
 def test_odd_values_of_a_configuration(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
-    digits = "9" * 5000
-    path.write_text(f"a: 1\na: 2\nb: -.INF\nc: 0x1F\nd: {digits}\ne: !!python/object/apply:os.system [x]\nf: !foo 3\n")
+    path.write_text("a: 1\na: 2\nb: -.INF\nc: 0x1F\ne: !!python/object/apply:os.system [x]\nf: !foo 3\n")
     values = {name: setting.value for name, setting in read_config(path).items()}
-    assert values == {"a": 2, "b": float("-inf"), "c": 31, "d": digits, "f": "3"}
+    assert values == {"a": 2, "b": float("-inf"), "c": 31, "f": "3"}
 
 
 def test_names_of_files_do_not_steer_the_terminal(care: Care, tmp_path: Path) -> None:

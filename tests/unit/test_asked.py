@@ -107,7 +107,11 @@ def test_without_waypoints_nothing_was_asked(items: tuple[tuple[float, ...], ...
 
 
 def test_power_and_resistance_are_those_in_the_air() -> None:
-    bat = table_of(Volt=[12.6, 11.5, 11.5, 12.6], Curr=[0.0, 30.0, 32.0, 0.1], Res=[0.0, 0.01, 0.02, 0.0])
+    count = 50
+    bat = Table(np.linspace(0.0, 100.0, 2 * count), {
+        "Volt": np.repeat([12.6, 11.5], count), "Curr": np.r_[np.zeros(count), np.tile([30.0, 32.0], count)[:count]],
+        "Res": np.r_[np.zeros(count), np.tile([0.01, 0.02], count)[:count]],
+    })  # fmt: skip
     flown = mission(TAKEOFF, place(0, 100, 20), bat=bat)
     assert hover_power(flown, {}) == pytest.approx(11.5 * 31)
     assert internal_resistance(flown, {}) == pytest.approx(0.015)

@@ -158,7 +158,8 @@ def test_a_parameter_that_the_log_lacks_is_read_off_what_it_alone_moves(planted:
     assert str(spoken).startswith("speed is not in the log: mean_speed ")
     assert not implied(slow, SCHEMA, planted.model, DEFAULTS)
     usual = planted_run()
-    assert not implied(replace(usual, config={}), SCHEMA, planted.model, DEFAULTS)
+    assert not implied(replace(usual, config=lacking.config), SCHEMA, planted.model, DEFAULTS)
+    assert not implied(replace(slow, config={}), SCHEMA, planted.model, DEFAULTS)
 
 
 @pytest.mark.parametrize(("default", "reference"), [(1200.0, 50.0), (0.0, 50.0), (35.0, 35.0), (50.0, 50.0)])
