@@ -39,6 +39,8 @@ ARCHIVE = b"PK\x03\x04"
 _DAMAGED = (ValueError, TypeError, KeyError, EOFError, OverflowError, RuntimeError)
 """What numpy and zipfile raise for what is no archive of arrays, beside their own errors."""
 MODEL_FILE, ARRAYS_FILE = "model.json", "mechanisms.npz"
+_LARGEST = 1e15
+"""Of any number of a mechanism: what it computes from larger ones has no number."""
 _NEXT_ARRAYS = f"{ARRAYS_FILE}.next"
 PRIOR = "prior:"
 """Begins the key of a mechanism that belongs to the platform a profile was carried over from."""
@@ -205,7 +207,7 @@ def read_model(folder: Path) -> Model:
         raise ProfileError(f"{err}.", hint="Train the profile again with 'care train'.", where=str(path)) from err
     except (*_DAMAGED, zipfile.BadZipFile, zlib.error) as err:
         raise ProfileError(
-            f"The model is damaged: {str(err).rstrip('.')}.",
+            f"The model is damaged: {str(err).partition(chr(10))[0].rstrip('.')}.",
             hint="Train the profile again with 'care train'.",
             where=str(folder),
         ) from err
@@ -323,10 +325,14 @@ def _mechanism(key: str, record: _MechanismRecord, arrays: Mapping[str, FloatArr
         array = arrays[f"{key}/{name}"]
         if not np.isfinite(array).all():
             raise ValueError(f"{key}/{name} holds values that are not finite")
+        if np.abs(array).max(initial=0.0) > _LARGEST:
+            raise ValueError(f"{key}/{name} holds values that no robot has")
         return array
 
     logs, centre, sd, relevance = floats("scaling")
     additive, joint, noise, mean, scale, *idle = floats("numbers")
+    if min(additive, joint) < 0 or min(noise, scale) <= 0 or np.any(relevance < 0) or np.any(sd <= 0):
+        raise ValueError(f"{key} has a variance or a scale below 0")
     reads = record.inputs if record.reads is None else record.reads
     points, targets, calibration = floats("points"), floats("targets"), floats("calibration")
     weights = floats("weights")

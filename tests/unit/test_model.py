@@ -173,6 +173,10 @@ def test_a_pickled_array_is_refused_and_never_run(folder: Path) -> None:
         lambda a: a.update({"time/calibration": np.zeros((2, 2))}),
         lambda a: a.update({"stage:armed/calibration": np.zeros(3)}),
         lambda a: a.update({"time/points": np.full(a["time/points"].shape, "x")}),
+        lambda a: a.update({"time/points": a["time/points"].astype(float) * 1e30}),
+        lambda a: a.update({"time/numbers": np.full_like(a["time/numbers"], 1e300)}),
+        lambda a: a.update({"time/numbers": -np.abs(a["time/numbers"])}),
+        lambda a: a.update({"time/scaling": -np.abs(a["time/scaling"])}),
     ],
 )
 def test_arrays_that_do_not_fit_are_a_profile_error(folder: Path, change: Callable[[Arrays], object]) -> None:
