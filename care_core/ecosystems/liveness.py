@@ -131,6 +131,16 @@ def overlaps(span: Span, others: Iterable[Span], least_s: float) -> Iterator[Spa
             yield common
 
 
+def is_part(one: Frozen, known: Iterable[Frozen]) -> bool:
+    """Whether it is told already of the whole of which a source is a part: a monitor, and its current."""
+    return any(
+        other.channel == one.channel
+        and set(one.source.fields) < set(other.source.fields)
+        and any(overlaps(one.span, [other.span], one.source.seconds))
+        for other in known
+    )
+
+
 def findings(
     frozen: Iterable[Frozen], severity: Callable[[float], Severity] = lambda _onset_s: "warning"
 ) -> Iterator[Finding]:

@@ -31,6 +31,7 @@ APART, _STAMPED_S, _QUARTERS, _MOSTLY = 1.25, 10.0, 4, 0.9
 right to 0.01 %; one that was set is off in one quarter of the time, one that runs wrong in each."""
 _SIMULATED_S = 1e9
 """A simulation's time begins at 0: stamps so far behind the recording's have a pace of their own."""
+_PLACE, _AT_ZERO_DEG, _ELSEWHERE_DEG = ("Lat", "Lng"), 1e-6, 0.1
 _ANY = Message({})
 _ENOUGH = 20
 """Samples that must agree before a source is called dead or a clock wrong."""
@@ -156,6 +157,7 @@ def _cleaned(known: Message, table: Table) -> Table:
         if field in table.columns:
             column = table[field]
             keep &= np.isnan(column) | ((column >= low) & (column <= high))
+    keep &= ~_nowhere(known, table)
     if not keep.all():
         table = table.where(keep)
     steps = {name: field.step for name, field in known.fields.items() if field.step is not None}
@@ -165,6 +167,15 @@ def _cleaned(known: Message, table: Table) -> Table:
             if field in table.columns:
                 keep[rows] &= ~_leaps(table[field][rows], step)
     return table if keep.all() else table.where(keep)
+
+
+def _nowhere(known: Message, table: Table) -> Mask:
+    """Rows at 0 degrees north and 0 east, of a track that is elsewhere: an estimator without a position says that."""
+    if not set(_PLACE) <= set(known.moving) & table.columns.keys():
+        return np.zeros(len(table), dtype=bool)
+    off = np.abs(table["Lat"]) + np.abs(table["Lng"])
+    known_off = off[off > _AT_ZERO_DEG]
+    return np.asarray((off <= _AT_ZERO_DEG) & (len(known_off) > 0 and float(median(known_off)) > _ELSEWHERE_DEG))
 
 
 def _instances(known: Message, table: Table) -> list[Mask]:

@@ -11,8 +11,11 @@ import pytest
 
 from care_core.ecosystems.examine import examine
 from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.liveness import Frozen, is_part
 from care_core.ecosystems.measures import find_extractor
 from care_core.ecosystems.registry import run_model
+from care_core.ecosystems.ros.sources import SOURCES
+from care_core.ecosystems.ros.sources import frozen as frozen_of
 from care_core.logs import formats
 from care_core.logs.base import Table
 from care_core.logs.opening import open_log
@@ -288,6 +291,21 @@ def test_a_source_without_numbers_from_some_time_on_is_named(kind: str, title: s
 
 def test_a_battery_that_repeats_itself_for_seconds_is_not_frozen(tmp_path: Path) -> None:
     assert not driven(BATTERY, tmp_path)
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_battery_of_which_the_current_dies_is_named_once(whole: bool) -> None:
+    t, rng = np.arange(0.0, 80.0, 0.5), np.random.default_rng(0)
+    dead = t > 30.0
+    current = np.where(dead, 0.0, rng.normal(-2.0, 0.1, len(t)))
+    volts = np.where(dead & whole, 25.0, 25.0 - 0.001 * t + rng.normal(0.0, 0.01, len(t)))
+    battery = Table(t, {"voltage": volts, "current": current})
+    place = {"pose.pose.position.x": 0.5 * t, "pose.pose.position.y": 0 * t}
+    odometry = Table(t, {**place, **{f"pose.pose.orientation.{axis}": 0 * t + (axis == "w") for axis in "xyzw"}})
+    found: list[Frozen] = []
+    for source in (one for one in SOURCES if "current" in one.fields):
+        found += [one for one in frozen_of(source, "/battery", battery, {"/odom": odometry}) if not is_part(one, found)]
+    assert [one.source.name for one in found] == ["the battery's monitor" if whole else "the battery's current"]
 
 
 def test_a_healthy_drive_freezes_nothing(tmp_path: Path) -> None:

@@ -131,6 +131,17 @@ def test_how_goals_end() -> None:
     assert value("goals_success", one) == 0.0
 
 
+def test_a_goal_of_which_only_the_end_was_heard_is_one() -> None:
+    told = states((5, [(9, SUCCEEDED)]), (10, [(9, SUCCEEDED), (1, SUCCEEDED)]), (20, [(1, SUCCEEDED), (2, ABORTED)]))
+    found = [(goal.sent_s, goal.end_s, goal.status) for goal in sent({STATUS: told})]
+    assert found == [(5.0, 10.0, Status.SUCCEEDED), (10.0, 20.0, Status.ABORTED)]
+
+
+def test_goals_between_which_states_were_lost_are_not_judged_as_one() -> None:
+    told = states((5, [(1, EXECUTING)]), (40, [(1, SUCCEEDED), (2, SUCCEEDED)]))
+    assert isinstance(value("goals_success", mission({STATUS: told}, {"kind": "nav2_goals"})), Unavailable)
+
+
 def test_a_goal_of_rviz_lies_where_it_was_clicked() -> None:
     pose = table([20.7], POSE_FIELDS, [("map", 7.0, 1.0, 0.0, 0.0, math.sin(0.5), math.cos(0.5))])
     found = sent(drive(goal_pose=pose))

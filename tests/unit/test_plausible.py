@@ -79,3 +79,18 @@ def test_a_rate_and_an_acceleration_that_no_sensor_measures_are_left_out() -> No
     rates, accelerations = np.array([0.1, 6e29, 0.1, -0.2]), np.array([-9.8, -9.8, 1.9e11, np.nan])
     sensor = {"IMU2": Table(np.arange(4.0), {"GyrX": rates, "AccZ": accelerations})}
     np.testing.assert_array_equal(plausible(sensor)["IMU2"].t, [0.0, 3.0])
+
+
+def track(lat: list[float], lng: list[float]) -> dict[str, Table]:
+    t = np.arange(len(lat), dtype=float)
+    return {"POS": Table(t, {"Lat": np.array(lat), "Lng": np.array(lng), "RelHomeAlt": t})}
+
+
+def test_a_position_at_zero_degrees_is_none_of_a_vehicle_that_is_elsewhere() -> None:
+    kept = plausible(track([47.0, 47.00001, 0.0, 0.0, 0.0, 47.00002], [8.0, 8.0, 0.0, 0.0, 0.0, 8.0]))
+    np.testing.assert_array_equal(kept["POS"].t, [0.0, 1.0, 5.0])
+
+
+def test_a_simulation_at_zero_degrees_keeps_its_track() -> None:
+    kept = plausible(track([0.0, 1e-5, 2e-5, 0.0], [0.0, 0.0, 1e-5, 0.0]))
+    assert len(kept["POS"]) == 4

@@ -20,6 +20,7 @@ from care_core.ecosystems.liveness import (
     Frozen,
     Live,
     Motion,
+    is_part,
     least,
     numberless,
     overlaps,
@@ -88,20 +89,14 @@ def frozen(flight: Airborne, moving: Sequence[Span], sources: Sequence[Live] = S
                 columns = [own[field] for field in fields]
                 yield from (Frozen(source, name, *one, None) for one in numberless(own.t, columns, source))
             for span, count in repeats(own.t, [own[field] for field in fields], source):
-                if any(_says(one, name, source, span) for one in told):
-                    continue
                 for part in overlaps(span, moving, source.seconds):
                     motion = motion_of(flight, part, source.message)
                     if motion.reaches(source.moved):
-                        told.append(Frozen(source, name, span, count, motion))
-                        yield told[-1]
+                        one = Frozen(source, name, span, count, motion)
+                        if not is_part(one, told):
+                            told.append(one)
+                            yield one
                         break
-
-
-def _says(one: Frozen, channel: str, source: Live, span: Span) -> bool:
-    """Whether what is known to be frozen is a whole of which a source is a part."""
-    is_part = one.channel == channel and set(source.fields) < set(one.source.fields)
-    return is_part and any(overlaps(span, [one.span], source.seconds))
 
 
 def _fixed(table: Table) -> Table:

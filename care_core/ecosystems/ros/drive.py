@@ -14,7 +14,7 @@ import numpy as np
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.findings import Severity
-from care_core.ecosystems.liveness import Frozen
+from care_core.ecosystems.liveness import Frozen, is_part
 from care_core.ecosystems.plausible import STAMP
 from care_core.ecosystems.ros import sources
 from care_core.ecosystems.ros.goals import STATUS_TOPIC, Goal, actionlib_goals, nav2_goals
@@ -255,9 +255,11 @@ class Drive(RunModel):
         own = [name for name in placed if _namespace(name) == _namespace(topic)]
         is_alone = types.get(topic) != ODOMETRY and len(set(map(_namespace, placed))) == 1
         others = {name: tables[name] for name in own or (placed if is_alone else ())}
+        told: list[Frozen] = []
         for source in sources.SOURCES:
             if source.message == types.get(topic):
-                yield from sources.frozen(source, topic, table, others)
+                told += [one for one in sources.frozen(source, topic, table, others) if not is_part(one, told)]
+        yield from told
 
     def moved_between(self, start_s: float, end_s: float) -> float:
         """Distance that odometry went in a time, m; nan where there is none."""

@@ -191,7 +191,8 @@ def nav2_goals(states: Mapping[str, Table], until_s: float) -> tuple[Goal, ...]:
         is_last = number + 1 == len(accepted)
         next_s = until_s if is_last else accepted[number + 1].sent_s
         ended_s, status = goal.ended_s, goal.status
-        replaced = not is_last and (ended_s is None or ended_s >= next_s)
+        is_over = ended_s is not None and (ended_s < next_s or (ended_s == next_s and status == Status.SUCCEEDED))
+        replaced = not is_last and not is_over
         if replaced:
             ended_s, status = next_s, status and Status.PREEMPTED
         end_s = next_s if ended_s is None else ended_s
@@ -206,13 +207,16 @@ def _states(action: str, table: Table) -> list[_States]:
     goals: dict[bytes, _States] = {}
     over_before: set[bytes] = set()
     columns = (table[name] for name in MESSAGES[STATUS].reads)
+    last_s = -math.inf
     for time_s, ids, codes in zip(table.t.tolist(), *columns, strict=True):
         for uuid, code in zip(ids, codes, strict=True):
             key, end = bytes(bytearray(uuid)), _ROS2.get(int(code))
-            if key not in goals and (end is not None or key in over_before):
+            if key not in goals and (key in over_before or (end is not None and last_s < 0)):
                 over_before.add(key)
                 continue
-            goal = goals.setdefault(key, _States(action, time_s))
+            # What is told of for the first time when it is over was accepted since the last word, which was lost.
+            goal = goals.setdefault(key, _States(action, time_s if end is None else last_s))
             if end is not None and goal.status is None:
                 goal.ended_s, goal.status = time_s, end
+        last_s = time_s
     return list(goals.values())

@@ -52,13 +52,15 @@ SOURCES = (
          least(way_m=_FOUND_M), records=3),
     Live(BATTERY, ("voltage", "current"), "the battery's monitor", "battery", _s("battery", 30.0),
          least(way_m=_DRAWN_M), is_optional=True, mission_lost=ASIDE),
+    Live(BATTERY, ("current",), "the battery's current", "battery", _s("battery's current", 30.0),
+         least(way_m=_DRAWN_M), is_optional=True, mission_lost=ASIDE),
     *(
         Live(kind, fields, "the command to the base", "commands", _s(f"command ({kind})", 10.0), least(way_m=_CURVE_M),
              is_optional=True)
         for kind, fields in ((TWIST, _TWIST), (TWIST_STAMPED, tuple(f"twist.{name}" for name in _TWIST)))
     ),
 )  # fmt: skip
-TYPES = tuple(source.message for source in SOURCES)
+TYPES = tuple(dict.fromkeys(source.message for source in SOURCES))
 
 
 def frozen(source: Live, topic: str, table: Table, others: Mapping[str, Table]) -> Iterator[Frozen]:
@@ -68,7 +70,7 @@ def frozen(source: Live, topic: str, table: Table, others: Mapping[str, Table]) 
         others: odometry and localisation of every other topic.
     """
     columns = [np.asarray(table[field], np.float64) for field in source.fields if field in table.columns]
-    if len(columns) < 2:
+    if len(columns) < min(2, len(source.fields)):
         return
     if source.message != BATTERY:  # many tell no current
         yield from (Frozen(source, topic, *one, None) for one in numberless(table.t, columns, source))
