@@ -76,7 +76,8 @@ def _differences(log: Log, schema: Schema, vehicle: Vehicle) -> Iterator[str]:
         return
     low, high = schema.firmware_window
     if vehicle.version is None:
-        yield "the log does not say which firmware flew"
+        own = "release of ArduPilot" if vehicle.firmware and vehicle.kind != "px4" else "firmware"
+        yield f"the log does not say which {own} flew"
     elif not low <= vehicle.version[: len(low)] or not vehicle.version[: len(high)] <= high:
         flown = ".".join(map(str, vehicle.version))
         yield f"firmware {flown} is outside {_dotted(low)} to {_dotted(high)}, for which the profile was made"

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime, timedelta, timezone
+from typing import NamedTuple
 
 import numpy as np
 
-from care_core.logs.base import Table
+from care_core.logs.base import Table, Wanted
 from care_core.run import Setting
 
 # GPS time runs ahead of UTC by the leap seconds since 1980: 18 since 2017, and none is announced.
@@ -16,8 +17,23 @@ _GPS_EPOCH = datetime(1980, 1, 6, tzinfo=timezone.utc) - timedelta(seconds=18)
 # A week that no receiver has reached yet is a flipped bit.
 _LAST_WEEK, _WEEK_MS = 5200, 7 * 24 * 3600 * 1000
 _GPS_FIELDS = (("GWk", "GMS"), ("Week", "TimeMS"))
-_FIRMWARE = re.compile(r"(?:Ardu(\w+)|APM:(\w+)|AntennaTracker|Blimp|Rover) V\d")
+_FIRMWARE = re.compile(r"(?:(?:Ardu|APM:)(Copter|Plane|Rover|Sub)|AntennaTracker|Blimp|Rover) V\d")
+_OTHER_NAME = re.compile(r"\S.* [Vv]\d+\.\d+\S* \([0-9a-f]{8}\)")
+"""A firmware that its vendor named says itself as ArduPilot does, with its commit: "HawkCopter V4.5.5 (cff126f5)"."""
 _VEHICLES = {"copter": "multicopter", "plane": "fixed wing", "sub": "submarine", "rover": "rover"}
+_BUILDS = {
+    1: ("rover", "ArduRover"), 2: ("multicopter", "ArduCopter"), 3: ("fixed wing", "ArduPlane"),
+    4: ("antennatracker", "AntennaTracker"), 7: ("submarine", "ArduSub"), 12: ("blimp", "Blimp"),
+    13: ("helicopter", "ArduCopter"),
+}  # fmt: skip
+"""VER.BU: which of ArduPilot's vehicles was built (AP_Vehicle_Type.h)."""
+_FIRST_WITH_VER = 4
+"""No firmware before 4 writes VER: a lower number is its vendor's own."""
+VER_NUMBERS = ("BU", "Maj", "Min", "Pat")
+FACTS: Wanted = {"VER": ("FWS", *VER_NUMBERS), "MSG": ("Message",)}
+"""What the facts of a DataFlash log are read of."""
+WHICH_IS = ", which is "
+"""Between the name that a vendor gave its firmware and ArduPilot's."""
 
 GPS_TIME = tuple(name for pair in _GPS_FIELDS for name in pair)
 """Fields of a GPS message that tell the wall clock, week and milliseconds of it: names of firmware 3.2, older ones."""
@@ -54,18 +70,54 @@ def shortest(value: float) -> float:
     return float(str(np.float32(value)))
 
 
-def facts_of(texts: Iterable[str]) -> dict[str, str]:
-    """`firmware` ("ArduCopter V4.5.4 (fd1bcc61)"), `vehicle` ("multicopter") and `frame` ("QUAD/PLUS") by the texts."""
+class Built(NamedTuple):
+    """What a log's numbers say was built, whatever name its vendor gave it."""
+
+    vehicle: str = ""
+    """As in the facts: "multicopter"."""
+    firmware: str = ""
+    """By ArduPilot's name, with its version where that is told: "ArduCopter 4.5.5"."""
+
+
+def facts_of(texts: Iterable[str], built: Built = Built()) -> dict[str, str]:  # noqa: B008 - it is frozen
+    """`firmware` ("ArduCopter V4.5.4 (fd1bcc61)"), `vehicle` ("multicopter") and `frame` ("QUAD/PLUS") by the texts.
+
+    One that its vendor named is told by what was built: "HawkCopter V4.5.5 (cff126f5), which is ArduCopter 4.5.5".
+    """
     facts: dict[str, str] = {}
+    vendors = ""
     for text in texts:
-        match = _FIRMWARE.match(text)
-        if match and "firmware" not in facts:
+        if "firmware" not in facts and (match := _FIRMWARE.match(text)):
             facts["firmware"] = text
-            kind = (match[1] or match[2] or match[0].split()[0]).casefold()
+            kind = (match[1] or match[0].split()[0]).casefold()
             facts["vehicle"] = _VEHICLES.get(kind, kind)
+        elif not vendors and _OTHER_NAME.fullmatch(text):
+            vendors = text
         if text.startswith("Frame: "):
             facts.setdefault("frame", text.removeprefix("Frame: "))
+    if "firmware" not in facts and (vendors or built.firmware):
+        facts["firmware"] = WHICH_IS.join(name for name in (vendors, built.firmware) if name)
+    if built.vehicle:
+        facts["vehicle"] = built.vehicle
     return facts
+
+
+def dataflash_facts(tables: Mapping[str, Table], *greetings: str) -> dict[str, str]:
+    """The facts by what VER and MSG say, and by the lines before any message."""
+    columns = (tables[name].columns.get(field, ()) for name, field in (("VER", "FWS"), ("MSG", "Message"))
+               if name in tables)  # fmt: skip
+    texts = (str(text) for column in columns for text in column)
+    return facts_of((*texts, *greetings), _built(tables["VER"]) if "VER" in tables else Built())
+
+
+def _built(ver: Table) -> Built:
+    """What the first record of VER says was built."""
+    if not len(ver) or any(name not in ver.columns or ver.kind(name) != "number" for name in VER_NUMBERS):
+        return Built()
+    build, *version = (int(ver[name][0]) if np.isfinite(ver[name][0]) else 0 for name in VER_NUMBERS)
+    vehicle, name = _BUILDS.get(build, ("", ""))
+    is_told = name and version[0] >= _FIRST_WITH_VER
+    return Built(vehicle, f"{name} {'.'.join(map(str, version))}" if is_told else name)
 
 
 def wall_clock(tables: Mapping[str, Table]) -> str | None:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from care_core import limits
 from care_core.errors import LogError
 from care_core.logs import formats
-from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, shortest, wall_clock
+from care_core.logs.ardupilot import FACTS, GPS_TIME, PARM_FIELDS, dataflash_facts, parameters_of, shortest, wall_clock
 from care_core.logs.base import Channel, Kind, LazyColumns, Table, Wanted
 from care_core.logs.clock import Clock, clock_of
 from care_core.logs.damage import summarised
@@ -326,8 +326,7 @@ class DataFlashLog:
     @cached_property
     def facts(self) -> Mapping[str, str]:
         """`firmware`, `vehicle` and `frame`, where the log names them."""
-        tables = self.read({"VER": ("FWS",), "MSG": ("Message",)})
-        return facts_of(str(text) for table in tables.values() for column in table.columns.values() for text in column)
+        return dataflash_facts(self.read(FACTS))
 
     @cached_property
     def start(self) -> str | None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from care_core import limits
 from care_core.errors import LogError
 from care_core.logs import formats
-from care_core.logs.ardupilot import GPS_TIME, PARM_FIELDS, facts_of, parameters_of, wall_clock
+from care_core.logs.ardupilot import FACTS, GPS_TIME, PARM_FIELDS, dataflash_facts, parameters_of, wall_clock
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
@@ -99,10 +99,9 @@ class DataFlashTextLog:
     @cached_property
     def facts(self) -> Mapping[str, str]:
         """`firmware`, `vehicle`, `frame` as a message or the greeting names them; `clock` where times are counted."""
-        tables = self.read({"VER": ("FWS",), "MSG": ("Message",)})
-        texts = [str(text) for table in tables.values() for column in table.columns.values() for text in column]
         first = int(min(places[0] for places in self._lines.values() if len(places)))
-        facts = facts_of([*texts, *(line.strip() for line in _text(self._data.between(0, first)).splitlines())])
+        greeting = _text(self._data.between(0, first)).splitlines()
+        facts = dataflash_facts(self.read(FACTS), *(line.strip() for line in greeting))
         if self._counted_from:
             facts["clock"] = f"counted from {self._counted_from}, {_STEADY_HZ:.0f} a second"
         return facts

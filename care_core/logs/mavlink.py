@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from care_core.errors import LogError
 from care_core.logs import formats, shared_id
-from care_core.logs.ardupilot import facts_of, history, shortest
+from care_core.logs.ardupilot import Built, facts_of, history, shortest
 from care_core.logs.base import Channel, Table, Wanted
 from care_core.logs.clock import find_clock
 from care_core.logs.damage import summarised
@@ -145,12 +145,11 @@ class MavlinkLog:
         tables = self.read({
             "STATUSTEXT": ("text",), "AUTOPILOT_VERSION": ("flight_sw_version", "flight_custom_version")
         })  # fmt: skip
-        facts = facts_of(tables["STATUSTEXT"]["text"].tolist() if "STATUSTEXT" in tables else ())
         vehicle, firmware = _VEHICLES.get(self._kind, ("", ""))
-        if vehicle:
-            facts["vehicle"] = vehicle
-        if "firmware" not in facts and firmware and self._autopilot == _AUTOPILOT_ARDUPILOT:
-            facts["firmware"] = f"{firmware} {_version(tables.get('AUTOPILOT_VERSION'))}".strip()
+        is_ardupilot = firmware and self._autopilot == _AUTOPILOT_ARDUPILOT
+        name = f"{firmware} {_version(tables.get('AUTOPILOT_VERSION'))}".strip() if is_ardupilot else ""
+        texts = tables["STATUSTEXT"]["text"].tolist() if "STATUSTEXT" in tables else ()
+        facts = facts_of(texts, Built(vehicle, name))
         if self._autopilot == _AUTOPILOT_PX4:
             facts["stack"] = "PX4"
         if self._is_restamped:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from care_core.ecosystems.vehicles import (
@@ -24,6 +25,8 @@ from care_core.ecosystems.vehicles.frames import FRAMES, arms_of
 from care_core.ecosystems.vehicles.modes import px4_mode
 from care_core.ecosystems.vehicles.parameters import _chains
 from care_core.ecosystems.vehicles.vehicle import Kind
+from care_core.logs.ardupilot import Built, dataflash_facts, facts_of
+from care_core.logs.base import Table
 from care_core.run import Setting
 
 QUAD_X = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0}
@@ -44,6 +47,36 @@ QUAD_OUTPUTS = {f"SERVO{n}_FUNCTION": 32.0 + n for n in range(1, 5)}
         ({"firmware": "AntennaTracker V4.5.0"}, {}, "tracker", "AntennaTracker V4.5.0, antenna tracker"),
         ({"firmware": "PX4 v1.15.0 (cb09dde6)", "stack": "PX4"}, {}, "px4", "PX4 v1.15.0, unknown vehicle"),
         ({"vehicle": "rover"}, {}, "unknown", "rover"),
+        (
+            {"firmware": "HawkCopter V4.5.5 (cff126f5), which is ArduCopter 4.5.5"},
+            QUAD_X,
+            "copter",
+            "HawkCopter V4.5.5, which is ArduCopter 4.5.5, quad X",
+        ),
+        (
+            {"firmware": "Hawk V4.5.5 (cff126f5)"},
+            {"TRIM_THROTTLE": 45.0, "KFF_RDDRMIX": 0.5},
+            "plane",
+            "Hawk V4.5.5, fixed wing",
+        ),
+        (
+            {"firmware": "Hawk V4.5.5 (cff126f5)"},
+            {"CRUISE_SPEED": 2.0, "CRUISE_THROTTLE": 50.0},
+            "rover",
+            "Hawk V4.5.5, rover",
+        ),
+        (
+            {"firmware": "Hawk V4.5.5 (cff126f5)"},
+            {**QUAD_X, "LAND_SPEED": 50.0, "RTL_CONE_SLOPE": 3.0},
+            "copter",
+            "Hawk V4.5.5, quad X",
+        ),
+        (
+            {"firmware": "Hawk V4.5.5 (cff126f5)"},
+            {"LAND_SPEED": 50.0, "CRUISE_SPEED": 2.0, "SIMPLE": 0.0},
+            "unknown",
+            "Hawk V4.5.5, unknown vehicle",
+        ),
     ],
 )
 def test_a_vehicle_is_what_its_log_says(facts: dict[str, str], settings: dict[str, float], kind: Kind,
@@ -56,6 +89,8 @@ def test_a_version_is_told_as_far_as_it_is_written() -> None:
     assert vehicle_of({"firmware": "ArduCopter V4.5.4"}, {}).version == (4, 5, 4)
     assert vehicle_of({"firmware": "ArduCopter V3.1 (5c6503e2)"}, {}).version == (3, 1)
     assert vehicle_of({"firmware": "ArduCopter"}, {}).version is None
+    assert vehicle_of({"firmware": "Hawk V7.1.0 (cff126f5), which is ArduCopter 4.5.5"}, {}).version == (4, 5, 5)
+    assert vehicle_of({"firmware": "Hawk V4.5.5 (cff126f5)"}, {}).version is None  # its vendor counts as it likes
 
 
 def test_old_firmware_has_no_class_but_its_four_motors_tell_it() -> None:
@@ -207,3 +242,39 @@ def test_every_name_belongs_to_one_parameter(kind: Kind) -> None:
         assert all(earlier.since < later.since for earlier, later in pairwise(chain))
         assert all(len(alias.name) <= 16 for alias in chain)  # AP_MAX_NAME_SIZE
         assert aliases_of(name, kind)[0].name == chain[0].name
+
+
+def ver(build: float, *version: float) -> Table:
+    columns = dict(zip(("BU", "Maj", "Min", "Pat"), map(np.atleast_1d, (build, *version)), strict=True))
+    return Table(np.zeros(1), {"FWS": np.array(["HawkOS V2.1 (cff126f5)"], dtype=object), **columns})
+
+
+@pytest.mark.parametrize(
+    ("build", "version", "firmware", "vehicle"),
+    [
+        (2.0, (4.0, 5.0, 5.0), "HawkOS V2.1 (cff126f5), which is ArduCopter 4.5.5", "multicopter"),
+        (1.0, (4.0, 6.0, 0.0), "HawkOS V2.1 (cff126f5), which is ArduRover 4.6.0", "rover"),
+        (13.0, (4.0, 5.0, 0.0), "HawkOS V2.1 (cff126f5), which is ArduCopter 4.5.0", "helicopter"),
+        (2.0, (2.0, 1.0, 0.0), "HawkOS V2.1 (cff126f5), which is ArduCopter", "multicopter"),  # the vendor's number
+        (99.0, (4.0, 5.0, 5.0), "HawkOS V2.1 (cff126f5)", None),
+        (np.nan, (np.nan, 5.0, 5.0), "HawkOS V2.1 (cff126f5)", None),
+    ],
+)
+def test_firmware_under_another_name_is_what_was_built(
+    build: float, version: tuple[float, ...], firmware: str, vehicle: str | None
+) -> None:
+    facts = dataflash_facts({"VER": ver(build, *version)})
+    assert (facts["firmware"], facts.get("vehicle")) == (firmware, vehicle)
+
+
+def test_firmware_by_its_own_name_keeps_it() -> None:
+    texts = Table(
+        np.zeros(2), {"Message": np.array(["ArduPlane V4.5.5 (cff126f5)", "u-blox 1 SW: 3.01 (107900)"], object)}
+    )
+    assert dataflash_facts({"MSG": texts})["firmware"] == "ArduPlane V4.5.5 (cff126f5)"
+
+
+def test_telemetry_names_the_firmware_by_its_heartbeats() -> None:
+    built = Built("multicopter", "ArduCopter V4.5.5 (cff126f5)")
+    assert facts_of(["Hawk V4.5.5 (cff126f5)"], built)["firmware"].endswith(", which is ArduCopter V4.5.5 (cff126f5)")
+    assert facts_of([], built)["firmware"] == "ArduCopter V4.5.5 (cff126f5)"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 _ROUTINE = re.compile(
     r"""
-      (Ardu\w+|APM:\w+|Rover|AntennaTracker|Blimp)\sV\d          # firmware
+      (Ardu\w+|APM:\w+|Rover|AntennaTracker|Blimp)\sV\d | \S.*\s[Vv]\d+\.\d+\S*\s\([0-9a-f]{8}\)$   # firmware
     | .?[0-9a-fA-F]{31,32}$ | (ChibiOS|NuttX|PX4|Pixhawk|Pixracer|Cube\w*|fmuv\d|Nano)\b | \S+\s[0-9A-F]{8}\s[0-9A-F]{8}
     | Param\sspace | RC\sProtocol | RCOut | RCInput | New\s(mission|rally|fence)$ | Frame: | GROUND\sSTART
     | Ground\sstart | Initiali[sz]ing | ArduPilot\sReady | Calibrating | (Barometer|barometer)\s.*complete | Ready\s

@@ -20,7 +20,16 @@ _KINDS: Mapping[str, Kind] = {
     "copter": "copter", "plane": "plane", "rover": "rover", "sub": "sub", "antennatracker": "tracker",
     "tracker": "tracker", "blimp": "blimp",
 }  # fmt: skip
-_VERSION = re.compile(r"[Vv](\d+)\.(\d+)(?:\.(\d+))?")
+_OWN_NAME = re.compile(r".*, which is ")
+_VERSION = re.compile(r"[Vv ](\d+)\.(\d+)(?:\.(\d+))?")
+_ONLY_ITS: Mapping[Kind, tuple[str, ...]] = {
+    "copter": ("LAND_SPEED", "LAND_SPD_MS", "SIMPLE", "SUPER_SIMPLE", "RTL_CONE_SLOPE", "PHLD_BRAKE_RATE"),
+    "plane": ("TRIM_THROTTLE", "STALL_PREVENTION", "THR_SLEWRATE", "KFF_RDDRMIX", "WP_LOITER_RAD"),
+    "rover": ("CRUISE_SPEED", "CRUISE_THROTTLE", "TURN_RADIUS", "TURN_MAX_G", "MODE_CH"),
+    "sub": ("JS_GAIN_DEFAULT", "JS_GAIN_MAX", "SURFACE_DEPTH", "JS_LIGHTS_STEPS"),
+    "tracker": ("YAW2SRV_P", "ONOFF_YAW_RATE", "ONOFF_PITCH_RATE", "PITCH2SRV_P"),
+}  # fmt: skip
+"""Parameters of one vehicle alone, in most of its releases; two of them tell it."""
 _HELI_CLASSES = frozenset((6, 11, 13))
 _HELI_ONLY = "H_SV1_POS", "H_SV_1_POS", "H_SWASH_TYPE", "H_SW_TYPE", "H_COL_MIN"
 """Parameters of the swash plate: only the firmware built for helicopters has any (AP_MotorsHeli, of every age)."""
@@ -74,15 +83,16 @@ def vehicle_of(facts: Mapping[str, str], settings: Driven, motors: int | None = 
             parameter that names it.
     """
     firmware = facts.get("firmware", "")
-    kind = _kind(firmware, facts, settings)
-    return Vehicle(kind, _name(kind, facts, settings, motors), firmware, _version(firmware))
+    own = _OWN_NAME.sub("", firmware)
+    kind = _kind(own, facts, settings)
+    return Vehicle(kind, _name(kind, facts, settings, motors), firmware, _version(own))
 
 
 def _kind(firmware: str, facts: Mapping[str, str], settings: Driven) -> Kind:
     if facts.get("stack") == "PX4" or firmware.startswith("PX4"):
         return "px4"
     match = _FIRMWARE.match(firmware)
-    kind = _KINDS[match[1].casefold()] if match else "unknown"
+    kind = _KINDS[match[1].casefold()] if match else _by_parameters(settings)
     if kind == "copter" and (
         facts.get("vehicle") == "helicopter"
         or code(settings, "FRAME_CLASS") in _HELI_CLASSES
@@ -92,6 +102,13 @@ def _kind(firmware: str, facts: Mapping[str, str], settings: Driven) -> Kind:
     if kind == "plane" and (facts.get("vehicle") == "VTOL" or code(settings, "Q_ENABLE") in (1, 2)):
         return "quadplane"
     return kind
+
+
+def _by_parameters(settings: Driven) -> Kind:
+    """The kind whose own parameters are there, where none of another's is."""
+    counts = {kind: sum(name in settings for name in names) for kind, names in _ONLY_ITS.items()}
+    there = [kind for kind, count in counts.items() if count]
+    return there[0] if len(there) == 1 and counts[there[0]] > 1 else "unknown"
 
 
 def _name(kind: Kind, facts: Mapping[str, str], settings: Driven, motors: int | None) -> str:
@@ -119,5 +136,7 @@ def _copter(facts: Mapping[str, str], settings: Driven, motors: int | None) -> s
 
 
 def _version(firmware: str) -> tuple[int, ...] | None:
-    match = _VERSION.search(firmware)
+    """The version of a firmware by its own name: a vendor counts as it likes."""
+    named = firmware.startswith("PX4") or _FIRMWARE.match(firmware)
+    match = _VERSION.search(firmware) if named else None
     return tuple(int(part) for part in match.groups() if part is not None) if match else None
