@@ -3,6 +3,8 @@
 Bit-identical samples tell of a sensor, or its driver, that died and is read on. Some repeat themselves rightly: parked
 vehicles, simulators without noise, batteries whose volts are rounded. So a source is called frozen only where another
 one says that the vehicle moved meanwhile, and for far longer than it repeats itself otherwise.
+
+What says nothing from first to last was never connected: that is told, and is no fault.
 """
 
 from __future__ import annotations
@@ -29,7 +31,15 @@ _VARIED = LIMITS.add(
 _MISSED = LIMITS.add("share of the time that was not recorded", 0.2, "", "a choice: checks say so where they saw less")
 _LASTS_S = LIMITS.add("shortest time of which this is said", 10.0, "s", "a choice: less is over before it is recorded")
 ASIDE = LIMITS.add("probability that what nothing steers by costs the mission", 0.05, "", "a choice: failsafes read it")
+UNPOWERED_V = LIMITS.add(
+    "most volts of a monitor without a pack", 2.5, "V", "a choice: 1 empty cell; loose inputs say 0.1 V"
+)
+_ONE_CELL_V = LIMITS.add("one full cell", 4.4, "V", "voltages of lithium polymer cells, high voltage ones as well")
+_TWO_CELLS_V = LIMITS.add("two cells that lift a vehicle", 6.0, "V", "voltages of lithium polymer cells: 3 V ruin one")
 PROBABILITY = LIMITS.add("probability of a dead source", 0.9, "", "a choice: nothing else repeats to the last bit")
+
+ZERO = "from first to last: it is not connected, not set up, or sees nothing"
+"""Of a sensor that reads zero."""
 
 
 class Motion(Record):
@@ -195,6 +205,57 @@ def recorded_in_part(sources: Mapping[str, Floats], spans: Sequence[Span]) -> It
         suspect="operation",
         probability=PROBABILITY,
     )
+
+
+class Unconnected(Record):
+    """A source that says nothing from first to last: nothing is connected to it, or it is switched off."""
+
+    kind: FindingKind
+    title: str
+    evidence: str
+    source: str
+    """The message or topic, with its number where it is not the first of its kind."""
+
+
+def unconnected(found: Iterable[Unconnected], end_s: float) -> Iterator[Finding]:
+    """What is said of sources that say nothing all along: no part of it failed in this run."""
+    for one in found:
+        yield Finding(
+            kind=one.kind,
+            title=one.title,
+            onset_s=0.0,
+            end_s=end_s,
+            severity="info",
+            evidence=one.evidence,
+            source=one.source,
+            suspect="parameter",
+            probability=PROBABILITY,
+            mission_lost=ASIDE,
+        )
+
+
+def says_nothing(column: Floats, most: float = 0.0) -> bool:
+    """Whether what a source says, shape (n,), never leaves 0 by more than so much; of a few samples nobody can tell."""
+    known = column[np.isfinite(column)]
+    return len(known) >= _RECORDS and float(np.abs(known).max()) <= most
+
+
+def no_pack(volts: Floats, aloft: Floats) -> str:
+    """Why a voltage is of no pack, in words; "" where it may be.
+
+    Args:
+        volts: all that the monitor says, shape (n,) in V.
+        aloft: what it says while its multicopter flies; empty where it does not, or something else flies.
+    """
+    known = volts[np.isfinite(volts)]
+    if says_nothing(known, UNPOWERED_V):
+        return f"never more than {known.max():.1f} V, and no vehicle runs on that"
+    flying = aloft[np.isfinite(aloft)]
+    is_of_none = len(flying) >= _RECORDS and bool(np.all((flying > _ONE_CELL_V) & (flying < _TWO_CELLS_V)))
+    if not is_of_none or float(known.max()) >= _TWO_CELLS_V:
+        return ""
+    least = f"{flying.min():.1f} to {flying.max():.1f} V in the air"
+    return f"{least}: one cell has {_ONE_CELL_V:g} V at most, and two lift nothing below {_TWO_CELLS_V:g} V"
 
 
 def turned(degrees: Floats) -> float:

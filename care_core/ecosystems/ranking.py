@@ -93,7 +93,7 @@ def _belongs(root: Finding, finding: Finding, reach: Explains) -> bool:
     """Whether a finding is of the course of events that another began."""
     return (
         not finding.parameters  # somebody changed them
-        and not (finding.severity == "info" and finding.suspect == "parameter")  # it was set so before anything failed
+        and not any(one.severity == "info" and one.suspect == "parameter" for one in (root, finding))  # set so before
         and finding.kind in reach.get(root.kind, frozenset())
         and root.onset_s <= finding.onset_s + SLACK_S
         and root.end_s >= finding.onset_s - OVER_S

@@ -79,8 +79,8 @@ def test_a_flight_is_told_by_its_status_and_its_words() -> None:
                                  (40.0, "WARNING", "[failsafe] Failsafe activated\t")),
     })))  # fmt: skip
     assert texts(health) == [
-        "PX4 v1.15.0, multicopter", "mode Hold", "armed by RC", "mode Takeoff", "took off", "mode Mission",
-        "Failsafe activated", "mode Return", "landed", "disarmed, armed for 40 s",
+        "PX4 v1.15.0, multicopter", "mode Hold", "armed by RC", "mode Takeoff", "battery and GPS were not recorded",
+        "took off", "mode Mission", "Failsafe activated", "mode Return", "landed", "disarmed, armed for 40 s",
     ]  # fmt: skip
     assert health.findings == ()
 

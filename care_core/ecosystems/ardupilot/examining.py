@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 import numpy as np
 
 from care_core.ecosystems.ardupilot import flight as flight_model
@@ -9,12 +11,16 @@ from care_core.ecosystems.ardupilot import timeline
 from care_core.ecosystems.ardupilot.checks import CHECKS
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded
-from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, Health
+from care_core.ecosystems.findings import NOT_FLOWN, TOO_SHORT, Finding, FindingKind, Health
 from care_core.ecosystems.plausible import clock_doubt
 from care_core.ecosystems.ranking import rank_findings
 from care_core.logs.base import Wanted, merge_needs
+from care_core.records import replace
 
 _TOO_SHORT_S = 2.0
+_OF_SENSORS: frozenset[FindingKind] = frozenset((
+    "imu", "compass", "gps", "barometer", "battery", "vibration", "estimator", "attitude",
+))  # fmt: skip
 _TELLING = ("MODE", "MSG", "ATT", "IMU")
 
 READS: Wanted = merge_needs(
@@ -28,7 +34,19 @@ def find(flight: Flight) -> tuple[Finding, ...]:
     flight.expect(READS)
     with np.errstate(all="ignore"):
         found = [finding for check in CHECKS for finding in check.find(flight)]
-    return rank_findings(found, flight.down_s)
+    return rank_findings(_on_a_bench(found) if _is_on_a_bench(flight) else found, flight.down_s)
+
+
+def _is_on_a_bench(flight: Flight) -> bool:
+    """Whether nobody meant to fly or drive: it never armed, and no one tried."""
+    return not flight.armed and not any(one.was_tried for one in flight.refusals)
+
+
+def _on_a_bench(findings: Iterable[Finding]) -> Iterator[Finding]:
+    """What sensors of a board on a bench say is an offset to calibrate, or a part not fitted yet: nothing failed."""
+    for one in findings:
+        is_told_only = one.kind in _OF_SENSORS and one.severity != "info"
+        yield replace(one, severity="info", evidence=f"{one.evidence}; nobody tried to arm") if is_told_only else one
 
 
 def examine(flight: Flight) -> Health:
@@ -37,7 +55,7 @@ def examine(flight: Flight) -> Health:
     is_readable = flight.end_s >= _TOO_SHORT_S and any(name in tables for name in _TELLING)
     findings = find(flight) if is_readable else ()
     too_little = TOO_SHORT if not is_readable else "" if flight.armed else NOT_FLOWN
-    if not too_little and not findings:
+    if not too_little and all(one.severity == "info" for one in findings):
         # Times that cannot be are no reason to keep quiet about what was found, but none to call the rest fine.
         too_little = clock_doubt(MESSAGES, tables, 0.0, flight.end_s)
     return Health(flight.vehicle.title, timeline.timeline(flight, tables.values()), findings, too_little)

@@ -111,8 +111,9 @@ class Flight(Airborne):
 
     @cached_property
     def batteries(self) -> tuple[Battery, ...]:
-        """The batteries whose voltage is recorded."""
-        return tuple(Battery.of(self, number, table) for number, table in enumerate(self.all("BAT", "Volt"), start=1))
+        """The batteries whose voltage is measured."""
+        monitors = enumerate(self.all("BAT", "Volt"), start=1)
+        return tuple(Battery.of(self, number, one) for number, one in monitors if not sources.no_pack_on(self, one))
 
     @cached_property
     def battery_failsafe_s(self) -> float | None:

@@ -14,11 +14,14 @@ from numpy.typing import NDArray
 
 from care_core.ecosystems.ardupilot.messages import MESSAGES, former_fields, recorded_as
 from care_core.ecosystems.dictionary import instance_field
+from care_core.ecosystems.liveness import says_nothing
 from care_core.logs.base import Kind, LazyColumns, Table
 from care_core.numbers import distinct
 
 Floats = NDArray[np.float64]
 
+_NO_FIX = 1.0
+"""GPS.Status of a receiver that is there and has no fix."""
 _CENTIVOLTS = 200.0
 """A pack reads more than this only where it is recorded in hundredths of a volt (CURR before 3.3)."""
 _FULL_SCALE = 2.0
@@ -90,6 +93,13 @@ def _renamed(name: str, table: Table) -> Table:
 def _top(column: NDArray[Any]) -> float:
     known = column[np.isfinite(column)]
     return float(known.max()) if len(known) else 0.0
+
+
+def sees_nothing(receiver: Table) -> bool:
+    """Whether rows of GPS never have a satellite or a fix: none is connected, or it lies under a roof."""
+    if not {"NSats", "Status"} <= receiver.columns.keys():
+        return False
+    return says_nothing(receiver["NSats"]) and says_nothing(receiver["Status"], _NO_FIX)
 
 
 def split(name: str, table: Table) -> list[Table]:

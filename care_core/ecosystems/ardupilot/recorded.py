@@ -15,7 +15,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot import held_missions
 from care_core.ecosystems.ardupilot.held_missions import HeldMission
-from care_core.ecosystems.ardupilot.instances import instances
+from care_core.ecosystems.ardupilot.instances import instances, sees_nothing
 from care_core.ecosystems.ardupilot.messages import MESSAGES, expanded, recorded_as
 from care_core.ecosystems.ardupilot.texts import Refusal, refusal_of
 from care_core.ecosystems.base import RunModel
@@ -93,8 +93,12 @@ class Recorded(RunModel):
         return tuple(table for table in known[1] if len(table) and all(field in table.columns for field in fields))
 
     def one(self, name: str, *fields: str) -> Table | None:
-        """The first instance of a message, None where the log lacks it or one of these fields."""
-        return next(iter(self.all(name, *fields)), None)
+        """The first instance of a message, None where the log lacks it or one of these fields; of several receivers
+        the first that ever sees a satellite."""
+        tables = self.all(name, *fields)
+        if name == "GPS" and len(tables) > 1:
+            tables = (*(table for table in tables if not sees_nothing(table)), *tables)
+        return next(iter(tables), None)
 
     def sound_table(self, name: str, table: Table) -> Table | None:
         """A recorded table without the rows that cannot be; None where its source is dead."""

@@ -7,25 +7,32 @@ height.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from care_core.ecosystems.ardupilot.airborne import Airborne
+from care_core.ecosystems.ardupilot.instances import instances, sees_nothing
 from care_core.ecosystems.ardupilot.messages import expanded
+from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.base import Limits
 from care_core.ecosystems.coverage import Span
+from care_core.ecosystems.findings import FindingKind
 from care_core.ecosystems.liveness import (
     ASIDE,
+    ZERO,
     Frozen,
     Live,
     Motion,
+    Unconnected,
     is_part,
     least,
+    no_pack,
     numberless,
     overlaps,
     ranged,
     repeats,
+    says_nothing,
     turned,
 )
 from care_core.ecosystems.vehicles import flies
@@ -66,9 +73,16 @@ SOURCES = (
 )  # fmt: skip
 _FIX = 3
 _METRES = 111_319.5
+_ZEROS: Mapping[str, tuple[FindingKind, str, tuple[str, ...]]] = {
+    "MAG": ("compass", "compass", ("MagX", "MagY", "MagZ")),
+    "ARSP": ("barometer", "airspeed sensor", ("Airspeed",)),
+    "RFND": ("barometer", "range finder", ("Dist",)),
+}
+"""Sensors that read zero where they are not fitted."""
 READS: Wanted = merge_needs((
+    *({message: fields} for message, (_, _, fields) in _ZEROS.items()),
     *({source.message: source.fields} for source in SOURCES),
-    {"GPS": ("Alt", "Status"), "CTUN": ("Alt", "BAlt")},
+    {"GPS": ("Alt", "Status", "NSats"), "CTUN": ("Alt", "BAlt")},
 ))  # fmt: skip
 ATTITUDE = tuple(source for source in SOURCES if source.message == "ATT")
 
@@ -83,6 +97,8 @@ def frozen(flight: Airborne, moving: Sequence[Span], sources: Sequence[Live] = S
             continue  # servos and throttles stay where they are
         for number, table in enumerate(flight.all(source.message, source.fields[0]), start=1):
             fields = [field for field in source.fields if field in table.columns]
+            if source.message in _ZEROS and all(says_nothing(table[field]) for field in fields):
+                continue  # it is not connected
             own = _fixed(table) if source.message == "GPS" else table
             name = source.message if number == 1 else f"{source.message} {number}"
             if not source.is_optional:
@@ -97,6 +113,54 @@ def frozen(flight: Airborne, moving: Sequence[Span], sources: Sequence[Live] = S
                             told.append(one)
                             yield one
                         break
+
+
+def unconnected(flight: Airborne) -> Iterator[Unconnected]:
+    """Sources of a vehicle that was armed, or was to be, which say nothing from first to last."""
+    if not flight.armed and not flight.refusals:
+        return
+    yield from _no_packs(flight)
+    receivers = recorded_instances(flight, "GPS", "Status", "NSats")
+    for number, table in enumerate(receivers, start=1):
+        if sees_nothing(table):
+            name = "the GPS" if len(receivers) == 1 else f"GPS {number}"
+            why = f"no satellite and no fix in {len(table)} records"
+            yield Unconnected("gps", f"{name} sees no satellites", why, _named("GPS", number))
+    for message, (kind, noun, fields) in _ZEROS.items():
+        tables = recorded_instances(flight, message, *fields)
+        for number, table in enumerate(tables, start=1):
+            if all(says_nothing(table[field]) for field in fields if field in table.columns):
+                name = f"the {noun}" if len(tables) == 1 else f"{noun} {number}"
+                yield Unconnected(kind, f"{name} reads zero all along", ZERO, _named(message, number))
+
+
+def _no_packs(flight: Airborne) -> Iterator[Unconnected]:
+    """Monitors of batteries without a battery. Where none is set up, the firmware may record nothing of it."""
+    monitors = recorded_instances(flight, "BAT", "Volt")
+    for number, table in enumerate(monitors, start=1):
+        if why := no_pack_on(flight, table):
+            name = "no battery monitor" if number == 1 else f"no monitor of battery {number}"
+            yield Unconnected(
+                "battery", f"{name} is connected: {np.nanmax(table['Volt']):.1f} V", why, _named("BAT", number)
+            )
+    if not monitors and flight.setting("BATT_MONITOR") == 0:
+        why = "BATT_MONITOR is 0, and no voltage is recorded"
+        yield Unconnected("battery", "no battery monitor is set up", why, "BAT")
+
+
+def no_pack_on(flight: Airborne, battery: Table) -> str:
+    """Why no pack is connected to the monitor of a battery, in words; "" where one may be."""
+    return no_pack(battery["Volt"], battery["Volt"][during(flight.airborne if flight.is_copter else (), battery.t)])
+
+
+def recorded_instances(flight: Airborne, name: str, *fields: str) -> tuple[Table, ...]:
+    """The instances of a message with its first field as they were recorded, those that measure nothing among them."""
+    tables = flight.tables(expanded({name: fields}))
+    return tuple(table for table in instances(tables, name) if fields[0] in table.columns)
+
+
+def _named(message: str, number: int) -> str:
+    return message if number == 1 else f"{message} {number}"
 
 
 def _fixed(table: Table) -> Table:

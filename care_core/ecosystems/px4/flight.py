@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.ecosystems.base import RunModel
-from care_core.ecosystems.findings import Event
-from care_core.ecosystems.liveness import Frozen
+from care_core.ecosystems.findings import Event, FindingKind
+from care_core.ecosystems.liveness import Frozen, Unconnected
 from care_core.ecosystems.px4 import sources
 from care_core.ecosystems.px4.attitude import ATTITUDE, WANTED, Lean, lean_of
 from care_core.ecosystems.px4.attitude import READS as ATTITUDE_READS
@@ -188,6 +188,15 @@ class Px4Flight(RunModel):
     def frozen(self) -> tuple[Frozen, ...]:
         """Stretches in which a source only repeats itself while the vehicle moves."""
         return tuple(sources.frozen(self, self.aloft))
+
+    @cached_property
+    def unconnected(self) -> tuple[Unconnected, ...]:
+        """Sources that say nothing from first to last; none of a vehicle that never armed."""
+        return tuple(sources.unconnected(self, self.aloft if self.hovers else ())) if self.armed else ()
+
+    def has_no(self, kind: FindingKind | None) -> bool:
+        """Whether nothing is connected that the firmware could find failed."""
+        return any(one.kind == kind for one in self.unconnected)
 
     def repeats(self, channel: str) -> tuple[Span, ...]:
         return tuple(one.span for one in self.frozen if one.channel == channel)

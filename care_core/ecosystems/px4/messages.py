@@ -104,6 +104,7 @@ MESSAGES: Dictionary = {
         "baro_pressure_pa": Field("Pa", "air pressure"),
     }),
     "vehicle_magnetometer": Message(_along("magnetometer_ga", "Gauss", "magnetic field")),
+    "distance_sensor": Message({"current_distance": Field("m", "range")}),
     "airspeed": Message({"indicated_airspeed_m_s": Field("m/s", "indicated airspeed")}),
     "battery_status": Message({
         "voltage_v": Field("V", "battery voltage", plausible=_RATIO),

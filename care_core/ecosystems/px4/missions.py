@@ -36,6 +36,8 @@ _SOON_S = 1.0
 """What falls is disarmed as it hits the ground."""
 _BARELY_M = 0.5
 """Rise below which a vehicle never left the ground."""
+_HOVERS_S = 5.0
+"""A throttle-up on a bench is over sooner."""
 _CUT = Unavailable("the log ends before the vehicle disarmed", "record until it has disarmed")
 
 
@@ -132,15 +134,33 @@ def _is_in(span: Span, t: float) -> bool:
 
 
 def _took_off(flight: Px4Flight, span: Span) -> Value:
-    """1 where it rose, or, where no height is told, the land detector said so: that also speaks up on a bench."""
+    """1 where it rose, or, where no height is told, the land detector said so: that also speaks up on a bench. Under a
+    roof both say so: a low rise, and for longer than a throttle-up takes no ground."""
     heights = flight.heights(span)
     if heights is not None:
         rise_m = float(heights["height"].max())
+        if rise_m > _BARELY_M and _off_the_ground_s(flight, span) > _HOVERS_S:
+            return 1.0
         barely = f"it rose no higher than {rise_m:.1f} m" if rise_m > _BARELY_M else "it never left the ground"
         return 1.0 if rise_m > AIRBORNE_M else Unavailable(barely)
     if flight.during(LANDED, "landed", span) is None:
         return Unavailable("the log does not say when it was on the ground", f"record {LANDED}", LANDED)
     return 1.0 if flight.ever(LANDED, "landed", 0, span) else Unavailable("it never left the ground")
+
+
+def _off_the_ground_s(flight: Px4Flight, span: Span) -> float:
+    """For how long the land detector says at a stretch that it is in the air."""
+    table = flight.during(LANDED, "landed", span)
+    if table is None or not len(table):
+        return 0.0
+    up = np.append(table["landed"] == 0, False)
+    longest, since = 0.0, None
+    for t, is_up in zip([*table.t.tolist(), span[1]], up.tolist(), strict=True):
+        if is_up and since is None:
+            since = t
+        elif not is_up and since is not None:
+            longest, since = max(longest, t - since), None
+    return longest
 
 
 def _on_ground(flight: Px4Flight, span: Span, *, ended: bool) -> Value:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from care_core.ecosystems.base import Limits, RunModel
-from care_core.ecosystems.coverage import Span
+from care_core.ecosystems.coverage import Span, inside
+from care_core.ecosystems.findings import FindingKind
 from care_core.ecosystems.liveness import (
     ASIDE,
+    ZERO,
     Frozen,
     Live,
     Motion,
+    Unconnected,
     least,
+    no_pack,
     numberless,
     overlaps,
     ranged,
     repeats,
+    says_nothing,
     turned,
 )
 from care_core.logs.base import Table, Wanted, merge_needs
@@ -70,7 +75,21 @@ SOURCES = (
 _DEGREES = 1e7
 """Before 1.14 latitudes are integers of 1e-7 degrees."""
 _METRES = 111_319.5
-READS: Wanted = merge_needs({source.message: source.fields} for source in SOURCES)
+_BATTERY = "battery_status"
+_NO_FIX = 1.0
+"""fix_type of a receiver without a fix (SensorGps.msg)."""
+_ZEROS: Mapping[str, tuple[FindingKind, str, tuple[str, ...]]] = {
+    "vehicle_magnetometer": ("compass", "compass", _axes("magnetometer_ga")),
+    "airspeed": ("barometer", "airspeed sensor", ("indicated_airspeed_m_s",)),
+    "distance_sensor": ("barometer", "range finder", ("current_distance",)),
+}
+"""Sensors that read zero where they are not fitted."""
+READS: Wanted = merge_needs((
+    *({source.message: source.fields} for source in SOURCES),
+    *({topic: fields} for topic, (_, _, fields) in _ZEROS.items()),
+    *({topic: ("fix_type", "satellites_used")} for topic in _PLACES),
+    {_BATTERY: ("connected",)},
+))  # fmt: skip
 
 
 def frozen(model: RunModel, moving: Sequence[Span]) -> Iterator[Frozen]:
@@ -79,9 +98,9 @@ def frozen(model: RunModel, moving: Sequence[Span]) -> Iterator[Frozen]:
     for source in (one for one in SOURCES if one.message in tables):
         table = tables[source.message]
         fields = [field for field in source.fields if field in table.columns]
-        if not fields:
-            continue
         columns = [table[field] for field in fields]
+        if not fields or (source.message in _ZEROS and all(map(says_nothing, columns))) or _sees_nothing(table):
+            continue
         for span, count in () if source.is_optional else numberless(table.t, columns, source):
             if any(True for _ in overlaps(span, moving, source.seconds)):
                 yield Frozen(source, source.message, span, count, None)
@@ -91,6 +110,43 @@ def frozen(model: RunModel, moving: Sequence[Span]) -> Iterator[Frozen]:
                 if motion.reaches(source.moved):
                     yield Frozen(source, source.message, span, count, motion)
                     break
+
+
+def unconnected(model: RunModel, hovering: Sequence[Span]) -> Iterator[Unconnected]:
+    """Sources that say nothing from first to last.
+
+    Args:
+        hovering: when a multicopter flew; empty of what flies otherwise.
+    """
+    tables = {name: table for name, table in model.tables(READS).items() if len(table)}
+    if _holds(tables, _BATTERY, "voltage_v"):
+        yield from _no_pack(tables[_BATTERY], hovering)
+    receivers = [name for name in _PLACES if name in tables]
+    if receivers and all(_sees_nothing(tables[name]) for name in receivers):
+        why = f"no satellite and no fix in {len(tables[receivers[0]])} records"
+        yield Unconnected("gps", "the GPS sees no satellites", why, receivers[0])
+    for topic, (kind, noun, fields) in _ZEROS.items():
+        columns = (
+            [tables[topic][field] for field in fields if field in tables[topic].columns] if topic in tables else []
+        )
+        if columns and all(map(says_nothing, columns)):
+            yield Unconnected(kind, f"the {noun} reads zero all along", ZERO, topic)
+
+
+def _no_pack(battery: Table, hovering: Sequence[Span]) -> Iterator[Unconnected]:
+    volts = battery["voltage_v"]
+    why = no_pack(volts, volts[inside(hovering, battery.t)])
+    if not why and "connected" in battery.columns and not battery["connected"].any():
+        why = "the firmware finds none connected from first to last"
+    if why:
+        title = f"no battery monitor is connected: {np.nanmax(volts):.1f} V"
+        yield Unconnected("battery", title, why, _BATTERY)
+
+
+def _sees_nothing(receiver: Table) -> bool:
+    if not {"fix_type", "satellites_used"} <= receiver.columns.keys():
+        return False
+    return says_nothing(receiver["satellites_used"]) and says_nothing(receiver["fix_type"], _NO_FIX)
 
 
 def _motion(model: RunModel, span: Span, but: str) -> Motion:

@@ -64,6 +64,7 @@ def timeline(flight: Px4Flight, tables: Collection[Table]) -> tuple[Event, ...]:
         *_spoken(flight),
         *_battery(flight),
         *_gps(flight),
+        *_not_recorded(flight),
         *parameter_changes(log.settings(), flight.armed, "parameters"),
         *gaps(tables, flight.armed),
         *damage_of(log.damage),
@@ -181,6 +182,18 @@ def _gps(flight: Px4Flight) -> Iterator[Event]:
         lost = [t for t, fix in changes(table, "fix_type") if fix < _3D and flight.began_armed(t)]
         if lost:
             yield Event(lost[0], "gps", "GPS lost its 3D fix while armed", topic)
+
+
+def _not_recorded(flight: Px4Flight) -> Iterator[Event]:
+    """What nothing can be said of, of a flight that was armed."""
+    missing = []
+    if flight.table("battery_status", "voltage_v") is None:
+        missing.append("battery")
+    if all(flight.table(name, "fix_type") is None for name in ("vehicle_gps_position", "sensor_gps")):
+        missing.append("GPS")
+    if missing and flight.armed:
+        were = "were" if len(missing) > 1 else "was"
+        yield Event(flight.armed[0][0], "log", f"{' and '.join(missing)} {were} not recorded", "the log")
 
 
 def _ending(flight: Px4Flight) -> Iterator[Event]:

@@ -24,6 +24,7 @@ from care_core.ecosystems.ardupilot.statistics import (
 )
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
+from care_core.ecosystems.liveness import says_nothing
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median, quantile
 
@@ -68,13 +69,17 @@ _DOUBTED = LIMITS.add("probability where the estimator alone doubts it", 0.2, ""
 
 def find(flight: Flight) -> Iterator[Finding]:
     """What is wrong with the compasses while they matter: the first of these that shows."""
-    compasses = [table.where(flight.watch(table.t)) for table in flight.all("MAG", *AXES)]
     compasses = [
-        table
-        for n, table in enumerate(compasses, start=1)
-        if len(table) >= 3 and flight.setting("COMPASS_USE" if n == 1 else f"COMPASS_USE{n}") != 0
+        watched
+        for n, table in enumerate(flight.all("MAG", *AXES), start=1)
+        if len(watched := table.where(flight.watch(table.t))) >= 3
+        and flight.setting("COMPASS_USE" if n == 1 else f"COMPASS_USE{n}") != 0
+        and not all(says_nothing(table[axis]) for axis in AXES)
     ]
-    if not compasses or flight.setting("COMPASS_ENABLE", "MAG_ENABLE") == 0:
+    if flight.setting("COMPASS_ENABLE", "MAG_ENABLE") == 0:
+        return
+    if not compasses:
+        yield from _refused(flight, compasses)
         return
     for test in (_dead, _apart, _refused, _by_motors, _implausible):
         found = next(iter(test(flight, compasses)), None)

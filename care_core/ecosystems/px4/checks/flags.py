@@ -41,6 +41,10 @@ STATES = (
     State(_ESTIMATOR, "fs_bad_acc_clipping", "accelerometers clip", "vibration"),
 )
 """msg/VehicleStatus.msg, FailsafeFlags.msg, VehicleStatusFlags.msg (to 1.13) and EstimatorStatusFlags.msg."""
+_OF_PARTS = frozenset((
+    "battery_unhealthy", "battery_low_remaining_time", "condition_battery_healthy", "global_position_invalid",
+))  # fmt: skip
+"""What the vehicle says of a part also where none is connected."""
 _GOOD_WHEN_SET = frozenset(("condition_battery_healthy",))
 
 READS: Wanted = merge_needs({state.topic: (state.field,)} for state in STATES)
@@ -51,7 +55,7 @@ def episodes(flight: Px4Flight) -> Iterator[Episode]:
     """What was flagged while it was armed."""
     for state in STATES:
         table = flight.table(state.topic, state.field)
-        if table is not None:
+        if table is not None and not (state.field in _OF_PARTS and flight.has_no(state.kind)):
             bad = table[state.field] == (0 if state.field in _GOOD_WHEN_SET else 1)
             found = episode(flight, table, bad, state, f"{state.topic}.{state.field}")
             if found is not None:

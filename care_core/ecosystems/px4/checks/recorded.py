@@ -12,9 +12,11 @@ from care_core.ecosystems.px4.flight import Px4Flight
 
 
 def find(flight: Px4Flight) -> Iterator[Finding]:
-    """What froze, and what was recorded in part."""
+    """What froze, what was never connected, and what was recorded in part."""
     yield from liveness.findings(flight.frozen)
-    recorded = {topic: table.t for topic, table in flight.tables(sources.READS).items()}
+    yield from liveness.unconnected(flight.unconnected, flight.end_s)
+    topics = {source.message for source in sources.SOURCES}
+    recorded = {topic: table.t for topic, table in flight.tables(sources.READS).items() if topic in topics}
     yield from liveness.recorded_in_part(recorded, flight.armed)
 
 
