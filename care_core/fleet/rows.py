@@ -143,7 +143,8 @@ def row_of(log: str, diagnosis: Diagnosis, query: CounterfactualQuery | None = N
         start=run.log.start,
         duration_s=run.log.duration_s,
         sha256=run.log.sha256,
-        recording=run.log.identity,
+        # What its robot put its own number into is no copy of another robot's.
+        recording=f"{run.log.identity} {robot.id}" if robot is not None and robot.is_sure else run.log.identity,
         mission=run.mission.index,
         kind=clean(next((facts[name] for name in _SORTS if facts.get(name)), run.log.format)),
         firmware=clean(facts.get("firmware") or facts.get("distro") or ""),
