@@ -128,6 +128,15 @@ def test_an_impact_is_after_the_loss_of_control_and_what_follows_it_is_marked() 
     assert all(one.after_impact for one in made.find() if one.onset_s > flight.impact_s)
 
 
+@pytest.mark.parametrize(("reached_s", "is_lost"), [(FAILS_S - 5, True), (FAILS_S + 3, True), (FAILS_S + 20, False)])
+def test_what_reaches_a_waypoint_later_has_lost_no_control(reached_s: float, is_lost: bool) -> None:
+    made = Made()
+    swinging = made.after(FAILS_S)
+    made.table["ATT"]["Roll"][swinging] = 50.0 * np.sign(np.sin(8.0 * made.t[swinging]))
+    made.rows["MSG"].append((reached_s, {"Message": "Reached command #4"}))
+    assert (made.flight().lost_control_s is not None) == is_lost
+
+
 def test_what_climbs_on_after_a_low_pass_did_not_crash() -> None:
     made = Made()
     falling(made, -60.0, 40.0)

@@ -89,6 +89,13 @@ def test_an_attitude_that_freezes_has_lost_no_control() -> None:
     assert not [one for one in findings if one.kind == "attitude"]
 
 
+def test_a_height_that_reads_zero_in_flight_is_frozen_although_by_it_nothing_flies() -> None:
+    flight = made()
+    flight.table["POS"]["RelHomeAlt"][flight.after(30.0)] = 0.0
+    found = frozen(flight.find())
+    assert [(one.title, round(one.onset_s)) for one in found] == [("the estimated height is frozen", 30)]
+
+
 def test_a_barometer_that_freezes_on_the_way_down_is_named() -> None:
     flight = made()
     freeze(flight, "BARO", 85.0)

@@ -16,6 +16,7 @@ import numpy as np
 from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.recorded import UNKNOWN_MODE
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts, runs
+from care_core.ecosystems.ardupilot.texts import mission_item
 from care_core.ecosystems.coverage import inside
 from care_core.ecosystems.vehicles import flies
 from care_core.logs.base import Table, Wanted
@@ -171,6 +172,8 @@ class Airborne(Armed):
         back = runs(t, held, gap_s=0.5)
         height = self.height
         for start, end in runs(t, off & matters & self._is_driven(t)):
+            if self._reaches_after(start + _BACK_S):
+                continue
             fell_s = self._fell_from(start, height)
             until = start + _CRASH_CHECK_S if fell_s is None else fell_s
             stays = off[(t >= start) & (t <= until)].mean() > 0.6  # else it swings
@@ -182,6 +185,12 @@ class Airborne(Armed):
             if not flew_on and not any(b - max(a, end) > _BACK_S for a, b in back):
                 return start
         return None
+
+    def _reaches_after(self, time_s: float) -> bool:
+        """Whether it reached another waypoint after a time, before it was disarmed: that is steered."""
+        end_s = next((end for start, end in self.armed if start <= time_s <= end), time_s)
+        said = (mission_item(text) for t, text in self.messages if time_s < t <= end_s)
+        return any(item is not None and item[1] == "reached" for item in said)
 
     @cached_property
     def left_demand(self) -> tuple[float, ...]:

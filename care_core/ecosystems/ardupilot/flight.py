@@ -7,6 +7,7 @@ air and lost (`airborne`), and here what of it can be judged, with its batteries
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -33,6 +34,8 @@ _LEANS_DEG, _HELD_S = 15.0, 10.0
 gale holds such a lean still as well, but strikes nothing."""
 _STANDS_S, _WALKS_MS, _IDLES = 5.0, 1.5, 0.1
 """What stood for so long, no faster than a receiver's speed wanders, with less throttle than taxiing takes."""
+_LIFTS = 0.2
+"""Throttle that lifts a light copter, or holds it in a descent; on the ground it idles at half of it."""
 _REFUSED_S = 30.0
 """The firmware repeats its complaints at least as often (AP_Arming: every 30 s)."""
 _ERR_BATTERY = 6
@@ -104,7 +107,16 @@ class Flight(Airborne):
     @cached_property
     def frozen(self) -> tuple[Frozen, ...]:
         """Stretches in which a source only repeats itself while the vehicle moves."""
-        return tuple(sources.frozen(self, self.flown if self.is_copter else self.watched))
+        return tuple(sources.frozen(self, (*self.flown, *self._lifted) if self.is_copter else self.watched))
+
+    @property
+    def _lifted(self) -> Iterator[Span]:
+        """Spans before a copter was lost in which its motors lift: a height that died knows no flight."""
+        if self.throttle is None:
+            return
+        t, driven = self.throttle
+        for start, end in self.watched:
+            yield from runs(t, (driven > _LIFTS) & (t >= start) & (t <= end), gap_s=3.0)
 
     def repeats(self, channel: str) -> tuple[Span, ...]:
         return tuple(one.span for one in self.frozen if one.channel == channel)
