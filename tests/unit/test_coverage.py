@@ -301,3 +301,21 @@ def test_an_answer_may_have_come_while_nothing_was_recorded(tmp_path: Path) -> N
     everything = dict.fromkeys(("odom", "cmd_vel", "battery_state", "move_base/result"), hole)
     success = run(tmp_path, **everything)["mission_success"]
     assert success == Unavailable("the drive was recorded for 10 of 24 s", "record it from start to end")
+
+
+def test_energy_of_two_batteries_needs_the_whole_record_of_both() -> None:
+    def second(until_s: float) -> Callable[[dict[str, Table]], None]:
+        def change(tables: dict[str, Table]) -> None:
+            first = tables["BAT"]
+            other = first.where(first.t < until_s)
+            t = np.concatenate((first.t, other.t))
+            order = np.argsort(t, kind="stable")
+            columns = {name: np.concatenate((first[name], other[name]))[order] for name in first.columns}
+            columns["Inst"] = np.concatenate((np.zeros(len(first)), np.ones(len(other))))[order]
+            tables["BAT"] = Table(t[order], columns)
+
+        return change
+
+    energy = find_extractor("energy_used").compute
+    assert isinstance(energy(flown(second(1e9)), {}), float)
+    assert isinstance(energy(flown(second(40.0)), {}), Unavailable)

@@ -35,7 +35,12 @@ def _throughout(bears: Bears) -> RestsOn:
 
     def rests_on(mission: Mission, args: Args) -> Iterator[Samples]:
         span = span_of_phase(mission, args) if "phase" in args else whole(mission)
-        yield samples(mission, "BAT", ("Volt",), [] if isinstance(span, Unavailable) else [span], bears)
+        spans = [] if isinstance(span, Unavailable) else [span]
+        yield samples(mission, "BAT", ("Volt",), spans, bears)
+        table = mission.tables.get("BAT")
+        for other in () if table is None else split("BAT", table)[1:]:
+            if has(other, "Volt") and _has_voltage(other):  # what measures nothing is no battery
+                yield samples(mission, "BAT", ("Volt",), spans, bears, one=other)
 
     return rests_on
 

@@ -32,11 +32,11 @@ def whole(mission: Mission) -> Span:
 
 def samples(
     mission: Mission, channel: str, fields: Iterable[str], spans: Iterable[Span], bears: Bears,
-    moments: Iterable[float] = (),
+    moments: Iterable[float] = (), one: Table | None = None,
 ) -> Samples:  # fmt: skip
-    """The samples of a message's first instance that hold numbers in all of these fields."""
+    """The samples of a message's first instance, or of `one`, that hold numbers in all of these fields."""
     table = mission.tables.get(channel)
-    first = None if table is None else next(iter(split(channel, table)), table)
+    first = one if one is not None or table is None else next(iter(split(channel, table)), table)
     t = np.empty(0) if first is None else _told(first, fields)
     own = flight_of(mission).repeats(channel)
     dead, dead_name = (own, "") if own or channel != "POS" else (_misled(mission), named("GPS"))
