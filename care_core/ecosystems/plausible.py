@@ -26,6 +26,8 @@ ANY_FASTEST_HZ = 2_000.0
 """Of a message without an entry: robots publish odometry and lasers at up to some 100 Hz, joints at 1 kHz."""
 _PACE, _GPS_STEP_S = 1.2, 60.0
 """How far the log's clock may run from the satellites': in 24 logs of four firmwares they agree to 0.3 %."""
+_SET_S = 5.0
+"""A step of a clock by less costs no mission its time; most recorders stall for less."""
 APART, _STAMPED_S, _QUARTERS, _MOSTLY = 1.25, 10.0, 4, 0.9
 """By what factor stamps that a robot makes may run from the recording's clock, over so many seconds. A real clock is
 right to 0.01 %; one that was set is off in one quarter of the time, one that runs wrong in each."""
@@ -87,6 +89,8 @@ def clock_doubt(dictionary: Dictionary, tables: Mapping[str, Table], start_s: fl
         stands = _longest_stand(inside) if known.moving else 0
         if stands >= _ENOUGH:
             return f"the log's clock stands still: {stands} {name} messages in a row have the same time"
+    if why := _was_set(dictionary, tables, start_s, end_s):
+        return why
     pace = _satellites_pace(dictionary, tables.get("GPS"), start_s, end_s)
     if not 1 / _PACE < pace < _PACE:
         return f"the log's clock goes wrong: by the satellites' time {pace:.3g} s pass in each of its seconds"
@@ -95,17 +99,52 @@ def clock_doubt(dictionary: Dictionary, tables: Mapping[str, Table], start_s: fl
 
 def _satellites_pace(dictionary: Dictionary, gps: Table | None, start_s: float, end_s: float) -> float:
     """Seconds by the satellites' time (`GMS`, ms of the week) in one of the log's; 1 where nothing tells."""
-    if gps is None or "GMS" not in gps.columns:
-        return 1.0
-    inside = gps.between(start_s, end_s)
-    known = dictionary.get("GPS", _ANY)
-    first = inside.where(_instances(known, inside)[0]) if len(inside) else inside
-    timed = first.where(first["GMS"] > 0)
-    true_s, said_s = np.diff(timed["GMS"]) / 1e3, np.diff(timed.t)
+    said, true = _satellites(dictionary, gps, start_s, end_s)
+    true_s, said_s = np.diff(true), np.diff(said)
     steady = (true_s > 0) & (true_s < _GPS_STEP_S)  # a new week, a receiver that found the time
     if steady.sum() < _ENOUGH or said_s[steady].sum() <= 0:
         return 1.0
     return float(true_s[steady].sum() / said_s[steady].sum())
+
+
+def _satellites(dictionary: Dictionary, gps: Table | None, start_s: float, end_s: float) -> tuple[Floats, Floats]:
+    """The log's time and the satellites' time of the first receiver, in s, both of shape (n,)."""
+    if gps is None or "GMS" not in gps.columns:
+        return np.empty(0), np.empty(0)
+    inside = gps.between(start_s, end_s)
+    first = inside.where(_instances(dictionary.get("GPS", _ANY), inside)[0]) if len(inside) else inside
+    timed = first.where(first["GMS"] > 0)
+    return timed.t, timed["GMS"] / 1e3
+
+
+def _was_set(dictionary: Dictionary, tables: Mapping[str, Table], start_s: float, end_s: float) -> str:
+    """Where the log's clock was set forward under way, as all that have their own say; "" where it was not."""
+    stamped = (table.between(start_s, end_s) for table in tables.values() if STAMP in table.columns)
+    clocks = [(one.t, one[STAMP]) for one in stamped if not is_simulated(one.t, one[STAMP])]
+    steps = [
+        set_forward(said, own)
+        for said, own in (_satellites(dictionary, tables.get("GPS"), start_s, end_s), *clocks)
+        if len(said) >= 2 * _ENOUGH
+    ]
+    if not steps or None in steps:
+        return ""
+    at_s, by_s = min(one for one in steps if one is not None)
+    return f"the log's clock was set forward by {by_s:.0f} s at {at_s:.1f} s, so no time across that is known"
+
+
+def set_forward(said: Floats, own: Floats) -> tuple[float, float] | None:
+    """When a clock, `said`, was set forward and by how much, as another, `own`, tells; both of shape (n,), in s.
+
+    What was held up on its way comes late as well, but not all that follows it.
+    """
+    known = np.isfinite(said) & np.isfinite(own)
+    said, own = said[known], own[known]
+    went, passed = np.diff(said), np.diff(own)
+    for row in np.flatnonzero((went > _SET_S) & (passed >= 0) & (went - passed > _SET_S)).tolist():
+        before, after = (said - own)[max(row + 1 - _ENOUGH, 0) : row + 1], (said - own)[row + 1 :]
+        if min(len(before), len(after)) >= _ENOUGH and (by_s := float(after.min() - median(before))) > _SET_S:
+            return float(said[row]), by_s
+    return None
 
 
 def _stamps_doubt(tables: Mapping[str, Table], start_s: float, end_s: float) -> str:

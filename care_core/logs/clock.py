@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from care_core.numbers import median
 from care_core.records import Record, Struct
 from care_core.run import Damage
 
@@ -48,21 +49,49 @@ class Clock(Record, eq=False):
         return stamps_s - shifts[np.searchsorted(self.places, places, side="right")] - self.first_s
 
 
-def find_clock(stamps_s: Floats, places: Offsets) -> tuple[Clock, NDArray[np.bool_], list[Damage]]:
+class OwnClock(Record, eq=False):
+    """What records say by a clock of the robot itself, beside the stamps of who recorded them: a step that this one did
+    not make is no pause, the recorder's clock was set."""
+
+    places: Offsets
+    """The bytes of the records that say it, shape (k,), ascending."""
+    seconds: Floats
+    stamps_s: Floats
+    """When the recorder got them, by its clock."""
+
+    def set_s(self, place: int) -> float:
+        """By how much the recorder's clock was set forward at a byte; 0 where this one started again or stood still.
+        What was held up on its way comes late as well, but not all that follows it."""
+        row = int(np.searchsorted(self.places, place))
+        before = slice(max(row - _STEADY, 0), row)
+        if not 0 < row < len(self.places) or np.ptp(self.seconds[before]) == 0:
+            return 0.0
+        if self.seconds[row] < self.seconds[row - 1] - BACK_S:
+            return 0.0
+        late_s = self.stamps_s - self.seconds
+        return float(late_s[row:].min() - median(late_s[before]))
+
+
+def find_clock(
+    stamps_s: Floats, places: Offsets, own: OwnClock | None = None
+) -> tuple[Clock, NDArray[np.bool_], list[Damage]]:
     """The clock of a log, the records whose stamp is impossible (a mask), and where the clock jumped.
 
     Args:
         stamps_s: shape (n,), the stamps in seconds, in the order of the file.
         places: shape (n,), the byte at which each record begins.
+        own: what tells a pause from a clock that was set forward.
     """
-    clock, spans, jumps = clock_of([(stamps_s, places)])
+    clock, spans, jumps = clock_of([(stamps_s, places)], own)
     impossible = ~np.isfinite(stamps_s)
     for first, last in spans:
         impossible[np.searchsorted(places, first) : np.searchsorted(places, last, side="right")] = True
     return clock, impossible, jumps
 
 
-def clock_of(pieces: Iterable[tuple[Floats, Offsets]]) -> tuple[Clock, list[tuple[int, int]], list[Damage]]:
+def clock_of(
+    pieces: Iterable[tuple[Floats, Offsets]], own: OwnClock | None = None
+) -> tuple[Clock, list[tuple[int, int]], list[Damage]]:
     """As `find_clock`, of stamps that come piece by piece, as a large log is read: none is held. In place of a mask the
     bytes of the first and last of records in a row whose stamps are impossible."""
     runs, spans = _runs(pieces)
@@ -78,8 +107,7 @@ def clock_of(pieces: Iterable[tuple[Floats, Offsets]]) -> tuple[Clock, list[tupl
             if not _fits(begins, ends, now, following - shift):
                 spans.append((run.first, run.last))
                 continue
-        elif now > -np.inf and not -BACK_S <= begins - now <= PAUSE_S:
-            jump_s = begins - now
+        elif now > -np.inf and (jump_s := _jump(begins - now, run.first, own)):
             what = f"the clock of the log jumps by {jump_s:+.0f} s"
             jumps.append(Damage(what, run.first, now - first_s, is_jump=True))
             shift += jump_s
@@ -90,6 +118,15 @@ def clock_of(pieces: Iterable[tuple[Floats, Offsets]]) -> tuple[Clock, list[tupl
     changes = np.array([place for place, _ in shifts], dtype=np.int64)
     clock = Clock(first_s, now, changes, np.array([amount for _, amount in shifts]))
     return clock, sorted(spans), jumps
+
+
+def _jump(step_s: float, place: int, own: OwnClock | None) -> float:
+    """By how much a clock was set at a record that is stamped so much later than what was written before; 0 where it
+    went on."""
+    if not -BACK_S <= step_s <= PAUSE_S:
+        return step_s
+    set_s = 0.0 if own is None or step_s <= STEP_S else own.set_s(place)
+    return set_s if set_s > STEP_S else 0.0
 
 
 class _Run(Struct, eq=False):

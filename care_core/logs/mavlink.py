@@ -22,7 +22,7 @@ from care_core.errors import LogError
 from care_core.logs import formats, shared_id
 from care_core.logs.ardupilot import Built, facts_of, history, shortest
 from care_core.logs.base import Channel, Table, Wanted
-from care_core.logs.clock import find_clock
+from care_core.logs.clock import OwnClock, find_clock
 from care_core.logs.damage import summarised
 from care_core.logs.file_windows import FileArray
 from care_core.logs.formats import is_raw_mavlink
@@ -33,6 +33,7 @@ from care_core.logs.mavlink_packets import (
     Message,
     Offsets,
     Packets,
+    boot_clock,
     decode,
     definitions,
     find_packets,
@@ -91,7 +92,10 @@ class MavlinkLog:
         if not len(packets):
             raise LogError("The log holds no sound MAVLink packet.", hint="Copy it again.", where=str(path))
         seconds = stamps(data, packets.start)
-        self._clock, impossible, jumps = find_clock(seconds, packets.start)
+        rows, own = boot_clock(data, packets)
+        self._clock, impossible, jumps = find_clock(
+            seconds, packets.start, OwnClock(packets.start[rows], own, seconds[rows])
+        )
         self._first_stamp_s = float(seconds[~impossible][0])
         lost = [Damage("a packet's time is impossible", byte) for byte in packets.start[impossible].tolist()]
         unknown, broken = self._between(data, packets)

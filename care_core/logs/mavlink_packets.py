@@ -119,6 +119,17 @@ def stamped(data: FileArray) -> bytes | None:
 
 def _boot_times(data: FileArray, packets: Packets) -> NDArray[np.float64] | None:
     """When each packet was sent, seconds since the vehicle started; None where none says so."""
+    rows, own = boot_clock(data, packets)
+    if not len(rows):
+        return None
+    restarts = np.append(0.0, np.maximum(own[:-1] - own[1:], 0.0))
+    own = np.maximum.accumulate(own + np.cumsum(np.where(restarts > _RESTART_S, restarts, 0.0)))
+    return np.asarray(np.interp(np.arange(len(packets)), rows, own), np.float64)
+
+
+def boot_clock(data: FileArray, packets: Packets) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Which packets of the sender who does most often say how long ago it was started, and what they say, in s; shapes
+    (k,), both empty where nobody does."""
     known = np.full(len(packets), np.nan)
     senders = packets.system.astype(np.int32) << 8 | packets.component
     for number in np.unique(packets.id).tolist():
@@ -128,13 +139,10 @@ def _boot_times(data: FileArray, packets: Packets) -> NDArray[np.float64] | None
             known[rows] = decode(data, packets.start[rows], field) / 1e3
     timed = np.isfinite(known) & (known > 0)
     if not timed.any():
-        return None
+        return np.empty(0, np.intp), np.empty(0)
     speakers, counts = np.unique(senders[timed], return_counts=True)
     rows = np.flatnonzero(timed & (senders == speakers[counts.argmax()]))
-    own = known[rows]
-    restarts = np.append(0.0, np.maximum(own[:-1] - own[1:], 0.0))
-    own = np.maximum.accumulate(own + np.cumsum(np.where(restarts > _RESTART_S, restarts, 0.0)))
-    return np.asarray(np.interp(np.arange(len(packets)), rows, own), np.float64)
+    return rows, known[rows]
 
 
 def _sound(data: FileArray, candidates: Sequence[Offsets], stamp_bytes: int) -> Packets:

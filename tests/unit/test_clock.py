@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from care_core.logs.clock import clock_of, find_clock
+from care_core.logs.clock import OwnClock, clock_of, find_clock
 
 
 def places(n: int) -> NDArray[np.int64]:
@@ -47,6 +47,28 @@ def test_a_restarted_clock_goes_on() -> None:
     assert not impossible.any()
     assert [(one.what, one.byte) for one in jumps] == [("the clock of the log jumps by -59 s", 2000)]
     assert (np.diff(clock.seconds(stamps, places(100))) >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("went_s", "jumps"),
+    [
+        (1.0, ["the clock of the log jumps by +3550 s"]),  # it was set
+        (3551.0, []),  # nothing was recorded
+        (-20.0, []),  # the robot was started again: nobody knows
+    ],
+)
+def test_a_step_forward_is_a_pause_where_the_robots_own_clock_made_it(went_s: float, jumps: list[str]) -> None:
+    stamps = np.concatenate((seconds(50), seconds(50, 3600)))
+    own = np.concatenate((seconds(50, 7), seconds(50, 56 + went_s)))
+    clock, _, found = find_clock(stamps, places(100), OwnClock(places(100), own, stamps))
+    assert [one.what for one in found] == jumps
+    assert clock.duration_s == (99.0 if jumps else 3649.0)
+
+
+def test_what_a_link_held_up_and_sent_at_once_sets_no_clock() -> None:
+    stamps = np.concatenate((seconds(30), np.full(30, 60.0), seconds(40, 60)))
+    _, _, jumps = find_clock(stamps, places(100), OwnClock(places(100), seconds(100, 7), stamps))
+    assert jumps == []
 
 
 def test_a_pause_of_an_hour_is_no_damage_and_a_jump_of_years_is() -> None:

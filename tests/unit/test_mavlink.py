@@ -298,6 +298,34 @@ def test_two_vehicles_under_one_system_id_are_told_and_neither_is_judged(tmp_pat
     assert "two vehicles speak under one system id" in {f.title for f in examine(run_model(open_log(both))).findings}
 
 
+@pytest.mark.parametrize("step_s", [3600.0, 40.0, -40.0])
+def test_a_station_whose_clock_was_set_in_flight_is_told_and_costs_no_time(tmp_path: Path, step_s: float) -> None:
+    good = Path(__file__).parents[1] / "data" / "arducopter_good.BIN"
+    raw = bytearray(write_tlog(tmp_path / "one.tlog", good, np.random.default_rng(0)).read_bytes())
+    whole = open_log(tmp_path / "one.tlog")
+    places = find_packets(FileArray.open(tmp_path / "one.tlog")).start.tolist()
+    for place in places[len(places) // 2 :]:
+        stamp = struct.unpack_from(">Q", raw, place)[0] + int(step_s * 1e6)
+        struct.pack_into(">Q", raw, place, stamp)
+    (tmp_path / "set.tlog").write_bytes(raw)
+    log = open_log(tmp_path / "set.tlog")
+    assert [one.what for one in log.damage if one.is_jump] == [f"the clock of the log jumps by {step_s:+.0f} s"]
+    assert log.duration_s == pytest.approx(whole.duration_s, abs=1.0)
+    assert not [one for one in whole.damage if one.is_jump]
+
+
+def test_a_link_that_is_silent_for_a_while_is_no_clock_that_was_set(tmp_path: Path) -> None:
+    good = Path(__file__).parents[1] / "data" / "arducopter_good.BIN"
+    one = write_tlog(tmp_path / "one.tlog", good, np.random.default_rng(0))
+    packets, raw, whole = find_packets(FileArray.open(one)), one.read_bytes(), open_log(one)
+    bounds = list(zip(packets.start.tolist(), packets.end.tolist(), strict=True))
+    kept = bounds[: len(bounds) // 3] + bounds[len(bounds) // 2 :]
+    (tmp_path / "gap.tlog").write_bytes(b"".join(raw[start:end] for start, end in kept))
+    log = open_log(tmp_path / "gap.tlog")
+    assert not log.damage
+    assert log.duration_s == pytest.approx(whole.duration_s)
+
+
 def _booted(packet: bytes, later_s: float) -> bytes:
     """A stamped packet of a vehicle that was started so much later; the packet itself where it tells no clock."""
     (message,) = mavlink.MAVLink(None).parse_buffer(packet[8:]) or [None]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from care_core.ecosystems.ardupilot.messages import MESSAGES
-from care_core.ecosystems.plausible import clock_doubt, sound
+from care_core.ecosystems.plausible import Floats, clock_doubt, set_forward, sound
 from care_core.logs.base import Table
 
 
@@ -67,6 +68,40 @@ def test_stamps_tell_a_recording_whose_clock_runs_wrong() -> None:
     )  # a simulation's own time
     was_set = {"/odom": Table(t, {"header.stamp": t + 100 * (t > 20)})}
     assert clock_doubt(MESSAGES, was_set, 0, 60) == ""
+
+
+T = np.arange(0.0, 60.0, 0.5)
+SET = T + 40 * (T > 20)
+"""The times of a log whose clock was set forward by 40 s under way."""
+
+
+def satellites(t: Floats, true_s: Floats) -> dict[str, Table]:
+    return {"GPS": Table(t, {"GMS": 3e8 + 1e3 * true_s, "I": np.zeros(len(t))})}
+
+
+def test_a_clock_that_was_set_forward_under_way_is_told_with_its_step() -> None:
+    says = "the log's clock was set forward by 40 s at 20.0 s, so no time across that is known"
+    assert clock_doubt(MESSAGES, satellites(SET, T), 0, 100) == says
+    assert clock_doubt(MESSAGES, {name: Table(SET, {"header.stamp": T}) for name in ("/odom", "/scan")}, 0, 100) == says
+    assert clock_doubt(MESSAGES, satellites(SET, T), 30, 100) == ""  # before this run
+
+
+@pytest.mark.parametrize(
+    ("t", "own"),
+    [
+        (SET, SET),  # nothing was recorded for so long
+        (np.where((T > 20) & (T < 40), 40.0, T), T),  # what was held up comes in one burst
+        (T, np.where(T > 20, T - 3, T)),  # a receiver found the leap seconds
+        (np.delete(T, range(42, 60)), np.delete(T, range(42, 60))),
+    ],
+)
+def test_a_pause_or_what_was_held_up_is_no_clock_that_was_set(t: Floats, own: Floats) -> None:
+    assert set_forward(t, own) is None
+
+
+def test_one_topic_that_was_held_up_to_the_end_sets_no_clock() -> None:
+    topics = {"/odom": Table(SET, {"header.stamp": T}), "/scan": Table(SET, {"header.stamp": SET})}
+    assert clock_doubt(MESSAGES, topics, 0, 100) == ""
 
 
 def test_what_a_vehicle_writes_at_once_says_nothing_of_its_clock() -> None:
