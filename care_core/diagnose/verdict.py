@@ -133,6 +133,8 @@ class Verdict(Record):
     reasons: tuple[Reason, ...]
     """What explains the failure, the likeliest first."""
     next_step: str
+    others: str = ""
+    """Which other missions of the log failed, empty where none did."""
 
     @property
     def word(self) -> str:
@@ -159,8 +161,8 @@ class Verdict(Record):
     @property
     def lines(self) -> tuple[str, ...]:
         """The verdict as every report begins."""
-        lines = (self.headline, str(self.advice), f"Next: {self.next_step}" if self.next_step else "", self.fit)
-        return tuple(filter(None, lines))
+        next_step = f"Next: {self.next_step}" if self.next_step else ""
+        return tuple(filter(None, (self.headline, self.others, str(self.advice), next_step, self.fit)))
 
     @property
     def in_short(self) -> str:
@@ -177,6 +179,8 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
     """The verdict of a diagnosis."""
     fit, objectives, findings = diagnosis.profile.fit, diagnosis.objectives, diagnosis.health.findings
     status = status_of({one.status for one in objectives}, {one.severity for one in findings}, fit.verdict)
+    own = diagnosis.run.mission.index
+    missions = diagnosis.missions
     return compose(
         diagnosis.profile.title,
         fit,
@@ -185,6 +189,7 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
         diagnosis.hypotheses,
         _advice(diagnosis),
         next_step(diagnosis, has_failed=status == "fault"),
+        [(m.mission.index, m.reason) for m in missions if m.status == "fault" and m.mission.index != own],
     )
 
 
@@ -212,8 +217,10 @@ def compose(
     hypotheses: Sequence[Hypothesis],
     advice: Advice,
     next_step: str,
+    others: Sequence[tuple[int, str]] = (),
 ) -> Verdict:
-    """The verdict out of what was judged and found; `profile` is empty where none fits."""
+    """The verdict out of what was judged and found; `profile` is empty where none fits. `others`: number and reason of
+    the other missions of the log that failed."""
     status = status_of({one.status for one in objectives}, {one.severity for one in findings}, fit.verdict)
     return Verdict(
         fit=clean(fit_line(profile, fit)),
@@ -222,7 +229,17 @@ def compose(
         advice=advice,
         reasons=tuple(_reason(one, findings) for one in hypotheses),
         next_step=clean(next_step),
+        others=clean(_others(others)),
     )
+
+
+def _others(failed: Sequence[tuple[int, str]]) -> str:
+    """That a good mission which was flown last hides none that failed."""
+    if not failed:
+        return ""
+    named = ", ".join(f"mission {index} ({reason})" for index, reason in failed[:MOST_FINDINGS])
+    more = f" and {len(failed) - MOST_FINDINGS} more" if len(failed) > MOST_FINDINGS else ""
+    return f"In the same log: FAULT in {named}{more}; look at it with --mission {failed[0][0]}"
 
 
 def _reason(one: Hypothesis, findings: Sequence[SeenFinding]) -> Reason:

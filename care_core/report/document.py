@@ -358,6 +358,7 @@ def remembered_verdict(document: TriageDocument) -> Verdict:
         document.hypotheses,
         _advice(document),
         document.next_step,
+        [(one.index, one.reason) for one in document.missions if one.status == "fault" and not one.judged],
     )
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import care_core
 from care_core.application.case import Case
-from care_core.diagnose.records import ObjectiveResult
+from care_core.diagnose.records import MissionVerdict, ObjectiveResult
 from care_core.diagnose.verdict import STATUS_WORDS, Advice, Verdict, compose, exit_code, verdict_of
 from care_core.ecosystems.findings import Finding
 from care_core.errors import ExitCode, UsageError
@@ -161,3 +161,15 @@ def test_a_change_whose_odds_were_not_measured_says_so() -> None:
     again = remembered_verdict(document_of(json.loads(to_json(document))))
     assert str(again.advice) == str(verdict_of(shown).advice)
     assert "odds not measured" in flat(to_text(shown))
+
+
+def test_a_good_mission_that_was_flown_last_hides_none_that_failed() -> None:
+    good = replace(made_diagnosis(), objectives=(), faults=(), fix=None)
+    failed = MissionVerdict(replace(good.run.mission, index=2, count=2), "fault", "success")
+    fine = replace(failed, status="ok", reason="")
+    verdict = verdict_of(replace(good, missions=(fine, failed)))
+    assert verdict.others == "In the same log: FAULT in mission 2 (success); look at it with --mission 2"
+    assert verdict.lines[1] == verdict.others
+    assert verdict_of(replace(good, missions=(fine, replace(failed, mission=good.run.mission)))).others == ""
+    document = build_document(replace(good, missions=(fine, failed)))
+    assert remembered_verdict(document).others == verdict.others
