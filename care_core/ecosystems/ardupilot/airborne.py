@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot import sources
 from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.recorded import UNKNOWN_MODE
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during, parts, runs
@@ -145,10 +146,13 @@ class Airborne(Armed):
         living = table.where(~inside(dead, table.t))
         return living if len(living) else None
 
+    @property
+    def hovering(self) -> tuple[Span, ...]:
+        """When motors held it in the air: of wings nobody knows."""
+        return self.airborne if self.is_copter else ()
+
     @cached_property
     def _dead_attitude(self) -> tuple[Span, ...]:
-        from care_core.ecosystems.ardupilot import sources  # which asks this model what else moved
-
         return tuple(one.span for one in sources.frozen(self, self.airborne, sources.ATTITUDE))
 
     @cached_property

@@ -125,7 +125,9 @@ class Flight(Airborne):
     def batteries(self) -> tuple[Battery, ...]:
         """The batteries whose voltage is measured."""
         monitors = enumerate(self.all("BAT", "Volt"), start=1)
-        return tuple(Battery.of(self, number, one) for number, one in monitors if not sources.no_pack_on(self, one))
+        return tuple(
+            Battery.of(self, number, one) for number, one in monitors if not sources.no_pack_on(one, self.hovering)
+        )
 
     @cached_property
     def battery_failsafe_s(self) -> float | None:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.airborne import Airborne
+from care_core.ecosystems.ardupilot.armed import Armed
 from care_core.ecosystems.ardupilot.instances import instances, sees_nothing
 from care_core.ecosystems.ardupilot.messages import expanded
 from care_core.ecosystems.ardupilot.spans import during
@@ -87,7 +87,7 @@ READS: Wanted = merge_needs((
 ATTITUDE = tuple(source for source in SOURCES if source.message == "ATT")
 
 
-def frozen(flight: Airborne, moving: Sequence[Span], sources: Sequence[Live] = SOURCES) -> Iterator[Frozen]:
+def frozen(flight: Armed, moving: Sequence[Span], sources: Sequence[Live] = SOURCES) -> Iterator[Frozen]:
     """Every stretch in which a source says the same while others tell that the vehicle moved, in spans in which it
     does: what stands on the ground moves by its estimate alone."""
     flight.tables(expanded(READS if sources is SOURCES else {source.message: source.fields for source in sources}))
@@ -115,11 +115,15 @@ def frozen(flight: Airborne, moving: Sequence[Span], sources: Sequence[Live] = S
                         break
 
 
-def unconnected(flight: Airborne) -> Iterator[Unconnected]:
-    """Sources of a vehicle that was armed, or was to be, which say nothing from first to last."""
+def unconnected(flight: Armed, hovering: Sequence[Span]) -> Iterator[Unconnected]:
+    """Sources of a vehicle that was armed, or was to be, which say nothing from first to last.
+
+    Args:
+        hovering: when motors held it in the air.
+    """
     if not flight.armed and not flight.refusals:
         return
-    yield from _no_packs(flight)
+    yield from _no_packs(flight, hovering)
     receivers = recorded_instances(flight, "GPS", "Status", "NSats")
     for number, table in enumerate(receivers, start=1):
         if sees_nothing(table):
@@ -134,11 +138,11 @@ def unconnected(flight: Airborne) -> Iterator[Unconnected]:
                 yield Unconnected(kind, f"{name} reads zero all along", ZERO, _named(message, number))
 
 
-def _no_packs(flight: Airborne) -> Iterator[Unconnected]:
+def _no_packs(flight: Armed, hovering: Sequence[Span]) -> Iterator[Unconnected]:
     """Monitors of batteries without a battery. Where none is set up, the firmware may record nothing of it."""
     monitors = recorded_instances(flight, "BAT", "Volt")
     for number, table in enumerate(monitors, start=1):
-        if why := no_pack_on(flight, table):
+        if why := no_pack_on(table, hovering):
             name = "no battery monitor" if number == 1 else f"no monitor of battery {number}"
             yield Unconnected(
                 "battery", f"{name} is connected: {np.nanmax(table['Volt']):.1f} V", why, _named("BAT", number)
@@ -148,12 +152,12 @@ def _no_packs(flight: Airborne) -> Iterator[Unconnected]:
         yield Unconnected("battery", "no battery monitor is set up", why, "BAT")
 
 
-def no_pack_on(flight: Airborne, battery: Table) -> str:
+def no_pack_on(battery: Table, hovering: Sequence[Span]) -> str:
     """Why no pack is connected to the monitor of a battery, in words; "" where one may be."""
-    return no_pack(battery["Volt"], battery["Volt"][during(flight.airborne if flight.is_copter else (), battery.t)])
+    return no_pack(battery["Volt"], battery["Volt"][during(hovering, battery.t)])
 
 
-def recorded_instances(flight: Airborne, name: str, *fields: str) -> tuple[Table, ...]:
+def recorded_instances(flight: Armed, name: str, *fields: str) -> tuple[Table, ...]:
     """The instances of a message with its first field as they were recorded, those that measure nothing among them."""
     tables = flight.tables(expanded({name: fields}))
     return tuple(table for table in instances(tables, name) if fields[0] in table.columns)
@@ -169,7 +173,7 @@ def _fixed(table: Table) -> Table:
     return table.where(fixed & (table["Status"] >= _FIX) if "Status" in table.columns else fixed)
 
 
-def motion_of(flight: Airborne, span: Span, but: str) -> Motion:
+def motion_of(flight: Armed, span: Span, but: str) -> Motion:
     """How far the vehicle came in a span, by any source but that of one message."""
 
     def told(name: str, *fields: str) -> Table | None:

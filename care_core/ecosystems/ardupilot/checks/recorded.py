@@ -15,7 +15,7 @@ from care_core.ecosystems.findings import Finding
 def find(flight: Flight) -> Iterator[Finding]:
     """What froze, what was never connected, and what was recorded in part."""
     yield from liveness.findings(flight.frozen)
-    yield from liveness.unconnected(sources.unconnected(flight), flight.end_s)
+    yield from liveness.unconnected(sources.unconnected(flight, flight.hovering), flight.end_s)
     messages = dict.fromkeys(source.message for source in sources.SOURCES)
     recorded = {named(name): table.t for name in messages if (table := flight.one(name)) is not None}
     yield from liveness.recorded_in_part(recorded, flight.armed)

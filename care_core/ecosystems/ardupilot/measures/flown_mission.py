@@ -176,7 +176,7 @@ def analyse(mission: Mission) -> FlownMission:
     route = np.array([_offset(home, w.lat, w.lng) for w in waypoints]) if home and waypoints else np.empty((0, 2))
     corners, end = _way(mission.shared(requested_mission))
     places = dict(zip(numbers, route, strict=True)) if len(route) else {}
-    passed = _passed(mission, track, places, started, reached)
+    passed = _passed(mission, track, places, started, reached, lands=drive is None)
     return FlownMission(
         waypoints=waypoints,
         route=route.astype(np.float64),
@@ -194,12 +194,12 @@ def analyse(mission: Mission) -> FlownMission:
 
 def _passed(
     mission: Mission, track: Track | None, places: Mapping[int, Floats], started: Mapping[int, float],
-    reached: Mapping[int, float],
+    reached: Mapping[int, float], *, lands: bool,
 ) -> dict[int, bool | None]:  # fmt: skip
     """Of each waypoint that was not said to be reached, whether the vehicle went on from it after it had passed there;
     None where it went on and nothing tells where it was."""
     told = [*started.items(), *((number + 0.5, t) for number, t in reached.items())]
-    if track is not None and track.height.max() > AIRBORNE_M and _ends_by_itself(mission):
+    if lands and track is not None and track.height.max() > AIRBORNE_M and _ends_by_itself(mission):
         told.append((math.inf, mission.end_s))
     found: dict[int, bool | None] = {}
     for number, place in places.items():
