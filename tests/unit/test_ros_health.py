@@ -18,7 +18,7 @@ from care_core.ecosystems.ros.checks import odometry
 from care_core.ecosystems.ros.checks.messages import gist
 from care_core.logs.opening import open_log
 from care_core.logs.ros_log import RosLog
-from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SUCCEEDED, Drive
+from tests.ros_drives import ABORTED, BATTERY, FAILS_AT_S, ODOMETRY, SCAN, SUCCEEDED, Drive
 from tests.ros_samples import (
     ROS2,
     SECOND_NS,
@@ -136,6 +136,18 @@ def test_what_was_survived_is_no_more_than_a_warning(tmp_path: Path) -> None:
     lost = looked_at(Drive("laser dead", ABORTED), tmp_path)
     assert [one.severity for one in survived.findings] == ["warning"]
     assert lost.findings[0].severity == "critical"
+
+
+def test_a_laser_of_which_few_scans_came_before_it_died_is_told(tmp_path: Path) -> None:
+    class Thinned(Drive):
+        def messages(self) -> Iterator[tuple[str, str, float, Any]]:
+            everything = list(super().messages())
+            scans = [one for one in everything if one[1] == SCAN and one[2] >= FAILS_AT_S - 6]
+            yield from (one for one in everything if one[1] != SCAN)
+            yield from scans[:: len(scans) // 6]
+
+    titles = [one.title for one in looked_at(Thinned("laser dead"), tmp_path).findings]
+    assert titles[0] == "the laser falls silent: /front/scan ends"
 
 
 def test_consequences_fold_under_their_cause(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from care_core.ecosystems.ros.messages import (
     ACTION_GOAL,
     ACTION_RESULT,
     BATTERY,
+    CLOUD,
     DIAGNOSTICS,
     FRAME,
     LOCALISED,
@@ -50,6 +51,8 @@ OPEN_S = 30.0
 """A goal without an answer for longer than this at the end of a recording was not being reached."""
 STREAM_MESSAGES, STEADY = 10, 3.0
 """A stream has so many messages, and nine in ten of its pauses are below so many times the usual one."""
+SCAN_MESSAGES = 5
+"""A laser sends steadily as long as it lives: so few tell that it did, also in a recording that is thinned."""
 SILENT_S, SILENT_PERIODS = 5.0, 10.0
 """A stream has ended when it is silent for so long and for so many of its periods."""
 DROVE_M = 1.0
@@ -172,8 +175,9 @@ class Drive(RunModel):
     def streams(self) -> Mapping[str, float]:
         """Topics that come steadily, so that silence means something, with their usual period, s."""
         found = {}
+        scans = {channel.name for channel in self.channels if type_of(channel) in (SCAN, CLOUD)}
         for topic, times in self.times.items():
-            if len(times) < STREAM_MESSAGES:
+            if len(times) < (SCAN_MESSAGES if topic in scans else STREAM_MESSAGES):
                 continue
             pauses = np.diff(times)
             usual = float(median(pauses))
