@@ -207,7 +207,7 @@ def test_a_full_disk_is_said_to_be_one_and_costs_no_run(
     assert "is full" in said or "No space left" in said
     assert "longer than" not in said
     assert time.monotonic() - began < 60.0
-    assert {1, 2} >= set(_done(small_disk))
+    assert 3 not in _done(small_disk)  # the fourth may have ended beside it, before the disk was full
     (small_disk / "fill").unlink()
     code, out, _ = care("collect", path, "--out", small_disk / "campaign", "--json")
     assert (code, json.loads(out)["done"], json.loads(out)["failed"]) == (ExitCode.OK, 4, 0)
