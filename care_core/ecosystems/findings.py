@@ -76,6 +76,9 @@ class Finding(Record):
     """How likely a mission fails with it (0 to 1), where the training flights tell; None: as its severity says."""
     parameters: tuple[str, ...] = ()
     """Parameters that it names by itself, whatever any profile knows of them."""
+    wanted: tuple[tuple[str, float], ...] = ()
+    """The value that the log itself measures for a parameter that it names; none where only that it is wrong follows.
+    """
     after_impact: bool = False
     consequences: tuple[Finding, ...] = ()
     """Later findings that this one led to, by physical steps each forwards in time."""
