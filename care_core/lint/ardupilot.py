@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 
-from care_core.ecosystems.vehicles.parameters import aliases_of
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Kind
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.metadata import ardupilot
+from care_core.metadata.aliases import aliases_of
 from care_core.metadata.ardupilot import Release
 from care_core.metadata.fact import Fact
 

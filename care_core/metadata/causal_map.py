@@ -6,9 +6,18 @@ learned: it turns a parameter that is off its default into a suspect, or clears 
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Literal, TypeVar, get_args
 
-from care_core.records import Record
+from care_core.files import read_small_text
+from care_core.metadata.aliases import aliases_of
+from care_core.metadata.ardupilot import VEHICLES
+from care_core.metadata.fact import expanded
+from care_core.records import Record, replace
+
+TABLE = Path(__file__).with_name("ardupilot_map.tsv")
 
 Role = Literal["choice", "safety", "calibration", "wiring", "written", "idle"]
 """Who sets a parameter, and for what: an operator's choice (gains, speeds, heights); a protection (failsafes, arming
@@ -29,10 +38,10 @@ Sign = Literal[
     "failsafe_radio", "failsafe_gcs", "failsafe_estimator", "failsafe_fence", "failsafe_terrain", "elsewhere", "stuck",
     "loop", "vibration", "stops",
 ]  # fmt: skip
-"""How a run shows that it failed: arming was refused, it did not rise, tipped over at take-off, lost control or crashed,
-had too little thrust, swung around its target, left its path; its heading, position, height or estimate was false; a
-phase took long, it drew too much, a failsafe acted, it came down elsewhere, made no progress, its main loop was late, it
-shook, it disarmed or stopped by itself."""
+"""How a run shows that it failed: arming was refused, it did not rise, tipped over at take-off, lost control or
+crashed, had too little thrust, swung around its target, left its path; its heading, position, height or estimate was
+false; a phase took long, it drew too much, a failsafe acted, it came down elsewhere, made no progress, its main loop
+was late, it shook, it disarmed or stopped by itself."""
 
 ROLES: tuple[Role, ...] = get_args(Role)
 READS: tuple[Read, ...] = get_args(Read)
@@ -49,3 +58,49 @@ class Meaning(Record):
     read: frozenset[Read]
     signs: frozenset[Sign]
     """How a run shows that it is wrong, where it can matter."""
+
+
+class _Map(Record):
+    """The rows of one kind of vehicle."""
+
+    names: Mapping[str, Meaning]
+    families: Mapping[str, Meaning]
+    """By what their names begin with."""
+
+
+def meaning_of(name: str, kind: str) -> Meaning | None:
+    """What a parameter does on a kind of vehicle (`ardupilot.VEHICLES`), under any of the names that it has had: by its
+    own row, else by the longest family that it belongs to. None where the map does not know it."""
+    if kind not in VEHICLES:
+        return None
+    held = _map_of(VEHICLES[kind])
+    names = dict.fromkeys((name, *(one.name for one in aliases_of(name, kind))))
+    beginnings = (one[:length] for one in names for length in range(len(one), 0, -1))
+    found = next((held.names[one] for one in names if one in held.names), None)
+    found = found or next((held.families[one] for one in beginnings if one in held.families), None)
+    return None if found is None else replace(found, name=name)
+
+
+@cache
+def _map_of(vehicle: str) -> _Map:
+    """The map of the vehicle with this letter: a row for it counts before one for all."""
+    names: dict[str, Meaning] = {}
+    families: dict[str, Meaning] = {}
+    rows = [line.split("\t") for line in read_small_text(TABLE).splitlines() if not line.startswith("#")][1:]
+    for pattern, vehicles, role, part, read, signs in sorted(rows, key=lambda row: row[1] != ""):
+        if vehicles and vehicle not in vehicles:
+            continue
+        for one in expanded(pattern):
+            start = one.removesuffix("*")
+            known = names if one == start else families
+            known[start] = Meaning(
+                start, _words(ROLES, role)[0], part, frozenset(_words(READS, read)), frozenset(_words(SIGNS, signs))
+            )
+    return _Map(names, families)
+
+
+W = TypeVar("W", bound=str)
+
+
+def _words(known: tuple[W, ...], text: str) -> tuple[W, ...]:
+    return tuple(one for one in known if one in text.split())

@@ -23,10 +23,10 @@ from care_core.ecosystems.vehicles import (
 )
 from care_core.ecosystems.vehicles.frames import FRAMES, arms_of
 from care_core.ecosystems.vehicles.modes import px4_mode
-from care_core.ecosystems.vehicles.parameters import _chains
 from care_core.ecosystems.vehicles.vehicle import Kind
 from care_core.logs.ardupilot import Built, dataflash_facts, facts_of
 from care_core.logs.base import Table
+from care_core.metadata.aliases import _chains
 from care_core.run import Setting
 
 QUAD_X = {"FRAME_CLASS": 1.0, "FRAME_TYPE": 1.0}

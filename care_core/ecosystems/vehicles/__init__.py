@@ -15,9 +15,9 @@ from care_core.ecosystems.vehicles.motors import (
     motors_of,
     switched_off,
 )
-from care_core.ecosystems.vehicles.parameters import ParameterAlias, alias_in, aliases_of, renamed
 from care_core.ecosystems.vehicles.self_written import is_self_written
 from care_core.ecosystems.vehicles.vehicle import UNLIKE_ROVERS, Kind, Vehicle, flies, vehicle_of
+from care_core.metadata.aliases import ParameterAlias, alias_in, aliases_of, renamed
 
 __all__ = [
     "FAILSAFE",

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Container, Iterator, Mapping, Sequence
 from functools import cache
 
-from care_core.ecosystems.vehicles.vehicle import Kind
 from care_core.records import Record
 
 Version = tuple[int, ...]
@@ -155,19 +154,19 @@ def _of_all() -> Iterator[Chain]:
             yield _chain(f"GPS_MB{receiver}_OFS_{axis}", (_46, f"GPS{receiver}_MB_OFS_{axis}", 1))
 
 
-_FAMILIES: Mapping[Kind, tuple[str, ...]] = {
+_FAMILIES: Mapping[str, tuple[str, ...]] = {
     "copter": ("copter", "all"), "heli": ("copter", "all"), "quadplane": ("quadplane", "all"),
 }  # fmt: skip
 
 
 @cache
-def _chains(kind: Kind) -> Mapping[str, Chain]:
+def _chains(kind: str) -> Mapping[str, Chain]:
     made = {"copter": _of_copter, "quadplane": _of_quadplane, "all": _of_all}
     found = [chain for family in _FAMILIES.get(kind, ("all",)) for chain in made[family]()]
     return {alias.name: chain for chain in found for alias in chain}
 
 
-def aliases_of(name: str, kind: Kind = "copter") -> Sequence[ParameterAlias]:
+def aliases_of(name: str, kind: str = "copter") -> Sequence[ParameterAlias]:
     """Every name that a parameter has had, oldest first; only its own where it never had another.
 
     `scale` of each is relative to `name`: a value under that alias is `scale` times the value under `name`.
@@ -179,7 +178,7 @@ def aliases_of(name: str, kind: Kind = "copter") -> Sequence[ParameterAlias]:
     return tuple(ParameterAlias(one.name, one.since, one.scale / own) for one in chain)
 
 
-def renamed(name: str, version: Version, kind: Kind = "copter") -> ParameterAlias:
+def renamed(name: str, version: Version, kind: str = "copter") -> ParameterAlias:
     """The name by which firmware of this version knows a parameter, given under any of its names.
 
     Development versions carry the next release's number before they carry its names: where there is a log, ask
@@ -189,7 +188,7 @@ def renamed(name: str, version: Version, kind: Kind = "copter") -> ParameterAlia
     return next((alias for alias in reversed(known) if alias.since <= tuple(version)), known[0])
 
 
-def alias_in(name: str, held: Container[str], kind: Kind = "copter") -> ParameterAlias | None:
+def alias_in(name: str, held: Container[str], kind: str = "copter") -> ParameterAlias | None:
     """The name by which a log or a file holds a parameter, given under any of its names; None where it holds none."""
     known = aliases_of(name, kind)
     own = next((alias for alias in known if alias.name == name), None)
