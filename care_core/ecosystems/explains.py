@@ -43,7 +43,9 @@ EXPLAINS: Explains = {
     "control": frozenset(("control",)),
     "software": frozenset(("software", "topics")),
     # --- both
-    "battery": frozenset(("battery", "thrust", "log", "crash", "drive", "commands", "topics", "laser", "cpu")),
+    "battery": frozenset(
+        ("battery", "thrust", "log", "crash", "prearm", "drive", "commands", "topics", "laser", "cpu")
+    ),
     "cpu": frozenset(("cpu", "estimator", "tuning", "log", "attitude", "crash", "control", "tf", "topics", "commands")),
     "radio": frozenset(("crash", "topics", "laser", "localisation", "commands", "drive", "tf", "imu")),
     "blocked": frozenset(

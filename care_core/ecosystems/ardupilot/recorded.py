@@ -36,6 +36,8 @@ READS: Wanted = {
 }
 
 _MODES = 2.0**32
+_SAME = 1e-5
+"""A parameter is stored in 32 bits, its default written in decimals."""
 _LAST_S = 1.0
 """Damage so near to the end is the end."""
 _REASONS_KNOWN = (4, 0)
@@ -141,6 +143,14 @@ class Recorded(RunModel):
             if values and isinstance(values[0].value, (int, float)) and math.isfinite(values[0].value):
                 return float(values[0].value)
         return None
+
+    def default_left(self, name: str) -> float | None:
+        """The default of a parameter that was driven off it; None where it is at its default, or the log has none."""
+        default = self.settings[name][0].default if self.settings.get(name) else None
+        value = self.setting(name)
+        if value is None or not isinstance(default, (int, float)) or math.isclose(value, default, rel_tol=_SAME):
+            return None
+        return float(default)
 
     @cached_property
     def kind(self) -> Kind:

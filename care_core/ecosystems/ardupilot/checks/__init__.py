@@ -22,10 +22,12 @@ from care_core.ecosystems.ardupilot.checks import (
     thrust,
     vibration,
 )
+from care_core.ecosystems.ardupilot.checks.settings import supply
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
 CHECKS: tuple[Check[Flight], ...] = (
+    supply.CHECK,
     attitude.CHECK,
     barometer.CHECK,
     battery.CHECK,

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.battery import Battery, within_reason
+from care_core.ecosystems.ardupilot.checks.settings import supply
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import calibrated, calibrated_probability, lasting, smooth
@@ -51,8 +52,8 @@ _BOARD = LIMITS.add("probability of a weak board supply", 0.7, "", "a choice: be
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """What is wrong with the supply."""
-    for battery in flight.batteries[:1]:
+    """What is wrong with the supply. A voltage that is measured wrongly says nothing of the pack."""
+    for battery in () if supply.wrong_scale(flight) else flight.batteries[:1]:
         yield from _monitor(flight, battery.table)
         alive = within_reason(battery.table)
         if len(alive) >= 3 and np.ptp(alive["Volt"]) > 0:
@@ -70,7 +71,7 @@ def _pack(flight: Flight, battery: Battery, table: Table) -> Iterator[Finding]:
     elif low:
         deep = bool(lasting(t, watched & (lowest < RUINOUS), _LASTS_S))
         yield _sags(flight, table, low, float(np.min(lowest[watched])), cells, is_deep=deep)
-    elif (failsafe := flight.battery_failsafe_s) is not None:
+    elif (failsafe := flight.battery_failsafe_s) is not None and supply.early_failsafe(flight) is None:
         yield _failsafe(flight, failsafe, float(np.interp(failsafe, t, table["Volt"])), cells, rest)
 
 
@@ -110,8 +111,8 @@ def _sags(flight: Flight, table: Table, low: list[Span], lowest: float, cells: i
 
 
 def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int, rest: float | None) -> Finding:
-    """A failsafe of a battery that was well: set too early for a full one, or flown until then."""
-    limit = flight.setting("BATT_LOW_VOLT", "FS_BATT_VOLTAGE", "LOW_VOLT") or 0.0
+    """A failsafe of a battery that was flown until then."""
+    limit = flight.setting(*supply.LOW_VOLT) or 0.0
     is_early = limit / cells > LOW + _EARLY_V
     is_full = rest is None or rest / cells >= FULL
     asks = f"; BATT_LOW_VOLT={limit:g} asks for it at {limit / cells:.2f} V a cell, 3.5 is usual" if is_early else ""
@@ -124,7 +125,7 @@ def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int, rest: f
         severity="critical",
         evidence=f"failsafe at {volts:.1f} V, {volts / cells:.2f} V for each of {cells} cells{asks}",
         source="ERR of the battery failsafe; BAT.Volt",
-        suspect="parameter" if is_early and is_full else "operation",
+        suspect="operation",
         probability=_FAILSAFE,
     )
 
