@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.findings import Finding
 from care_core.run import Setting
 from tests.flights import ARMED_S, DOWN_S, Made
@@ -123,3 +124,133 @@ def test_a_voltage_above_what_a_full_pack_sags_to(level: str, parameter: str) ->
     finding = made.find()[0]
     assert (finding.parameters, finding.wanted) == ((parameter,), ())
     assert f"{parameter}=11.8 (default" in finding.evidence
+
+
+# --- compasses
+
+
+def compasses(made: Made, **settings: float) -> None:
+    made.settings |= {"COMPASS_EXTERNAL": 1, "COMPASS_EXTERN2": 0, **settings}
+
+
+def turn(made: Made, table: str, rotation: np.ndarray) -> None:
+    field = made.table[table]
+    turned = rotation @ np.stack([field[f"Mag{axis}"] for axis in "XYZ"])
+    for axis, row in zip("XYZ", turned, strict=True):
+        field[f"Mag{axis}"][:] = row
+
+
+def mounting(number: float) -> np.ndarray:
+    found = matrix(number)
+    assert found is not None
+    return found
+
+
+def manoeuvre(made: Made) -> None:
+    """Speeds up and slows down to all sides, as the leans say, at the heading that the compasses tell."""
+    flying = made.after(20.0, 90.0)
+    roll, pitch = (10.0 * np.sin(made.t / period) * flying for period in (1.7, 2.3))
+    turned = np.radians(made.table["ATT"]["Yaw"])
+    for angle, value in (("Roll", roll), ("Pitch", pitch)):
+        for name in (angle, f"Des{angle}"):
+            made.table["ATT"][name][:] = value
+    lean = 9.81 * (-np.tan(np.radians(pitch)) + 1j * np.tan(np.radians(roll)) / np.cos(np.radians(pitch)))
+    speed = np.cumsum(lean * np.exp(1j * turned)) * float(np.diff(made.t)[0])
+    late = np.interp(made.t - 0.2, made.t, speed.real) + 1j * np.interp(made.t - 0.2, made.t, speed.imag)
+    made.table["GPS"] |= {"Spd": np.abs(late), "GCrs": np.degrees(np.angle(late)) % 360.0}
+    level = np.array([np.zeros(len(made.t)), np.zeros(len(made.t)), np.zeros(len(made.t))])
+    level[0], level[1], level[2] = 220 * np.cos(turned), -220 * np.sin(turned), 420.0
+    cr, sr, cp, sp = (f(np.radians(a)) for a in (roll, pitch) for f in (np.cos, np.sin))
+    x = cp * level[0] - sp * level[2]
+    down = sp * level[0] + cp * level[2]
+    for table in ("MAG", "MAG#2"):
+        made.table[table] |= {"MagX": x, "MagY": cr * level[1] + sr * down, "MagZ": -sr * level[1] + cr * down}
+
+
+@pytest.mark.parametrize("number", [1, 2, 4, 6, 8, 12, 24])
+def test_a_compass_that_is_told_a_wrong_mounting(number: int) -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    made.drive("COMPASS_ORIENT", number, 0)
+    turn(made, "MAG", mounting(number))
+    finding = made.find()[0]
+    assert finding.wanted == (("COMPASS_ORIENT", 0.0),)
+    assert [one.title for one in made.find()] == ["compass 1 is set up wrongly"]
+
+
+@pytest.mark.parametrize("number", [2, 8])
+def test_a_board_that_is_told_a_wrong_mounting(number: int) -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    made.drive("AHRS_ORIENTATION", number, 0)
+    turn(made, "MAG#2", mounting(number))
+    assert naming(made, "AHRS_ORIENTATION").wanted == (("AHRS_ORIENTATION", 0.0),)
+
+
+def test_a_mounting_off_its_default_that_is_right_is_none() -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    made.drive("COMPASS_ORIENT", 6, 0)
+    made.drive("AHRS_ORIENTATION", 4, 0)
+    assert made.find() == ()
+
+
+def test_a_compass_that_undoing_does_not_mend_is_disturbed() -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    made.drive("COMPASS_ORIENT", 6, 0)
+    made.drive("COMPASS_OFS_X", 30, 0)
+    made.table["MAG"]["MagX"][made.after(FAILSAFE_S)] += 300
+    assert made.find()[0].title == "compass 1 is disturbed"
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_an_offset_that_shifts_a_compass(number: int) -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    name = f"COMPASS_OFS{'' if number == 1 else number}_X"
+    made.drive(name, 400, 5)
+    made.table["MAG" if number == 1 else "MAG#2"]["MagX"] += 395
+    assert made.find()[0].wanted == ((name, 5.0),)
+
+
+def test_a_scale_that_stretches_a_compass() -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    made.drive("COMPASS_SCALE", 1.4, 1)
+    for axis in "XYZ":
+        made.table["MAG"][f"Mag{axis}"] *= 1.4
+    assert naming(made, "COMPASS_SCALE").wanted == (("COMPASS_SCALE", 1.0),)
+
+
+def test_a_motor_compensation_that_disturbs_what_it_is_to_mend() -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    made.drive("COMPASS_MOT_X", 100, 0)
+    for table, moved in (("MAG", 1000 * made.table["CTUN"]["ThO"]), ("MAG#2", 0 * made.t)):
+        made.table[table] |= {"MOX": moved, "MOY": 0 * moved, "MOZ": 0 * moved}
+    made.table["MAG"]["MagX"] += made.table["MAG"]["MOX"]
+    assert naming(made, "COMPASS_MOT_X").wanted == (("COMPASS_MOT_X", 0.0),)
+
+
+@pytest.mark.parametrize("number", [2, 4, 6, 8])
+def test_one_compass_alone_is_held_against_how_it_flies(number: int) -> None:
+    made = MadeWithDefaults()
+    manoeuvre(made)
+    made.table.pop("MAG#2")
+    compasses(made)
+    made.settings["COMPASS_ORIENT"] = 0
+    assert not [one for one in made.find() if one.parameters]
+    made.settings["COMPASS_ORIENT"] = number
+    turn(made, "MAG", mounting(number))
+    assert naming(made, "COMPASS_ORIENT").wanted == (("COMPASS_ORIENT", 0.0),)
+
+
+def test_a_declination_that_somebody_gave() -> None:
+    made = MadeWithDefaults()
+    manoeuvre(made)
+    compasses(made, COMPASS_DEC=0.6)
+    made.drive("COMPASS_AUTODEC", 0, 1)
+    ((name, value),) = naming(made, "COMPASS_DEC").wanted
+    assert name == "COMPASS_DEC"
+    assert value == pytest.approx(0.0, abs=0.05)

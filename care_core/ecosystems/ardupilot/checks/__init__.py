@@ -22,11 +22,12 @@ from care_core.ecosystems.ardupilot.checks import (
     thrust,
     vibration,
 )
-from care_core.ecosystems.ardupilot.checks.settings import supply
+from care_core.ecosystems.ardupilot.checks.settings import heading, supply
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
 CHECKS: tuple[Check[Flight], ...] = (
+    heading.CHECK,
     supply.CHECK,
     attitude.CHECK,
     barometer.CHECK,

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.settings import heading
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
 from care_core.ecosystems.ardupilot.statistics import (
@@ -68,7 +69,7 @@ _DOUBTED = LIMITS.add("probability where the estimator alone doubts it", 0.2, ""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
-    """What is wrong with the compasses while they matter: the first of these that shows."""
+    """What is wrong with the compasses while they matter: the first of these that shows, but no parameter."""
     compasses = [
         watched
         for n, table in enumerate(flight.all("MAG", *AXES), start=1)
@@ -76,7 +77,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         and flight.setting("COMPASS_USE" if n == 1 else f"COMPASS_USE{n}") != 0
         and not all(says_nothing(table[axis]) for axis in AXES)
     ]
-    if flight.setting("COMPASS_ENABLE", "MAG_ENABLE") == 0:
+    if flight.setting("COMPASS_ENABLE", "MAG_ENABLE") == 0 or heading.wrong_setting(flight) is not None:
         return
     if not compasses:
         yield from _refused(flight, compasses)
