@@ -12,6 +12,7 @@ from care_core.ecosystems.ardupilot.checks import (
     cpu,
     crash,
     estimator,
+    fence,
     gps,
     imu,
     log,
@@ -19,8 +20,10 @@ from care_core.ecosystems.ardupilot.checks import (
     prearm,
     radio,
     recorded,
+    takeoff,
     thrust,
     vibration,
+    way_home,
 )
 from care_core.ecosystems.ardupilot.checks.settings import heading, supply
 from care_core.ecosystems.ardupilot.flight import Flight
@@ -38,6 +41,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     cpu.CHECK,
     crash.CHECK,
     estimator.CHECK,
+    fence.CHECK,
     recorded.CHECK,
     gps.CHECK,
     imu.CHECK,
@@ -45,6 +49,8 @@ CHECKS: tuple[Check[Flight], ...] = (
     motor.CHECK,
     prearm.CHECK,
     radio.CHECK,
+    takeoff.CHECK,
     thrust.CHECK,
     vibration.CHECK,
+    way_home.CHECK,
 )

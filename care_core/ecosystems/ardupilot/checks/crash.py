@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.takeoff import wrong_layout
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import CAME_DOWN, Finding
@@ -34,6 +35,8 @@ def find(flight: Flight) -> Iterator[Finding]:
     if begin is None:
         yield from _stranded(flight)
     elif _tipped(flight, lost if lost is not None else begin):
+        if wrong_layout(flight) is not None:
+            return  # that says why
         start = lost if lost is not None else begin
         yield Finding(
             kind="takeoff",

@@ -1,0 +1,86 @@
+"""A fence that the vehicle was sent across: its limit, and what the mission asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.held_missions import PLACES, TAKEOFF, Item
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Wanted
+
+READS: Wanted = {"CTUN": ("DAlt",), "POS": ("Lat", "Lng")}
+
+LIMITS = Limits()
+_BEYOND_M = LIMITS.add("what was asked for beyond the fence", 0.0, "m", "the vehicle is stopped at the fence itself")
+_WAS_SENT = LIMITS.add("probability of the fence", 0.9, "", "what was asked for lies beyond it")
+_STOPS = LIMITS.add("probability that a mission fails of it", 0.95, "", "the rest of the mission is not flown")
+_SOON_S = 5.0
+_ERR_FENCE = 9
+_TOO_HIGH, _TOO_FAR = 1, 2
+"""Kinds of breach (AC_Fence.h: AC_FENCE_TYPE_ALT_MAX, AC_FENCE_TYPE_CIRCLE)."""
+_ABOVE_HOME = frozenset((3, 6))
+"""Frames of a height above home (MAV_FRAME)."""
+_METRES = 111319.5
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """The first fence that stopped what the vehicle was told to do."""
+    for t, code in flight.errors(_ERR_FENCE):
+        for kind, parameter, asked, what in (
+            (_TOO_HIGH, "FENCE_ALT_MAX", _highest(flight, t), "high"),
+            (_TOO_FAR, "FENCE_RADIUS", _farthest(flight), "from home"),
+        ):
+            limit = flight.setting(parameter)
+            if code < 0 or not code & kind or limit is None or asked is None or asked - limit <= _BEYOND_M:
+                continue
+            yield Finding(
+                kind="commands",
+                title="it was sent across its fence",
+                onset_s=t,
+                end_s=t,
+                severity="critical" if flight.impact_s is not None else "warning",
+                evidence=(
+                    f"it was told to go {asked:.0f} m {what}, and the fence is at {limit:g} m ({parameter}): the "
+                    "mission or the fence is wrong, and which only the site can tell"
+                ),
+                source="ERR 9, CMD, CTUN.DAlt; AC_Fence.h",
+                suspect="parameter",
+                probability=_WAS_SENT,
+                mission_lost=_STOPS,
+                parameters=(parameter,),
+            )
+            return
+
+
+def _highest(flight: Flight, at: float) -> float | None:
+    """The greatest height above home that was asked for, by the mission or, until shortly after, by its controller."""
+    asked = [item.alt_m for item in _places(flight) if item.frame in _ABOVE_HOME]
+    wanted = flight.one("CTUN", "DAlt")
+    if wanted is not None:
+        asked += wanted["DAlt"][during(flight.airborne, wanted.t) & (wanted.t <= at + _SOON_S)].tolist()
+    return max(asked, default=None)
+
+
+def _farthest(flight: Flight) -> float | None:
+    """How far from where it was armed the mission leads."""
+    been = flight.one("POS", "Lat", "Lng")
+    if been is None or not flight.armed:
+        return None
+    row = min(int(np.searchsorted(been.t, flight.armed[0][0])), len(been) - 1)
+    lat, lng = float(been["Lat"][row]), float(been["Lng"][row])
+    east = float(np.cos(np.radians(lat)))
+    away = (np.hypot(item.lat - lat, (item.lng - lng) * east) for item in _places(flight) if item.lat or item.lng)
+    return max((float(one) * _METRES for one in away), default=None)
+
+
+def _places(flight: Flight) -> Iterator[Item]:
+    for held in flight.held_missions:
+        yield from (item for item in held.items.values() if item.command in PLACES or item.command == TAKEOFF)
+
+
+CHECK = Check("fence", "a fence that the vehicle was sent across", READS, LIMITS, find)
