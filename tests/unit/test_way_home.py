@@ -60,7 +60,8 @@ def test_a_phase_names_the_parameter_that_it_follows(
     assert (finding.parameters, finding.wanted) == ((parameter,), ((parameter, wanted),))
     assert shown in finding.evidence
     assert finding.severity == "warning"
-    assert finding.mission_lost is not None and finding.mission_lost >= 0.3
+    assert finding.mission_lost is not None
+    assert finding.mission_lost >= 0.3
     made.settings[parameter] = AS_SHIPPED[parameter]
     assert told(made) == ()  # it took as long, and not for that
 
@@ -97,7 +98,15 @@ def fenced(code: float, **settings: float) -> Made:
     made = Made()
     made.settings |= {"FENCE_ENABLE": 1.0, **settings}
     made.rows["ERR"] = [(40.0, {"Subsys": 9.0, "ECode": code})]
-    place = {"CNum": 1.0, "CId": 16.0, "Lat": 47.0 + 160 * METRE, "Lng": 8.0, "Alt": HEIGHT_M, "Frame": 3.0}
+    made.rows["MODE"] = [(0.0, {"ModeNum": 3.0}), (40.0, {"ModeNum": 6.0})]
+    place: dict[str, float | str] = {
+        "CNum": 1.0,
+        "CId": 16.0,
+        "Lat": 47.0 + 160 * METRE,
+        "Lng": 8.0,
+        "Alt": HEIGHT_M,
+        "Frame": 3.0,
+    }
     made.rows["CMD"] = [(1.0, place)]
     return made
 
@@ -116,3 +125,9 @@ def test_a_fence_that_the_mission_crosses_is_named(code: float, parameter: str, 
 def test_a_fence_that_the_vehicle_strays_across_is_no_parameters_fault() -> None:
     assert not [*fence.find(fenced(1.0, FENCE_ALT_MAX=30.0).flight())]
     assert not [*fence.find(fenced(2.0, FENCE_RADIUS=300.0).flight())]
+
+
+def test_a_pilot_who_crosses_the_fence_is_no_parameters_fault() -> None:
+    made = fenced(1.0, FENCE_ALT_MAX=10.0)
+    made.rows["MODE"] = [(0.0, {"ModeNum": 2.0}), (40.0, {"ModeNum": 6.0})]
+    assert not [*fence.find(made.flight())]

@@ -19,7 +19,8 @@ LIMITS = Limits()
 _BEYOND_M = LIMITS.add("what was asked for beyond the fence", 0.0, "m", "the vehicle is stopped at the fence itself")
 _WAS_SENT = LIMITS.add("probability of the fence", 0.9, "", "what was asked for lies beyond it")
 _STOPS = LIMITS.add("probability that a mission fails of it", 0.95, "", "the rest of the mission is not flown")
-_SOON_S = 5.0
+_SOON_S, _BEFORE_S = 5.0, 0.1
+_BY_ITSELF = frozenset(("mission", "guided"))
 _ERR_FENCE = 9
 _TOO_HIGH, _TOO_FAR = 1, 2
 """Kinds of breach (AC_Fence.h: AC_FENCE_TYPE_ALT_MAX, AC_FENCE_TYPE_CIRCLE)."""
@@ -31,6 +32,9 @@ _METRES = 111319.5
 def find(flight: Flight) -> Iterator[Finding]:
     """The first fence that stopped what the vehicle was told to do."""
     for t, code in flight.errors(_ERR_FENCE):
+        mode = flight.mode_at(t - _BEFORE_S)
+        if mode is None or mode.way not in _BY_ITSELF:
+            continue  # a pilot flies as he likes
         for kind, parameter, asked, what in (
             (_TOO_HIGH, "FENCE_ALT_MAX", _highest(flight, t), "high"),
             (_TOO_FAR, "FENCE_RADIUS", _farthest(flight), "from home"),
@@ -43,7 +47,7 @@ def find(flight: Flight) -> Iterator[Finding]:
                 title="it was sent across its fence",
                 onset_s=t,
                 end_s=t,
-                severity="critical" if flight.impact_s is not None else "warning",
+                severity="warning",
                 evidence=(
                     f"it was told to go {asked:.0f} m {what}, and the fence is at {limit:g} m ({parameter}): the "
                     "mission or the fence is wrong, and which only the site can tell"
