@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from care_core.application.open_run import OpenRun, Reading
 from care_core.errors import CareError
@@ -17,14 +17,17 @@ from care_core.records import Record, field, replace
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
     from care_core.configs.loading import ConfigFile
+    from care_core.diagnose.judging import Judged
     from care_core.diagnose.records import Diagnosis, Fix
     from care_core.diagnose.reference import Good
     from care_core.ecosystems.base import RunModel
     from care_core.ecosystems.findings import Health
+    from care_core.ecosystems.ros.drive import Drive
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
     from care_core.profile.store import Profile
-    from care_core.run import ProfileChoice
+    from care_core.run import ProfileChoice, Setting
+    from care_core.variables import Variable
 
 Progress = Callable[[str, float], None]
 """Is told the step and the share that is done, 0 to 1."""
@@ -86,7 +89,7 @@ def open_case(request: Request, progress: Progress) -> Case:
     configs = read_configs(request.configs)
     with watching(progress) as progress, opened(request.log, progress) as (log, sha256):
         profile, choice = choose(log, request.profile)
-        model = _model_of(log, profile)
+        model = _model_of(log, profile, configs)
         progress("looking at what happened", 0.1)
         health = examine(model)
         reading = None
@@ -97,7 +100,7 @@ def open_case(request: Request, progress: Progress) -> Case:
                 reason = err.message[:1].lower() + err.message[1:].rstrip(".")
                 choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, reason)))
         if reading is None:
-            diagnosis = _of_robot(_plainly(model, choice, health, request, sha256), log, request)
+            diagnosis = _of_robot(_plainly(model, choice, health, request, configs, sha256), log, request)
             return Case(diagnosis, (), log, None, request.configs)
         diagnosis = _of_robot(_diagnose(reading, request, progress), log, request)
     return Case(diagnosis, reading.profile.schema.options, log, reading, request.configs)
@@ -111,17 +114,18 @@ def read_case(request: Request, progress: Progress) -> Reading:
     configs = read_configs(request.configs)
     with opened(request.log) as (log, sha256):
         profile, choice = fitting(log, request.profile)
-        model = _model_of(log, profile)
+        model = _model_of(log, profile, configs)
         return _read(model, profile, choice, examine(model), request, configs, progress, sha256)
 
 
-def _model_of(log: Log, profile: Profile | None) -> RunModel:
+def _model_of(log: Log, profile: Profile | None, configs: Sequence[ConfigFile]) -> RunModel:
     """The model of a log's run, which decodes at once what the health checks and whoever judges will read."""
     from care_core.ecosystems.registry import run_model
     from care_core.extract.plain import plain_plans
     from care_core.extract.read import reading_plan
 
     model = run_model(log)
+    model.given = {name: one for file in configs for name, one in file.settings.items()}
     for plan in plain_plans(log) if profile is None else (reading_plan(profile.schema),):
         model.expect(plan)
     return model
@@ -184,7 +188,14 @@ def _candidates(log: Log, name: str | None) -> tuple[list[Profile], str]:
     return [replace(profile, schema=with_logged_names(profile.schema, log)) for profile in profiles], left_out
 
 
-def _plainly(model: RunModel, choice: ProfileChoice, health: Health, request: Request, sha256: Sha256) -> Diagnosis:
+def _plainly(
+    model: RunModel,
+    choice: ProfileChoice,
+    health: Health,
+    request: Request,
+    configs: tuple[ConfigFile, ...],
+    sha256: Sha256,
+) -> Diagnosis:
     """The diagnosis of a log that no profile fits: by what its robot says of itself, where it holds a run at all."""
     from care_core.diagnose.judging import judge_plainly
     from care_core.diagnose.triage import unjudged, without_profile
@@ -192,6 +203,7 @@ def _plainly(model: RunModel, choice: ProfileChoice, health: Health, request: Re
 
     judged = judge_plainly(model, mission=request.mission, sha256=sha256, findings=health.findings)
     if judged is not None:
+        health = _linted(model, health, judged, configs)
         return without_profile(judged, choice, health)
     settings = {name: history[-1] for name, history in model.log.settings().items()}
     return unjudged(log_info(model, sha256()), settings, choice, health)
@@ -231,7 +243,38 @@ def _read(
                     run_model(other), profile, configs=configs, thresholds=request.thresholds, good=good, sha256=digest
                 )
             )
+    health = _linted(model, health, judged, configs, profile.schema.options, good)
     return Reading(profile, choice, configs, with_repeats(judged, repeats), health)
+
+
+def _linted(
+    model: RunModel,
+    health: Health,
+    judged: Judged,
+    configs: tuple[ConfigFile, ...],
+    options: Sequence[Variable] = (),
+    good: Good | None = None,
+) -> Health:
+    """What happened, with what is wrong with the parameters of a ROS robot whose run failed."""
+    from care_core.configs.driven import option_value, readable, same_value
+
+    missed = any(result.status == "fault" for result in (*judged.results, *judged.checks))
+    if model.log.format.ecosystem != "ros" or not missed:
+        return health
+    from care_core.diagnose.linted import with_lint
+
+    by_parameter = {parameter: option for option in options for parameter in readable(option)}
+
+    def usual(name: str, setting: Setting) -> bool:
+        before = None if good is None else good.settings.get(name)
+        if before is not None:
+            return same_value(before.value, setting.value)
+        option = by_parameter.get(name)
+        reference = None if option is None else judged.reference.config.get(option.name)
+        return option is not None and same_value(option_value(option, setting), reference)
+
+    names = {parameter: option.name for parameter, option in by_parameter.items()}
+    return with_lint(health, cast("Drive", model), configs, names, usual, is_asked=bool(judged.broken))
 
 
 def with_own_limits(profile: Profile, site: Path | None) -> Profile:

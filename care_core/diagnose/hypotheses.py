@@ -159,7 +159,8 @@ def weigh(
         weights[what, ""] = UNSEEN * (1.0 if verdict == "fits" else 3.0)
     seen = [finding for finding in findings if not finding.after_impact and finding.severity != "info"]
     by_setting = [finding for finding in seen if set_wrong(finding)]
-    for option, share in _raised(options, by_setting).items():
+    unnamed = [finding for finding in by_setting if not finding.parameters]
+    for option, share in _raised(options, unnamed).items():
         if share * trust > 0:
             weights["parameter", option] = share * trust
     other = 1.0 - (1.0 - min(1.0, sum(options.values()))) * (1.0 - chance)

@@ -16,7 +16,7 @@ from care_core.logs import formats
 from care_core.logs.base import Channel, Log, Table, Wanted, merge_needs
 from care_core.logs.formats import LogFormat
 from care_core.records import Record
-from care_core.run import Robot
+from care_core.run import Robot, Setting
 
 
 class Limit(Record):
@@ -59,6 +59,8 @@ class RunModel:
 
     def __init__(self, log: Log) -> None:
         self.log = log
+        self.given: Mapping[str, Setting] = {}
+        """Parameters of the configuration files that the operator named."""
         self._expected: Wanted = {}
         self._read: Wanted = {}
         self._tables: dict[str, Table] = {}

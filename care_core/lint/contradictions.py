@@ -53,6 +53,10 @@ ROS_PAIRS: tuple[Pair, ...] = (
     Pair("min_vel_theta", "max_vel_theta", "", _LIMITS),
     Pair("min_vel_trans", "max_vel_trans", "", _LIMITS),
     Pair("min_trans_vel", "max_trans_vel", "", _LIMITS),
+    Pair("min_vel_trans", "max_vel_x", "no speed forwards is allowed", _LIMITS),
+    Pair("min_trans_vel", "max_vel_x", "no speed forwards is allowed", _LIMITS),
+    Pair("min_speed_xy", "max_vel_x", "no speed forwards is allowed", _LIMITS),
+    Pair("min_in_place_vel_theta", "max_vel_theta", "no turn in place is allowed", _LIMITS),
     Pair("min_rot_vel", "max_rot_vel", "", _LIMITS),
     Pair("min_speed_xy", "max_speed_xy", "", _LIMITS),
     Pair("vx_min", "vx_max", "", _LIMITS),
@@ -83,8 +87,8 @@ def pairs(file: ConfigFile, values: Mapping[str, Entry], known: Sequence[Pair]) 
         if low.number > high.number:
             why = f": {pair.why}" if pair.why else ""
             text = f"{low.keys[-1]} ({low.number:g}) is above {high.keys[-1]} ({high.number:g}){why}."
-            hint = f"The other is in line {high.line}."
-            yield problem_at("contradiction", Severity.WARNING, file, low, text, hint, pair.source)
+            hint = f"The other is in line {high.line}." if high.line else ""
+            yield problem_at("contradiction", Severity.WARNING, file, low, text, hint, pair.source, (high.name,))
 
 
 def inscribed_radius(footprint: Entry | None, radius: Entry | None) -> float | None:

@@ -13,11 +13,18 @@ from care_core.run import shown
 
 
 def problem_at(
-    rule: str, severity: Severity, file: ConfigFile, entry: Entry, text: str, hint: str = "", source: str = ""
+    rule: str,
+    severity: Severity,
+    file: ConfigFile,
+    entry: Entry,
+    text: str,
+    hint: str = "",
+    source: str = "",
+    others: tuple[str, ...] = (),
 ) -> Problem:
     """A problem at an entry; `source` where it is not the rule's own."""
     where = (file.path, entry.line, entry.column, entry.name)
-    return Problem(rule, severity, *where, text, hint, source or BY_ID[rule].source)
+    return Problem(rule, severity, *where, text, hint, source or BY_ID[rule].source, others)
 
 
 def check(file: ConfigFile) -> Iterator[Problem]:

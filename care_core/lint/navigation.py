@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from difflib import get_close_matches
 
 from care_core.errors import UsageError, nearest
-from care_core.lint import contradictions
+from care_core.lint import contradictions, workable
 from care_core.lint.generic import problem_at
 from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
 from care_core.lint.rules import MEANT, ROS1_RENAMED, ROS2_NODES_RENAMED, ROS2_RENAMED
@@ -55,7 +55,13 @@ def check(file: ConfigFile, target: str) -> Iterator[Problem]:
         text = f"Nothing loads {name}: no list of {key} names it."
         yield problem_at("not-loaded", Severity.NOTE, file, entry, text, f"Add it to {key}, or leave it out.")
     yield from _nodes(file, distribution)
+    yield from values(file, result)
+
+
+def values(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+    """Values that cannot be meant or cannot work, whatever the release."""
     yield from _contradictions(file, result)
+    yield from workable.check(file, result)
 
 
 def _likely(result: Scoped) -> frozenset[str]:

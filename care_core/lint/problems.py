@@ -66,3 +66,5 @@ class Problem(Record):
     hint: str
     source: str
     """Where the rule has it from."""
+    others: tuple[str, ...] = ()
+    """The other parameters that it takes to be wrong, as the file names them."""

@@ -27,6 +27,8 @@ RULES: tuple[Rule, ...] = (
     Rule("not-in-values", "A value that is none of those declared.", _TABLES),
     Rule("wrong-unit", "A value off by the ratio of two units.", "the declared range, or what an angle can be"),
     Rule("contradiction", "Two values that cannot both be meant.", "the source that the problem names"),
+    Rule("cannot-work", "A value with which its node cannot do its work.", "the source that the problem names"),
+    Rule("hinders", "A value that makes a mission likely to fail.", "the source that the problem names"),
     Rule("outside-profile", "A value outside what the profile holds acceptable.", "the profile's `range`"),
 )  # fmt: skip
 BY_ID = {rule.id: rule for rule in RULES}

@@ -201,7 +201,7 @@ def test_recorded_configurations_have_the_findings_that_were_looked_at_by_hand(r
     """Errors and warnings of each file, all of them checked against the sources; any more is a false alarm."""
     wanted = {
         "aion_r1_rover.param": 1, "solo_copter36.param": 2, "linorobot2_navigation.yaml": 7,
-        "nav2_bringup_nav2_params.yaml": 1, "tb3_humble_burger.yaml": 1, "tb3_jazzy_burger.yaml": 2,
+        "nav2_bringup_nav2_params.yaml": 1, "tb3_humble_burger.yaml": 2, "tb3_jazzy_burger.yaml": 2,
         "vacuum_robot_nav2_params.yaml": 1, "husky/planner.yaml": 5, "jackal/base_local_planner_params.yaml": 1,
         "jackal/costmap_common_params.yaml": 6, "jackal/map_nav_params_global_costmap_params.yaml": 1,
         "amcl_params.yaml": 1, "carlike_teb_local_planner_params.yaml": 2, "diff_drive_costmap_common_params.yaml": 1,
@@ -249,3 +249,71 @@ def test_a_number_of_hundreds_of_digits_is_a_problem_of_its_line(
     tmp_path: Path, name: str, text: str, number: str
 ) -> None:
     assert (1, "error") in [(line, kind) for line, _, kind in told(tmp_path, name, f"{text.format(number)}\n")]
+
+
+MOVE_BASE = {"max_vel_x": 0.5, "acc_lim_x": 2.5, "acc_lim_theta": 3.2, "sim_time": 1.7, "xy_goal_tolerance": 0.2}
+
+
+def planner(controller_frequency: float = 10.0, **values: float) -> str:
+    lines = [f"  {name}: {value}" for name, value in {**MOVE_BASE, **values}.items()]
+    return "\n".join([f"controller_frequency: {controller_frequency}", "DWAPlannerROS:", *lines, ""])
+
+
+@pytest.mark.parametrize(
+    ("text", "rule", "key"),
+    [
+        (planner(), "", ""),
+        (planner(max_vel_x=0.0), "cannot-work", "max_vel_x"),
+        (planner(acc_lim_theta=0.0), "cannot-work", "acc_lim_theta"),
+        (planner(controller_frequency=0.0), "cannot-work", "controller_frequency"),
+        (planner(sim_time=0.05), "contradiction", "sim_time"),
+        (planner(min_vel_trans=0.6), "contradiction", "min_vel_trans"),
+        (planner(min_vel_theta=0.4, yaw_goal_tolerance=0.01), "contradiction", "yaw_goal_tolerance"),
+        (planner(acc_lim_x=0.5, acc_lim_theta=1.0, min_vel_trans=0.1, min_vel_theta=0.4), "contradiction", "acc_lim_x"),
+        (f"oscillation_timeout: 0.5\noscillation_distance: 0.5\n{planner()}", "contradiction", "oscillation_timeout"),
+        (f"recovery_behavior_enabled: false\n{planner()}", "hinders", "recovery_behavior_enabled"),
+        ("local_costmap:\n  update_frequency: 0.0\n", "cannot-work", "update_frequency"),
+        ("local_costmap:\n  width: 1.0\n  height: 3.0\n  robot_radius: 0.6\n", "hinders", "width"),
+        ("local_costmap:\n  resolution: 0.5\n  robot_radius: 0.3\n", "hinders", "resolution"),
+        ("local_costmap:\n  rolling_window: false\n", "cannot-work", "rolling_window"),
+        (
+            "local_costmap:\n  robot_radius: 0.3\nglobal_costmap:\n  robot_radius: 0.9\n",
+            "contradiction",
+            "robot_radius",
+        ),
+        ("amcl:\n  tf_broadcast: false\n", "cannot-work", "tf_broadcast"),
+    ],
+)
+def test_values_with_which_a_robot_cannot_work_are_found(tmp_path: Path, text: str, rule: str, key: str) -> None:
+    found = [(one.rule, one.parameter.rpartition("/")[2]) for one in findings(tmp_path, "a.yaml", text)]
+    assert found == ([(rule, key)] if rule else [])
+
+
+LAYERED = """local_costmap:
+  local_costmap:
+    ros__parameters:
+      plugins: [obstacle_layer]
+      obstacle_layer:
+        plugin: nav2_costmap_2d::ObstacleLayer
+        enabled: true
+        observation_sources: scan
+        scan: {topic: /scan, marking: true, clearing: true, obstacle_max_range: 2.5, raytrace_max_range: 3.0}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        ("marking: true", "marking: false", "hinders"),
+        ("clearing: true", "clearing: false", "hinders"),
+        ("enabled: true", "enabled: false", "hinders"),
+        ("raytrace_max_range: 3.0", "raytrace_max_range: 2.0", "contradiction"),
+        ("obstacle_max_range: 2.5", "obstacle_max_range: 0.0", "cannot-work"),
+        ("max_range: 3.0}", "max_range: 3.0}\n      use_sim_time: true\namcl: {ros__parameters: {use_sim_time: false}}",
+         "contradiction"),
+        ("marking: true", "marking: true", ""),
+    ],
+)  # fmt: skip
+def test_costmaps_that_see_nothing_or_forget_nothing_are_found(tmp_path: Path, old: str, new: str, rule: str) -> None:
+    text = LAYERED.replace(old, new)
+    assert [one.rule for one in findings(tmp_path, "a.yaml", text)] == ([rule] if rule else [])

@@ -129,6 +129,13 @@ class Drive(RunModel):
     def settings(self) -> Mapping[str, tuple[Setting, ...]]:
         return self.log.settings()
 
+    @cached_property
+    def parameters(self) -> Mapping[str, Setting]:
+        """Parameters as driven; of the files that the operator named what the recording does not hold."""
+        driven = {name: history[-1] for name, history in self.settings.items()}
+        ends = {name[place:] for name in driven for place in range(len(name)) if place == 0 or name[place - 1] == "/"}
+        return {**{name: one for name, one in self.given.items() if name not in ends}, **driven}
+
     def look_at(self, types: Iterable[str]) -> None:
         """Read samples of messages of these types, in one pass with whatever else is expected to be read."""
         self._looked_at = topics(self.channels, types)
@@ -318,14 +325,22 @@ class Drive(RunModel):
         )
         return last_s if not is_piloted and odometry.spread_m(since_s) > DROVE_M else None
 
+    @property
+    def missed(self) -> tuple[Goal, ...]:
+        """The goals that failed, or are left open at the end."""
+        return tuple(one for one in self.goals if one.failed or (not one.outcome and one.time_s > OPEN_S))
+
+    @property
+    def missed_s(self) -> float:
+        """When the first goal was missed; the end where none was."""
+        return min((one.end_s for one in self.missed), default=self.duration_s)
+
     def severity(self, onset_s: float, otherwise: Severity = "warning") -> Severity:
         """How much something that began then matters: critical where a goal failed afterwards, or is left open at the
         end; a warning where every later goal was reached; `otherwise` where the robot was given no goal."""
         if not self.goals:
             return otherwise
-        after = [goal for goal in self.goals if goal.end_s >= onset_s]
-        stopped = any(goal.failed or (not goal.outcome and goal.time_s > OPEN_S) for goal in after)
-        return "critical" if stopped else "warning"
+        return "critical" if any(goal.end_s >= onset_s for goal in self.missed) else "warning"
 
     # Messages
 

@@ -15,6 +15,7 @@ from care_core.ecosystems.ros.checks import (
     laser,
     messages,
     odometry,
+    parameters,
     planner,
     recorded,
     timing,
@@ -34,4 +35,5 @@ CHECKS: tuple[Check[Drive], ...] = (
     planner.CHECK,
     timing.CHECK,
     messages.CHECK,
+    parameters.CHECK,
 )

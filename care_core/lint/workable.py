@@ -1,0 +1,468 @@
+"""Values of ROS navigation with which a robot cannot do its work, or hardly: limits of one value, and values of
+several readers beside each other."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+from care_core.lint.contradictions import inscribed_radius
+from care_core.lint.generic import problem_at
+from care_core.lint.problems import ConfigFile, Entry, Problem, Severity
+from care_core.lint.scopes import COSTMAP, Keys, Scoped, words_of
+from care_core.records import Struct, field
+
+PLANNERS = ("DWAPlannerROS", "TrajectoryPlannerROS", "TebLocalPlannerROS")
+CONTROLLERS = ("DWBLocalPlanner", "MPPIController", "RegulatedPurePursuitController", "GracefulController")
+CHECKERS = ("SimpleGoalChecker", "StoppedGoalChecker", "PositionGoalChecker")
+PROGRESS = ("SimpleProgressChecker", "PoseProgressChecker")
+OBSTACLES = ("ObstacleLayer", "VoxelLayer")
+INFLATIONS = ("InflationLayer", "LegacyInflationLayer", "AsymmetricInflationLayer")
+SAMPLED = ("DWAPlannerROS", "TrajectoryPlannerROS", "DWBLocalPlanner")
+"""Planners that try speeds out, over a time ahead."""
+TOP_SPEEDS = ("max_vel_x", "vx_max", "desired_linear_vel", "max_linear_vel", "v_linear_max")
+_OTHER_ROBOT = 1.5
+"""How far apart the sizes of one robot in two costmaps are never meant to be: padding makes a few percent."""
+
+
+class Above(NamedTuple):
+    """A value that must be above 0 (`sign` -1: below, 0: another), by who reads it."""
+
+    owners: tuple[str, ...]
+    names: tuple[str, ...]
+    why: str
+    source: str
+    sign: int = 1
+    rule: str = "cannot-work"
+
+
+_SPEED = "the planner samples speeds up to it"
+_TOLERANCE = "a goal is reached when the distance is below it"
+ABOVE: tuple[Above, ...] = (
+    Above(("move_base", "controller_server"), ("controller_frequency",), "no command is ever computed",
+          "the control loop runs at this rate (move_base.cpp, controller_server.cpp)"),
+    Above((COSTMAP,), ("update_frequency",), "the costmap is never updated", "costmap_2d_ros.cpp, mapUpdateLoop"),
+    Above((COSTMAP,), ("transform_tolerance",), "every pose of the robot counts as too old",
+          "costmap_2d_ros.cpp, getRobotPose"),
+    Above((*PLANNERS, *CONTROLLERS), TOP_SPEEDS, "the robot may not drive forwards", _SPEED),
+    Above(("DWAPlannerROS",), ("max_vel_trans", "max_trans_vel"), "the robot may not drive", _SPEED),
+    Above(("DWBLocalPlanner",), ("max_speed_xy",), "the robot may not drive",
+          "dwb_plugins, kinematic_parameters.cpp: below 0 there is no limit", 0),
+    Above((*PLANNERS, *CONTROLLERS), ("max_vel_theta", "max_rot_vel", "wz_max"), "the robot may not turn", _SPEED),
+    Above((*PLANNERS, "DWBLocalPlanner", "MPPIController"), ("acc_lim_x", "acc_lim_theta", "ax_max", "az_max"),
+          "the speed can never change", "speeds are sampled as far as this acceleration leads in a step"),
+    Above(("DWBLocalPlanner",), ("decel_lim_x", "decel_lim_theta"), "the robot cannot slow down",
+          "dwb_plugins, one_d_velocity_iterator.hpp: a deceleration is negative", -1),
+    Above(SAMPLED, ("sim_time", "sim_granularity", "linear_granularity", "angular_granularity"),
+          "no trajectory is simulated", "the trajectory generators step through sim_time by the granularity"),
+    Above(("RegulatedPurePursuitController",), ("lookahead_dist", "max_lookahead_dist"),
+          "there is nothing ahead to drive to", "the controller drives to the point so far ahead"),
+    Above((*PLANNERS, *CHECKERS), ("xy_goal_tolerance", "yaw_goal_tolerance"), "no goal is ever reached", _TOLERANCE),
+    Above(PROGRESS, ("movement_time_allowance",), "every drive counts as stuck at once", "simple_progress_checker.cpp"),
+    Above(("velocity_smoother",), ("smoothing_frequency",), "no command is passed on", "velocity_smoother.cpp"),
+    Above(("behavior_server",), ("cycle_frequency",), "no behaviour runs", "timed_behavior.hpp"),
+    Above(("bt_navigator",), ("bt_loop_duration", "default_server_timeout"), "no server can answer in time",
+          "bt_action_node.hpp waits so many milliseconds"),
+    Above(("move_base",), ("controller_patience", "planner_patience"), "one failed attempt starts the recoveries",
+          "move_base.cpp compares the time since the last good plan or command with it", rule="hinders"),
+    Above(OBSTACLES, ("obstacle_range", "obstacle_max_range", "max_obstacle_height"), "no obstacle is ever marked",
+          "obstacle_layer.cpp, updateBounds"),
+    Above(("StaticLayer", COSTMAP), ("lethal_cost_threshold",), "every cell of the map is an obstacle",
+          "static_layer.cpp, interpretValue"),
+    Above(INFLATIONS, ("inflation_radius",), "plans may touch obstacles", "inflation_layer.cpp", rule="contradiction"),
+)  # fmt: skip
+
+
+class Off(NamedTuple):
+    """A switch that is off, by who reads it."""
+
+    owners: tuple[str, ...]
+    name: str
+    why: str
+    source: str
+    rule: str = "hinders"
+
+
+OFF: tuple[Off, ...] = (
+    Off(("amcl",), "tf_broadcast", "nobody tells where odom is on the map", "amcl publishes that transform",
+        "cannot-work"),
+    Off(("move_base",), "recovery_behavior_enabled", "a robot that is stuck gives up at once", "move_base.cpp"),
+    Off(INFLATIONS, "enabled", "plans may touch obstacles", "inflation_layer.cpp"),
+)  # fmt: skip
+
+
+class Reader(Struct, eq=False):
+    """A node or plugin with the values that it reads, by its own names for them."""
+
+    owners: tuple[str, ...]
+    scope: Keys
+    values: dict[str, Entry] = field(default_factory=dict)
+
+    def number(self, name: str) -> float | None:
+        entry = self.values.get(name)
+        return None if entry is None else entry.number
+
+    def first(self, names: Iterable[str]) -> Entry | None:
+        """The first of these that has a number."""
+        held = (self.values[name] for name in names if name in self.values)
+        return next((one for one in held if one.number is not None), None)
+
+    def is_off(self, name: str) -> bool:
+        return name in self.values and self.values[name].value == "false"
+
+    def own(self, name: str) -> list[Entry]:
+        """A value of its own or of its parts, such as the sources of a layer."""
+        return [entry for key, entry in self.values.items() if key.rpartition(".")[2] == name]
+
+    def is_a(self, *owners: str) -> bool:
+        return bool(self.owners) and all(one in owners for one in self.owners)
+
+
+class Readers(tuple[Reader, ...]):
+    """Every reader of a file."""
+
+    __slots__ = ()
+
+    def of(self, *owners: str) -> list[Reader]:
+        return [one for one in self if one.is_a(*owners)]
+
+    def one(self, owners: Iterable[str], names: Iterable[str]) -> Entry | None:
+        """The only value of these names; None where there is none, or several differ."""
+        found = [entry for one in self.of(*owners) if (entry := one.first(names)) is not None]
+        return found[0] if found and len({entry.number for entry in found}) == 1 else None
+
+    def within(self, scope: Keys) -> list[Reader]:
+        """The readers below a scope."""
+        return [one for one in self if len(one.scope) > len(scope) and one.scope[: len(scope)] == scope]
+
+
+def readers(result: Scoped) -> Readers:
+    """The values of a file by who reads them."""
+    found: dict[tuple[tuple[str, ...], Keys], Reader] = {}
+    for place in result.places:
+        if place.owners:
+            reader = found.setdefault((place.owners, place.scope), Reader(place.owners, place.scope))
+            reader.values[place.name] = place.entry
+    return Readers(found.values())
+
+
+def check(file: ConfigFile, result: Scoped) -> Iterator[Problem]:
+    """Values with which a robot cannot do its work, or hardly."""
+    held = readers(result)
+    for reader in held:
+        yield from _above(file, reader)
+        yield from _off(file, reader)
+    for rule in RULES_OF_SEVERAL:
+        yield from rule(file, held)
+
+
+def _above(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
+    for rule in ABOVE:
+        if not reader.is_a(*rule.owners):
+            continue
+        for key, entry in reader.values.items():
+            if key.rpartition(".")[2] not in rule.names or entry.number is None or _is_of_source(key):
+                continue
+            if entry.number * rule.sign < 0 or entry.number == 0:
+                text = f"{entry.keys[-1]} is {entry.number:g}: {rule.why}."
+                side = {1: "above", -1: "below", 0: "other than"}[rule.sign]
+                yield _problem(rule.rule, file, entry, text, f"It must be {side} 0.", rule.source)
+
+
+def _is_of_source(key: str) -> bool:
+    """Whether it is a source's own height: 0 is then that of its layer."""
+    return key.endswith(".max_obstacle_height")
+
+
+def _off(file: ConfigFile, reader: Reader) -> Iterator[Problem]:
+    for rule in OFF:
+        if reader.is_a(*rule.owners) and reader.is_off(rule.name):
+            entry = reader.values[rule.name]
+            text = f"{rule.name} of {reader.owners[0]} is off: {rule.why}."
+            yield _problem(rule.rule, file, entry, text, "Switch it on.", rule.source)
+
+
+def _problem(
+    rule: str, file: ConfigFile, entry: Entry, text: str, hint: str, source: str, others: Sequence[Entry] = ()
+) -> Problem:
+    return problem_at(rule, Severity.WARNING, file, entry, text, hint, source, tuple(one.name for one in others))
+
+
+# Several values beside each other
+
+
+def _rate(held: Readers) -> Entry | None:
+    """The rate of the control loop, where it can be divided by."""
+    entry = held.one(("move_base", "controller_server"), ("controller_frequency",))
+    return entry if entry is not None and entry.number is not None and entry.number > 0 else None
+
+
+def _simulated(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Trajectories shorter than a control step."""
+    rate = _rate(held)
+    for reader in held.of(*SAMPLED) if rate is not None else ():
+        entry = reader.values.get("sim_time")
+        if entry is not None and entry.number and rate is not None and 0 < entry.number * (rate.number or 0) < 1:
+            text = f"sim_time ({entry.number:g} s) is shorter than a step of controller_frequency ({rate.number:g} Hz)."
+            hint = "The robot drives on past what was tried out: raise the rate or sim_time."
+            yield _problem("contradiction", file, entry, text, hint, "the trajectory generators", [rate])
+
+
+def _settles(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Tolerances that the smallest step of a turn leaps over."""
+    rate = _rate(held)
+    for reader in held.of("DWAPlannerROS", "TrajectoryPlannerROS"):
+        slowest = reader.first(("min_vel_theta", "min_rot_vel", "min_in_place_vel_theta"))
+        entry = reader.values.get("yaw_goal_tolerance")
+        if None in (rate, slowest, entry) or rate is None or slowest is None or entry is None:
+            continue
+        step = (slowest.number or 0.0) / (rate.number or 1.0)
+        if entry.number and 0 < entry.number < step / 2:
+            text = (
+                f"yaw_goal_tolerance ({entry.number:g} rad) is less than half of the smallest step of a turn "
+                f"({step:.2g} rad: {slowest.keys[-1]} {slowest.number:g} at {rate.number:g} Hz)."
+            )
+            source = "latched_stop_rotate_controller.cpp turns no slower"
+            yield _problem("contradiction", file, entry, text, "The robot turns to and fro.", source, [slowest, rate])
+
+
+def _starts(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Least speeds that no acceleration reaches within a control step."""
+    rate = _rate(held)
+    for reader in held.of("DWAPlannerROS"):
+        least, turn = reader.first(("min_vel_trans", "min_trans_vel")), reader.first(("min_vel_theta", "min_rot_vel"))
+        ahead, around = reader.values.get("acc_lim_x"), reader.values.get("acc_lim_theta")
+        every = (rate, least, turn, ahead, around)
+        hz, v, w, a, b = (0.0 if one is None or one.number is None else one.number for one in every)
+        if ahead is None or None in every or reader.is_off("use_dwa"):
+            continue
+        if 0 < a < v * hz and 0 < b < w * hz:
+            text = (
+                f"acc_lim_x ({a:g}) and acc_lim_theta ({b:g}) reach neither min_vel_trans ({v:g}) nor min_vel_theta "
+                f"({w:g}) within a step at {hz:g} Hz: the robot never starts."
+            )
+            source = "simple_trajectory_generator.cpp: only speeds that a step reaches, and none below both"
+            others = [one for one in every if one is not None and one is not ahead]
+            yield _problem("contradiction", file, ahead, text, "Raise them or lower the least speeds.", source, others)
+
+
+def _progress(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Progress that is asked for faster than the robot may drive."""
+    top = held.one((*PLANNERS, *CONTROLLERS), TOP_SPEEDS)
+    names = (
+        (("move_base",), "oscillation_distance", "oscillation_timeout", "move_base.cpp"),
+        (PROGRESS, "required_movement_radius", "movement_time_allowance", "simple_progress_checker.cpp"),
+    )
+    for owners, way, time, source in names:
+        for reader in held.of(*owners):
+            far, within, speed = reader.number(way), reader.number(time), None if top is None else top.number
+            if top is None or far is None or not within or within < 0 or not speed or far < within * speed:
+                continue
+            text = (
+                f"{way} ({far:g} m) within {time} ({within:g} s) asks for {far / within:.2g} m/s, and {top.keys[-1]} "
+                f"is {speed:g}: every drive counts as stuck."
+            )
+            others = [reader.values[way], top]
+            yield _problem("contradiction", file, reader.values[time], text, "Give it more time.", source, others)
+
+
+def _window(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Local costmaps that are too small for the robot, its look-ahead or its trajectories."""
+    for reader in held.of(COSTMAP):
+        if not any("local_costmap" in key for key in reader.scope):
+            continue
+        if reader.is_off("rolling_window"):
+            text = "rolling_window of the local costmap is off: the robot drives out of it."
+            entry = reader.values["rolling_window"]
+            yield _problem("cannot-work", file, entry, text, "Switch it on.", "the window stays where it began")
+        sides = [one for name in ("width", "height") if (one := reader.values.get(name)) is not None and one.number]
+        if not sides:
+            continue
+        side = min(sides, key=lambda one: one.number or 0.0)
+        half = (side.number or 0.0) / 2
+        for reach_m, what, others in _reaches(held, reader):
+            if reach_m > half > 0:
+                text = f"{side.keys[-1]} of the local costmap ({side.number:g} m) ends before {what} ({reach_m:.3g} m)."
+                source = "what is off the costmap is no valid trajectory (costmap_model.cpp)"
+                yield _problem("hinders", file, side, text, f"Make it more than {2 * reach_m:.3g} m.", source, others)
+
+
+def _reaches(held: Readers, costmap: Reader) -> Iterator[tuple[float, str, list[Entry]]]:
+    """How far ahead of the robot a local costmap has to reach, m, for what."""
+    radius = inscribed_radius(costmap.values.get("footprint"), costmap.values.get("robot_radius"))
+    if radius is not None:
+        yield radius, "the robot itself", []
+    for reader in held.of("RegulatedPurePursuitController"):
+        ahead = reader.first(("lookahead_dist",))
+        if ahead is not None:
+            yield ahead.number or 0.0, "lookahead_dist", [ahead]
+    for reader in held.of(*SAMPLED):
+        top, time = reader.first(("max_vel_trans", "max_speed_xy", "max_vel_x")), reader.values.get("sim_time")
+        if top is not None and time is not None and top.number and time.number:
+            yield top.number * time.number, "where a trajectory of sim_time ends", [top, time]
+    for layer in held.within(costmap.scope):
+        entry = layer.values.get("inflation_radius") if layer.is_a(*INFLATIONS) else None
+        if entry is not None:
+            yield entry.number or 0.0, "inflation_radius", [entry]
+
+
+def _cells(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Cells larger than the robot or than the tolerance of its goals."""
+    for reader in held.of(COSTMAP):
+        cell, radius = (
+            reader.values.get("resolution"),
+            inscribed_radius(reader.values.get("footprint"), reader.values.get("robot_radius")),
+        )
+        if cell is None or cell.number is None:
+            continue
+        if cell.number <= 0:
+            text = f"resolution is {cell.number:g}: the costmap has no cells."
+            yield _problem("cannot-work", file, cell, text, "It must be above 0.", "costmap_2d")
+        elif radius is not None and cell.number > radius > 0:
+            text = f"resolution ({cell.number:g} m) is coarser than the robot's inscribed radius ({radius:.3g} m)."
+            yield _problem("hinders", file, cell, text, "Ways through are closed: make cells smaller.", "costmap_2d")
+    cell = held.one((COSTMAP,), ("resolution",))
+    for reader in held.of(*PLANNERS, *CHECKERS):
+        entry = reader.values.get("xy_goal_tolerance")
+        if cell is not None and cell.number and entry is not None and entry.number and 0 < entry.number < cell.number:
+            text = f"xy_goal_tolerance ({entry.number:g} m) is finer than a cell of the costmap ({cell.number:g} m)."
+            hint = "The robot circles about its goal: give it more."
+            yield _problem("hinders", file, entry, text, hint, _TOLERANCE, [cell])
+
+
+def _sizes(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """One robot of two sizes."""
+    sized = []
+    for reader in held.of(COSTMAP):
+        radius = inscribed_radius(reader.values.get("footprint"), reader.values.get("robot_radius"))
+        footprint = reader.values.get("footprint")
+        is_drawn = footprint is not None and str(footprint.value).strip() not in ("", "[]")
+        entry = footprint if is_drawn else reader.values.get("robot_radius")
+        if radius and entry is not None:
+            sized.append((radius, entry))
+        padding = reader.values.get("footprint_padding")
+        if radius and padding is not None and padding.number is not None and padding.number > radius:
+            text = f"footprint_padding ({padding.number:g} m) is more than the robot itself ({radius:.3g} m)."
+            yield _problem(
+                "contradiction", file, padding, text, "It closes narrow ways.", "costmap_2d pads each side by it"
+            )
+    for one, other in combinations(sized, 2):
+        (small, _), (large, entry) = sorted((one, other), key=lambda pair: pair[0])
+        if large > _OTHER_ROBOT * small > 0:
+            text = f"The robot has an inscribed radius of {large:.3g} m in one costmap and {small:.3g} m in the other."
+            others = [pair[1] for pair in (one, other) if pair[1] is not entry]
+            source = "both planners have to keep the same robot clear"
+            yield _problem("contradiction", file, entry, text, "Give both the same.", source, others)
+
+
+def _marks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Costmaps into which nothing puts obstacles, or out of which nothing takes them, and obstacles that stay."""
+    for costmap in held.of(COSTMAP):
+        layers = [one for one in held.within(costmap.scope) if one.is_a(*OBSTACLES)]
+        marking = [one for one in layers if not one.is_off("enabled")]
+        if layers and not marking and any("local_costmap" in key for key in costmap.scope):
+            text = "No layer of the local costmap that marks obstacles is on: the robot drives blind."
+            yield _problem("hinders", file, layers[0].values["enabled"], text, "Switch one on.", "obstacle_layer.cpp")
+        for name, what in (("marking", "puts obstacles into it"), ("clearing", "takes obstacles out of it")):
+            switches = [entry for layer in marking for entry in layer.own(name)]
+            if switches and all(entry.value == "false" for entry in switches):
+                text = f"No source of {costmap.scope[-1] if costmap.scope else 'the costmap'} {what}."
+                hint = f"Switch {name} on for one."
+                yield _problem("hinders", file, switches[0], text, hint, "obstacle_layer.cpp", switches[1:])
+    for reader in held.of(*OBSTACLES, COSTMAP):
+        for short, far in (("raytrace_range", "obstacle_range"), ("raytrace_max_range", "obstacle_max_range")):
+            for entry in reader.own(far):
+                key = next(key for key, one in reader.values.items() if one is entry)
+                other = reader.values.get(f"{key[: len(key) - len(far)]}{short}")
+                if other is not None and other.number and entry.number and 0 < other.number < entry.number:
+                    text = f"{far} ({entry.number:g} m) is above {short} ({other.number:g} m)."
+                    hint = "What is marked beyond is never cleared."
+                    yield _problem("contradiction", file, other, text, hint, "obstacle_layer.cpp", [entry])
+
+
+def _goal_checks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """A controller that turns at the goal before the goal checker counts it as there."""
+    checker = held.one(CHECKERS, ("xy_goal_tolerance",))
+    for reader in held.of("DWBLocalPlanner") if checker is not None else ():
+        entry = reader.values.get("xy_goal_tolerance")
+        least = 0.0 if checker is None or checker.number is None else checker.number
+        if checker is not None and entry is not None and entry.number and 0 < least * 1.001 < entry.number:
+            text = (
+                f"xy_goal_tolerance of the controller ({entry.number:g} m) is above that of the goal checker "
+                f"({least:g} m): it stops to turn before it has arrived."
+            )
+            hint = "Give both the same."
+            yield _problem("contradiction", file, checker, text, hint, "dwb_critics, rotate_to_goal.cpp", [entry])
+
+
+def _unknown_space(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Planners that keep to known space, of which there is none."""
+    costmap = next((one for one in held.of(COSTMAP) if any("global_costmap" in key for key in one.scope)), None)
+    if costmap is None or not words_of(costmap.values.get("plugins")) or costmap.is_off("track_unknown_space"):
+        return
+    loaded = words_of(costmap.values["plugins"])
+    mapped = {one.scope[-1] for one in held.within(costmap.scope) if one.is_a("StaticLayer")}
+    is_mapped = any("static" in word or word in mapped for word in loaded)
+    planner = next((one for one in held if one.is_off("allow_unknown")), None)
+    if planner is not None and not is_mapped and "track_unknown_space" in costmap.values:
+        entry = planner.values["allow_unknown"]
+        text = "allow_unknown is off, and the global costmap has no map: where nothing was seen there is no plan."
+        others = [costmap.values["plugins"]]
+        yield _problem("contradiction", file, entry, text, "Allow it.", "the planners keep to known cells", others)
+
+
+def _drawn(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Planners that nothing draws to the goal."""
+    for reader in held.of("DWAPlannerROS", "TrajectoryPlannerROS"):
+        names = ("goal_distance_bias", "path_distance_bias")
+        entries = [one for name in names if (one := reader.first((name, name.replace("tance_bias", "t_scale"))))]
+        if len(entries) == len(names) and not any(one.number for one in entries):
+            text = "goal_distance_bias and path_distance_bias are 0: nothing draws the robot to its goal."
+            yield _problem("cannot-work", file, entries[0], text, "Raise them.", "dwa_planner.cpp", entries[1:])
+
+
+def _smoothed(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """A smoother that lets nothing through."""
+    top = held.one(CONTROLLERS, TOP_SPEEDS)
+    for reader in held.of("velocity_smoother"):
+        for name in ("max_velocity", "max_accel"):
+            entry = reader.values.get(name)
+            first = _numbers(entry)[:1]
+            if entry is not None and first and first[0] <= 0:
+                text = f"{name} of velocity_smoother begins with {first[0]:g}: the robot never moves."
+                yield _problem("cannot-work", file, entry, text, "It must be above 0.", "velocity_smoother.cpp")
+        entry = reader.values.get("deadband_velocity")
+        first = _numbers(entry)[:1]
+        if entry is not None and top is not None and top.number and first and first[0] >= top.number > 0:
+            text = f"deadband_velocity ({first[0]:g}) swallows every speed up to {top.keys[-1]} ({top.number:g})."
+            yield _problem("contradiction", file, entry, text, "Lower it.", "velocity_smoother.cpp", [top])
+
+
+def _numbers(entry: Entry | None) -> list[float]:
+    """A list of numbers, empty where it is none."""
+    if entry is None or not isinstance(entry.value, str):
+        return []
+    try:
+        held = ast.literal_eval(entry.value.strip())
+        return [float(one) for one in held]
+    except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):
+        return []
+
+
+def _clocks(file: ConfigFile, held: Readers) -> Iterator[Problem]:
+    """Nodes of one robot on two clocks."""
+    entries = [one.values["use_sim_time"] for one in held if "use_sim_time" in one.values]
+    off = [one for one in entries if one.value == "false"]
+    on = [one for one in entries if one.value == "true"]
+    for entry in off if on and len(off) <= len(on) else on if off else ():
+        text = f"use_sim_time is {entry.value} here and not for {len(entries) - min(len(off), len(on))} other nodes."
+        source = "nodes on two clocks drop each other's transforms"
+        yield _problem("contradiction", file, entry, text, "Give all the same.", source)
+
+
+RULES_OF_SEVERAL: tuple[Callable[[ConfigFile, Readers], Iterator[Problem]], ...] = (
+    _simulated, _settles, _starts, _progress, _window, _cells, _sizes, _marks, _goal_checks, _unknown_space, _drawn,
+    _smoothed, _clocks,
+)  # fmt: skip
