@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.refused_by import refusing
 from care_core.ecosystems.ardupilot.checks.settings import heading
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, during
@@ -200,9 +201,9 @@ def _rejected(flight: Flight, start: float) -> bool:
 
 def _refused(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
     """The firmware refused arming for a compass: it knows what the Earth's field should be there. One that is to be
-    calibrated, or was and wants a restart, is not wrong."""
+    calibrated, or was and wants a restart, is not wrong, nor one beside a parameter that cannot hold."""
     begin = flight.refused_for("mag field", "compass", "mag anomaly", but="calibrat")
-    if begin is not None:
+    if begin is not None and not any(one.is_shown for one in refusing(flight)):
         said = next(text for t, text in flight.messages if t == begin)
         yield Finding(
             kind="compass",

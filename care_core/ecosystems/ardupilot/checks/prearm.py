@@ -6,10 +6,13 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
+from care_core.ecosystems.ardupilot.checks.refused_by import LIMITS as SETTING_LIMITS
+from care_core.ecosystems.ardupilot.checks.refused_by import Refusing, refusing, standing
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.logs.base import Wanted
+from care_core.records import replace
 
 READS: Wanted = {}
 
@@ -30,37 +33,49 @@ _SURE = LIMITS.add(
     "probability of what the pilot has to do", 0.95, "", "the firmware says itself that this kept it from arming"
 )
 _BY_SETTING = LIMITS.add("probability of a parameter", 0.3, "", "a choice: a sensor may be the reason as well")
-_STARTING_S = LIMITS.add(
-    "how long before the last a refusal counts", 30.0, "s", "AP_Arming repeats complaints every 30 s"
-)
 
 
 def find(flight: Flight) -> Iterator[Finding]:
     """The refusal that lasted, where no arming followed it."""
     if flight.armed:
         return
-    refusals = [(one.time_s, one.why, one.was_tried) for one in flight.refusals]
-    if not refusals:
+    refusals, lasting = flight.refusals, standing(flight)
+    if not lasting:
         return
-    last = refusals[-1][0]
-    lasting = [(t, why, asked) for t, why, asked in refusals if last - t < _STARTING_S]
-    counts = Counter(_plain(why) for _, why, _ in lasting)
+    counts = Counter(_plain(one.why) for one in lasting)
     why = max(counts, key=lambda one: counts[one])
-    begin = next(t for t, one, _ in refusals if _plain(one) == why)
-    asked = any(is_order for _, _, is_order in refusals)
+    begin = next(one.time_s for one in refusals if _plain(one.why) == why)
+    asked = any(one.was_tried for one in refusals)
     severity: Severity = "critical" if asked and not flight.breaks_off else "warning"
-    by_operator = all(_BY_OPERATOR.search(one) for _, one, _ in lasting)
+    by_operator = all(_BY_OPERATOR.search(one.why) for one in lasting)
     suspect: SuspectKind = "operation" if by_operator else "parameter"
-    yield Finding(
+    complaints = tuple(dict.fromkeys(_plain(one.why) for one in lasting))
+    finding = Finding(
         kind="prearm",
         title=f"arming was refused: {why}",
         onset_s=begin,
-        end_s=last,
+        end_s=lasting[-1].time_s,
         severity=severity,
-        evidence="; ".join(dict.fromkeys(_plain(one) for _, one, _ in lasting)),
+        evidence="; ".join(complaints),
         source="MSG",
         suspect=suspect,
         probability=_SURE if by_operator else _BY_SETTING,
+    )
+    yield _blaming(finding, tuple(one for one in refusing(flight) if one.is_shown or not by_operator))
+
+
+def _blaming(finding: Finding, blamed: tuple[Refusing, ...]) -> Finding:
+    """The finding with the parameters that keep the vehicle from arming, where there are any."""
+    if not blamed:
+        return finding
+    return replace(
+        finding,
+        suspect="parameter",
+        parameters=tuple(one.name for one in blamed),
+        wanted=tuple((one.name, one.wanted) for one in blamed if one.wanted is not None),
+        evidence="; ".join((finding.evidence, *(one.words for one in blamed))),
+        source="MSG, PARM; what each check reads: AP_Arming",
+        probability=max(one.probability for one in blamed),
     )
 
 
@@ -69,4 +84,6 @@ def _plain(why: str) -> str:
     return re.sub(r"\s*\([^)]*\d[^)]*\)", "", why)
 
 
-CHECK = Check("prearm", "arming that was refused to the end of the log", READS, LIMITS, find)
+CHECK = Check(
+    "prearm", "arming that was refused to the end of the log", READS, Limits((*LIMITS, *SETTING_LIMITS)), find
+)

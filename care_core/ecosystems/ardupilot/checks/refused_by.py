@@ -1,0 +1,174 @@
+"""Which parameters a refusal to arm is about: what its check reads, where that is off its default or cannot hold."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from care_core.ecosystems.ardupilot.battery import FULL_V
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.texts import Refusal
+from care_core.ecosystems.base import Limits
+from care_core.metadata.ardupilot import firmware_default
+from care_core.metadata.causal_map import Role, meaning_of
+from care_core.metadata.refusals import Must, refusal_reads
+from care_core.run import Setting
+
+LIMITS = Limits()
+PROVEN = LIMITS.add(
+    "probability of a parameter that cannot hold", 0.9, "", "the text names it, or it breaks what the check asks"
+)
+OFF = LIMITS.add(
+    "probability of the parameters off their default", 0.8, "", "a choice: they are all that this check reads"
+)
+PLAUSIBLE = LIMITS.add(
+    "probability of a parameter that cannot hold, where surroundings bring such a refusal", 0.8, "", "a choice"
+)
+OUTSIDE = LIMITS.add(
+    "share of that where surroundings bring such a refusal", 0.5, "", "a choice: the log tells neither from the other"
+)
+_REPEATED_S = LIMITS.add(
+    "how long before the last a refusal counts", 30.0, "s", "AP_Arming repeats complaints every 30 s"
+)
+_FAR = LIMITS.add(
+    "far off its default", 1.5, "times", "a choice: what is tuned is seldom off by more and fails a check"
+)
+_CODES = LIMITS.add("greatest default of a code", 10.0, "", "a choice: another code is another choice, however near")
+_FULL_AT = LIMITS.add("cell that reads full", 4.1, "V", "voltages of lithium polymer cells")
+_NONE_AT = LIMITS.add("cell that no pack has", 3.0, "V", "voltages of lithium polymer cells")
+_MOST_V = LIMITS.add("cell fully charged", FULL_V + 0.05, "V", "voltages of lithium polymer cells")
+_SAME = 1e-6
+"""Vehicles hold parameters in 32 bits."""
+
+_SENSING, _THRESHOLD = re.compile(r"_(MONITOR|VOLT_PIN|VLT_OFFSET)$"), re.compile(r"_(LOW|CRT|ARM|MIN)_?VOLT2?$|_MAH$")
+
+
+class Refusing(NamedTuple):
+    """A parameter that keeps the vehicle from arming."""
+
+    name: str
+    words: str
+    """Its value, its default, what the check asks, and the way back."""
+    wanted: float | None
+    probability: float
+    is_shown: bool
+    """Whether its value alone keeps the check from passing, or the text names it."""
+
+
+class _Held(NamedTuple):
+    """A parameter when arming was refused."""
+
+    name: str
+    value: float
+    default: float | None
+    role: Role | None
+
+    @property
+    def is_off(self) -> bool:
+        return self.default is not None and not math.isclose(self.value, self.default, rel_tol=_SAME, abs_tol=1e-9)
+
+    @property
+    def is_far_off(self) -> bool:
+        """Whether it is off so far that a check may fail by it; what a vehicle is calibrated to is off rightly."""
+        if self.default is None or not self.is_off or self.role not in ("choice", "wiring", "safety"):
+            return False
+        is_code = abs(self.default) <= _CODES and self.default.is_integer() and self.value.is_integer()
+        if self.role == "wiring" or is_code or self.default == 0:
+            return True
+        ratio = self.value / self.default
+        return not 1 / _FAR <= ratio <= _FAR
+
+
+def standing(flight: Flight) -> tuple[Refusal, ...]:
+    """The refusals that stood when arming was last refused."""
+    return tuple(one for one in flight.refusals if flight.refusals[-1].time_s - one.time_s < _REPEATED_S)
+
+
+def refusing(flight: Flight) -> tuple[Refusing, ...]:
+    """The parameters behind the refusals that stood: those that cannot hold, else those that are off."""
+    last = standing(flight)
+    complaints = dict.fromkeys(one.why for one in last)
+    found = [one for why in complaints for one in _behind(flight, why, last[-1].time_s)]
+    shown = [one for one in found if one.is_shown]
+    return tuple({one.name: one for one in shown or found}.values())
+
+
+def _behind(flight: Flight, why: str, at_s: float) -> Iterator[Refusing]:
+    reads = refusal_reads(why, flight.mode_kind, flight.settings)
+    values = dict(_values(flight.settings, at_s))
+    is_outside = "world" in reads.also
+    held = [_held(flight, name, values[name]) for name in reads.parameters if name in values]
+    if "voltage" in reads.also:
+        yield from (_told(one, OFF, is_shown=True) for one in _of_voltage(flight, held, why))
+        return
+    broken = [one for one in reads.must if one.is_broken(values)]
+    bound = {name: _held(flight, name, values[name]) for must in broken for name in must.parameters if name in values}
+    named = [one for one in held if one.name in reads.named]
+    if proven := _at_fault(list(bound.values())):
+        sure = PLAUSIBLE if is_outside else PROVEN
+        yield from (_told(one, sure, _asks(one, broken, values), is_shown=True) for one in proven)
+    elif proven := _at_fault(named):
+        yield from (_told(one, PROVEN, is_shown=True) for one in proven)
+    else:
+        sure = OFF * OUTSIDE if is_outside else OFF
+        yield from (_told(one, sure) for one in held if one.is_far_off)
+
+
+def _at_fault(held: Sequence[_Held]) -> list[_Held]:
+    """Those that are off their default; all where no default is known."""
+    off = [one for one in held if one.is_off]
+    return off or [one for one in held if one.default is None]
+
+
+def _asks(one: _Held, broken: Sequence[Must], values: Mapping[str, float]) -> str:
+    return next(must.asks(one.name, values) for must in broken if one.name in must.parameters)
+
+
+def _of_voltage(flight: Flight, held: Sequence[_Held], why: str) -> Iterator[_Held]:
+    """What makes a battery that is full read as too low: a scale with which it would read full, a pin that measures no
+    pack, a level above what a full pack has. A battery that is not full is the reason itself."""
+    number = int(next(iter(re.findall(r"\d+", why)), "1"))
+    battery = next((one for one in flight.batteries if one.number == number), None)
+    cell = None if battery is None or battery.rest_v is None else battery.rest_v / battery.cells
+    for one in held:
+        if one.name.endswith("_VOLT_MULT"):
+            is_behind = cell is not None and one.is_off and _reads_full(cell, one)
+        elif _SENSING.search(one.name):
+            is_behind = (cell is None or cell < _NONE_AT) and one.is_off
+        else:
+            is_behind = cell is not None and _FULL_AT <= cell <= _MOST_V and one.is_off
+        if is_behind:
+            yield one
+
+
+def _reads_full(cell: float, scale: _Held) -> bool:
+    """Whether a full pack is what such a cell would read with the default."""
+    return scale.default is not None and scale.value > 0 and _FULL_AT <= cell * scale.default / scale.value <= _MOST_V
+
+
+def _values(settings: Mapping[str, tuple[Setting, ...]], at_s: float) -> Iterator[tuple[str, float]]:
+    """The numbers in force at a time."""
+    for name, history in settings.items():
+        value = [one for one in history if one is history[0] or (one.changed_at_s or 0.0) <= at_s][-1].value
+        if isinstance(value, (int, float)) and math.isfinite(value):
+            yield name, float(value)
+
+
+def _held(flight: Flight, name: str, value: float) -> _Held:
+    recorded = flight.settings[name][-1].default
+    known = float(recorded) if isinstance(recorded, (int, float)) else firmware_default(name, flight.mode_kind)
+    meaning = meaning_of(name, flight.mode_kind)
+    return _Held(name, value, known, None if meaning is None else meaning.role)
+
+
+def _told(one: _Held, probability: float, asks: str = "", *, is_shown: bool = False) -> Refusing:
+    default = "" if one.default is None else f" (default {one.default:g})"
+    told = f"{one.name} is {one.value:g}{default}{f', {asks}' if asks else ''}"
+    wanted = one.default if one.is_off and one.role in ("choice", "wiring") else None
+    if wanted is not None:
+        back = f"'param set {one.name} {wanted:g}' puts it back"
+    else:
+        back = "calibrate again" if one.role in ("calibration", "written") else "check it first"
+    return Refusing(one.name, f"{told}: {back}", wanted, probability, is_shown)
