@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from care_core.ecosystems.ardupilot.battery import FULL_V
+from care_core.ecosystems.ardupilot.checks.settings.supply import wrong_scale
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.texts import Refusal
 from care_core.ecosystems.base import Limits
@@ -38,11 +38,10 @@ _FAR = LIMITS.add(
 _CODES = LIMITS.add("greatest default of a code", 10.0, "", "a choice: another code is another choice, however near")
 _FULL_AT = LIMITS.add("cell that reads full", 4.1, "V", "voltages of lithium polymer cells")
 _NONE_AT = LIMITS.add("cell that no pack has", 3.0, "V", "voltages of lithium polymer cells")
-_MOST_V = LIMITS.add("cell fully charged", FULL_V + 0.05, "V", "voltages of lithium polymer cells")
 _SAME = 1e-6
 """Vehicles hold parameters in 32 bits."""
 
-_SENSING, _THRESHOLD = re.compile(r"_(MONITOR|VOLT_PIN|VLT_OFFSET)$"), re.compile(r"_(LOW|CRT|ARM|MIN)_?VOLT2?$|_MAH$")
+_SENSING, _LEVEL = re.compile(r"_(MONITOR|VOLT_PIN)$"), re.compile(r"_(LOW|CRT|ARM|MIN)_(VOLT|MAH)2?$|_VOLT2?_MIN$")
 
 
 class Refusing(NamedTuple):
@@ -126,26 +125,19 @@ def _asks(one: _Held, broken: Sequence[Must], values: Mapping[str, float]) -> st
     return next(must.asks(one.name, values) for must in broken if one.name in must.parameters)
 
 
-def _of_voltage(flight: Flight, held: Sequence[_Held], why: str) -> Iterator[_Held]:
-    """What makes a battery that is full read as too low: a scale with which it would read full, a pin that measures no
-    pack, a level above what a full pack has. A battery that is not full is the reason itself."""
+def _of_voltage(flight: Flight, held: Sequence[_Held], why: str) -> list[_Held]:
+    """What makes a battery that is full read as too low: a wrong scale or pin, or a level above what a full pack has. A
+    battery that is not full is the reason itself."""
+    scale = wrong_scale(flight)
+    if scale is not None:
+        return [one for one in held if one.name in scale.parameters]
     number = int(next(iter(re.findall(r"\d+", why)), "1"))
     battery = next((one for one in flight.batteries if one.number == number), None)
-    cell = None if battery is None or battery.rest_v is None else battery.rest_v / battery.cells
-    for one in held:
-        if one.name.endswith("_VOLT_MULT"):
-            is_behind = cell is not None and one.is_off and _reads_full(cell, one)
-        elif _SENSING.search(one.name):
-            is_behind = (cell is None or cell < _NONE_AT) and one.is_off
-        else:
-            is_behind = cell is not None and _FULL_AT <= cell <= _MOST_V and one.is_off
-        if is_behind:
-            yield one
-
-
-def _reads_full(cell: float, scale: _Held) -> bool:
-    """Whether a full pack is what such a cell would read with the default."""
-    return scale.default is not None and scale.value > 0 and _FULL_AT <= cell * scale.default / scale.value <= _MOST_V
+    cell = 0.0 if battery is None or battery.rest_v is None else battery.rest_v / battery.cells
+    off = [one for one in held if one.is_off]
+    if cell < _NONE_AT:
+        return [one for one in off if _SENSING.search(one.name)]
+    return [one for one in off if _LEVEL.search(one.name)] if cell >= _FULL_AT else []
 
 
 def _values(settings: Mapping[str, tuple[Setting, ...]], at_s: float) -> Iterator[tuple[str, float]]:

@@ -1,0 +1,226 @@
+"""What the checks before arming read: the table, refusals by their text, and the parameters that a finding names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import pytest
+
+from care_core.ecosystems.ardupilot.examining import find
+from care_core.ecosystems.findings import Finding, every_finding
+from care_core.metadata import ardupilot
+from care_core.metadata.fact import expanded
+from care_core.metadata.refusals import RELATIONS, TABLE, Must, refusal_reads
+from care_core.run import Setting
+from tests.flights import END_S, Made, flight_of
+
+ROWS = [line.split("\t") for line in TABLE.read_text(encoding="utf-8").splitlines() if not line.startswith("#")][1:]
+NAMES = frozenset(ardupilot.names())
+COPTER = frozenset(
+    name for name in NAMES if any((one.vehicle, one.version) == ("C", "4.5") for one in ardupilot.known_in(name))
+)
+
+
+def _names(pattern: str) -> list[str]:
+    filled = pattern.replace("{n}", "2").replace("{k}", "2").replace("{m}", "34")
+    return list(expanded(filled))
+
+
+def test_every_row_reads_parameters_that_are_known_and_bounds_them_in_known_words() -> None:
+    for text, reads, must, also in ROWS:
+        assert reads, text
+        assert also in ("", "world", "voltage", "calibration"), text
+        for pattern in reads.split():
+            assert NAMES.intersection(_names(pattern)), pattern
+        for bound in filter(None, must.split("; ")):
+            for part in bound.split(" if "):
+                left, relation, right = part.split()
+                assert relation in RELATIONS, bound
+                assert NAMES.intersection(_names(left)), bound
+                assert (
+                    right.lstrip("-").replace(".", "").isdigit() or right == "{m}" or NAMES.intersection(_names(right))
+                )
+    assert sorted(ROWS) == ROWS
+
+
+@pytest.mark.parametrize(
+    ("text", "first"),
+    [
+        ("Check ANGLE_MAX", ("ANGLE_MAX",)),
+        ("RTL_ALT_TYPE is above-terrain but no terrain data", ("RTL_ALT_TYPE", "TERRAIN_ENABLE")),
+        ("GPS 2: Bad fix", ("GPS_TYPE2",)),
+        ("GPS 1 still configuring this GPS", ("GPS_TYPE", "GPS_AUTO_CONFIG")),
+        ("Battery 2 below minimum arming capacity", ("BATT2_ARM_MAH", "BATT2_CAPACITY")),
+        ("SERVO4_MAX is less than SERVO4_TRIM", ("SERVO4_MAX", "SERVO4_TRIM")),
+        ("AHRS: EK3_MAG_CAL and EK3_SRC1_YAW inconsiste", ("EK3_MAG_CAL", "EK3_SRC1_YAW")),
+        ("Motors: no SERVOx_FUNCTION set to Motor10", ("SERVO10_FUNCTION", "FRAME_CLASS", "FRAME_TYPE")),
+        ("Bad parameter: PSC_POSXY_P must be > 0", ("PSC_POSXY_P",)),
+        ("Main loop slow (234Hz < 400Hz)", ("SCHED_LOOP_RATE",)),
+        ("Throttle below failsafe", ("FS_THR_VALUE", "RC3_MIN")),
+        ("nobody ever said that", ()),
+    ],
+)
+def test_a_refusal_tells_what_its_check_reads(text: str, first: tuple[str, ...]) -> None:
+    assert refusal_reads(text, "copter", COPTER).parameters[: len(first)] == first
+    if not first:
+        assert refusal_reads(text, "copter", COPTER).parameters == ()
+
+
+def test_a_vehicle_of_another_release_is_read_by_its_own_names() -> None:
+    assert refusal_reads("GPS 2: Bad fix", "copter", {"GPS2_TYPE"}).parameters == ("GPS2_TYPE",)
+    assert refusal_reads("Check ANGLE_MAX", "copter", {"ATC_ANGLE_MAX"}).named == ("ATC_ANGLE_MAX",)
+
+
+def test_what_must_hold_is_broken_only_where_all_of_it_is_known() -> None:
+    bound = Must("INS_ACC3OFFS_X", "=", "0", Must("INS_ACC3_ID", "=", "0"))
+    assert bound.is_broken({"INS_ACC3OFFS_X": 3.5, "INS_ACC3_ID": 0.0})
+    assert not bound.is_broken({"INS_ACC3OFFS_X": 3.5, "INS_ACC3_ID": 2753044.0})
+    assert not bound.is_broken({"INS_ACC3OFFS_X": 3.5})
+    assert not Must("BATT_CRT_VOLT", "<", "BATT_LOW_VOLT").is_broken({"BATT_CRT_VOLT": 11.0})
+    assert Must("AHRS_TRIM_X", "within", "0.175").is_broken({"AHRS_TRIM_X": -0.3})
+
+
+Off = tuple[float, float | None]
+"""A value and its default; None where the log does not tell it."""
+
+
+def refused(*texts: str, **settings: Off) -> Finding:
+    """The finding of a vehicle that never armed, with these refusals and parameters."""
+    return refused_at(12.6, texts, settings)
+
+
+def refused_at(volts: float, texts: Sequence[str], settings: Mapping[str, Off]) -> Finding:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    made.table["BAT"]["Volt"][:] = volts + made.noise(0.01)
+    made.rows["MSG"] = [(t, {"Message": f"Arm: {text}"}) for t in (20.0, 30.0, 40.0) for text in texts]
+    known = {name: (Setting(name, value, "PARM", default),) for name, (value, default) in settings.items()}
+    flight = flight_of(made.tables(), {**made.known, **known}, made.facts, END_S)
+    (finding,) = [one for one in every_finding(find(flight)) if one.kind == "prearm"]
+    return finding
+
+
+def test_a_parameter_that_the_text_names_is_named_with_its_default_and_the_way_back() -> None:
+    finding = refused("RTL_ALT_TYPE is above-terrain but no terrain data", RTL_ALT_TYPE=(1, 0), TERRAIN_ENABLE=(0, 0))
+    assert (finding.suspect, finding.parameters, finding.wanted) == (
+        "parameter",
+        ("RTL_ALT_TYPE",),
+        (("RTL_ALT_TYPE", 0),),
+    )
+    assert "RTL_ALT_TYPE is 1 (default 0): 'param set RTL_ALT_TYPE 0' puts it back" in finding.evidence
+    assert finding.probability >= 0.9
+
+
+@pytest.mark.parametrize(
+    ("text", "settings", "named"),
+    [
+        ("SERVO2_MAX is less than SERVO2_TRIM", {"SERVO2_MAX": (1452, 1900), "SERVO2_TRIM": (1500, 1500)},
+         "SERVO2_MAX"),
+        ("SERVO4_MAX is less than SERVO4_TRIM", {"SERVO4_MAX": (1900, 1900), "SERVO4_TRIM": (2200, 1500)},
+         "SERVO4_TRIM"),
+        ("Check ACRO_BAL_ROLL/PITCH", {"ACRO_BAL_ROLL": (1, 1), "ATC_ANG_RLL_P": (0.8, 4.5), "ACRO_BAL_PITCH": (1, 1),
+                                       "ATC_ANG_PIT_P": (4.1, 4.5)}, "ATC_ANG_RLL_P"),
+        ("AHRS: EK3 sources require VisualOdom", {"EK3_SRC2_VELZ": (6, 0), "EK3_SRC1_POSZ": (2, 1)}, "EK3_SRC2_VELZ"),
+        ("Motors: no SERVOx_FUNCTION set to Motor1", {"SERVO1_FUNCTION": (52, 33), "SERVO9_FUNCTION": (7, 0),
+                                                      "FRAME_CLASS": (1, 0)}, "SERVO1_FUNCTION"),
+        ("GPS 1: primary but TYPE 0", {"GPS_PRIMARY": (1, 0), "GPS_TYPE": (0, 0)}, "GPS_PRIMARY"),
+    ],
+)  # fmt: skip
+def test_of_what_a_check_reads_the_one_that_breaks_it_is_named(text: str, settings: dict[str, Off], named: str) -> None:
+    finding = refused(text, **settings)
+    assert finding.parameters == (named,)
+    assert finding.wanted[0][0] == named
+
+
+def test_a_protection_is_never_loosened_and_a_calibration_is_done_again() -> None:
+    safety = refused(
+        "Battery 1 voltage failsafe critical >= low", BATT_CRT_VOLT=(11.8, 9.6), BATT_LOW_VOLT=(10.5, 10.5)
+    )
+    assert (safety.parameters, safety.wanted) == (("BATT_CRT_VOLT",), ())
+    assert "BATT_CRT_VOLT is 11.8 (default 9.6), must be below BATT_LOW_VOLT (10.5): check it first" in safety.evidence
+    assert "param set" not in safety.evidence
+    calibration = refused(
+        "3D Accel calibration needed",
+        INS_ACC3OFFS_X=(3.5, 0),
+        INS_ACC3_ID=(0, 0),
+        INS_ACCOFFS_X=(0.4, 0),
+        INS_ACC_ID=(2, 0),
+    )
+    assert (calibration.parameters, calibration.wanted) == (("INS_ACC3OFFS_X",), ())
+    assert "calibrate again" in calibration.evidence
+
+
+def test_what_is_calibrated_as_it_should_be_is_not_named() -> None:
+    finding = refused("3D Accel calibration needed", INS_ACCOFFS_X=(0.4, 0), INS_ACC_ID=(2, 0), INS_ACCSCAL_X=(1.01, 1))
+    assert (finding.suspect, finding.parameters) == ("operation", ())
+    assert not refused("Accels inconsistent", INS_ACC2OFFS_Y=(0.3, 0)).parameters
+    assert refused("Accels inconsistent", INS_ACC2OFFS_Y=(-3.5, 0)).parameters == ("INS_ACC2OFFS_Y",)
+
+
+def test_a_refusal_where_nothing_that_it_reads_is_off_stays_as_it_is() -> None:
+    for text in ("Need Position Estimate", "GPS 1: Bad fix", "Check mag field (xy diff:130>100)"):
+        finding = refused(text, EK3_SRC1_POSXY=(3, 3), GPS_TYPE=(1, 1), COMPASS_OFS_X=(43, 0), GPS_RATE_MS=(200, 200))
+        assert (finding.suspect, finding.parameters) == ("parameter", ())
+        assert finding.probability == 0.3
+
+
+def test_what_the_pilot_has_to_do_names_no_parameter() -> None:
+    for text in ("RC not found", "Throttle too high", "Hardware safety switch", "RTL mode not armable", "Leaning"):
+        finding = refused(text, FS_THR_VALUE=(1100, 975), ANGLE_MAX=(4500, 3000), BRD_SAFETYENABLE=(1, 0))
+        assert (finding.suspect, finding.parameters) == ("operation", ())
+
+
+def test_where_surroundings_may_be_the_reason_a_parameter_is_less_sure() -> None:
+    alone, outside = (
+        refused("GPS 2 still configuring this GPS", GPS_TYPE2=(9, 0)),
+        refused("GPS 2: Bad fix", GPS_TYPE2=(19, 0)),
+    )
+    assert alone.parameters == outside.parameters == ("GPS_TYPE2",)
+    assert outside.probability < alone.probability < 0.9
+
+
+def test_what_is_only_a_little_off_is_not_blamed() -> None:
+    finding = refused("AHRS: waiting for home", EK3_POSNE_M_NSE=(0.6, 0.5), EK3_VELNE_M_NSE=(5.0, 0.3))
+    assert finding.parameters == ("EK3_VELNE_M_NSE",)
+
+
+def test_a_default_that_the_log_lacks_names_both_sides_of_what_cannot_hold() -> None:
+    finding = refused("SERVO2_MAX is less than SERVO2_TRIM", SERVO2_MAX=(1452, None), SERVO2_TRIM=(1500, None))
+    assert finding.parameters == ("SERVO2_MAX", "SERVO2_TRIM")
+    assert finding.wanted == ()
+
+
+def test_several_refusals_name_what_each_of_them_reads() -> None:
+    finding = refused(
+        "AHRS: EK3 sources require RangeFinder", "Check ACRO_BAL_ROLL/PITCH", "Throttle too high",
+        EK3_SRC1_POSZ=(2, 1), ACRO_BAL_ROLL=(1, 1), ATC_ANG_RLL_P=(0.8, 4.5), GPS_TYPE2=(5, 0),
+    )  # fmt: skip
+    assert sorted(finding.parameters) == ["ATC_ANG_RLL_P", "EK3_SRC1_POSZ"]
+
+
+def test_a_battery_that_is_low_is_the_reason_itself() -> None:
+    text = "Battery 1 low voltage failsafe"
+    low = refused_at(10.2, (text,), {"BATT_LOW_VOLT": (10.4, 10.5), "BATT_VOLT_MULT": (10.1, 10.1)})
+    assert low.parameters == ()
+    scaled = refused_at(10.25, (text,), {"BATT_LOW_VOLT": (10.5, 10.5), "BATT_VOLT_MULT": (8.218, 10.1)})
+    assert scaled.parameters == ("BATT_VOLT_MULT",)
+    assert scaled.wanted == ()
+    calibrated = refused_at(10.25, (text,), {"BATT_LOW_VOLT": (10.5, 10.5), "BATT_VOLT_MULT": (12.02, 10.1)})
+    assert calibrated.parameters == ()
+    level = refused_at(12.5, (text,), {"BATT_LOW_VOLT": (13.2, 10.5), "BATT_VOLT_MULT": (10.1, 10.1)})
+    assert level.parameters == ("BATT_LOW_VOLT",)
+    assert "check it first" in level.evidence
+
+
+def test_a_compass_beside_a_parameter_that_cannot_hold_is_not_called_wrong() -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    made.rows["MSG"] = [(t, {"Message": "PreArm: Compasses inconsistent"}) for t in (20.0, 50.0)]
+    titles = [one.title for one in find(flight_of(made.tables(), made.known, made.facts, END_S))]
+    assert "the firmware finds the compass wrong" in titles
+    known = {**made.known, "COMPASS_OFS_Z": (Setting("COMPASS_OFS_Z", -600.0, "PARM", -18.0),)}
+    found = find(flight_of(made.tables(), known, made.facts, END_S))
+    assert [(one.kind, one.parameters) for one in found if one.suspect == "hardware"] == []
+    assert any("COMPASS_OFS_Z" in one.parameters for one in found)
