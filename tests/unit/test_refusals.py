@@ -124,6 +124,7 @@ def test_a_parameter_that_the_text_names_is_named_with_its_default_and_the_way_b
         ("AHRS: EK3 sources require VisualOdom", {"EK3_SRC2_VELZ": (6, 0), "EK3_SRC1_POSZ": (2, 1)}, "EK3_SRC2_VELZ"),
         ("Motors: no SERVOx_FUNCTION set to Motor1", {"SERVO1_FUNCTION": (52, 33), "SERVO9_FUNCTION": (7, 0),
                                                       "FRAME_CLASS": (1, 0)}, "SERVO1_FUNCTION"),
+        ("Motors: Check frame class and type", {"FRAME_CLASS": (2, 1), "FRAME_TYPE": (10, 1)}, "FRAME_TYPE"),
         ("GPS 1: primary but TYPE 0", {"GPS_PRIMARY": (1, 0), "GPS_TYPE": (0, 0)}, "GPS_PRIMARY"),
     ],
 )  # fmt: skip
