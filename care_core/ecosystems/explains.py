@@ -22,7 +22,9 @@ the estimator can follow, and air streams over the barometer."""
 EXPLAINS: Explains = {
     # --- vehicles: what fails first shows in what follows, the attitude and the crash last
     "vibration": frozenset(("imu", "estimator", "tuning", "attitude", "crash")),  # aliased and clipped inertial data
-    "imu": frozenset(("vibration", "estimator", "tuning", "thrust", "attitude", "crash", "localisation")),
+    "imu": frozenset(  # a false tilt turns the magnetic field, and keeps the vehicle from arming
+        ("vibration", "estimator", "tuning", "thrust", "attitude", "crash", "compass", "prearm", "localisation")
+    ),
     "motor": frozenset(("thrust", "tuning", "vibration", "attitude", "takeoff", "crash")),
     "thrust": frozenset(("attitude", "battery", "takeoff", "crash")),  # full throttle draws the pack down
     "gps": frozenset(("estimator", "attitude", "crash", "prearm")),  # position control leans after a false position

@@ -8,7 +8,7 @@ import pytest
 from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.findings import Finding
 from care_core.run import Setting
-from tests.flights import ARMED_S, DOWN_S, Made
+from tests.flights import ARMED_S, DOWN_S, HOVER, UP_S, Made
 
 FAILSAFE_S = 60.0
 
@@ -254,3 +254,117 @@ def test_a_declination_that_somebody_gave() -> None:
     ((name, value),) = naming(made, "COMPASS_DEC").wanted
     assert name == "COMPASS_DEC"
     assert value == pytest.approx(0.0, abs=0.05)
+
+
+# --- what stands level
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "default", "sensor", "axis"),
+    [
+        ("INS_ACCOFFS_X", 3.0, 0.0, "IMU", "AccX"),
+        ("INS_ACC2OFFS_Y", -3.5, 0.0, "IMU#2", "AccY"),
+        ("INS_ACCOFFS_Z", -3.0, 0.0, "IMU", "AccZ"),
+        ("INS_ACC2SCAL_Z", 0.8, 1.0, "IMU#2", "AccZ"),
+    ],
+)
+def test_an_accelerometer_that_undoing_mends(
+    parameter: str, value: float, default: float, sensor: str, axis: str
+) -> None:
+    made = MadeWithDefaults()
+    made.drive(parameter, value, default)
+    made.table[sensor][axis] = (
+        made.table[sensor][axis] * value if "SCAL" in parameter else made.table[sensor][axis] - value
+    )
+    assert naming(made, parameter).wanted == ((parameter, default),)
+    assert "the accelerometers disagree" not in [one.title for one in made.find()]
+
+
+def test_an_accelerometer_that_was_calibrated_is_none() -> None:
+    made = MadeWithDefaults()
+    made.drive("INS_ACCOFFS_X", 0.4, 0.0)
+    made.drive("INS_ACCSCAL_Z", 1.02, 1.0)
+    assert made.find() == ()
+
+
+def test_an_accelerometer_that_undoing_does_not_mend_disagrees() -> None:
+    made = MadeWithDefaults()
+    made.drive("INS_ACCOFFS_Y", 0.4, 0.0)
+    made.table["IMU"]["AccX"] += 5.0
+    assert [one.title for one in made.find()] == ["the accelerometers disagree"]
+
+
+@pytest.mark.parametrize(
+    ("parameter", "angle", "trim"), [("AHRS_TRIM_X", "Roll", 0.17), ("AHRS_TRIM_Y", "Pitch", -0.1)]
+)
+def test_a_trim_that_tilts_what_stands_level(parameter: str, angle: str, trim: float) -> None:
+    made = MadeWithDefaults()
+    made.settings[parameter] = trim
+    for name in (angle, f"Des{angle}"):
+        made.table["ATT"][name] -= np.degrees(trim)
+    assert naming(made, parameter).wanted == ((parameter, 0.0),)
+
+
+def test_a_vehicle_that_stands_on_a_slope_has_no_wrong_trim() -> None:
+    made = MadeWithDefaults()
+    made.settings["AHRS_TRIM_X"] = 0.02
+    standing = ~made.after(UP_S)
+    made.table["ATT"]["Roll"][standing] = 8.0
+    for sensor in ("IMU", "IMU#2"):
+        made.table[sensor]["AccY"][standing] = -9.81 * np.sin(np.radians(8.0))
+        made.table[sensor]["AccZ"][standing] = -9.81 * np.cos(np.radians(8.0))
+    assert not [one for one in made.find() if one.parameters]
+
+
+def test_gravity_tells_a_board_that_is_told_a_wrong_mounting() -> None:
+    made = MadeWithDefaults()
+    made.drive("AHRS_ORIENTATION", 8, 0)
+    for name in ("MAG", "MAG#2"):
+        made.table.pop(name)
+    for sensor in ("IMU", "IMU#2"):
+        for axis in "YZ":
+            made.table[sensor][f"Acc{axis}"] *= -1.0
+    assert naming(made, "AHRS_ORIENTATION").wanted == (("AHRS_ORIENTATION", 0.0),)
+
+
+# --- hovering
+
+
+def stays_down(made: Made) -> None:
+    throttle = np.where(made.after(ARMED_S + 3, DOWN_S), 0.93, 0.0)
+    made.table["CTUN"] |= {"ThO": throttle, "Alt": 0 * made.t, "BAlt": 0 * made.t}
+    made.table["POS"]["RelHomeAlt"][:] = made.noise(0.02)
+
+
+@pytest.mark.parametrize(("parameter", "value", "shipped"), [("MOT_SPIN_MAX", 0.6, 0.95), ("MOT_PWM_MAX", 1600, 2000)])
+def test_outputs_that_end_before_it_rises(parameter: str, value: float, shipped: float) -> None:
+    made = MadeWithDefaults()
+    stays_down(made)
+    made.drive(parameter, value, shipped)
+    assert not [one for one in made.find() if one.parameters]  # the outputs stay well below
+    for output in made.table["RCOU"].values():
+        output[made.after(ARMED_S + 3, DOWN_S)] = 1600.0
+    finding = made.find()[0]
+    assert (finding.title, finding.severity) == ("too little thrust to take off", "critical")
+    assert finding.wanted == ((parameter, shipped),)
+    assert "the outputs end at 1600 us of 2000" in finding.evidence
+
+
+def test_a_throttle_that_swings_names_the_gain_that_was_raised() -> None:
+    made = MadeWithDefaults()
+    flying = made.after(UP_S + 1, DOWN_S - 1)
+    made.table["CTUN"]["ThO"][flying] = 0.5 + 0.45 * np.sign(np.sin(8.0 * made.t[flying]))
+    assert not [one for one in made.find() if one.parameters]
+    made.drive("PSC_ACCZ_D", 0.4, 0.0)
+    finding = naming(made, "PSC_ACCZ_D")
+    assert (finding.title, finding.wanted) == ("the throttle swings", ())
+
+
+def test_a_hover_throttle_that_nothing_learns() -> None:
+    made = MadeWithDefaults()
+    made.drive("MOT_THST_HOVER", 0.15, 0.35)
+    made.settings["MOT_HOVER_LEARN"] = 2
+    assert made.find() == ()
+    made.settings["MOT_HOVER_LEARN"] = 0
+    ((name, value),) = naming(made, "MOT_THST_HOVER").wanted
+    assert (name, value) == ("MOT_THST_HOVER", HOVER)

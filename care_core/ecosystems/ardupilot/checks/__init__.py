@@ -26,12 +26,14 @@ from care_core.ecosystems.ardupilot.checks import (
     vibration,
     way_home,
 )
-from care_core.ecosystems.ardupilot.checks.settings import heading, supply
+from care_core.ecosystems.ardupilot.checks.settings import heading, hover, level, supply
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
 CHECKS: tuple[Check[Flight], ...] = (
     heading.CHECK,
+    hover.CHECK,
+    level.CHECK,
     supply.CHECK,
     attitude.CHECK,
     barometer.CHECK,

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.settings import level
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Floats, Mask, Span, during
 from care_core.ecosystems.ardupilot.statistics import (
@@ -78,7 +79,8 @@ def find(flight: Flight) -> Iterator[Finding]:
     yield from _unhealthy(flight, sensors)
     if len(sensors) > 1:
         yield from _gyros(flight, sensors)
-        yield from _accelerometers(flight, sensors)
+        if level.wrong_accelerometer(flight) is None:
+            yield from _accelerometers(flight, sensors)
 
 
 def _unhealthy(flight: Flight, sensors: list[Table]) -> Iterator[Finding]:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.settings import hover
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
@@ -44,6 +45,8 @@ def find(flight: Flight) -> Iterator[Finding]:
     driven = flight.throttle
     if not flight.is_copter or flight.kind == "heli" or driven is None:
         return  # what a helicopter records as throttle is its collective pitch
+    if hover.kept_from_range(flight) is not None and hover.spent_on_ground(flight) is not None:
+        return  # a parameter keeps it down
     t, throttle = driven
     flown = during(flight.flown or flight.watched, t) & (throttle > _FLYING)
     if flown.sum() < 5:
@@ -55,7 +58,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         start, end = full[0][0], full[-1][1]
         below = _below(flight, start, end)
         begin = min([start, *[a for a, _ in high]])
-        hover = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
+        before = float(median(throttle[flown & (t <= max(start, t[flown][0] + 5))]))
         lasted = sum(b - a for a, b in full)
         grounded = not flight.flown and lasted > _GROUNDED_S
         lost = flight.impact_s is not None or any(code for _, code in flight.errors(_FAILSAFE_BATT))
@@ -70,7 +73,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             evidence=(
                 f"throttle above {100 * FULL:.0f} % for {lasted:.0f} s from {start:.0f} s on"
                 + (f", {below:.1f} m below the height wanted" if below else "")
-                + f"; {100 * hover:.0f} % before that"
+                + f"; {100 * before:.0f} % before that"
                 + why
             ),
             source="CTUN.ThO; AP_MOTORS_THST_HOVER_MAX 0.6875",

@@ -31,6 +31,7 @@ _FULL = LIMITS.add("cell of a pack that was charged", 4.1, "V", _LOW_CELL)
 _MOST = LIMITS.add("highest cell", 4.25, "V", _LOW_CELL)
 _NO_CELL = LIMITS.add("cell that no pack has", 4.4, "V", "lithium polymer cells of high voltage: 4.35 V")
 _NO_PACK = LIMITS.add("cell at rest that no vehicle flies on", 2.5, "V", "lithium polymer cells are ruined below 3 V")
+_RUNS_V = LIMITS.add("voltage that a vehicle runs on", 4.0, "V", "one full cell")
 _AT_REST_A = LIMITS.add("current before arming", 3.0, "A", "a choice: boards, radios and cameras draw less")
 _NONE_A = LIMITS.add("current before arming that is none", 1.0, "A", "a choice")
 _ADVISED = {
@@ -134,7 +135,7 @@ def _not_measured(flight: Flight) -> Iterator[Finding]:
     """A monitor that measures no voltage or no current, and is not the one that was to: wrong where a failsafe rests on
     it."""
     default = flight.default_left("BATT_MONITOR")
-    if not default or not flight.armed:
+    if not default or not flight.watched:
         return
     table = _first(flight)
     lacking = next((field for field in ("Volt", "Curr") if table is None or not _says(table, field)), None)
@@ -142,13 +143,14 @@ def _not_measured(flight: Flight) -> Iterator[Finding]:
         return
     what, thresholds = ("voltage", _BY_VOLTAGE) if lacking == "Volt" else ("current", _BY_CHARGE)
     rests = next((name for name in thresholds if (flight.setting(name) or 0.0) > 0.0), "")
+    refused = flight.refused_for("battery") is not None
     value = shown(flight.setting("BATT_MONITOR"))
     yield Finding(
         kind="battery",
         title=f"the battery's {what} is not measured",
         onset_s=0.0,
         end_s=flight.end_s,
-        severity="warning" if rests else "info",
+        severity="critical" if refused else "warning" if rests else "info",
         evidence=f"no {what} is recorded with BATT_MONITOR={value} (default {shown(default)})"
         + (f", and {rests} rests on it" if rests else ""),
         source="BAT; BATT_MONITOR",
@@ -160,7 +162,8 @@ def _not_measured(flight: Flight) -> Iterator[Finding]:
 
 
 def _says(table: Table, field: str) -> bool:
-    return field in table.columns and bool(np.isfinite(table[field]).any())
+    values = table[field] if field in table.columns else np.empty(0)
+    return bool(np.isfinite(values).any()) and (field != "Volt" or bool(np.nanmax(values) > _RUNS_V))
 
 
 def _offset(flight: Flight) -> Iterator[Finding]:

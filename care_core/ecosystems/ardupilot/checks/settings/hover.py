@@ -1,0 +1,183 @@
+"""Motors that are kept from their thrust, a throttle that swings, a hover throttle that is not the vehicle's.
+
+All that motors have is spent where the throttle stays high and the vehicle stays down. Their outputs then end where
+MOT_PWM_MIN, MOT_PWM_MAX and MOT_SPIN_MAX end them (AP_MotorsMulticopter: output_to_pwm).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.statistics import lasting, smooth
+from care_core.ecosystems.base import Check, Limits
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Wanted
+from care_core.numbers import median
+from care_core.records import Record
+from care_core.run import shown
+
+READS: Wanted = {"CTUN": ("ThO", "Alt"), "RCOU": tuple(f"C{n}" for n in range(1, 9))}
+
+LIMITS = Limits()
+_SPENT = LIMITS.add("throttle that lifts any vehicle", 0.6875, "", "AP_MotorsMulticopter.h: AP_MOTORS_THST_HOVER_MAX")
+_GROUNDED_S = LIMITS.add("such a throttle on the ground", 10.0, "s", "a choice: a take-off takes less")
+_KEPT = LIMITS.add("range of the outputs that is left", 0.9, "", "a choice: a share of the range as shipped")
+_REACHED = LIMITS.add("outputs that reach what is left of it", 0.05, "", "a choice: a share of the range as shipped")
+_SWINGS = LIMITS.add(
+    "throttle off its mean of three seconds",
+    0.2,
+    "",
+    "305 healthy flights have 0.14 at most, in the median of the flight",
+)
+_RAISED = LIMITS.add("times its default that a gain is raised", 1.5, "", "a choice")
+_HOVER = LIMITS.add("times MOT_THST_HOVER that hovering takes", 1.6, "", "a choice: loads and winds take less")
+_EDGE_S, _FEWEST = 4.0, 20
+_SURE = LIMITS.add("probability that what ends the outputs keeps it down", 0.9, "", "both flights that stayed down so")
+_GAIN = LIMITS.add("probability of a raised gain", 0.8, "", "a choice: no healthy flight swings so")
+_FEEDS = LIMITS.add("probability of a hover throttle that is wrong", 0.9, "", "it is measured")
+_FEEDS_LOST = LIMITS.add("probability that it costs the mission", 0.02, "", "0 of 4 flights at half and twice failed")
+_GAINS = (
+    "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_ACCZ_D", "PSC_ACCZ_FF", "PSC_ACCZ_D_FF", "PSC_VELZ_P", "PSC_VELZ_I", "PSC_VELZ_D",
+    "PSC_POSZ_P",
+)  # fmt: skip
+_SHIPPED = {"MOT_SPIN_MAX": 0.95, "MOT_PWM_MAX": 2000.0, "MOT_PWM_MIN": 1000.0}
+"""What the firmware comes with, where the log tells no default."""
+
+
+class Kept(Record):
+    """What keeps the outputs of the motors from their range."""
+
+    parameter: str
+    wanted: float
+    evidence: str
+
+
+def find(flight: Flight) -> Iterator[Finding]:
+    """What is wrong with how the throttle becomes thrust."""
+    if not flight.is_copter or flight.kind == "heli" or flight.throttle is None:
+        return
+    yield from _kept_down(flight)
+    yield from _swings(flight)
+    yield from _hovers_elsewhere(flight)
+
+
+def _kept_down(flight: Flight) -> Iterator[Finding]:
+    kept, span = kept_from_range(flight), spent_on_ground(flight)
+    if kept is not None and span is not None:
+        yield Finding(
+            kind="thrust",
+            title="too little thrust to take off",
+            onset_s=span[0],
+            end_s=span[1],
+            severity="critical",
+            evidence=f"{span[1] - span[0]:.0f} s at full throttle without rising; {kept.evidence}",
+            source="CTUN.ThO, RCOU",
+            suspect="parameter",
+            probability=_SURE,
+            parameters=(kept.parameter,),
+            wanted=((kept.parameter, kept.wanted),),
+        )
+
+
+def spent_on_ground(flight: Flight) -> tuple[float, float] | None:
+    """The first span in which a copter that never flew spends its throttle; None where there is none."""
+    if flight.throttle is None or flight.airborne:
+        return None
+    t, driven = flight.throttle
+    high = smooth(t, driven, 4.0) > _SPENT
+    return next(iter(lasting(t, high & during(flight.armed, t), _GROUNDED_S, gap_s=5.0)), None)
+
+
+def kept_from_range(flight: Flight) -> Kept | None:
+    """The parameter that takes most of the range of the motors' outputs, where they reach what it leaves; None where
+    that is nearly whole."""
+    driven = {name: flight.setting(name) for name in _SHIPPED}
+    least, most, spin = driven["MOT_PWM_MIN"], driven["MOT_PWM_MAX"], driven["MOT_SPIN_MAX"]
+    if least is None or not most or not spin:
+        return None
+    left = {name: flight.default_left(name) for name in _SHIPPED}
+    whole = {name: shipped if left[name] is None else left[name] or 0.0 for name, shipped in _SHIPPED.items()}
+    span = whole["MOT_PWM_MAX"] - whole["MOT_PWM_MIN"]
+    shares = {"MOT_SPIN_MAX": spin / whole["MOT_SPIN_MAX"], "MOT_PWM_MAX": (most - whole["MOT_PWM_MIN"]) / span}
+    share, name = min((share, name) for name, share in shares.items())
+    highest = _highest_output(flight)
+    if share >= _KEPT or (highest is not None and highest < least + spin * (most - least) - _REACHED * span):
+        return None
+    reached = "" if highest is None else f"the outputs end at {highest:.0f} us of {whole['MOT_PWM_MAX']:.0f}, for "
+    return Kept(name, whole[name], f"{reached}{name} is {shown(driven[name])} (as shipped {whole[name]:g})")
+
+
+def _highest_output(flight: Flight) -> float | None:
+    """What the motors were asked for at most, in microseconds; None where nothing tells."""
+    outputs = [flight.one("RCOU", f"C{n}") for n in range(1, 5)]
+    known = [float(np.nanmax(one[f"C{n}"])) for n, one in enumerate(outputs, start=1) if one is not None]
+    return max(known, default=None)
+
+
+def _swings(flight: Flight) -> Iterator[Finding]:
+    """A throttle that swings as no healthy one does, with a gain of the height control that was raised."""
+    assert flight.throttle is not None
+    t, driven = flight.throttle
+    flying = during(((start + _EDGE_S, end - _EDGE_S) for start, end in flight.flown), t)
+    raised = [name for name in _GAINS if _is_raised(flight, name)]
+    if flying.sum() < _FEWEST or not raised:
+        return
+    swing = float(median(np.abs(driven - smooth(t, driven, 3.0))[flying]))
+    if swing > _SWINGS:
+        yield Finding(
+            kind="tuning",
+            title="the throttle swings",
+            onset_s=flight.flown[0][0],
+            end_s=flight.flown[-1][1],
+            severity="critical",
+            evidence=(
+                f"half of the time it is {100 * swing:.0f} % and more off its mean (limit {100 * _SWINGS:.0f} %) with "
+                + ", ".join(f"{name}={flight.setting(name):g}" for name in raised)
+            ),
+            source="CTUN.ThO",
+            suspect="parameter",
+            probability=_GAIN,
+            parameters=tuple(raised),
+        )
+
+
+def _is_raised(flight: Flight, name: str) -> bool:
+    default, value = flight.default_left(name), flight.setting(name)
+    return default is not None and value is not None and value > _RAISED * default
+
+
+def _hovers_elsewhere(flight: Flight) -> Iterator[Finding]:
+    """A hover throttle that nothing learns, and that is far from what hovering takes."""
+    assert flight.throttle is not None
+    value = flight.setting("MOT_THST_HOVER")
+    if flight.setting("MOT_HOVER_LEARN") != 0 or not value or flight.default_left("MOT_THST_HOVER") is None:
+        return
+    t, driven = flight.throttle
+    flying = during(((start + _EDGE_S, end - _EDGE_S) for start, end in flight.flown), t)
+    if flying.sum() < _FEWEST:
+        return
+    hover = float(median(driven[flying]))
+    if max(hover / value, value / max(hover, 1e-3)) > _HOVER:
+        yield Finding(
+            kind="tuning",
+            title="MOT_THST_HOVER is not what hovering takes",
+            onset_s=flight.flown[0][0],
+            end_s=flight.flown[-1][1],
+            severity="warning",
+            evidence=f"hovering takes {hover:.2f}, MOT_THST_HOVER={value:g}, and MOT_HOVER_LEARN=0 learns none",
+            source="CTUN.ThO",
+            suspect="parameter",
+            probability=_FEEDS,
+            mission_lost=_FEEDS_LOST,
+            parameters=("MOT_THST_HOVER",),
+            wanted=(("MOT_THST_HOVER", round(hover, 2)),),
+        )
+
+
+CHECK = Check(
+    "hover settings", "motors kept from their thrust, a throttle that swings or is fed wrongly", READS, LIMITS, find
+)
