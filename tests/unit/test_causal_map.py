@@ -35,6 +35,7 @@ def test_what_nothing_reads_shows_nothing_and_what_is_safety_shows_something() -
             assert not signs, pattern
         if role == "safety":
             assert signs, pattern
+        assert (role == "idle") <= (read == "never"), pattern
 
 
 def test_every_row_is_of_parameters_that_are_known() -> None:

@@ -9,6 +9,7 @@ import pytest
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.findings import Finding, every_finding
 from care_core.metadata import ardupilot
+from care_core.metadata.causal_map import meaning_of
 from care_core.metadata.fact import expanded
 from care_core.metadata.refusals import RELATIONS, TABLE, Must, refusal_reads
 from care_core.run import Setting
@@ -41,6 +42,17 @@ def test_every_row_reads_parameters_that_are_known_and_bounds_them_in_known_word
                     right.lstrip("-").replace(".", "").isdigit() or right == "{m}" or NAMES.intersection(_names(right))
                 )
     assert sorted(ROWS) == ROWS
+
+
+def test_the_causal_map_knows_that_arming_reads_what_a_refusal_reads() -> None:
+    read = {name for _, reads, *_ in ROWS for pattern in reads.split() for name in _names(pattern)}
+    for kind in ("copter", "rover", "plane"):
+        own = (one for one in read if any(at.vehicle == ardupilot.VEHICLES[kind] for at in ardupilot.known_in(one)))
+        for meaning in (meaning_of(name, kind) for name in own):
+            assert meaning is not None
+            assert "arming" in meaning.read, meaning.name
+            assert "refused" in meaning.signs, meaning.name
+            assert meaning.role != "idle", meaning.name
 
 
 @pytest.mark.parametrize(
