@@ -151,3 +151,24 @@ def test_a_bench_that_idles_as_shipped_says_nothing() -> None:
     idles(made, 5.0)
     made.rows["MODE"] = [(0.0, {"ModeNum": 0.0})]  # the pilot flies it, and did not
     assert told(made, {"DISARM_DELAY": 10.0}) == ()
+
+
+def driven_as_servos(made: Made) -> None:
+    """All the throttle is given, two of four outputs rest, and it does not rise."""
+    full = made.t > UP_S
+    made.table["CTUN"]["ThO"] = np.where(full, 0.96, 0.0)
+    for name, field in (("POS", "RelHomeAlt"), ("CTUN", "Alt")):
+        made.table[name][field] = 0.1 * np.sin(made.t)
+    for output, pulse in (("C1", 1950.0), ("C2", 1940.0), ("C3", 1500.0), ("C4", 1490.0)):
+        made.table["RCOU"][output] = np.where(full, pulse, 1000.0)
+
+
+def test_motors_that_a_class_of_frame_drives_as_servos_are_told() -> None:
+    made = Made()
+    made.settings["FRAME_CLASS"] = 10.0
+    driven_as_servos(made)
+    (finding,) = told(made, {"FRAME_CLASS": 1.0})
+    assert (finding.parameters, finding.wanted) == (("FRAME_CLASS",), ())
+    assert "outputs 3, 4 stay within 50 us of 1500 us" in finding.evidence
+    made.settings["FRAME_CLASS"] = 1.0
+    assert told(made, {"FRAME_CLASS": 1.0}) == ()  # two motors that give nothing

@@ -70,9 +70,9 @@ def find(flight: Flight) -> Iterator[Finding]:
     yield from _steering(flight)
     if not flight.is_copter:
         return
-    swings = list(_swings(flight))
-    yield from swings
-    if flight.lost_control_s is None and not swings:
+    swung = list(swings(flight))
+    yield from swung
+    if flight.lost_control_s is None and not swung:
         yield from _far(flight)
     yield from _yaw(flight)
 
@@ -174,7 +174,7 @@ def _is_a_turn(off: Floats) -> bool:
     return bool(np.all(off <= np.minimum.accumulate(off) + _WAVERS_DEG)) and float(off[-1]) < _NEARER * float(off[0])
 
 
-def _swings(flight: Flight) -> Iterator[Finding]:
+def swings(flight: Flight) -> Iterator[Finding]:
     """Rates that swing far more than is asked for: gains too high, or filters too slow. The axis that swings most."""
     table = flight.one("RATE", "R", "P", "RDes", "PDes")
     if table is None:

@@ -31,15 +31,13 @@ _OFF_MS = LIMITS.add(
 _ALIKE = LIMITS.add(
     "correlation with what the arm gives", 0.4, "", "one of 600 training flights has it with an arm of 3 m put in"
 )
-_FOLLOWS = LIMITS.add("share of the arm that it follows", 0.15, "", "in a thinned log much of a turn is missed")
+_FOLLOWS = LIMITS.add("share of the arm that it follows", 0.2, "", "in a thinned log much of a turn is missed")
 _SURE = LIMITS.add("probability of the arm", 0.9, "", "all 13 such flights have an arm that is not there")
-_LOST, _FLOWN = (
-    LIMITS.add("probability that a mission fails of it, after an EKF failsafe", 0.95, "", "7 of 7 such flights"),
-    LIMITS.add(
-        "probability that a mission fails of it, else", 0.5, "", "2 of 8 such flights, and other missions turn more"
-    ),
-)
+_LOST = LIMITS.add("probability that a mission fails of it, after an EKF failsafe", 0.95, "", "7 of 7 such flights")
+_OFF_PATH = LIMITS.add("probability that a mission fails of a wrong antenna, else", 0.8, "", "3 of 3 such flights")
+_IN_TURNS = LIMITS.add("probability that a mission fails of a wrong IMU, else", 0.3, "", "none of 8 flights; a choice")
 _ERR_EKF = (16, 17)
+_STEP_S, _LEARNED_S = 0.1, 1.0
 _LAGS_S = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5)
 """Receivers are late by so much (AP_GPS)."""
 
@@ -50,6 +48,8 @@ class _Arm(NamedTuple):
     title: str
     parameters: tuple[str, ...]
     used: Floats
+    fails: float
+    """How likely a mission fails with it, where the estimator still holds."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -75,22 +75,22 @@ def find(flight: Flight) -> Iterator[Finding]:
         source="XKF3.IVN, IVE, IVD against RATE and ATT; PARM",
         suspect="parameter",
         probability=_SURE,
-        mission_lost=_FLOWN if lost is None else _LOST,
+        mission_lost=arm.fails if lost is None else _LOST,
         parameters=arm.parameters,
         wanted=((arm.parameters[0], 0.0),) if len(arm.parameters) == 1 else (),
     )
 
 
 def _arms(flight: Flight) -> Iterator[_Arm]:
-    for what, sign, names in (
-        ("the GPS antenna", 1.0, ("GPS_POS1_{}", "GPS1_POS_{}")),
-        ("the IMU", -1.0, ("INS_POS1_{}",)),
+    for what, sign, fails, names in (
+        ("the GPS antenna", 1.0, _OFF_PATH, ("GPS_POS1_{}", "GPS1_POS_{}")),
+        ("the IMU", -1.0, _IN_TURNS, ("INS_POS1_{}",)),
     ):
         for name in names:
             arm = {name.format(axis): flight.setting(name.format(axis)) or 0.0 for axis in "XYZ"}
             named = tuple(one for one, metres in arm.items() if metres)
             if np.linalg.norm(list(arm.values())) >= _ARM_M:
-                yield _Arm(f"{what} is not where it is said to be", named, sign * np.array(list(arm.values())))
+                yield _Arm(f"{what} is not where it is said to be", named, sign * np.array([*arm.values()]), fails)
 
 
 def _follows(flight: Flight, arm: Floats) -> Iterator[tuple[float, tuple[float, float, float, float]]]:
@@ -101,21 +101,37 @@ def _follows(flight: Flight, arm: Floats) -> Iterator[tuple[float, tuple[float, 
         return
     rows = during(flight.flown, inno.t)
     t, off = inno.t[rows], np.stack([inno[axis][rows] for axis in READS["XKF3"]], axis=-1)
-    best: tuple[float, tuple[float, float, float, float]] | None = None
-    for lag in _LAGS_S:
-        given = _given(leans.t, _angles(leans.columns), rates.t, rates.columns, t - lag, arm)
-        turns: Mask = (np.abs(given) > _TURNS_MS) & np.isfinite(off)
-        if turns.sum() < _RECORDS:
-            continue
-        a, b = given[turns], off[turns]
-        size = float(np.sqrt(np.mean(b**2)))
-        alike = float(a @ b) / float(np.linalg.norm(a) * np.linalg.norm(b) or 1.0)
-        if size > _OFF_MS and alike > _ALIKE and float(a @ b) > _FOLLOWS * float(a @ a):
-            begin = float(t[np.any(turns & (np.abs(off) > _OFF_MS), axis=1)][0])
-            if best is None or alike > best[0]:
-                best = alike, (begin, size, float(np.sqrt(np.mean(a**2))), alike)
-    if best is not None:
-        yield best
+    grid = np.arange(flight.flown[0][0] - _LEARNED_S, flight.flown[-1][1], _STEP_S)
+    given = _given(leans.t, _angles(leans.columns), rates.t, rates.columns, grid, arm)
+    found = [
+        alike
+        for velocity in (given, _unlearned(given))
+        for lag in _LAGS_S
+        for alike in _alike(t, off, np.stack([np.interp(t - lag, grid, one) for one in velocity.T], axis=-1))
+    ]
+    if found:
+        yield max(found, key=lambda one: one[0])
+
+
+def _alike(t: Floats, off: Floats, given: Floats) -> Iterator[tuple[float, tuple[float, float, float, float]]]:
+    turns: Mask = (np.abs(given) > _TURNS_MS) & np.isfinite(off)
+    if turns.sum() < _RECORDS:
+        return
+    a, b = given[turns], off[turns]
+    size = float(np.sqrt(np.mean(b**2)))
+    alike = float(a @ b) / float(np.linalg.norm(a) * np.linalg.norm(b) or 1.0)
+    if size > _OFF_MS and alike > _ALIKE and float(a @ b) > _FOLLOWS * float(a @ a):
+        begin = float(t[np.any(turns & (np.abs(off) > _OFF_MS), axis=1)][0])
+        yield alike, (begin, size, float(np.sqrt(np.mean(a**2))), alike)
+
+
+def _unlearned(given: Floats) -> Floats:
+    """What is left of a velocity once the estimator has learned, over a second, what lasts; shape (n, 3)."""
+    learned, left = np.zeros(given.shape[1]), np.empty_like(given)
+    for row, velocity in enumerate(given):
+        learned = learned + (velocity - learned) * _STEP_S / _LEARNED_S
+        left[row] = velocity - learned
+    return left
 
 
 def _angles(leans: Mapping[str, Floats]) -> tuple[Floats, Floats, Floats]:

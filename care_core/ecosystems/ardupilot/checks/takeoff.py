@@ -1,4 +1,4 @@
-"""Take-off: motors that answer against their demand, and motors that are kept from spooling up.
+"""Take-off: motors that answer against their demand, that are driven as servos, or are kept from spooling up.
 
 A rate that grows against all that its controller gives is turned by motors that push the other way: their order, their
 places or their directions are not those of FRAME_TYPE, FRAME_CLASS and SERVOn_FUNCTION. One weak or dead motor tips a
@@ -14,7 +14,7 @@ import numpy as np
 
 from care_core.ecosystems.ardupilot.airborne import ACRO
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import Mask, Span, runs
+from care_core.ecosystems.ardupilot.spans import Mask, Span, during, runs
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.vehicles import motor_outputs
@@ -23,6 +23,7 @@ from care_core.numbers import median
 
 READS: Wanted = {
     "RATE": ("R", "RDes", "ROut", "P", "PDes", "POut", "Y", "YDes", "YOut"),
+    "RCOU": tuple(f"C{n}" for n in range(1, 15)),
     "ESC": ("RPM",),
 }
 
@@ -44,10 +45,16 @@ _SURE = LIMITS.add("probability of a parameter, where motors answer wrongly", 0.
 _KEPT = LIMITS.add("probability of a parameter that keeps motors down", 0.95, "", "the firmware does as it says")
 _LOST = LIMITS.add("probability that a mission fails of it", 0.95, "", "it does not take off")
 _DELAY_S = LIMITS.add("disarming off DISARM_DELAY", 0.7, "s", "arming and spooling up take some of it")
+_FULL = LIMITS.add("throttle of what does not rise", 0.9, "", "a choice: any vehicle that can fly rises with less")
+_FULL_S = LIMITS.add("time without rising", 5.0, "s", "a choice: a take-off takes less")
+_RESTS_US = LIMITS.add("pulse of a servo at rest", 1500.0, "us", "SERVOn_TRIM as shipped")
+_RESTS_BY_US = LIMITS.add("pulse off that", 50.0, "us", "a motor at full throttle is 400 above it")
 _AXES = (("roll", "R"), ("pitch", "P"), ("yaw", "Y"))
 _USUAL_TYPES, _USUAL_CLASSES = frozenset((0.0, 1.0)), frozenset((1.0, 2.0))
 """FRAME_TYPE of plus and X, FRAME_CLASS of quad and hexa (AP_Motors_Class.h): every other is one of few vehicles."""
 _FIRST_MOTOR = 33
+_THRUSTERS = frozenset((*range(33, 41), *range(82, 86), 73, 74, 75, 76))
+"""SERVOn_FUNCTION of motors, of throttles left and right and of what tilts them (SRV_Channel.h)."""
 _IDLED = "after idling on the ground"
 
 
@@ -65,7 +72,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     """What answers wrongly; else what never spooled up."""
     if not flight.is_copter or not flight.armed:
         return
-    layout = wrong_layout(flight)
+    layout = wrong_layout(flight) or _no_motors(flight)
     if layout is not None:
         yield layout
     else:
@@ -179,6 +186,42 @@ def _flew(flight: Flight, at: float, rate: str) -> bool:
     return len(before) > 0 and float(np.max(before)) > most
 
 
+def _no_motors(flight: Flight) -> Finding | None:
+    """Outputs of motors that stay where a servo rests while the throttle is all the way up, and it does not rise."""
+    table, throttle, values = flight.one("RCOU"), flight.throttle, _layout(flight)
+    if table is None or throttle is None or "FRAME_CLASS" not in values or flight.airborne:
+        return None
+    driven = np.interp(table.t, *throttle)
+    full = (driven > _FULL) & during(flight.armed, table.t)
+    if not full.any() or float(np.sum(np.diff(table.t)[full[1:]])) < _FULL_S:
+        return None
+    outputs = [
+        n for n in range(1, 15) if flight.setting(f"SERVO{n}_FUNCTION") in _THRUSTERS and f"C{n}" in table.columns
+    ]
+    pulses = {n: table[f"C{n}"][full] for n in outputs if table[f"C{n}"][full].any()}
+    resting = [n for n, us in pulses.items() if float(np.abs(us[:_RECORDS] - _RESTS_US).max()) < _RESTS_BY_US]
+    if not resting or len(resting) == len(pulses):
+        return None
+    kind = flight.setting("FRAME_CLASS")
+    return Finding(
+        kind="takeoff",
+        title="outputs of motors are driven as servos",
+        onset_s=float(table.t[full][0]),
+        end_s=float(table.t[full][-1]),
+        severity="critical",
+        evidence=(
+            f"with the throttle above {100 * _FULL:.0f} % outputs {', '.join(map(str, resting))} stay within "
+            f"{_RESTS_BY_US:g} us of {_RESTS_US:g} us, and it does not rise; FRAME_CLASS is {kind:g}"
+            f"{_default_words(values['FRAME_CLASS'])}: set it as the frame is built"
+        ),
+        source="RCOU against CTUN.ThO, height; PARM",
+        suspect="parameter",
+        probability=_SURE,
+        mission_lost=_LOST,
+        parameters=("FRAME_CLASS",),
+    )
+
+
 def _kept_down(flight: Flight) -> Iterator[Finding]:
     """It was armed to fly by itself, idled, and was disarmed for it."""
     for change in flight.arm_changes:
@@ -244,4 +287,4 @@ def _down(title: str, span: Span, evidence: str, source: str, parameter: str, va
     )
 
 
-CHECK = Check("takeoff", "motors that answer against their demand, or are kept from spooling up", READS, LIMITS, find)
+CHECK = Check("takeoff", "motors that answer against their demand, or are driven as none", READS, LIMITS, find)
