@@ -41,8 +41,15 @@ def mend_first(findings: Sequence[Finding]) -> Finding | None:
     battery that was not charged or kept the vehicle from arming; but for what a sign of how the vehicle was set led to.
     """
     by_setting = [one for one in findings if set_wrong(one)]
-    stopping = (one for one in _unexplained(findings) if _stops(one))
+    is_shown = any(one.severity == "critical" and one.parameters for one in by_setting)
+    stopping = (one for one in _unexplained(findings) if _stops(one) and not (is_shown and _only_not_full(one)))
     return next((one for one in stopping if one.probability >= LIKELY or not is_late(one, by_setting)), None)
+
+
+def _only_not_full(finding: Finding) -> bool:
+    """Whether it is a battery that was flown with less than a full charge, and held: beside a parameter that was wrong
+    in itself it is no matter."""
+    return finding.title == UNCHARGED and finding.severity != "critical"
 
 
 def _unexplained(findings: Sequence[Finding]) -> Iterator[Finding]:

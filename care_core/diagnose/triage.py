@@ -376,13 +376,15 @@ def _cause(case: _Case, result: ObjectiveResult, suspect: Suspect, rank: int) ->
 
 
 def _as_in_fix(case: _Case, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
-    """The causes with the values that the fix gives their options: nobody is told two values for one option."""
+    """The causes with the values that the fix gives their options: nobody is told two values for one option.
+    Beside a fix whose odds were not measured none has any: what training says of them was not enough to advise one."""
     values = {change.option.name: change.suggested for change in fix.changes}
 
     def as_in_fix(cause: Cause) -> Cause:
         value = values.get(cause.option.name, cause.suggested)
-        if fix.shown_by and cause.option.name in values:
-            return replace(cause, suggested=value, predicted=None, p_fixed=None)
+        if fix.shown_by:
+            predicted = None if cause.option.name in values else cause.predicted
+            return replace(cause, suggested=value, predicted=predicted, p_fixed=None)
         if value is None or value == cause.suggested:
             return cause
         changed = {**case.query.config, cause.option.name: value}

@@ -43,7 +43,8 @@ class PromisedSet(Record):
     """One set of changes of the report: option -> (from, to), with the outcome it promised."""
 
     changes: Mapping[str, tuple[float, float]]
-    p_fixed: float
+    p_fixed: float | None
+    """None where the odds were not measured: that promises nothing."""
     intervals: Mapping[str, tuple[float, float]]
     """Per objective the 80 % interval."""
 
@@ -99,7 +100,7 @@ class Verification(Record):
     verdict: VerifyVerdict
     sentence: str
     chosen: int
-    p_fixed: float
+    p_fixed: float | None
     changes: tuple[MadeChange, ...]
     others: tuple[OtherChange, ...]
     objectives: tuple[ObjectiveCheck, ...]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +64,30 @@ class Motion(Record):
 def least(way_m: float = math.inf, turn_deg: float = math.inf, rise_m: float = math.inf) -> Motion:
     """The motion of which any part shows in a source that lives."""
     return Motion(way_m, turn_deg, rise_m)
+
+
+class Shows(NamedTuple):
+    """The motion that shows in a vehicle's sources, whatever wrote the log."""
+
+    place: Motion
+    heading: Motion
+    height: Motion
+    any: Motion
+    """In an attitude and in what it is made from."""
+
+
+def motion_shown(limits: Limits) -> Shows:
+    """The motion that shows in a vehicle's sources, as limits of the check that compares with it."""
+    way_m = limits.add("way that shows in a position", 10.0, "m", "a choice: receivers resolve 1 cm")
+    turn_deg = limits.add(
+        "turn that shows in a compass, an attitude", 20.0, "deg", "a choice: they resolve 0.1 degrees"
+    )
+    rise_m = limits.add("rise that shows in an attitude", 5.0, "m", "a choice: still air moves a vehicle, too")
+    rose_m = limits.add(
+        "rise that shows in a barometer", 10.0, "m", "a choice: of estimates on the ground some rise 6 m"
+    )
+    height, whole = least(rise_m=rose_m), least(way_m, turn_deg, rise_m)
+    return Shows(least(way_m=way_m), least(turn_deg=turn_deg), height, whole)
 
 
 class Live(Record):

@@ -167,7 +167,9 @@ class History(Record):
             insert_triage(connection, document, mission, about or About())
 
     def add_verification(self, document: Mapping[str, Any]) -> None:
-        """Remember a `care.verify/1` document. Raises HistoryError."""
+        """Remember a `care.verify/1` document; nothing of one that no odds were promised for. Raises HistoryError."""
+        if document["p_fixed"] is None:
+            return
         profile = document["profile"]
         row = (
             _now(), profile["name"], profile["version"], document["report_log"]["sha256"], document["log"]["sha256"],

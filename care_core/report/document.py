@@ -183,11 +183,12 @@ class ChangeEntry(Document, kw_only=True):
 
 class FixSet(Document, kw_only=True):
     changes: list[ChangeEntry]
-    p_fixed: Share
+    p_fixed: Share | None
+    """Null where the odds were not measured."""
     guess: bool = False
     """Whether a value is one that no training run came near."""
     shown_by: str = ""
-    """The finding that shows the cause, where training says little of it: then `p_fixed` is no promise."""
+    """The finding that shows the cause, where training says little of it."""
     predicted: dict[str, PredictedObjective]
 
     @property
@@ -481,7 +482,7 @@ def _fix_set(fix: Fix) -> FixSet:
     entries = {name: predicted_objective(prediction) for name, prediction in fix.predicted.items()}
     return FixSet(
         changes=[_change(change) for change in fix.changes],
-        p_fixed=six_digits(fix.p_fixed),
+        p_fixed=estimate(fix.odds),
         guess=fix.is_guess,
         shown_by=clean(fix.shown_by),
         predicted={name: entry for name, entry in entries.items() if entry is not None},

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 from care_core.diagnose.records import ObjectiveResult
-from care_core.diagnose.verdict import STATUS_WORDS
+from care_core.diagnose.verdict import STATUS_WORDS, beside
 from care_core.diagnose.verify import (
     NOT_HELD,
     Before,
@@ -106,7 +106,10 @@ class VerifyDocument(Document, kw_only=True):
     """What `care triage` says of the run."""
     alternative: int
     """0: the suggested set of changes; else the number of the alternative that was made instead."""
-    p_fixed: float
+    p_fixed: float | None
+    """Null where the report gave no odds."""
+    odds_as_driven: float | None = None
+    """What the report gave the same run without the change."""
     worked: bool | None
     """Whether the promised change repaired the run; null where it was not made, or nobody can tell."""
     changes: list[CheckedChange]
@@ -147,7 +150,7 @@ def promise_of(report: TriageDocument, schema: Schema, path: Path) -> Promise:
         sets=tuple(
             PromisedSet(
                 {one.option.name: (one.before, one.value) for one in suggested_changes(fix, schema, path, key)},
-                fix.p_fixed,
+                fix.odds,
                 {name: (predicted.low, predicted.high) for name, predicted in fix.predicted.items()},
             )
             for key, fix in fix_sets(report.fix)
@@ -166,6 +169,7 @@ def verify_document(report: TriageDocument, run: Run, found: Verification) -> Ve
         sentence=clean(found.sentence),
         alternative=found.chosen,
         p_fixed=found.p_fixed,
+        odds_as_driven=report.odds_as_driven,
         worked=found.worked,
         triage=found.headline,
         changes=[_change(change) for change in found.changes],
@@ -223,7 +227,9 @@ def _lines(document: VerifyDocument) -> Iterator[str]:
         yield from wrapped(note, "  ! ")
     yield ""
     which = f" of alternative {document.alternative}" if document.alternative else ""
-    yield f"Changes{which} (promised at {document.p_fixed:.0%})"
+    odds = document.p_fixed
+    promised = "odds not measured" if odds is None else f"promised at {odds:.0%}{beside(document.odds_as_driven)}"
+    yield f"Changes{which} ({promised})"
     for change in document.changes:
         driven = "" if change.driven is None or change.made == "made" else f" ({change.driven:g} was driven)"
         note = f"; {change.note}" if change.note else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import care_core
+from care_core.report.document import build_document
 
 
 def test_the_fix_and_the_causes_suggest_the_same_value(recorded: Path) -> None:
@@ -26,3 +27,7 @@ def test_a_finding_that_names_its_options_leads_to_them(recorded: Path) -> None:
     assert diagnosis.fix is not None
     assert [str(change) for change in diagnosis.fix.changes] == ["ATC_RAT_PIT_D 0.008471 -> 0.0036"]
     assert (diagnosis.fix.odds, diagnosis.fix.shown_by) == (None, "pitch oscillates")
+    assert [one.p_fixed for fault in diagnosis.faults for one in fault.causes if one.p_fixed is not None] == []
+    fix = build_document(diagnosis).fix
+    assert fix is not None
+    assert fix.p_fixed is None

@@ -158,6 +158,15 @@ def test_what_is_no_failed_part_does_not(other: Finding) -> None:
     assert mend_first([other]) is None
 
 
+def test_a_battery_that_held_is_no_matter_beside_a_parameter_that_is_wrong_in_itself() -> None:
+    wrong = replace(
+        part("compass", "the compass reads nothing", 0.9, suspect="parameter"), parameters=("COMPASS_MOT_X",)
+    )
+    assert mend_first([wrong, part("battery", UNCHARGED, 0.9, severity="warning")]) is None
+    empty = part("battery", UNCHARGED, 0.9)
+    assert mend_first([wrong, empty]) == empty
+
+
 def test_motors_at_their_limit_for_an_oscillation_are_no_failed_part_but_a_sure_one_is() -> None:
     assert mend_first([SWINGS, part("motor", "motor 2 lost thrust", 0.3)]) is None
     sure = part("motor", "motor 2 lost thrust", 0.9)

@@ -324,6 +324,7 @@ def test_a_calibration_that_is_no_number_is_the_dead_compass() -> None:
     finding = first(made)
     assert (finding.severity, finding.suspect) == ("critical", "parameter")
     assert "COMPASS_MOT_X" in finding.evidence
+    assert (first(made).parameters, first(made).wanted) == (("COMPASS_MOT_X",), (("COMPASS_MOT_X", 0.0),))
 
 
 def test_a_refusal_that_names_the_compass_is_the_compass() -> None:

@@ -56,6 +56,11 @@ def test_an_empty_history_is_no_error(history: History) -> None:
     assert "No triage" in history_text(history_document((), ()))
 
 
+def test_what_promised_nothing_is_no_promise(history: History) -> None:
+    history.add_verification({**verification_of(1, 0.5, True), "p_fixed": None})
+    assert history.verifications() == ()
+
+
 def test_the_same_log_is_remembered_once(history: History) -> None:
     for number in (1, 2, 1):
         history.add_triage(triage_of(number), 1)

@@ -174,6 +174,16 @@ def test_what_falls_after_the_kill_switch_is_the_kill_switchs_doing() -> None:
     assert killed(0.1).findings == ()  # a pilot killed what did not let itself be disarmed
 
 
+def test_the_failure_detector_has_the_time_at_which_it_acted() -> None:
+    def flown(**topics: Table) -> Px4Flight:
+        return Px4Flight(MadeLog({"vehicle_status": FLOWN, **topics}))
+
+    flags = states(fd_critical_failure=[(0, 0), (42, 1), (43, 0)], fd_motor_failure=[(0, 0), (41, 1)])
+    assert flown(failsafe_flags=flags).gave_up_s((10.0, 60.0)) == 41.0
+    assert flown(failsafe_flags=flags).gave_up_s((10.0, 30.0)) is None
+    assert flown().gave_up_s((10.0, 60.0)) is None
+
+
 def test_newer_firmware_tells_of_the_heading_in_place_of_the_compass() -> None:
     ratios = states(hdg_test_ratio=[(0, 0.1), (30, 1.4), (36, 0.2)])
     health = examine(Px4Flight(MadeLog({"vehicle_status": FLOWN, "estimator_status": ratios})))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import jsonschema
@@ -233,6 +234,16 @@ def test_a_reports_own_limit_counts_where_it_is_stricter_only() -> None:
     assert any("--threshold time=1e+09" in note for note in slow.notes)
 
 
+def unmeasured(report: Path) -> Path:
+    """The same report with a change whose odds were not measured, of another log."""
+    data = YAML(typ="safe").load(report)
+    data["log"]["sha256"] = "0" * 64
+    data["fix"] |= {"p_fixed": None, "shown_by": "pitch oscillates"}
+    other = report.with_suffix(".json")
+    other.write_text(json.dumps(data), encoding="utf-8")
+    return other
+
+
 # Reports on disk
 
 
@@ -304,6 +315,18 @@ def test_a_run_that_still_fails_ends_with_1(care: Care, report: Path) -> None:
     assert code == 1
     assert document["verdict"] == "change_not_made"
     assert document["worked"] is None
+
+
+def test_the_odds_as_driven_stand_beside_the_promise(care: Care, report: Path) -> None:
+    assert re.search(r"\(promised at \d+%; as driven \d+%\)", care("verify", report, SAMPLE).stdout)
+
+
+def test_odds_that_were_not_measured_promise_nothing(care: Care, report: Path) -> None:
+    code, out, _ = care("verify", unmeasured(report), SAMPLE)
+    assert code == 1
+    assert "Changes (odds not measured)" in out
+    document = json.loads(care("verify", unmeasured(report), SAMPLE, "--json").stdout)
+    assert document["p_fixed"] is None
 
 
 def test_a_run_is_judged_against_the_reference_of_the_triage(care: Care, report: Path, tmp_path: Path) -> None:

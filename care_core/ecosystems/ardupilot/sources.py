@@ -26,7 +26,7 @@ from care_core.ecosystems.liveness import (
     Motion,
     Unconnected,
     is_part,
-    least,
+    motion_shown,
     no_pack,
     numberless,
     overlaps,
@@ -47,21 +47,18 @@ def _s(name: str, value: float) -> float:
     return LIMITS.add(f"longest repetition of the {name}", value, "s", _CHOICE)
 
 
-_WAY_M = LIMITS.add("way that shows in a position", 10.0, "m", "a choice: receivers resolve 1 cm")
-_TURN_DEG = LIMITS.add("turn that shows in a compass, an attitude", 20.0, "deg", "a choice: they resolve 0.1 degrees")
-_RISE_M = LIMITS.add("rise that shows in an attitude", 5.0, "m", "a choice: still air moves a vehicle, too")
-_ROSE_M = LIMITS.add("rise that shows in a barometer", 10.0, "m", "a choice: of estimates on the ground some rise 6 m")
-_ANY = least(_WAY_M, _TURN_DEG, _RISE_M)
+_SHOWS = motion_shown(LIMITS)
+_ANY = _SHOWS.any
 
 SOURCES = (
-    Live("GPS", ("Lat", "Lng"), "the GPS", "gps", _s("GPS", 5.0), least(way_m=_WAY_M)),
+    Live("GPS", ("Lat", "Lng"), "the GPS", "gps", _s("GPS", 5.0), _SHOWS.place),
     Live("IMU", ("GyrX", "GyrY", "GyrZ"), "the gyro", "imu", _s("gyro", 1.0), _ANY),
     Live("IMU", ("AccX", "AccY", "AccZ"), "the accelerometer", "imu", _s("accelerometer", 1.0), _ANY),
-    Live("MAG", ("MagX", "MagY", "MagZ"), "the compass", "compass", _s("compass", 3.0), least(turn_deg=_TURN_DEG)),
-    Live("BARO", ("Alt",), "the barometer", "barometer", _s("barometer", 5.0), least(rise_m=_ROSE_M)),
+    Live("MAG", ("MagX", "MagY", "MagZ"), "the compass", "compass", _s("compass", 3.0), _SHOWS.heading),
+    Live("BARO", ("Alt",), "the barometer", "barometer", _s("barometer", 5.0), _SHOWS.height),
     Live("ATT", ("Roll", "Pitch", "Yaw"), "the attitude", "estimator", _s("attitude", 3.0), _ANY),
-    Live("POS", ("Lat", "Lng"), "the estimated position", "estimator", _s("position", 5.0), least(way_m=_WAY_M)),
-    Live("POS", ("RelHomeAlt",), "the estimated height", "estimator", _s("height", 5.0), least(rise_m=_ROSE_M)),
+    Live("POS", ("Lat", "Lng"), "the estimated position", "estimator", _s("position", 5.0), _SHOWS.place),
+    Live("POS", ("RelHomeAlt",), "the estimated height", "estimator", _s("height", 5.0), _SHOWS.height),
     Live("BAT", ("Volt", "Curr"), "the battery's monitor", "battery", _s("battery", 30.0), _ANY, is_optional=True,
          mission_lost=ASIDE),
     Live("BAT", ("Curr",), "the current sensor", "battery", _s("current sensor", 30.0), _ANY, is_optional=True,

@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Iterator
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -211,16 +212,17 @@ class Px4Flight(RunModel):
         before = [mode for t, mode in self.modes if t <= span[0]][-1:]
         return [*before, *(mode for t, mode in self.modes if span[0] < t <= span[1])]
 
-    def gave_up(self, span: Span) -> bool:
-        """Whether the failure detector acted in a span."""
+    def gave_up_s(self, span: Span) -> float | None:
+        """When the failure detector first acted in a span; None where it did not."""
+        times = [self.first_s(FLAGS, name, 1, span) for name in ("fd_critical_failure", "fd_motor_failure")]
+        times.append(self.first_s(STATUS, "nav_state", TERMINATION, span))
+        if TERMINATION in self.modes_during((span[0], span[0])):
+            times.append(span[0])
         status = self.during(STATUS, "failure_detector_status", span)
-        bits = np.nan_to_num(status["failure_detector_status"]).astype(np.int64) if status is not None else 0
-        return (
-            self.ever(FLAGS, "fd_critical_failure", 1, span)
-            or self.ever(FLAGS, "fd_motor_failure", 1, span)
-            or TERMINATION in self.modes_during(span)
-            or bool(np.any(bits & _GAVE_UP))
-        )
+        if status is not None:
+            bits = np.nan_to_num(status["failure_detector_status"]).astype(np.int64) & _GAVE_UP
+            times.append(_first_s(status.t, bits != 0))
+        return min((one for one in times if one is not None), default=None)
 
     def changes(self, topic: str, field: str) -> Iterator[tuple[float, float]]:
         """The first value of a field and every change of it; nothing where the log lacks it."""
@@ -232,10 +234,14 @@ class Px4Flight(RunModel):
         table = self.table(topic, field)
         return None if table is None else table.between(*span)
 
+    def first_s(self, topic: str, field: str, value: float, span: Span) -> float | None:
+        """When a field first had a value in a span; None where it never had."""
+        table = self.during(topic, field, span)
+        return None if table is None else _first_s(table.t, table[field] == value)
+
     def ever(self, topic: str, field: str, value: float, span: Span) -> bool:
         """Whether a field had a value in a span."""
-        table = self.during(topic, field, span)
-        return table is not None and bool(np.any(table[field] == value))
+        return self.first_s(topic, field, value, span) is not None
 
     def at_least(self, topic: str, field: str, value: float, span: Span) -> bool:
         """Whether a field reached a value in a span."""
@@ -286,3 +292,8 @@ def log_messages(flight: RunModel) -> Iterator[Event]:
     assert isinstance(flight, Px4Flight)
     for t, level, text in flight.messages:
         yield Event(t, _LEVELS.get(level.casefold(), "message"), text, MESSAGES)
+
+
+def _first_s(t: NDArray[Any], holds: NDArray[np.bool_]) -> float | None:
+    """The first time at which something holds; None where it never does."""
+    return float(t[int(np.argmax(holds))]) if holds.any() else None

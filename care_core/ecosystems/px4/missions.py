@@ -116,14 +116,14 @@ def _lost_events(flight: Px4Flight, span: Span) -> Unavailable | None:
 def _no_crash(flight: Px4Flight, span: Span) -> Check:
     """Whether it stayed in control. What falls after its motors were cut is no failure of its own."""
     killed_s = flight.killed_s(span)
-    gave_up = flight.gave_up((span[0], min(span[1], math.inf if killed_s is None else killed_s)))
-    was_cut = not gave_up and killed_aloft_s(flight, span) is not None
+    gave_up_s = flight.gave_up_s((span[0], min(span[1], math.inf if killed_s is None else killed_s)))
+    was_cut = gave_up_s is None and killed_aloft_s(flight, span) is not None
     hit, lost = upset.hit(flight), upset.lost_control(flight)
     how = (
         "the kill switch cut its motors in the air" if was_cut
         else f"it hit the ground at {hit.speed_ms:.1f} m/s" if hit is not None and _is_in(span, hit.time_s)
         else "control was lost in the air" if lost is not None and _is_in(span, lost.time_s)
-        else "the failure detector acted" if gave_up
+        else f"the failure detector acted at {gave_up_s:.1f} s" if gave_up_s is not None
         else ""
     )  # fmt: skip
     return Check("no_crash", float(not how), "the failure detector stayed silent", how)

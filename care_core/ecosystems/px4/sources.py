@@ -16,7 +16,7 @@ from care_core.ecosystems.liveness import (
     Live,
     Motion,
     Unconnected,
-    least,
+    motion_shown,
     no_pack,
     numberless,
     overlaps,
@@ -36,11 +36,8 @@ def _s(name: str, value: float) -> float:
     return LIMITS.add(f"longest repetition of the {name}", value, "s", _CHOICE)
 
 
-_WAY_M = LIMITS.add("way that shows in a position", 10.0, "m", "a choice: receivers resolve 1 cm")
-_TURN_DEG = LIMITS.add("turn that shows in a compass, an attitude", 20.0, "deg", "a choice: they resolve 0.1 degrees")
-_RISE_M = LIMITS.add("rise that shows in an attitude", 5.0, "m", "a choice: still air moves a vehicle, too")
-_ROSE_M = LIMITS.add("rise that shows in a barometer", 10.0, "m", "a choice: of estimates on the ground some rise 6 m")
-_ANY = least(_WAY_M, _TURN_DEG, _RISE_M)
+_SHOWS = motion_shown(LIMITS)
+_ANY = _SHOWS.any
 
 
 def _axes(name: str, count: int = 3) -> tuple[str, ...]:
@@ -53,18 +50,18 @@ _PLACES = {
 }
 _GPS = ("latitude_deg", "longitude_deg", "lat", "lon")
 SOURCES = (
-    *(Live(topic, _GPS, "the GPS", "gps", _s(f"GPS ({topic})", 5.0), least(way_m=_WAY_M)) for topic in _PLACES),
+    *(Live(topic, _GPS, "the GPS", "gps", _s(f"GPS ({topic})", 5.0), _SHOWS.place) for topic in _PLACES),
     Live("sensor_combined", _axes("gyro_rad"), "the gyro", "imu", _s("gyro", 1.0), _ANY),
     Live("sensor_combined", _axes("accelerometer_m_s2"), "the accelerometer", "imu", _s("accelerometer", 1.0), _ANY),
     Live("vehicle_magnetometer", _axes("magnetometer_ga"), "the compass", "compass", _s("compass", 3.0),
-         least(turn_deg=_TURN_DEG)),
+         _SHOWS.heading),
     Live("vehicle_air_data", ("baro_alt_meter",), "the barometer", "barometer", _s("barometer", 5.0),
-         least(rise_m=_ROSE_M)),
+         _SHOWS.height),
     Live("vehicle_attitude", _axes("q", 4), "the attitude", "estimator", _s("attitude", 3.0), _ANY),
     Live("vehicle_local_position", ("x", "y"), "the estimated position", "estimator", _s("position", 5.0),
-         least(way_m=_WAY_M)),
+         _SHOWS.place),
     Live("vehicle_local_position", ("z",), "the estimated height", "estimator", _s("height", 5.0),
-         least(rise_m=_ROSE_M)),
+         _SHOWS.height),
     Live("battery_status", ("voltage_v", "current_a"), "the battery's monitor", "battery", _s("battery", 30.0), _ANY,
          is_optional=True, mission_lost=ASIDE),
     Live("airspeed", ("indicated_airspeed_m_s",), "the airspeed sensor", "barometer", _s("airspeed", 5.0), _ANY,

@@ -111,10 +111,12 @@ def _dead(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
         if not replaced or flight.lost_control_s is not None or _rejected(flight, start)
         else "warning",
         evidence="the field of compass 1 is zero or marked unhealthy"
-        + (f"; {broken} is not a number" if broken else ""),
+        + (f"; not a number: {', '.join(broken)}" if broken else ""),
         source="MAG",
         suspect="parameter" if broken else "hardware",
         probability=_DEAD,
+        parameters=broken[:1],  # its axes are one calibration
+        wanted=tuple((name, 0.0) for name in broken[:1]),
     )
 
 
@@ -123,13 +125,13 @@ def _silent(compass: Table) -> Mask:
     return silent | (compass["Health"] == 0) if "Health" in compass.columns else silent
 
 
-def _not_a_number(flight: Flight) -> str:
-    """A calibration of the compass that is no number, which makes every field none; "" where there is no such."""
+def _not_a_number(flight: Flight) -> tuple[str, ...]:
+    """The calibrations of the compass that are no numbers, which make every field none."""
     table = flight.one("PARM", "Name", "Value")
     if table is None:
-        return ""
-    names = table["Name"][~np.isfinite(table["Value"])].tolist()
-    return next((name for name in names if str(name).startswith("COMPASS_")), "")
+        return ()
+    names = map(str, table["Name"][~np.isfinite(table["Value"])].tolist())
+    return tuple(dict.fromkeys(name for name in names if name.startswith("COMPASS_")))
 
 
 def _apart(flight: Flight, compasses: list[Table]) -> Iterator[Finding]:
