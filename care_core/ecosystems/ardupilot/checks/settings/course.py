@@ -62,7 +62,10 @@ class Leans:
 
     def against(self, t: Floats, heading: Floats) -> Course:
         """How a heading (radians, at times t) turns the leans to the speeding up, beside drag and wind."""
-        turned = self._lean * np.exp(1j * np.interp(self._t, t, np.unwrap(heading)))
+        told = np.isfinite(heading)
+        if not told.any():
+            return Course(0.0, 0.0)
+        turned = self._lean * np.exp(1j * np.interp(self._t, t[told], np.unwrap(heading[told])))
         push = np.concatenate(([0.0], np.cumsum(0.5 * (turned[1:] + turned[:-1]) * np.diff(self._t))))
         begin, end = (np.interp(one - _LATE_S, self._t, push) for one in self._ends)
         mean = (end - begin) / (self._ends[1] - self._ends[0])
