@@ -13,7 +13,9 @@ Where two would each have done alone, both are told; the weights are brought to 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Container, Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.diagnose.parts import is_late, set_wrong
@@ -42,6 +44,7 @@ LEAST = 0.005
 """Hypotheses less likely than this are told together with chance."""
 UNNAMED = "chance, or what no log shows"
 """What chance is called where there is no reference configuration that could fail as well."""
+NONE_OUTSIDE: Mapping[str, float] = MappingProxyType({})
 _WHAT: Mapping[SuspectKind, str] = {"hardware": "hardware", "world": "world", "operation": "world"}
 
 
@@ -64,6 +67,7 @@ def explain(
     findings: Sequence[Finding],
     shown: Mapping[str, Evidence],
     verdict: FitVerdict,
+    outside: Mapping[str, float] = NONE_OUTSIDE,
 ) -> tuple[Hypothesis, ...]:
     """What explains the broken objectives of a run.
 
@@ -75,6 +79,7 @@ def explain(
         found: per objective the options that may have moved it, with their weights.
         refused: options that the check reads which refused this mission: they explain it whole.
         shown: by title, the findings that say which options they speak of (`speaking`).
+        outside: how likely each parameter outside the profile is wrong and loses a mission in this way.
     """
     before = replace(query, observed={})
     options: dict[str, float] = {}
@@ -90,7 +95,7 @@ def explain(
             for option, share in _named_by(finding, shown[finding.title].options, found).items():
                 options[option] = max(options.get(option, 0.0), share)
     options.update({suspect.option: 1.0 for group in found.values() for suspect in group if suspect.option in refused})
-    return weigh(options, min(chance, default=0.0), findings, verdict)
+    return weigh(options, min(chance, default=0.0), findings, verdict, outside)
 
 
 def unasked(
@@ -99,6 +104,7 @@ def unasked(
     failed: bool = False,
     shown: Mapping[str, Evidence] | None = None,
     verdict: FitVerdict = "no",
+    outside: Mapping[str, float] = NONE_OUTSIDE,
 ) -> tuple[Hypothesis, ...]:
     """What explains a failure of which no model can be asked; empty where nothing failed, by a check of the run
     (`failed`) or by a critical finding. Options are those that such a finding names (`shown`, as for `explain`)."""
@@ -111,7 +117,7 @@ def unasked(
         for option in named:
             share = finding.probability * _mission_lost(finding) / len(named)
             options[option] = max(options.get(option, 0.0), share)
-    weighed = weigh(options, 0.0, findings, verdict if options else "no")
+    weighed = weigh(options, 0.0, findings, verdict if options else "no", outside)
     return tuple(replace(one, name=UNNAMED) if one.what == "chance" else one for one in weighed)
 
 
@@ -144,6 +150,7 @@ def weigh(
     chance: float,
     findings: Iterable[Finding],
     verdict: FitVerdict,
+    outside: Mapping[str, float] = NONE_OUTSIDE,
 ) -> tuple[Hypothesis, ...]:
     """Every explanation with its probability, the likeliest first; they add up to 1.
 
@@ -152,6 +159,7 @@ def weigh(
         chance: probability that the reference configuration fails in this way as well.
         findings: what the log shows, in the order told; what came after the impact explains nothing.
         verdict: how well the profile fits the log.
+        outside: as for `explain`; they need no profile.
     """
     trust = DOUBT[verdict]
     weights: dict[tuple[str, str], float] = {("chance", ""): max(chance * trust, UNSEEN)}
@@ -163,7 +171,9 @@ def weigh(
     for option, share in _raised(options, unnamed).items():
         if share * trust > 0:
             weights["parameter", option] = share * trust
-    other = 1.0 - (1.0 - min(1.0, sum(options.values()))) * (1.0 - chance)
+    weights |= {("parameter", name): share for name, share in outside.items()}
+    without = math.prod(1.0 - share for share in outside.values())
+    other = 1.0 - (1.0 - min(1.0, sum(options.values()))) * (1.0 - chance) * without
     for finding in seen:
         if finding.suspect in _WHAT:
             key = _WHAT[finding.suspect], finding.title

@@ -7,6 +7,7 @@ from typing import Literal
 
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.ecosystems.ranking import lost_by
+from care_core.metadata.causal_map import Role as ParameterRole
 from care_core.records import Record, field
 from care_core.run import MissionInfo, ProfileChoice, Run, shown
 from care_core.text import figures
@@ -238,6 +239,22 @@ class Hypothesis(Record):
     probability: float
 
 
+class OutsideSuspect(Record):
+    """A parameter that the profile does not model, and that may have lost this run."""
+
+    name: str
+    value: float
+    back: float
+    """What to put it back to: the last good run's value, else the firmware's default."""
+    weight: float
+    """Probability that it is wrong and loses a mission in this way, before other explanations are weighed (0 to 1)."""
+    role: ParameterRole
+    is_learned: bool
+    """Whether flights with such a value were lost in this way."""
+    text: str
+    """Value, default, and what speaks against it."""
+
+
 class ParameterChange(Record):
     """A parameter with another value than in the good run; None where that log does not hold it."""
 
@@ -295,6 +312,8 @@ class Diagnosis(Record):
     health: Health = NOTHING_SEEN
     hypotheses: tuple[Hypothesis, ...] = ()
     """What explains the failure, the likeliest first; empty where nothing failed."""
+    outside: tuple[OutsideSuspect, ...] = ()
+    """The suspects among the parameters that the profile does not model, the likeliest first."""
 
     @property
     def lost_by(self) -> tuple[str, ...]:

@@ -43,6 +43,7 @@ from care_core.diagnose.hypotheses import explain, speaking, unasked
 from care_core.diagnose.implied import implied
 from care_core.diagnose.judging import Judged, check_wishes, query_of, unread_options
 from care_core.diagnose.next_step import bench, trial, was_upset
+from care_core.diagnose.outside import suspects_outside
 from care_core.diagnose.parts import mend_first, unmended
 from care_core.diagnose.ranking import (
     Suspect,
@@ -51,7 +52,17 @@ from care_core.diagnose.ranking import (
     not_ruled_out,
     suspects,
 )
-from care_core.diagnose.records import Cause, Confidence, Diagnosis, Fault, Fix, Hypothesis, Note, ObjectiveResult
+from care_core.diagnose.records import (
+    Cause,
+    Confidence,
+    Diagnosis,
+    Fault,
+    Fix,
+    Hypothesis,
+    Note,
+    ObjectiveResult,
+    OutsideSuspect,
+)
 from care_core.diagnose.since import compare, with_evidence
 from care_core.diagnose.tell_more import AGAIN, SAME_AGAIN, tell_more
 from care_core.ecosystems.findings import NOTHING_SEEN, Finding, Health, every_finding
@@ -111,7 +122,8 @@ def triage(
         CareError: the profile has no usable model, or no such option.
     """
     check_wishes(profile.schema, keep, {})
-    diagnosis = diagnose(judged, profile, choice, keep=keep, health=health, top=top, progress=progress)
+    good = None if since is None else {name: history[-1] for name, history in since.settings().items()}
+    diagnosis = diagnose(judged, profile, choice, keep=keep, health=health, top=top, good=good, progress=progress)
     notes = provenance.notes(profile.schema, judged.run, judged.configs, judged.given)
     diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *notes))
     if since is None:
@@ -129,9 +141,11 @@ def diagnose(
     keep: Collection[str] = (),
     health: Health = NOTHING_SEEN,
     top: int = 5,
+    good: Mapping[str, Setting] | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Causes and fix of a run that has been judged; the arguments are those of `triage`."""
+    """Causes and fix of a run that has been judged; the arguments are those of `triage`, and the parameters of the last
+    good run, None where none is known."""
     report = progress or (lambda _step, _share: None)
     schema, broken = profile.schema, judged.broken
     said = speaking(health.findings, schema, judged.run.config)
@@ -139,8 +153,11 @@ def diagnose(
     objectives = (*judged.results, *judged.checks)
     choice = replace(choice, fit=choice.fit.with_objection(*unusual(run, profile)))
     if not broken:
-        missed = any(result.status == "fault" for result in judged.checks)
-        told = unasked(health.findings, failed=missed, shown=said, verdict=choice.fit.verdict)
+        missed = [result for result in judged.checks if result.status == "fault"]
+        outside = suspects_outside(run, missed, health, schema, good=good) if _failed(missed, health) else ()
+        told = unasked(
+            health.findings, failed=bool(missed), shown=said, verdict=choice.fit.verdict, outside=_weights(outside)
+        )
         return Diagnosis(
             choice,
             run,
@@ -151,6 +168,7 @@ def diagnose(
             missions=judged.missions,
             health=health,
             hypotheses=told,
+            outside=outside,
         )
     report("ranking the causes", 0.7)
     query = query_of(judged, profile, keep)
@@ -166,7 +184,10 @@ def diagnose(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
         for name, result in ((result.variable.name, result) for result in broken)
     )
-    hypotheses = explain(query, broken, weighed, run.refused_by, health.findings, said, choice.fit.verdict)
+    outside = suspects_outside(run, broken, health, schema, query, good)
+    hypotheses = explain(
+        query, broken, weighed, run.refused_by, health.findings, said, choice.fit.verdict, _weights(outside)
+    )
     report("searching for a fix", 0.85)
     as_driven = odds_as_driven(float(query.probability([query.config])[0]), hypotheses)
     held = _failsafes_held(case, health.findings)
@@ -211,7 +232,12 @@ def diagnose(
         tell_more=_tell_more(case, faults, health) if unsure and not out_of_reach else (),
         health=health,
         hypotheses=hypotheses,
+        outside=outside,
     )
+
+
+def _weights(outside: Sequence[OutsideSuspect]) -> dict[str, float]:
+    return {one.name: one.weight for one in outside}
 
 
 def _tell_more(case: _Case, faults: tuple[Fault, ...], health: Health) -> tuple[str, ...]:
@@ -319,6 +345,7 @@ def unjudged(log: LogInfo, settings: Mapping[str, Setting], choice: ProfileChoic
 def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Diagnosis:
     """The answer for a run that no profile fits: what it did and what failed, and no cause by parameters."""
     broken = tuple(result for result in judged.checks if result.status == "fault")
+    outside = suspects_outside(judged.run, broken, health) if _failed(broken, health) else ()
     return Diagnosis(
         choice,
         judged.run,
@@ -327,8 +354,14 @@ def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Di
         None,
         missions=judged.missions,
         health=health,
-        hypotheses=unasked(health.findings, failed=bool(broken)),
+        hypotheses=unasked(health.findings, failed=bool(broken), outside=_weights(outside)),
+        outside=outside,
     )
+
+
+def _failed(missed: Sequence[ObjectiveResult], health: Health) -> bool:
+    """Whether a run failed of which no model can be asked: by a check, or by what was found in it."""
+    return bool(missed) or any(one.severity == "critical" for one in health.findings)
 
 
 def _causes(case: _Case, result: ObjectiveResult, found: tuple[Suspect, ...], top: int) -> tuple[Cause, ...]:

@@ -1,0 +1,84 @@
+"""Which parameters outside the profile are off: off the firmware's default, off the last good run, off their range."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+
+from care_core.configs.driven import same_value
+from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX
+from care_core.ecosystems.vehicles.vehicle import Kind, Vehicle
+from care_core.metadata import ardupilot
+from care_core.metadata.causal_map import Meaning, meaning_of
+from care_core.records import Record
+from care_core.run import Setting
+
+UNCHOSEN = frozenset(("written", "idle"))
+"""Roles of parameters that lose no mission: outcomes, and what moves no vehicle."""
+
+
+class OffParameter(Record):
+    """A parameter that is not as it would be without anybody's hand."""
+
+    name: str
+    value: float
+    default: float
+    meaning: Meaning
+    is_changed: bool | None
+    """Whether it differs from the last good run; None where none is known."""
+    is_out_of_range: bool
+    """Whether it lies outside its documented range, or is no documented code."""
+    last_good: float | None = None
+
+    @property
+    def back(self) -> float:
+        """The value to put it back to: the last good run's, else the firmware's default."""
+        return self.default if self.last_good is None else self.last_good
+
+
+def off_parameters(
+    settings: Mapping[str, Setting], vehicle: Vehicle, modelled: Collection[str], good: Mapping[str, Setting] | None
+) -> Iterator[OffParameter]:
+    """The parameters of a vehicle that are off, without those that the profile models, that the vehicle writes itself,
+    and that move nothing.
+
+    Args:
+        modelled: parameters of the profile's options, by their names in the log.
+        good: the parameters of the last good run, None where none is known.
+    """
+    for name, setting in settings.items():
+        if name in modelled or name.startswith(SIMULATOR_PREFIX) or not isinstance(setting.value, (int, float)):
+            continue
+        meaning = meaning_of(name, vehicle.kind)
+        if meaning is None or meaning.role in UNCHOSEN:
+            continue
+        default = _default(setting, vehicle.kind)
+        before = None if good is None or name not in good else good[name].value
+        last_good = float(before) if isinstance(before, (int, float)) else None
+        is_changed = None if good is None else last_good is None or not same_value(last_good, setting.value)
+        back = default if default is not None else last_good
+        if back is None or (same_value(default, setting.value) and not is_changed):
+            continue
+        yield OffParameter(
+            name,
+            float(setting.value),
+            back,
+            meaning,
+            is_changed,
+            _is_out_of_range(name, float(setting.value), vehicle),
+            last_good,
+        )
+
+
+def _default(setting: Setting, kind: Kind) -> float | None:
+    if isinstance(setting.default, (int, float)):
+        return float(setting.default)
+    return ardupilot.firmware_default(setting.name, kind)
+
+
+def _is_out_of_range(name: str, value: float, vehicle: Vehicle) -> bool:
+    fact = ardupilot.fact_of(name, vehicle.kind, vehicle.version)
+    if fact is None:
+        return False
+    if fact.low is not None and fact.high is not None:
+        return not fact.low <= value <= fact.high
+    return bool(fact.values) and value not in {code for code, _ in fact.values}

@@ -1,0 +1,163 @@
+"""How likely each parameter outside the profile lost this mission, before it is held against other explanations.
+
+A parameter is wrong with a probability that screening flights with such values tell, or its role where none were flown;
+it explains a run as far as what it does shows in the way in which the run failed; and one that no phase of the run reads
+explains nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+
+from care_core.diagnose.outside.off import OffParameter
+from care_core.diagnose.outside.signs import Signs
+from care_core.diagnose.records import OutsideSuspect
+from care_core.metadata.causal_map import Meaning, Read, Role
+from care_core.metadata.screening import Flight, flights_of
+from care_core.run import Run, shown
+from care_core.text import listed
+
+UNSCREENED: Mapping[Role, float] = {"choice": 0.05, "safety": 0.05, "wiring": 0.3, "calibration": 0.3}
+"""Probability that a value which nobody flew loses a mission, by the role of its parameter."""
+OUT_OF_RANGE = 0.5
+"""The least of it where the value lies outside what is documented."""
+HARMLESS = 0.02
+"""Probability that a value loses a mission that lost none when it was flown."""
+ANSWERS, MAY_ANSWER = 0.5, 0.1
+"""Share of what an unscreened parameter loses that shows as its signs say, first or later."""
+CHANGED, UNCHANGED = 10.0, 0.05
+"""By how much its odds rise where it was changed since the last good run, and fall where it was not."""
+MANY = 20.0
+"""From this ratio of its documented bounds on a parameter's distance is that of logarithms."""
+BUILT: frozenset[Role] = frozenset(("wiring", "calibration"))
+"""Roles of parameters that are off on every sound vehicle: one among many others is off for a good reason."""
+LEAST = 0.005
+"""What is less likely is no suspect."""
+
+
+def outside_suspects(
+    off: Iterable[OffParameter], signs: Signs, read: frozenset[Read], kind: str
+) -> tuple[OutsideSuspect, ...]:
+    """The parameters that may have lost a run, the likeliest first.
+
+    Args:
+        read: the phases and protections of this run (`phases_of`).
+    """
+    every = list(off)
+    built = Counter(one.meaning.role for one in every if one.is_changed is not True)
+    found = []
+    for one in every:
+        if not one.meaning.read & read:
+            continue
+        flights = flights_of(one.name, kind)
+        like = [flight for flight in flights if flight.is_lost and _is_alike(flight, signs)]
+        wrong = _wrong(one, flights, built)
+        weight = wrong * (_shows(flights, like) if flights else _answers(one.meaning, signs))
+        if weight >= LEAST:
+            found.append(_suspect(one, weight, _flown(like)))
+    return tuple(sorted(found, key=lambda suspect: (-suspect.weight, suspect.name)))
+
+
+def _suspect(one: OffParameter, weight: float, flown: str) -> OutsideSuspect:
+    before = f"; it was {shown(one.last_good)} in the good run" if one.is_changed and one.last_good is not None else ""
+    text = f"{one.name} {shown(one.value)} (default {shown(one.default)}){before}{': ' if flown else ''}{flown}"
+    return OutsideSuspect(one.name, one.value, one.back, weight, one.meaning.role, bool(flown), text)
+
+
+def phases_of(run: Run, has_risen: bool) -> frozenset[Read]:
+    """When the firmware read parameters in this run."""
+    read: set[Read] = {"always", "arming", "battery", "radio", "gcs"}
+    if run.mission.ended or has_risen:
+        read |= {"takeoff"}
+    modes = {mode.casefold() for mode in run.modes}
+    if has_risen:
+        read |= {"navigation", "hold", "land"}
+        asked = dict(run.mission.asked)
+        if asked.get("returns") or any("rtl" in mode for mode in modes):
+            read.add("rtl")
+    if any("guided" in mode for mode in modes):
+        read.add("guided")
+    if modes - {"auto", "rtl", "land", "guided", "smart rtl", "hold"}:
+        read.add("manual")
+    for phase, switch in _SWITCHES.items():
+        setting = run.settings.get(switch)
+        if setting is not None and isinstance(setting.value, (int, float)) and setting.value > 0:
+            read.add(phase)
+    return frozenset(read)
+
+
+_SWITCHES: Mapping[Read, str] = {
+    "fence": "FENCE_ENABLE", "terrain": "TERRAIN_ENABLE", "rangefinder": "RNGFND1_TYPE", "flow": "FLOW_TYPE",
+    "beacon": "BCN_TYPE", "airspeed": "ARSPD_TYPE",
+}  # fmt: skip
+"""The parameter that has something used at all."""
+
+
+def _wrong(one: OffParameter, flights: Sequence[Flight], built: Mapping[Role, int]) -> float:
+    """Probability that this value loses such a mission."""
+    share = _lost(one, flights) if flights else UNSCREENED.get(one.meaning.role, 0.0)
+    if one.is_out_of_range:
+        share = max(share, OUT_OF_RANGE)
+    if one.meaning.role in BUILT and one.is_changed is not True:
+        share /= built[one.meaning.role]
+    if one.is_changed is None:
+        return share
+    factor = CHANGED if one.is_changed else UNCHANGED
+    return factor * share / (factor * share + 1.0 - share) if share < 1.0 else share
+
+
+def _lost(one: OffParameter, flights: Sequence[Flight]) -> float:
+    """Probability that the value loses a mission, by the screening flights: at its value, or as much of the way to the
+    bound that was lost as it is off."""
+    same = [flight for flight in flights if math.isclose(flight.value, one.value, rel_tol=1e-4, abs_tol=1e-6)]
+    if same:
+        return _share(same)
+    reference = flights[0].reference
+    side = [flight for flight in flights if (flight.value - reference) * (one.value - reference) > 0]
+    if not side:
+        return _share(flights)
+    return max(HARMLESS, max(min(1.0, _way(one.value, flight)) * flight.is_lost for flight in side))
+
+
+def _way(value: float, flight: Flight) -> float:
+    """How far a value is on the way from the reference to the one that was flown."""
+    ends = sorted((abs(flight.value), abs(flight.reference)))
+    if flight.value * flight.reference > 0 and ends[1] > MANY * ends[0] and value * flight.value > 0:
+        return math.log(value / flight.reference) / math.log(flight.value / flight.reference)
+    return (value - flight.reference) / (flight.value - flight.reference)
+
+
+def _share(flights: Sequence[Flight]) -> float:
+    """Share that was lost, as seen in so few: Jeffreys' estimate."""
+    lost = sum(flight.is_lost for flight in flights)
+    return (lost + 0.5) / (len(flights) + 1.0) if lost else HARMLESS
+
+
+def _is_alike(flight: Flight, signs: Signs) -> bool:
+    """Whether a run failed as a flight did: for the same refusal, or the first signs of each are among those of the
+    other."""
+    if signs.refusals or flight.refusals:
+        return bool(signs.refusals & flight.refusals)
+    return bool(flight.first & signs.every) and bool(signs.first & flight.every)
+
+
+def _shows(flights: Sequence[Flight], like: Sequence[Flight]) -> float:
+    """Probability that a mission which the parameter loses fails in this way."""
+    lost = sum(flight.is_lost for flight in flights)
+    return (len(like) + 0.05) / (lost + 0.5)
+
+
+def _answers(meaning: Meaning, signs: Signs) -> float:
+    """The same of a parameter that nobody flew, by the causal map."""
+    if meaning.signs & signs.first:
+        return ANSWERS
+    return MAY_ANSWER if meaning.signs & signs.every else 0.0
+
+
+def _flown(like: Sequence[Flight]) -> str:
+    if not like:
+        return ""
+    values = listed([shown(flight.value) for flight in like][:3])
+    return f"a simulated flight that was right but for it failed in this way at {values}"

@@ -1,0 +1,58 @@
+"""Flights of the real firmware with one parameter wrong at a time: which values lose a mission, and how that shows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import cast
+
+from care_core.files import read_small_text
+from care_core.metadata.ardupilot import VEHICLES
+from care_core.metadata.causal_map import SIGNS, Sign
+from care_core.records import Record
+
+TABLE = Path(__file__).with_name("ardupilot_screening.tsv")
+
+
+class Flight(Record):
+    """One flight with everything at its reference but one parameter."""
+
+    reference: float
+    value: float
+    is_lost: bool
+    first: frozenset[Sign]
+    """The signs that came first, empty where nothing failed."""
+    every: frozenset[Sign]
+    refusals: frozenset[str]
+    """What kept it from arming, as `plain_refusal` has it."""
+
+
+def plain_refusal(text: str) -> str:
+    """A refusal to arm without the numbers that change from flight to flight."""
+    return re.sub(r"[\d.]+", "#", text.casefold()).strip()
+
+
+def flights_of(name: str, kind: str) -> tuple[Flight, ...]:
+    """The screening flights of a parameter on a kind of vehicle; empty where it was not screened."""
+    return _flights().get((name, VEHICLES.get(kind, "")), ())
+
+
+@cache
+def _flights() -> Mapping[tuple[str, str], tuple[Flight, ...]]:
+    found: dict[tuple[str, str], list[Flight]] = {}
+    lines = (line for line in read_small_text(TABLE).splitlines() if not line.startswith("#"))
+    next(lines)
+    for line in lines:
+        name, vehicle, reference, value, first, others, refusals = line.split("\t")
+        early, later, why = _signs(first), _signs(others), frozenset(filter(None, refusals.split("; ")))
+        flight = Flight(float(reference), float(value), bool(early), early, early | later, why)
+        found.setdefault((name, vehicle), []).append(flight)
+    return {key: tuple(flights) for key, flights in found.items()}
+
+
+def _signs(text: str) -> frozenset[Sign]:
+    signs = frozenset(text.split())
+    assert signs <= frozenset(SIGNS), signs
+    return cast(frozenset[Sign], signs)
