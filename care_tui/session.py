@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 from care_core.application.case import Case, changes_of, decided, fixes
+from care_core.configs.driven import as_number
 from care_core.diagnose.records import Cause, Diagnosis, Fault, Fix, ObjectiveResult
 from care_core.errors import CareError
 from care_core.records import Struct, field, replace
@@ -147,13 +148,16 @@ class Session(Struct, eq=False):
 
     def current(self, option: Variable) -> float | None:
         """The option's value in this run; where no source holds it, what the engine took it to be."""
-        reading = self.case and self.case.reading
+        run, reading = self.diagnosis.run, self.case and self.case.reading
         reference = reading.judged.reference.config if reading else {}
-        return self.diagnosis.run.config.get(option.name, reference.get(option.name, option.default))
+        if option.name not in reference and (setting := run.settings.get(option.name)) is not None:
+            return as_number(setting.value)
+        return run.config.get(option.name, reference.get(option.name, option.default))
 
     def is_assumed(self, option: Variable) -> bool:
         """Whether no source holds the option's value."""
-        return option.name not in self.diagnosis.run.config
+        run = self.diagnosis.run
+        return option.name not in run.config and option.name not in run.settings
 
     def decided(self) -> Diagnosis:
         """The diagnosis with the ticked changes as its fix, and the causes set aside."""

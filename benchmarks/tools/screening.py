@@ -21,10 +21,10 @@ from care_core.diagnose.outside.signs import Signs, signs_of
 from care_core.metadata.screening import TABLE
 
 HEAD = """\
-# Flights of ArduPilot's own simulator with one parameter wrong at a time and all others at their reference, three short
-# missions in a light wind: Copter 4.5.4 (C). Documented values and the ends of documented ranges. `first`: the signs that
-# came first (words of causal_map.py), empty where the mission met every limit; `others`: those that followed;
-# `refusals`: what kept it from arming, without its numbers. Written by benchmarks/tools/screening.py.
+# Flights of ArduPilot's own simulator with one parameter wrong at a time and all others at their reference, three
+# short missions in a light wind: Copter 4.5.4 (C). Documented values and the ends of documented ranges. `first`: the
+# signs that came first (words of causal_map.py), empty where the mission met every limit; `others`: those that
+# followed; `refusals`: what kept it from arming, without its numbers. Written by benchmarks/tools/screening.py.
 name	vehicle	reference	value	first	others	refusals
 """
 
@@ -59,8 +59,8 @@ def main(folder: Path, vehicle: str, references: Path) -> None:
         for flight in sorted(flights, key=lambda one: (one["name"], one["value"]))
         if (log := folder / "logs" / f"{flight['tag']}.BIN").exists()
     ]
-    others = [line for line in TABLE.read_text().splitlines() if not line.startswith("#") and line.split("\t")[1] != vehicle]
-    kept = [line for line in others if not line.startswith("name\t")]
+    others = (line for line in TABLE.read_text().splitlines() if not line.startswith(("#", "name\t")))
+    kept = [line for line in others if line.split("\t")[1] != vehicle]
     TABLE.write_text(HEAD + "\n".join(sorted([*kept, *lines])) + "\n")
 
 

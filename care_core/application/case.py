@@ -360,10 +360,14 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
 
     if case.reading is None:
         raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")
+    advised, options = case.diagnosis.fix, {option.name for option in case.options}
+    if advised is not None and dict(changes) == changes_of(advised) and (advised.shown_by or changes.keys() - options):
+        return advised
+    if strange := sorted(changes.keys() - options):
+        raise CareError(
+            f"What {', '.join(strange)} does beside other changes is not known.", hint="Tick it alone, or untick it."
+        )
     answer = case.reading.question.ask(changes)
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
     (fix,) = believed([Fix(answer.changes, answer.p_ok, predicted)], case.diagnosis.hypotheses)
-    advised = case.diagnosis.fix
-    if advised is not None and advised.shown_by and dict(changes) == changes_of(advised):
-        return advised
     return fix if changes else replace(fix, p_fixed=odds_as_driven(answer.p_ok, case.diagnosis.hypotheses))

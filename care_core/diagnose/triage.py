@@ -44,6 +44,7 @@ from care_core.diagnose.implied import implied
 from care_core.diagnose.judging import Judged, check_wishes, query_of, unread_options
 from care_core.diagnose.next_step import bench, trial, was_upset
 from care_core.diagnose.outside import suspects_outside
+from care_core.diagnose.outside.change import Advisable, check_first, leading_outside, outside_fix
 from care_core.diagnose.parts import mend_first, unmended
 from care_core.diagnose.ranking import (
     Suspect,
@@ -97,6 +98,7 @@ class _Case(Record, eq=False):
     """Whose the reference is."""
     unranked: Mapping[str, tuple[Suspect, ...]]
     """Per objective the options off their reference whose effect the training runs cannot tell, the likeliest first."""
+    findings: Sequence[Finding]
 
 
 def triage(
@@ -158,6 +160,7 @@ def diagnose(
         told = unasked(
             health.findings, failed=bool(missed), shown=said, verdict=choice.fit.verdict, outside=_weights(outside)
         )
+        lead = leading_outside(told, outside, health.findings, run)
         return Diagnosis(
             choice,
             run,
@@ -167,6 +170,7 @@ def diagnose(
             notes=(*_set_wrong(judged, told, said), *(() if run.checks else (_reference(judged),))),
             missions=judged.missions,
             health=health,
+            abstained=None if lead is None else check_first(lead),
             hypotheses=told,
             outside=outside,
         )
@@ -177,7 +181,7 @@ def diagnose(
     }
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
-    case = _Case(profile, choice, run, query, _reference(judged), unranked)
+    case = _Case(profile, choice, run, query, _reference(judged), unranked, health.findings)
     refused = _refused_otherwise(case, health)
     unheard = {result.variable.name: refused or _out_of_reach(case, result) for result in broken}
     faults = tuple(
@@ -190,29 +194,19 @@ def diagnose(
     )
     report("searching for a fix", 0.85)
     as_driven = odds_as_driven(float(query.probability([query.config])[0]), hypotheses)
-    held = _failsafes_held(case, health.findings)
-    options = {s.option for group in found.values() for s in group}
-    held_too = held | _leads(faults)
-    found_fixes = _fixes(case, options, held_too)
-    if idle := _idle(case, judged, found_fixes[:1]):
-        found_fixes = _fixes(case, options, held_too | idle)
-    fixes = believed(found_fixes, hypotheses)
     out_of_reach = next(filter(None, unheard.values()), None)
     part = _part(case, health.findings)
-    abstained = (part and unmended(part)) or out_of_reach or outweighed(hypotheses, health.findings)
-    if abstained is None:
-        abstained = (
-            _abstains(case, faults, fixes, held, as_driven)
-            or falls_short(fixes[0], broken, _odds(query), as_driven)
-            or untried(fixes[0], schema.learned_elsewhere)
-            or unrecorded(fixes[0], choice.fit.verdict)
-            or no_stand_out(fixes[0], as_driven, hypotheses, _necessary(case, broken, fixes[0]))
-        )
-        shown = None if abstained is None else _shown_by_run(case, hypotheses)
-        if shown is not None:
-            abstained, fixes = None, (shown,)
+    lead = leading_outside(hypotheses, outside, health.findings, run)
+    if lead is not None and (part is None or lead.is_found):
+        advised = _of_outside(lead, run)
+    else:
+        lead = None
+        against = (part and unmended(part)) or out_of_reach or outweighed(hypotheses, health.findings)
+        options = {s.option for group in found.values() for s in group}
+        advised = _of_options(case, judged, faults, hypotheses, options, as_driven, against)
+    fixes, abstained = advised.fixes, advised.abstained
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
-    if abstained is None:
+    if abstained is None and lead is None:
         faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)
     faults = believed_causes(faults, hypotheses)
     report("done", 1.0)
@@ -225,8 +219,8 @@ def diagnose(
         alternatives=() if abstained else tuple(fixes[1:]),
         odds_as_driven=as_driven,
         abstained=abstained,
-        why_this="" if abstained or fixes[0].shown_by else explained(fixes[0], as_driven, hypotheses, faults),
-        notes=_notes(case, broken, None if abstained else fixes[0], as_driven),
+        why_this=advised.why or _why_this(fixes, abstained, as_driven, hypotheses, faults),
+        notes=_notes(case, broken, None if abstained or lead else fixes[0], as_driven),
         missions=judged.missions,
         rivals=circumstances(run, query, schema) if unsure else (),
         tell_more=_tell_more(case, faults, health) if unsure and not out_of_reach else (),
@@ -234,6 +228,66 @@ def diagnose(
         hypotheses=hypotheses,
         outside=outside,
     )
+
+
+class _Advised(Record):
+    """The fixes, the advised one first, or why none is advised."""
+
+    fixes: Sequence[Fix]
+    abstained: str | None
+    why: str = ""
+
+
+def _of_outside(lead: Advisable, run: Run) -> _Advised:
+    """What is advised of a parameter outside the profile that leads the ranking."""
+    if lead.is_advised:
+        return _Advised((outside_fix(lead, run),), None, lead.why)
+    return _Advised((), check_first(lead))
+
+
+def _of_options(
+    case: _Case,
+    judged: Judged,
+    faults: tuple[Fault, ...],
+    hypotheses: Sequence[Hypothesis],
+    options: Collection[str],
+    as_driven: float,
+    against: str | None,
+) -> _Advised:
+    """What is advised of the options of the profile.
+
+    Args:
+        options: those that may have moved what broke.
+        against: why nothing is advised whatever is found, None where nothing stands against it.
+    """
+    query, broken = case.query, judged.broken
+    held = _failsafes_held(case, case.findings)
+    held_too = held | _leads(faults)
+    found = _fixes(case, options, held_too)
+    if idle := _idle(case, judged, found[:1]):
+        found = _fixes(case, options, held_too | idle)
+    fixes = believed(found, hypotheses)
+    if against is not None:
+        return _Advised(fixes, against)
+    abstained = (
+        _abstains(case, faults, fixes, held, as_driven)
+        or falls_short(fixes[0], broken, _odds(query), as_driven)
+        or untried(fixes[0], case.profile.schema.learned_elsewhere)
+        or unrecorded(fixes[0], case.choice.fit.verdict)
+        or no_stand_out(fixes[0], as_driven, hypotheses, _necessary(case, broken, fixes[0]))
+    )
+    shown = None if abstained is None else _shown_by_run(case, hypotheses)
+    return _Advised(fixes, abstained) if shown is None else _Advised((shown,), None)
+
+
+def _why_this(
+    fixes: Sequence[Fix],
+    abstained: str | None,
+    as_driven: float,
+    hypotheses: Sequence[Hypothesis],
+    faults: Sequence[Fault],
+) -> str:
+    return "" if abstained or fixes[0].shown_by else explained(fixes[0], as_driven, hypotheses, faults)
 
 
 def _weights(outside: Sequence[OutsideSuspect]) -> dict[str, float]:
@@ -346,6 +400,8 @@ def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Di
     """The answer for a run that no profile fits: what it did and what failed, and no cause by parameters."""
     broken = tuple(result for result in judged.checks if result.status == "fault")
     outside = suspects_outside(judged.run, broken, health) if _failed(broken, health) else ()
+    told = unasked(health.findings, failed=bool(broken), outside=_weights(outside))
+    lead = leading_outside(told, outside, health.findings, judged.run)
     return Diagnosis(
         choice,
         judged.run,
@@ -354,7 +410,8 @@ def without_profile(judged: Judged, choice: ProfileChoice, health: Health) -> Di
         None,
         missions=judged.missions,
         health=health,
-        hypotheses=unasked(health.findings, failed=bool(broken), outside=_weights(outside)),
+        abstained=None if lead is None else check_first(lead),
+        hypotheses=told,
         outside=outside,
     )
 

@@ -80,6 +80,16 @@ class SeenFinding(Protocol):
     def probability(self) -> float | None: ...
 
 
+class SeenSuspect(Protocol):
+    """A parameter outside the profile that may have lost the run, of a diagnosis or of its document."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def text(self) -> str:
+        """Value, default, and what speaks against it."""
+
+
 F = TypeVar("F", bound=SeenFinding)
 
 
@@ -90,6 +100,7 @@ class Reason(Record):
     text: str
     name: str
     """The parameter or the finding that it names, empty for chance and for what no log shows."""
+    is_parameter: bool = False
 
     def __str__(self) -> str:
         return f"{self.probability:.0%} {self.text}"
@@ -186,7 +197,7 @@ def verdict_of(diagnosis: Diagnosis) -> Verdict:
         fit,
         objectives,
         findings,
-        diagnosis.hypotheses,
+        reasons_of(diagnosis.hypotheses, findings, diagnosis.outside),
         _advice(diagnosis),
         next_step(diagnosis, has_failed=status == "fault"),
         [(m.mission.index, m.reason) for m in missions if m.status == "fault" and m.mission.index != own],
@@ -214,7 +225,7 @@ def compose(
     fit: Fit,
     objectives: Sequence[JudgedObjective],
     findings: Sequence[SeenFinding],
-    hypotheses: Sequence[Hypothesis],
+    reasons: tuple[Reason, ...],
     advice: Advice,
     next_step: str,
     others: Sequence[tuple[int, str]] = (),
@@ -227,7 +238,7 @@ def compose(
         status=status,
         failed=clean(_failed(status, fit.verdict, objectives, findings)),
         advice=advice,
-        reasons=tuple(_reason(one, findings) for one in hypotheses),
+        reasons=reasons,
         next_step=clean(next_step),
         others=clean(_others(others)),
     )
@@ -242,9 +253,17 @@ def _others(failed: Sequence[tuple[int, str]]) -> str:
     return f"In the same log: FAULT in {named}{more}; look at it with --mission {failed[0][0]}"
 
 
-def _reason(one: Hypothesis, findings: Sequence[SeenFinding]) -> Reason:
+def reasons_of(
+    hypotheses: Sequence[Hypothesis], findings: Sequence[SeenFinding], outside: Sequence[SeenSuspect] = ()
+) -> tuple[Reason, ...]:
+    """What explains a failure in clauses; `outside`: the suspects that no profile models."""
+    return tuple(_reason(one, findings, outside) for one in hypotheses)
+
+
+def _reason(one: Hypothesis, findings: Sequence[SeenFinding], outside: Sequence[SeenSuspect]) -> Reason:
     name = "" if one.what == "chance" else clean(one.name)
-    return Reason(one.probability, clean(hypothesis_text(one, findings)), name)
+    text = clean(hypothesis_text(one, findings, outside))
+    return Reason(one.probability, text, name, one.what == "parameter")
 
 
 def status_of(objectives: Collection[Status], severities: Collection[Severity], fit: FitVerdict) -> Status:
@@ -369,10 +388,10 @@ def alone(share: float, as_driven: float | None) -> str:
     return f"{share:.0%} if only this is changed{beside(as_driven)}"
 
 
-def hypothesis_text(one: Hypothesis, findings: Sequence[SeenFinding] = ()) -> str:
+def hypothesis_text(one: Hypothesis, findings: Sequence[SeenFinding] = (), outside: Sequence[SeenSuspect] = ()) -> str:
     """An explanation in a clause; a finding that is itself a symptom stands for what the log does not show."""
     if one.what == "parameter":
-        return f"the parameter {one.name}"
+        return f"the parameter {next((suspect.text for suspect in outside if suspect.name == one.name), one.name)}"
     if one.name:
         is_symptom = any(finding.title == one.name and finding.kind in SYMPTOMS for finding in findings)
         return f"{one.name}; the log does not show why" if is_symptom else one.name

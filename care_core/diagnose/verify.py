@@ -11,6 +11,7 @@ from typing import Literal
 
 from care_core.configs.driven import option_value, readable, same_value
 from care_core.diagnose.judging import thresholds_in_force
+from care_core.diagnose.outside.change import outside_option, vehicle_of_run
 from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status
 from care_core.diagnose.verdict import status_of, verdict_of
 from care_core.profile.schema import Schema
@@ -186,7 +187,8 @@ def _notes(
 
 def _changes(promised: PromisedSet, run: Run, schema: Schema) -> tuple[MadeChange, ...]:
     return tuple(
-        _made(schema.variables[name], before, wanted, run) for name, (before, wanted) in promised.changes.items()
+        _made(schema.variables.get(name) or outside_option(name, None, vehicle_of_run(run)), before, wanted, run)
+        for name, (before, wanted) in promised.changes.items()
     )
 
 

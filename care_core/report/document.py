@@ -28,7 +28,7 @@ from care_core.diagnose.records import (
     Status,
     outcome,
 )
-from care_core.diagnose.verdict import Advice, Verdict, alone, chance, compose, promise, verdict_of
+from care_core.diagnose.verdict import Advice, Verdict, alone, chance, compose, promise, reasons_of, verdict_of
 from care_core.numbers import six_digits
 from care_core.records import Meta, field
 from care_core.report.entries import (
@@ -244,6 +244,16 @@ class CircumstanceEntry(Document, kw_only=True):
     text: str
 
 
+class OutsideEntry(Document, kw_only=True):
+    """A parameter that the profile does not model, and that may have lost the run."""
+
+    name: str
+    value: float
+    usual: float
+    """The last good run's value, else the firmware's default."""
+    text: str
+
+
 class MissionEntry(Document, kw_only=True):
     """A mission of the log with what became of it; `judged` is the one that the document is about."""
 
@@ -277,6 +287,8 @@ class TriageDocument(Document, kw_only=True):
     """In the order told, the first cause first."""
     hypotheses: list[Hypothesis] = field(default_factory=list)
     """What explains the failure, the likeliest first; empty where nothing failed."""
+    outside: list[OutsideEntry] = field(default_factory=list)
+    """The suspects among the parameters that the profile does not model."""
     notes: list[str] = field(default_factory=list)
     """What the operator should know of the log, the configuration and the profile."""
     sources: dict[str, str] = field(default_factory=dict)
@@ -341,6 +353,7 @@ def build_document(diagnosis: Diagnosis) -> Report:
         account=event_entries(diagnosis.health),
         findings=finding_entries(diagnosis.health),
         hypotheses=[publish(Hypothesis, h, probability=six_digits(h.probability)) for h in diagnosis.hypotheses],
+        outside=[publish(OutsideEntry, one, usual=one.back) for one in diagnosis.outside],
         headline=verdict.headline,
         next_step=verdict.next_step,
         verdict=verdict,
@@ -356,7 +369,7 @@ def remembered_verdict(document: TriageDocument) -> Verdict:
         document.fit,
         document.objectives,
         document.findings,
-        document.hypotheses,
+        reasons_of(document.hypotheses, document.findings, document.outside),
         _advice(document),
         document.next_step,
         [(one.index, one.reason) for one in document.missions if one.status == "fault" and not one.judged],

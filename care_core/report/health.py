@@ -83,3 +83,5 @@ def reason_lines(reasons: Sequence[Reason]) -> Iterator[str]:
         yield "What explains it"
     for one in reasons[:REASONS_SHOWN]:
         yield from wrapped(one.text, f"  {one.probability:>4.0%}  ")
+    if more := [one for one in reasons[REASONS_SHOWN:] if one.is_parameter]:
+        yield from wrapped(f"less likely: {', '.join(one.name for one in more)}", " " * 8)

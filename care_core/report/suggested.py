@@ -9,18 +9,23 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from care_core.diagnose.outside.change import outside_option
 from care_core.ecosystems.vehicles import Kind, aliases_of
+from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.errors import ConfigError, nearest
+from care_core.metadata.ardupilot import known_in
+from care_core.metadata.causal_map import meaning_of
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, installed_profile
 from care_core.records import Record, replace
 from care_core.report.document import ChangeEntry, FixEntry, FixSet, TriageDocument
 from care_core.report.reading import profile_of
 from care_core.text import clean
-from care_core.variables import Variable
+from care_core.variables import Variable, is_parameter_name
 
 _KINDS: tuple[Kind, ...] = ("copter", "quadplane", "rover")
 """Whose parameters have names of their own."""
+_KINDS_BY_WORD: dict[str, Kind] = {kind: kind for kind in _KINDS}
 _MAKE_ANEW = "Do not act on this report: make one from the log with 'care triage LOG'."
 
 
@@ -92,7 +97,7 @@ def check_acceptable(change: SuggestedChange, path: Path) -> None:
 
 def _suggested(change: ChangeEntry, schema: Schema, path: Path, key: str) -> SuggestedChange:
     options = {option.name: option for option in schema.options}
-    option = options.get(change.option)
+    option = options.get(change.option) or _outside(change.option, schema)
     if option is None:
         said = f"profile '{schema.name}' has no parameter '{clean(change.option)}'"
         raise _strange(f"{said}. {nearest(change.option, options)}".rstrip(), path, f"{key}.option")
@@ -106,6 +111,16 @@ def _suggested(change: ChangeEntry, schema: Schema, path: Path, key: str) -> Sug
     if not (math.isfinite(before) and math.isfinite(value)):
         raise _strange(f"{option.name} needs a finite number", path, key)
     return SuggestedChange(driven, _digits(before), _digits(value), change.assumed, key)
+
+
+def _outside(name: str, schema: Schema) -> Variable | None:
+    """A parameter that no option of the profile sets, as far as a report may suggest it: one that the firmware
+    documents and an operator chooses. How a vehicle is built and wired, and what protects it, no report sets."""
+    vehicle = Vehicle(_KINDS_BY_WORD.get(schema.match.get("vehicle", ""), "unknown"), "", "", None)
+    meaning = meaning_of(name, vehicle.kind) if is_parameter_name(name) else None
+    if meaning is None or meaning.role != "choice" or not known_in(name):
+        return None
+    return outside_option(name, None, vehicle)
 
 
 def _digits(value: float) -> float:

@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 from textual.content import Content
 
 from care_core.diagnose.records import Cause, Fault, Hypothesis
-from care_core.ecosystems.findings import Finding
+from care_core.ecosystems.findings import Finding, every_finding
 from care_core.text import clean
 from care_core.variables import Variable
 from care_tui.pages.page import View
@@ -56,15 +56,15 @@ class CausesPage(DiagnosisPage):
     def _item(self, one: Explanation) -> tuple[Content, Content]:
         if one.cause is None:
             assert one.hypothesis is not None
-            return hypothesis_item(one.hypothesis, self._finding(one.hypothesis))
+            return hypothesis_item(one.hypothesis, self._finding(one.hypothesis), self.session.diagnosis.outside)
         aside = self.session.dismissed.get(one.cause.option.name)
         share = None if one.hypothesis is None else one.hypothesis.probability
         return cause_item(one.cause, share, aside, self.glyphs, self.session.diagnosis.odds_as_driven)
 
     def _finding(self, hypothesis: Hypothesis) -> Finding | None:
         """The finding that an explanation is named after."""
-        findings = self.session.diagnosis.health.findings
-        return next((finding for finding in findings if hypothesis.name and finding.title == hypothesis.name), None)
+        name, findings = hypothesis.name, every_finding(self.session.diagnosis.health.findings)
+        return next((one for one in findings if name and (one.title == name or name in one.parameters)), None)
 
     @property
     def _has_causes(self) -> bool:
@@ -120,7 +120,9 @@ class CausesPage(DiagnosisPage):
         cause, hypothesis = self.ranked()[index]
         if cause is None or result is None:
             assert hypothesis is not None
-            return Rows(hypothesis_rows(hypothesis, self._finding(hypothesis), session.diagnosis.notes))
+            diagnosis = session.diagnosis
+            told = [*diagnosis.notes, *(one.text for one in diagnosis.outside)]
+            return Rows(hypothesis_rows(hypothesis, self._finding(hypothesis), told))
         model = session.case.model
         effect = model.effects.get((cause.option.name, result.variable.name)) if model else None
         return cause_detail(cause, session.causes, result, effect, session.diagnosis, session.dismissed, self.glyphs)

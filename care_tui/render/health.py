@@ -6,12 +6,13 @@ from collections.abc import Sequence
 
 from textual.content import Content
 
-from care_core.diagnose.records import Diagnosis, Hypothesis
+from care_core.diagnose.records import Diagnosis, Hypothesis, OutsideSuspect
 from care_core.diagnose.verdict import Verdict, hypothesis_text, verdict_of
 from care_core.ecosystems.findings import Event, Finding, Health, Severity
 from care_core.records import Record
 from care_core.report.marks import Mark
 from care_core.report.wording import SEVERITY_WORDS, noted
+from care_core.run import shown
 from care_core.text import clean, seconds
 from care_tui.render.objectives import damage
 from care_tui.render.rows import Glyphs, Row, heading, labelled, padded, percent, status, text, warning
@@ -157,10 +158,14 @@ def fit_rows(diagnosis: Diagnosis, advice: Sequence[str]) -> list[Row]:
     )
 
 
-def hypothesis_item(one: Hypothesis, finding: Finding | None) -> tuple[Content, Content]:
+def hypothesis_item(
+    one: Hypothesis, finding: Finding | None, outside: Sequence[OutsideSuspect] = ()
+) -> tuple[Content, Content]:
     """An explanation that is no cause of the list: how likely it is, what it is, and when it began."""
     when = "" if finding is None else f", from {seconds(finding.onset_s)}"
-    kind = {"hardware": "a part of the robot", "world": "something in the environment", "parameter": "a parameter"}
+    suspect = next((s for s in outside if s.name == one.name), None)
+    parameter = "a parameter" if suspect is None else f"{shown(suspect.value)}, usually {shown(suspect.back)}"
+    kind = {"hardware": "a part of the robot", "world": "something in the environment", "parameter": parameter}
     head = Content.assemble(
         f"{percent(one.probability):>5} ", text(hypothesis_text(one, [finding] if finding else ()), "bold")
     )

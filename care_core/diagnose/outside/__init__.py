@@ -1,7 +1,7 @@
 """Suspects among the parameters that the profile does not model: all that the log holds.
 
 What is off (`off`), how the run shows that it failed (`signs`), what the causal map and the screening flights say of
-each (`suspects`), and what is advised of it (`advice`).
+each (`suspects`), and what is advised of it (`change`).
 """
 
 from __future__ import annotations

@@ -137,7 +137,10 @@ def _of_objective(
     elif "energy" in name:
         yield "costly"
     elif "time" in name:
-        yield from _slow(run, schema, query) if schema is not None and query is not None else ("slow_cruise",)
+        if schema is None or query is None:
+            yield "slow_cruise"
+        else:
+            yield from _slow(run, schema, query)
 
 
 def _slow(run: Run, schema: Schema, query: CounterfactualQuery) -> Iterator[Sign]:

@@ -1,8 +1,8 @@
 """How likely each parameter outside the profile lost this mission, before it is held against other explanations.
 
-A parameter is wrong with a probability that screening flights with such values tell, or its role where none were flown;
-it explains a run as far as what it does shows in the way in which the run failed; and one that no phase of the run reads
-explains nothing.
+A parameter is wrong with a probability that screening flights with such values tell, or its role where none were
+flown; it explains a run as far as what it does shows in the way in which the run failed; and one that no phase of the
+run reads explains nothing.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def _lost(one: OffParameter, flights: Sequence[Flight]) -> float:
     side = [flight for flight in flights if (flight.value - reference) * (one.value - reference) > 0]
     if not side:
         return _share(flights)
-    return max(HARMLESS, max(min(1.0, _way(one.value, flight)) * flight.is_lost for flight in side))
+    return max(HARMLESS, *(min(1.0, _way(one.value, flight)) * flight.is_lost for flight in side))
 
 
 def _way(value: float, flight: Flight) -> float:
@@ -160,4 +160,4 @@ def _flown(like: Sequence[Flight]) -> str:
     if not like:
         return ""
     values = listed([shown(flight.value) for flight in like][:3])
-    return f"a simulated flight that was right but for it failed in this way at {values}"
+    return f"simulated flights with it at {values} failed in this way"

@@ -1,0 +1,111 @@
+"""What is advised of a parameter outside the profile: a change where the log or flights carry it, else a look first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from care_core.diagnose.records import Fix, Hypothesis, OutsideSuspect
+from care_core.ecosystems.findings import Finding, every_finding
+from care_core.ecosystems.vehicles import vehicle_of
+from care_core.ecosystems.vehicles.vehicle import Vehicle
+from care_core.metadata import ardupilot
+from care_core.metadata.causal_map import Role as ParameterRole
+from care_core.metadata.causal_map import meaning_of
+from care_core.metadata.fact import Fact
+from care_core.records import Record
+from care_core.run import Run, shown
+from care_core.variables import Change, Role, ValueType, Variable
+
+LEARNED: frozenset[ParameterRole] = frozenset(("choice", "wiring"))
+"""Roles of parameters that flights speak for: a calibration is of one vehicle alone."""
+ENOUGH = 0.4
+"""Probability of a parameter from which its change is advised: nothing else is then as likely by far."""
+
+
+class Advisable(Record):
+    """A parameter outside the profile that leads the ranking: its value, and the one that the log measures, or to which
+    it goes back."""
+
+    name: str
+    value: float
+    wanted: float
+    probability: float
+    why: str
+    is_found: bool
+    """Whether a finding of this run names it."""
+    is_advised: bool
+    """Whether the log itself, or flights with such a value, carry a change."""
+
+
+def leading_outside(
+    hypotheses: Sequence[Hypothesis], suspects: Sequence[OutsideSuspect], findings: Sequence[Finding], run: Run
+) -> Advisable | None:
+    """The parameter outside the profile that leads the ranking, None where another explanation does.
+
+    A change of it is advised where the log measures the value, or where flights with such a value were lost in this way
+    and nothing but its operator's choice stands against the default. What protects is never put back by advice.
+    """
+    first = next(iter(hypotheses), None)
+    if first is None or first.what != "parameter" or first.name in run.config:
+        return None
+    setting, meaning = run.settings.get(first.name), meaning_of(first.name, vehicle_of_run(run).kind)
+    if meaning is None or setting is None or not isinstance(setting.value, (int, float)):
+        return None
+    suspect = next((one for one in suspects if one.name == first.name), None)
+    finding = next((one for one in every_finding(findings) if first.name in one.parameters), None)
+    measured = None if finding is None else dict(finding.wanted).get(first.name)
+    wanted = suspect.back if measured is None and suspect is not None else measured
+    if wanted is None or wanted == setting.value:
+        return None
+    is_learned = suspect is not None and suspect.is_learned and meaning.role in LEARNED
+    is_carried = (measured is not None or is_learned) and meaning.role != "safety"
+    return Advisable(
+        first.name,
+        float(setting.value),
+        wanted,
+        first.probability,
+        finding.title if finding is not None else suspect.text if suspect is not None else "",
+        is_found=finding is not None,
+        is_advised=is_carried and first.probability >= ENOUGH,
+    )
+
+
+def outside_fix(one: Advisable, run: Run) -> Fix:
+    """Its change as a fix, which repairs the run as far as the parameter is its cause."""
+    option = outside_option(one.name, one.wanted, vehicle_of_run(run))
+    notes = ("takes effect after a reboot",) if option.reboot_required else ()
+    return Fix((Change(option, one.value, one.wanted, notes),), one.probability, {})
+
+
+def vehicle_of_run(run: Run) -> Vehicle:
+    """What drove or flew a run."""
+    return vehicle_of(run.log.facts, {name: (setting,) for name, setting in run.settings.items()})
+
+
+def outside_option(name: str, default: float | None, vehicle: Vehicle) -> Variable:
+    """A parameter that no profile models, as an option: with what the firmware's documentation says of it."""
+    fact = ardupilot.fact_of(name, vehicle.kind, vehicle.version)
+    meaning = meaning_of(name, vehicle.kind)
+    return Variable(
+        name=name,
+        role=Role.OPTION,
+        type=_type(fact),
+        unit="" if fact is None else fact.unit,
+        doc="" if fact is None else fact.line,
+        range=None if fact is None or fact.low is None or fact.high is None else (fact.low, fact.high),
+        default=default,
+        parameters=(name,),
+        reboot_required=fact is not None and fact.reboot,
+        safety=meaning is not None and meaning.role == "safety",
+    )
+
+
+def _type(fact: Fact | None) -> ValueType:
+    is_code = fact is not None and bool(fact.values) and fact.low is None
+    return "int" if is_code else "float"
+
+
+def check_first(one: Advisable) -> str:
+    """What to look at where no change is advised."""
+    why = f": {one.why}" if one.why and not one.why.startswith(one.name) else ""
+    return f"check first {one.name} {shown(one.value)} (usually {shown(one.wanted)}){why}"
