@@ -6,12 +6,14 @@ from collections.abc import Collection, Iterator, Mapping
 
 from care_core.configs.driven import same_value
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX
-from care_core.ecosystems.vehicles.vehicle import Kind, Vehicle
+from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import Meaning, meaning_of
 from care_core.records import Record
 from care_core.run import Setting
 
+TABLED = (4, 3), (4, 6)
+"""Releases whose defaults are about those of the table, where a log holds none."""
 UNCHOSEN = frozenset(("written", "idle"))
 """Roles of parameters that lose no mission: outcomes, and what moves no vehicle."""
 
@@ -51,7 +53,7 @@ def off_parameters(
         meaning = meaning_of(name, vehicle.kind)
         if meaning is None or meaning.role in UNCHOSEN:
             continue
-        default = _default(setting, vehicle.kind)
+        default = _default(setting, vehicle)
         before = None if good is None or name not in good else good[name].value
         last_good = float(before) if isinstance(before, (int, float)) else None
         is_changed = None if good is None else last_good is None or not same_value(last_good, setting.value)
@@ -69,10 +71,12 @@ def off_parameters(
         )
 
 
-def _default(setting: Setting, kind: Kind) -> float | None:
+def _default(setting: Setting, vehicle: Vehicle) -> float | None:
     if isinstance(setting.default, (int, float)):
         return float(setting.default)
-    return ardupilot.firmware_default(setting.name, kind)
+    if vehicle.version is None or not TABLED[0] <= vehicle.version[:2] <= TABLED[1]:
+        return None
+    return ardupilot.firmware_default(setting.name, vehicle.kind)
 
 
 def _is_out_of_range(name: str, value: float, vehicle: Vehicle) -> bool:
