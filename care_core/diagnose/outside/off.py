@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping
 
 from care_core.configs.driven import same_value
@@ -14,6 +15,7 @@ from care_core.run import Setting
 
 TABLED = (4, 3), (4, 6)
 """Releases whose defaults are about those of the table, where a log holds none."""
+_AT_EVERY_START = re.compile(r"INS\d?_GYR\d?_?OFF.*|COMPASS_PRIO\d_ID|.*_DEV_?ID\d?|BARO\d_GND_PRESS|STAT_.*")
 UNCHOSEN = frozenset(("written", "idle"))
 """Roles of parameters that lose no mission: outcomes, and what moves no vehicle."""
 
@@ -29,6 +31,8 @@ class OffParameter(Record):
     """Whether it differs from the last good run; None where none is known."""
     is_out_of_range: bool
     """Whether it lies outside its documented range, or is no documented code."""
+    is_code: bool
+    """Whether its values have no order."""
     last_good: float | None = None
 
     @property
@@ -48,7 +52,7 @@ def off_parameters(
         good: the parameters of the last good run, None where none is known.
     """
     for name, setting in settings.items():
-        if name in modelled or name.startswith(SIMULATOR_PREFIX) or not isinstance(setting.value, (int, float)):
+        if name in modelled or _is_nobodys(name) or not isinstance(setting.value, (int, float)):
             continue
         meaning = meaning_of(name, vehicle.kind)
         if meaning is None or meaning.role in UNCHOSEN:
@@ -66,9 +70,14 @@ def off_parameters(
             back,
             meaning,
             is_changed,
-            _is_out_of_range(name, float(setting.value), vehicle),
+            *_documented(name, float(setting.value), vehicle),
             last_good,
         )
+
+
+def _is_nobodys(name: str) -> bool:
+    """Whether a vehicle writes it at every start, or it is the simulated world's."""
+    return name.startswith(SIMULATOR_PREFIX) or _AT_EVERY_START.fullmatch(name) is not None
 
 
 def _default(setting: Setting, vehicle: Vehicle) -> float | None:
@@ -79,10 +88,11 @@ def _default(setting: Setting, vehicle: Vehicle) -> float | None:
     return ardupilot.firmware_default(setting.name, vehicle.kind)
 
 
-def _is_out_of_range(name: str, value: float, vehicle: Vehicle) -> bool:
+def _documented(name: str, value: float, vehicle: Vehicle) -> tuple[bool, bool]:
+    """Whether a value lies outside what is documented, and whether it is a code."""
     fact = ardupilot.fact_of(name, vehicle.kind, vehicle.version)
     if fact is None:
-        return False
+        return False, False
     if fact.low is not None and fact.high is not None:
-        return not fact.low <= value <= fact.high
-    return bool(fact.values) and value not in {code for code, _ in fact.values}
+        return not fact.low <= value <= fact.high, False
+    return bool(fact.values) and value not in {code for code, _ in fact.values}, bool(fact.values or fact.bits)

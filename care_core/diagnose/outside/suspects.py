@@ -8,6 +8,7 @@ run reads explains nothing.
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -46,18 +47,23 @@ def outside_suspects(
         read: the phases and protections of this run (`phases_of`).
     """
     every = list(off)
-    built = Counter(one.meaning.role for one in every if one.is_changed is not True)
+    built = {(one.meaning.role, _block(one.name)) for one in every if one.is_changed is not True}
+    counts = Counter(role for role, _ in built)
     found = []
     for one in every:
         if not one.meaning.read & read:
             continue
         flights = flights_of(one.name, kind)
         like = [flight for flight in flights if flight.is_lost and _is_alike(flight, signs)]
-        wrong = _wrong(one, flights, built)
-        weight = wrong * (_shows(flights, like) if flights else _answers(one.meaning, signs))
+        weight = _wrong(one, flights, counts) * _shows(one, flights, like, signs)
         if weight >= LEAST:
             found.append(_suspect(one, weight, _flown(like)))
     return tuple(sorted(found, key=lambda suspect: (-suspect.weight, suspect.name)))
+
+
+def _block(name: str) -> str:
+    """What is set together: the axes and the instances of one calibration."""
+    return re.sub(r"\d+|_[XYZ]$", "", name)
 
 
 def _suspect(one: OffParameter, weight: float, flown: str) -> OutsideSuspect:
@@ -95,13 +101,13 @@ _SWITCHES: Mapping[Read, str] = {
 """The parameter that has something used at all."""
 
 
-def _wrong(one: OffParameter, flights: Sequence[Flight], built: Mapping[Role, int]) -> float:
+def _wrong(one: OffParameter, flights: Sequence[Flight], blocks: Mapping[Role, int]) -> float:
     """Probability that this value loses such a mission."""
     share = _lost(one, flights) if flights else UNSCREENED.get(one.meaning.role, 0.0)
     if one.is_out_of_range:
         share = max(share, OUT_OF_RANGE)
     if one.meaning.role in BUILT and one.is_changed is not True:
-        share /= built[one.meaning.role]
+        share /= blocks[one.meaning.role]
     if one.is_changed is None:
         return share
     factor = CHANGED if one.is_changed else UNCHANGED
@@ -111,14 +117,18 @@ def _wrong(one: OffParameter, flights: Sequence[Flight], built: Mapping[Role, in
 def _lost(one: OffParameter, flights: Sequence[Flight]) -> float:
     """Probability that the value loses a mission, by the screening flights: at its value, or as much of the way to the
     bound that was lost as it is off."""
-    same = [flight for flight in flights if math.isclose(flight.value, one.value, rel_tol=1e-4, abs_tol=1e-6)]
-    if same:
+    if same := _at(one, flights):
         return _share(same)
     reference = flights[0].reference
     side = [flight for flight in flights if (flight.value - reference) * (one.value - reference) > 0]
-    if not side:
+    if one.is_code or not side:
         return _share(flights)
     return max(HARMLESS, *(min(1.0, _way(one.value, flight)) * flight.is_lost for flight in side))
+
+
+def _at(one: OffParameter, flights: Sequence[Flight]) -> list[Flight]:
+    """The flights with this very value."""
+    return [flight for flight in flights if math.isclose(flight.value, one.value, rel_tol=1e-4, abs_tol=1e-6)]
 
 
 def _way(value: float, flight: Flight) -> float:
@@ -143,14 +153,17 @@ def _is_alike(flight: Flight, signs: Signs) -> bool:
     return bool(flight.first & signs.every) and bool(signs.first & flight.every)
 
 
-def _shows(flights: Sequence[Flight], like: Sequence[Flight]) -> float:
-    """Probability that a mission which the parameter loses fails in this way."""
+def _shows(one: OffParameter, flights: Sequence[Flight], like: Sequence[Flight], signs: Signs) -> float:
+    """Probability that a mission which the parameter loses fails in this way, by flights and by the causal map where
+    nobody flew the value."""
     lost = sum(flight.is_lost for flight in flights)
-    return (len(like) + 0.05) / (lost + 0.5)
+    flown = (len(like) + 0.05) / (lost + 0.5) if lost else 0.0
+    return flown if _at(one, flights) else max(flown, _answers(one.meaning, signs))
 
 
 def _answers(meaning: Meaning, signs: Signs) -> float:
-    """The same of a parameter that nobody flew, by the causal map."""
+    if signs.refusals:
+        return 0.0  # the check's own words tell what it reads
     if meaning.signs & signs.first:
         return ANSWERS
     return MAY_ANSWER if meaning.signs & signs.every else 0.0
