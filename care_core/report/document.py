@@ -287,8 +287,6 @@ class TriageDocument(Document, kw_only=True):
     """In the order told, the first cause first."""
     hypotheses: list[Hypothesis] = field(default_factory=list)
     """What explains the failure, the likeliest first; empty where nothing failed."""
-    outside: list[OutsideEntry] = field(default_factory=list)
-    """The suspects among the parameters that the profile does not model."""
     notes: list[str] = field(default_factory=list)
     """What the operator should know of the log, the configuration and the profile."""
     sources: dict[str, str] = field(default_factory=dict)
@@ -307,6 +305,8 @@ class TriageDocument(Document, kw_only=True):
     """The verdict in a sentence."""
     next_step: str = ""
     """What to do next, empty where there is nothing to be done."""
+    outside: list[OutsideEntry] = field(default_factory=list)
+    """The suspects among the parameters that the profile does not model."""
 
 
 class Report(TriageDocument, kw_only=True):

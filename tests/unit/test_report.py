@@ -31,7 +31,7 @@ from tests.made import DRIVEN, ENERGY, HOSTILE, LAND_SPEED, made_diagnosis
 KEYS = ["schema", "fit", "profile", "log", "config", "context", "metrics", "objectives", "faults", "fix", "abstained"]
 HAPPENED = ["account", "findings", "hypotheses"]
 ADDED = [*HAPPENED, "notes", "sources", "since", "missions", "evidence", "rivals", "tell_more", "dismissed",
-         "odds_as_driven", "headline", "next_step"]  # fmt: skip
+         "odds_as_driven", "headline", "next_step", "outside"]  # fmt: skip
 
 
 def test_the_document_has_exactly_the_published_keys() -> None:

@@ -22,7 +22,7 @@ from care_core.text import listed
 
 UNSCREENED: Mapping[Role, float] = {"choice": 0.05, "safety": 0.05, "wiring": 0.3, "calibration": 0.3}
 """Probability that a value which nobody flew loses a mission, by the role of its parameter."""
-OUT_OF_RANGE = 0.5
+OUT_OF_RANGE = 0.2
 """The least of it where the value lies outside what is documented."""
 HARMLESS = 0.02
 """Probability that a value loses a mission that lost none when it was flown."""
