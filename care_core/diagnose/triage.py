@@ -42,7 +42,7 @@ from care_core.diagnose.fixes import (
 from care_core.diagnose.hypotheses import explain, speaking, unasked
 from care_core.diagnose.implied import implied
 from care_core.diagnose.judging import Judged, check_wishes, query_of, unread_options
-from care_core.diagnose.next_step import bench, trial, was_upset
+from care_core.diagnose.next_step import bench, trial, was_refused, was_upset
 from care_core.diagnose.outside import suspects_outside
 from care_core.diagnose.outside.change import Advisable, check_first, leading_outside, outside_fix
 from care_core.diagnose.parts import mend_first, unmended
@@ -74,6 +74,9 @@ from care_core.run import Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Se
 from care_core.text import listed
 from care_core.variables import Variable
 
+BESIDE = 0.3
+"""Share of the leading parameter's probability from which an option is changed with it, and what the options have to
+add to the odds of a mission that never began."""
 MIN_CONTRIBUTION = 0.02
 """Probability an option must cost before it is called a cause of this run."""
 MIN_PROBABILITY = 0.2
@@ -198,7 +201,7 @@ def diagnose(
     part = _part(case, health.findings)
     lead = leading_outside(hypotheses, outside, health.findings, run)
     if lead is not None and (part is None or lead.is_found):
-        advised = _of_outside(lead, run)
+        advised = _of_outside(lead, case, hypotheses)
     else:
         lead = None
         against = (part and unmended(part)) or out_of_reach or outweighed(hypotheses, health.findings)
@@ -238,11 +241,25 @@ class _Advised(Record):
     why: str = ""
 
 
-def _of_outside(lead: Advisable, run: Run) -> _Advised:
-    """What is advised of a parameter outside the profile that leads the ranking."""
-    if lead.is_advised:
-        return _Advised((outside_fix(lead, run),), None, lead.why)
-    return _Advised((), check_first(lead))
+def _of_outside(lead: Advisable, case: _Case, hypotheses: Sequence[Hypothesis]) -> _Advised:
+    """What is advised of a parameter outside the profile that leads the ranking, with the options that stand beside it
+    or, where the vehicle never armed, would fail the mission next."""
+    if not lead.is_advised:
+        return _Advised((), check_first(lead))
+    query, before = case.query, replace(case.query, observed={}, repeats=())
+    likely = {one.name: one.probability for one in hypotheses if one.probability >= BESIDE * lead.probability}
+    free = _off(case) - query.kept - _failsafes_held(case, case.findings)
+    beside = {name: query.reference[name] for name in sorted(free & likely.keys())}
+    odds = lead.probability + sum(likely[name] for name in beside)
+    if was_refused(case.findings):
+        now = float(before.probability([{**query.config, **beside}])[0])
+        found = search(before, sorted(free))
+        more, reached = found[smallest_good(found)] if found else ({}, now)
+        beside = {**beside, **more} if reached >= now + BESIDE else beside
+        odds *= max(now, reached) if beside else now
+    acceptable = {name: value for name, value in beside.items() if query.variables[name].accepts(value)}
+    changes = to_fix(query, acceptable, odds).changes if acceptable else ()
+    return _Advised((outside_fix(lead, odds, case.run, changes),), None, lead.why)
 
 
 def _of_options(

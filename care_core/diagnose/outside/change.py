@@ -70,11 +70,11 @@ def leading_outside(
     )
 
 
-def outside_fix(one: Advisable, run: Run) -> Fix:
-    """Its change as a fix, which repairs the run as far as the parameter is its cause."""
+def outside_fix(one: Advisable, odds: float, run: Run, beside: Sequence[Change] = ()) -> Fix:
+    """Its change as a fix, with those of the profile's options that are made with it."""
     option = outside_option(one.name, one.wanted, vehicle_of_run(run))
     notes = ("takes effect after a reboot",) if option.reboot_required else ()
-    return Fix((Change(option, one.value, one.wanted, notes),), one.probability, {})
+    return Fix((Change(option, one.value, one.wanted, notes), *beside), odds, {})
 
 
 def vehicle_of_run(run: Run) -> Vehicle:

@@ -26,15 +26,17 @@ OUT_OF_RANGE = 0.2
 """The least of it where the value lies outside what is documented."""
 HARMLESS = 0.02
 """Probability that a value loses a mission that lost none when it was flown."""
-ANSWERS, MAY_ANSWER = 0.5, 0.1
+ANSWERS, MAY_ANSWER = 0.5, 0.03
 """Share of what an unscreened parameter loses that shows as its signs say, first or later."""
 CHANGED, UNCHANGED = 10.0, 0.05
 """By how much its odds rise where it was changed since the last good run, and fall where it was not."""
 MANY = 20.0
 """From this ratio of its documented bounds on a parameter's distance is that of logarithms."""
+UNLIKELY = 0.02
+"""Flights that count for every other way to fail: those that were flown do not show all."""
 BUILT: frozenset[Role] = frozenset(("wiring", "calibration"))
 """Roles of parameters that are off on every sound vehicle: one among many others is off for a good reason."""
-LEAST = 0.005
+LEAST = 0.02
 """What is less likely is no suspect."""
 
 
@@ -157,7 +159,7 @@ def _shows(one: OffParameter, flights: Sequence[Flight], like: Sequence[Flight],
     """Probability that a mission which the parameter loses fails in this way, by flights and by the causal map where
     nobody flew the value."""
     lost = sum(flight.is_lost for flight in flights)
-    flown = (len(like) + 0.05) / (lost + 0.5) if lost else 0.0
+    flown = (len(like) + UNLIKELY) / (lost + 0.5) if lost else 0.0
     return flown if _at(one, flights) else max(flown, _answers(one.meaning, signs))
 
 

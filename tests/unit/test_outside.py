@@ -1,0 +1,236 @@
+"""Suspects among the parameters that no profile models: what is off, what it does, and what is advised of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import care_core
+from care_core.application.case import Case, predict
+from care_core.diagnose.outside.change import check_first, leading_outside, outside_fix, outside_option
+from care_core.diagnose.outside.off import off_parameters
+from care_core.diagnose.outside.signs import Signs, signs_of
+from care_core.diagnose.outside.suspects import outside_suspects, phases_of
+from care_core.diagnose.records import Hypothesis, ObjectiveResult, OutsideSuspect
+from care_core.diagnose.verdict import verdict_of
+from care_core.ecosystems.findings import NOTHING_SEEN, Event, Finding, Health
+from care_core.ecosystems.vehicles.vehicle import Vehicle
+from care_core.errors import CareError, ConfigError
+from care_core.metadata.screening import flights_of, plain_refusal
+from care_core.profile.store import load_profile
+from care_core.records import replace
+from care_core.report.document import ChangeEntry, FixSet
+from care_core.report.suggested import suggested_changes
+from care_core.run import Setting
+from tests.made import TIME, made_run
+
+COPTER = Vehicle("copter", "quad X", "ArduCopter V4.5.4", (4, 5, 4))
+SLOW_HOME = Signs(frozenset({"slow_rtl"}), frozenset({"slow_rtl", "costly"}))
+EVERYTHING = frozenset({"always", "arming", "takeoff", "navigation", "hold", "rtl", "land", "battery"})
+
+
+def setting(name: str, value: float, default: float | None = None) -> dict[str, Setting]:
+    return {name: Setting(name, value, "PARM", default)}
+
+
+def suspects(settings: dict[str, Setting], signs: Signs, good: dict[str, Setting] | None = None) -> dict[str, float]:
+    off = off_parameters(settings, COPTER, (), good)
+    return {one.name: one.weight for one in outside_suspects(off, signs, EVERYTHING, "copter")}  # type: ignore[arg-type]
+
+
+def test_a_parameter_at_its_default_is_not_off() -> None:
+    assert not list(off_parameters(setting("RTL_LOIT_TIME", 5000, 5000), COPTER, (), None))
+
+
+def test_a_log_without_defaults_is_held_against_the_firmwares() -> None:
+    (off,) = off_parameters(setting("RTL_LOIT_TIME", 60000), COPTER, (), None)
+    assert (off.value, off.default, off.back) == (60000, 5000, 5000)
+    old = replace(COPTER, version=(3, 6, 0))
+    assert not list(off_parameters(setting("RTL_LOIT_TIME", 60000), old, (), None))
+
+
+@pytest.mark.parametrize(
+    "name", ["STAT_RUNTIME", "INS_GYR2OFFS_X", "COMPASS_DEV_ID", "SIM_WIND_SPD", "LOG_BITMASK", "COMPASS_PRIO1_ID"]
+)
+def test_what_nobody_chose_and_what_moves_nothing_is_no_suspect(name: str) -> None:
+    assert not list(off_parameters(setting(name, 3.0, 1.0), COPTER, (), None))
+
+
+def test_options_of_the_profile_are_left_to_it() -> None:
+    assert not list(off_parameters(setting("LAND_SPEED", 16, 50), COPTER, {"LAND_SPEED"}, None))
+
+
+def test_what_changed_since_the_good_run_goes_back_to_its_value() -> None:
+    good = setting("RTL_LOIT_TIME", 8000, 5000)
+    (off,) = off_parameters(setting("RTL_LOIT_TIME", 60000, 5000), COPTER, (), good)
+    assert off.is_changed
+    assert off.back == 8000
+    (same,) = off_parameters(good, COPTER, (), good)
+    assert same.is_changed is False
+
+
+def test_a_value_whose_flights_failed_in_this_way_is_a_suspect() -> None:
+    assert any(flight.is_lost for flight in flights_of("RTL_LOIT_TIME", "copter"))
+    assert suspects(setting("RTL_LOIT_TIME", 60000, 5000), SLOW_HOME)["RTL_LOIT_TIME"] > 0.5
+
+
+def test_a_run_that_failed_in_another_way_clears_it() -> None:
+    tipped = Signs(frozenset({"tipped"}), frozenset({"tipped", "upset"}))
+    assert not suspects(setting("RTL_LOIT_TIME", 60000, 5000), tipped)
+
+
+def test_a_parameter_that_no_phase_of_the_run_read_is_none() -> None:
+    off = list(off_parameters(setting("RTL_LOIT_TIME", 60000, 5000), COPTER, (), None))
+    assert outside_suspects(off, SLOW_HOME, frozenset({"always", "navigation"}), "copter") == ()
+
+
+def test_a_harmless_value_is_next_to_nothing() -> None:
+    assert "RTL_LOIT_TIME" not in suspects(setting("RTL_LOIT_TIME", 6000, 5000), SLOW_HOME)
+
+
+def test_a_good_run_with_the_same_value_clears_it_and_a_change_accuses() -> None:
+    driven = setting("RTL_LOIT_TIME", 30000, 5000)
+    alone = suspects(driven, SLOW_HOME)["RTL_LOIT_TIME"]
+    assert suspects(driven, SLOW_HOME, setting("RTL_LOIT_TIME", 5000))["RTL_LOIT_TIME"] > alone
+    assert suspects(driven, SLOW_HOME, setting("RTL_LOIT_TIME", 30000)).get("RTL_LOIT_TIME", 0.0) < 0.1 * alone
+
+
+def test_only_the_same_refusal_accuses() -> None:
+    text = plain_refusal("SERVO2_MAX is less than SERVO2_TRIM")
+    same = Signs(frozenset({"refused"}), frozenset({"refused"}), frozenset({text}))
+    other = replace(same, refusals=frozenset({plain_refusal("Need 3D Fix")}))
+    driven = setting("SERVO2_MAX", 800, 1900)
+    assert suspects(driven, same)["SERVO2_MAX"] > 0.5
+    assert "SERVO2_MAX" not in suspects(driven, other)
+
+
+def test_wiring_among_much_other_wiring_is_off_for_good_reasons() -> None:
+    text = frozenset({plain_refusal("SERVO2_MAX is less than SERVO2_TRIM")})
+    signs = Signs(frozenset({"refused"}), frozenset({"refused"}), text)
+    driven = setting("SERVO2_MAX", 800, 1900)
+    names = ("GPS_TYPE2", "COMPASS_ORIENT", "FRAME_CLASS", "SERIAL3_PROTOCOL", "RNGFND1_TYPE")
+    others = {name: Setting(name, 2.0, "PARM", 0.0) for name in names}
+    assert suspects(driven | others, signs)["SERVO2_MAX"] < 0.5 * suspects(driven, signs)["SERVO2_MAX"]
+
+
+@given(st.sets(st.sampled_from(["LOIT_SPEED", "PHLD_BRAKE_RATE", "ACRO_RP_RATE", "CIRCLE_RATE", "FLTMODE3"])))
+def test_parameters_of_modes_that_were_not_flown_change_nothing(names: set[str]) -> None:
+    driven = setting("RTL_LOIT_TIME", 60000, 5000)
+    others = {name: Setting(name, 77.0, "PARM", 10.0) for name in names}
+    assert suspects(driven | others, SLOW_HOME) == suspects(driven, SLOW_HOME)
+
+
+def test_the_phases_of_a_run_come_from_its_mission_and_its_switches() -> None:
+    run = made_run()
+    assert "navigation" not in phases_of(run, has_risen=False)
+    flown = replace(run, mission=replace(run.mission, asked=(("returns", 1.0),)), modes=("Auto", "Loiter"))
+    assert {"navigation", "rtl", "land", "manual"} <= phases_of(flown, has_risen=True)
+    fenced = replace(flown, settings=setting("FENCE_ENABLE", 1))
+    assert "fence" in phases_of(fenced, has_risen=True)
+
+
+def test_the_first_sign_is_what_failed_first_and_a_failsafe_of_the_firmware() -> None:
+    tipped = Finding("takeoff", "it tipped over at take-off", 5.0, 9.0, "critical", "", "ATT")
+    health = Health("", (Event(6.0, "failsafe", "EKF failsafe", "ERR"),), (tipped,))
+    late = ObjectiveResult(TIME, 190.0, TIME.threshold, "fault")
+    signs = signs_of(made_run(), [late], health)
+    assert signs.first == {"tipped", "failsafe_estimator"}
+    assert signs_of(made_run(), [late], NOTHING_SEEN).first == {"slow_cruise"}
+
+
+def named(name: str, *wanted: tuple[str, float]) -> Finding:
+    return Finding("battery", f"{name} is wrong", 0.0, 9.0, "critical", "", "BAT", parameters=(name,), wanted=wanted)
+
+
+def lead(name: str, value: float, findings: list[Finding], suspect: OutsideSuspect | None = None) -> object:
+    run = replace(made_run(), settings=setting(name, value, 1.0))
+    ranked = [Hypothesis("parameter", name, 0.7), Hypothesis("chance", "", 0.3)]
+    return leading_outside(ranked, [suspect] if suspect else [], findings, run)
+
+
+def test_a_measured_value_is_advised() -> None:
+    found = lead("BATT_VOLT_MULT", 8.2, [named("BATT_VOLT_MULT", ("BATT_VOLT_MULT", 10.1))])
+    assert found is not None
+    assert (found.is_advised, found.wanted) == (True, 10.1)  # type: ignore[attr-defined]
+
+
+def test_what_flights_lost_is_advised_but_a_calibration_is_looked_at() -> None:
+    choice = OutsideSuspect("RTL_LOIT_TIME", 60000, 5000, 0.8, "choice", True, "RTL_LOIT_TIME 60000 (default 5000)")
+    assert lead("RTL_LOIT_TIME", 60000, [], choice).is_advised  # type: ignore[attr-defined]
+    offset = OutsideSuspect("INS_ACCOFFS_X", 3.5, 0.0, 0.8, "calibration", True, "")
+    found = lead("INS_ACCOFFS_X", 3.5, [], offset)
+    assert not found.is_advised  # type: ignore[attr-defined]
+    assert check_first(found) == "check first INS_ACCOFFS_X 3.5 (usually 0)"  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["BATT_LOW_MAH", "FENCE_RADIUS", "ARMING_CHECK", "FS_EKF_THRESH"])
+def test_what_protects_is_never_put_back_by_advice(name: str) -> None:
+    suspect = OutsideSuspect(name, 3200, 0.0, 0.9, "safety", True, "")
+    found = lead(name, 3200, [named(name, (name, 0.0))], suspect)
+    assert found is not None
+    assert not found.is_advised  # type: ignore[attr-defined]
+
+
+def test_a_parameter_outside_becomes_an_option_with_what_is_documented() -> None:
+    option = outside_option("RTL_ALT_FINAL", 0.0, COPTER)
+    assert (option.unit, option.parameters, option.safety) == ("cm", ("RTL_ALT_FINAL",), False)
+    assert outside_option("BATT_LOW_MAH", 0.0, COPTER).safety
+
+
+def entry(option: str, value: float) -> FixSet:
+    change = ChangeEntry(option=option, parameter=option, from_=1.0, to=value, reboot_required=False)
+    return FixSet(changes=[change], p_fixed=0.5, predicted={})
+
+
+def test_a_report_sets_what_an_operator_chooses_and_no_wiring_or_protection() -> None:
+    schema = load_profile("arducopter").schema
+    (change,) = suggested_changes(entry("RTL_LOIT_TIME", 5000), schema, Path("r"), "fix")
+    assert change.option.parameters == ("RTL_LOIT_TIME",)
+    for name in ("FRAME_CLASS", "SERVO1_FUNCTION", "BATT_LOW_MAH", "ARMING_CHECK", "SCR_USER1", "NO_SUCH", "a b"):
+        with pytest.raises(ConfigError, match="cannot be acted on"):
+            suggested_changes(entry(name, 1.0), schema, Path("r"), "fix")
+
+
+@pytest.fixture(scope="module")
+def slow_home(recorded: Path) -> Case:
+    return care_core.triage(recorded / "data/anyparam/a5501_09_04.BIN")
+
+
+def test_a_flight_that_a_parameter_outside_lost_is_answered_by_it(slow_home: Case) -> None:
+    diagnosis = slow_home.diagnosis
+    assert diagnosis.hypotheses[0].name == "RTL_LOIT_TIME"
+    assert diagnosis.fix is not None
+    assert [str(change) for change in diagnosis.fix.changes] == ["RTL_LOIT_TIME 60000 -> 5000"]
+    text = slow_home.report()
+    assert "param set RTL_LOIT_TIME 5000" in text
+    assert json.loads(slow_home.report("json"))["outside"][0]["name"] == "RTL_LOIT_TIME"
+    assert "RTL_LOIT_TIME" in str(verdict_of(diagnosis).reasons[0])
+
+
+def test_what_it_promises_is_asked_alone_or_not_at_all(slow_home: Case) -> None:
+    assert predict(slow_home, {"RTL_LOIT_TIME": 5000.0}) == slow_home.diagnosis.fix
+    with pytest.raises(CareError, match="RTL_LOIT_TIME"):
+        predict(slow_home, {"RTL_LOIT_TIME": 5000.0, "WPNAV_SPEED": 900.0})
+
+
+def test_a_protection_that_acted_early_is_looked_at_first(recorded: Path) -> None:
+    diagnosis = care_core.triage(recorded / "data/anyparam/a5501_10_00.BIN").diagnosis
+    assert diagnosis.fix is None
+    assert diagnosis.abstained is not None
+    assert diagnosis.abstained.startswith("check first BATT_CRT_MAH 3000")
+
+
+def test_options_that_stand_beside_it_are_changed_with_it(recorded: Path) -> None:
+    diagnosis = care_core.triage(recorded / "data/anyparam/a5501_04_07.BIN").diagnosis
+    assert diagnosis.fix is not None
+    assert {change.option.name for change in diagnosis.fix.changes} == {"LAND_ALT_LOW", "PSC_VELXY_P"}
+
+
+def test_its_fix_has_the_notes_of_its_documentation() -> None:
+    found = lead("FRAME_TYPE", 19, [named("FRAME_TYPE", ("FRAME_TYPE", 1.0))])
+    fix = outside_fix(found, 0.7, made_run())  # type: ignore[arg-type]
+    assert fix.changes[0].notes == ("takes effect after a reboot",)
