@@ -11,7 +11,7 @@ from care_core.ecosystems.findings import Finding, FindingKind, every_finding
 from care_core.ecosystems.ranking import SYMPTOMS
 from care_core.ecosystems.vehicles import flies, vehicle_of
 from care_core.logs.formats import format_named
-from care_core.run import Run
+from care_core.run import Run, shown
 
 UPSETS: frozenset[FindingKind] = frozenset(("attitude", "crash", "motor", "takeoff", "thrust"))
 """Kinds of findings after which a vehicle may be damaged, or does not do what it is told."""
@@ -80,6 +80,8 @@ def _undone(diagnosis: Diagnosis) -> str:
     """What can be put right at once, empty where nothing is said to be that."""
     findings = diagnosis.health.findings
     part, first = mend_first(findings), next(iter(diagnosis.hypotheses), None)
+    if first is not None and first.what == "parameter" and first.name not in diagnosis.run.config:
+        return _looked_at(first.name, diagnosis)
     if part is not None:
         return "charge or replace the battery" if part.kind in ("battery", "prearm") else ""
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
@@ -88,3 +90,13 @@ def _undone(diagnosis: Diagnosis) -> str:
     if first is not None and first.what == "parameter" and any(one.title.startswith(first.name) for one in findings):
         return f"put {first.name} back as the findings say"
     return ""
+
+
+def _looked_at(name: str, diagnosis: Diagnosis) -> str:
+    """What to do with a parameter outside the profile that leads and whose change is not advised."""
+    setting = diagnosis.run.settings.get(name)
+    value = "" if setting is None else f" {shown(setting.value)}"
+    suspect = next((one for one in diagnosis.outside if one.name == name), None)
+    is_chosen = suspect is not None and suspect.role in ("choice", "wiring")
+    back = f"; 'param set {name} {shown(suspect.back)}' puts it back" if suspect is not None and is_chosen else ""
+    return f"check whether {name}{value} is right for this vehicle{back}"

@@ -653,7 +653,7 @@ def _refused_otherwise(case: _Case, health: Health) -> str | None:
     """Said where the run ended at a refusal to arm that speaks of no option of the profile: for what an operator has to
     do, or for none of the complaints that the profile tells apart. What options do in flight is no cause of it."""
     said = next((one for one in health.findings if one.kind == "prearm"), None)
-    if said is None or case.run.refused_by:
+    if said is None or case.run.refused_by or said.parameters:
         return None
     if said.suspect == "operation":
         return f"{said.title}: that check reads no parameter of the profile, so none explains it"
