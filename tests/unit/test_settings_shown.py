@@ -83,6 +83,7 @@ def test_a_current_before_the_motors_turn(offset: float) -> None:
     made.settings["BATT_AMP_PERVLT"] = 17.0
     made.table["BAT"]["Curr"] -= 0.5 + 17.0 * offset
     made.drive("BATT_AMP_OFFSET", offset, 0.0)
+    made.table["BAT"]["EnrgTot"] = np.cumsum(made.table["BAT"]["Volt"] * made.table["BAT"]["Curr"]) / 36000.0
     assert naming(made, "BATT_AMP_OFFSET").wanted == (("BATT_AMP_OFFSET", 0.0),)
 
 
@@ -212,6 +213,19 @@ def test_an_offset_that_shifts_a_compass(number: int) -> None:
     made.drive(name, 400, 5)
     made.table["MAG" if number == 1 else "MAG#2"]["MagX"] += 395
     assert made.find()[0].wanted == ((name, 5.0),)
+
+
+def test_a_small_offset_counts_where_it_kept_the_vehicle_from_arming() -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    made.drive("COMPASS_OFS_X", 95, 5)
+    made.table["MAG"]["MagX"] += 90
+    assert not [one for one in made.find() if one.parameters]
+    text = "Arm: Check mag field (xy diff:115>100)"
+    made.rows = {"MSG": [(t, {"Message": text}) for t in (20.0, 50.0, 80.0)]}
+    for name in ("CTUN", "POS"):
+        made.table.pop(name)
+    assert (made.find()[0].severity, made.find()[0].wanted) == ("critical", (("COMPASS_OFS_X", 5.0),))
 
 
 def test_a_scale_that_stretches_a_compass() -> None:

@@ -42,7 +42,7 @@ _BATTERY_FIELDS: Mapping[str, Field] = {
     "Inst": Field(former=("Instance",)),
     "Volt": Field("V", "battery voltage", plausible=(0, 1e3), step=5.0),
     "Curr": Field("A", "battery current", plausible=(-1e3, 1e4)),
-    "EnrgTot": Field("Wh", "energy drawn", plausible=(0, 1e6), step=5.0),
+    "EnrgTot": Field("Wh", "energy drawn", plausible=(-1e6, 1e6), step=5.0),
     "CurrTot": Field("mAh", "charge drawn"),
     "Res": Field("ohm", "estimated resistance of the battery"),
 }

@@ -32,6 +32,7 @@ READS: Wanted = {
 
 LIMITS = Limits()
 _APART = LIMITS.add("compass off what it should read", 0.25, "", "a choice: a share of the field; 100 of 400 mGauss")
+_REFUSED = LIMITS.add("compass off it that kept the vehicle from arming", 0.1, "", "AP_Arming: 100 mGauss of the field")
 _AGREES = LIMITS.add("compass that reads what it should", 0.15, "", "a choice: calibrations differ by less")
 _MENDS = LIMITS.add("share of it that undoing leaves", 0.5, "", "a choice")
 _EXPLAINED = LIMITS.add(
@@ -154,11 +155,13 @@ class _Compass:
 
 def _by_others(compasses: list[_Compass]) -> Undone | None:
     """A compass that another agrees with once one of its parameters is undone."""
+    is_refused = bool(compasses) and compasses[0].flight.refused_for("compass", "mag field") is not None
+    limit = _REFUSED if is_refused else _APART
     for one, other in permutations(compasses, 2):
         expected = np.stack([aligned(one.table.t, other.table.t, row) for row in other.field])
         size = _size(expected)
         apart = _apart(one.field, expected) / size
-        if not apart > _APART or not one.is_used:
+        if not apart > limit or not one.is_used:
             continue
         undone = [(_apart(field, expected) / size, name, default) for name, default, field in one.undone()]
         left, name, default = min(undone, default=(math.inf, "", 0.0))
@@ -169,7 +172,7 @@ def _by_others(compasses: list[_Compass]) -> Undone | None:
                 title=_title(one, name),
                 evidence=(
                     f"compasses {one.number} and {other.number} differ by {100 * apart:.0f} % of the field (limit "
-                    f"{100 * _APART:.0f} %) with {name}={one.flight.setting(name):g}, and would by {100 * left:.0f} % "
+                    f"{100 * limit:.0f} %) with {name}={one.flight.setting(name):g}, and would by {100 * left:.0f} % "
                     f"with its default {default:g}"
                 ),
             )
