@@ -40,6 +40,7 @@ class Leans:
         attitude, moved = flight.living_attitude("Roll", "Pitch"), flight.one("GPS", "Spd", "GCrs")
         if attitude is None or moved is None or not flight.is_copter or len(moved) < _FEWEST:
             return None
+        attitude = attitude.where(np.isfinite(attitude["Roll"]) & np.isfinite(attitude["Pitch"]))
         moved = moved.where(np.isfinite(moved["Spd"]) & np.isfinite(moved["GCrs"]))
         t, speed = moved.t, moved["Spd"] * np.exp(1j * np.radians(moved["GCrs"]))
         step = max(round(_OVER_S / max(float(median(np.diff(t))), 1e-3)), 1) if len(t) > _FEWEST else 0
@@ -47,7 +48,7 @@ class Leans:
             return None
         begin, end = t[:-step], t[step:]
         flying = during(flight.flown, begin) & during(flight.flown, end) & (end - begin < _HOLE_S) & (end > begin)
-        if flying.sum() < _FEWEST:
+        if flying.sum() < _FEWEST or len(attitude) < _FEWEST:
             return None
         roll, pitch = np.radians(attitude["Roll"]), np.radians(attitude["Pitch"])
         lean = _G * (-np.tan(pitch) + 1j * np.tan(roll) / np.cos(pitch))

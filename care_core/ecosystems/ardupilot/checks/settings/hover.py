@@ -102,6 +102,8 @@ def kept_from_range(flight: Flight) -> Kept | None:
     left = {name: flight.default_left(name) for name in _SHIPPED}
     whole = {name: shipped if left[name] is None else left[name] or 0.0 for name, shipped in _SHIPPED.items()}
     span = whole["MOT_PWM_MAX"] - whole["MOT_PWM_MIN"]
+    if span <= 0.0 or whole["MOT_SPIN_MAX"] <= 0.0:
+        return None
     shares = {"MOT_SPIN_MAX": spin / whole["MOT_SPIN_MAX"], "MOT_PWM_MAX": (most - whole["MOT_PWM_MIN"]) / span}
     share, name = min((share, name) for name, share in shares.items())
     highest = _highest_output(flight)
@@ -114,8 +116,8 @@ def kept_from_range(flight: Flight) -> Kept | None:
 def _highest_output(flight: Flight) -> float | None:
     """What the motors were asked for at most, in microseconds; None where nothing tells."""
     outputs = [flight.one("RCOU", f"C{n}") for n in range(1, 5)]
-    known = [float(np.nanmax(one[f"C{n}"])) for n, one in enumerate(outputs, start=1) if one is not None]
-    return max(known, default=None)
+    values = [one[f"C{n}"] for n, one in enumerate(outputs, start=1) if one is not None]
+    return max((float(column[np.isfinite(column)].max(initial=0.0)) for column in values), default=0.0) or None
 
 
 def _swings(flight: Flight) -> Iterator[Finding]:
