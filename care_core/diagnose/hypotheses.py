@@ -90,6 +90,8 @@ def explain(
         total = sum(max(0.0, suspect.weight) for suspect in found[name])
         for suspect in found[name] if total else ():
             options[suspect.option] = max(options.get(suspect.option, 0.0), excess * suspect.weight / max(total, 1.0))
+    if any(one.kind == "prearm" and one.severity == "critical" for one in findings):
+        options.clear()  # what acts in flight kept no vehicle from arming
     for finding in findings:
         if finding.title in shown:
             for option, share in _named_by(finding, shown[finding.title].options, found).items():

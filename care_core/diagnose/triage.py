@@ -75,8 +75,7 @@ from care_core.text import listed
 from care_core.variables import Variable
 
 BESIDE = 0.3
-"""Share of the leading parameter's probability from which an option is changed with it, and what the options have to
-add to the odds of a mission that never began."""
+"""Share of the leading parameter's probability from which an option is changed with it."""
 MIN_CONTRIBUTION = 0.02
 """Probability an option must cost before it is called a cause of this run."""
 MIN_PROBABILITY = 0.2
@@ -242,23 +241,18 @@ class _Advised(Record):
 
 
 def _of_outside(lead: Advisable, case: _Case, hypotheses: Sequence[Hypothesis]) -> _Advised:
-    """What is advised of a parameter outside the profile that leads the ranking, with the options that stand beside it
-    or, where the vehicle never armed, would fail the mission next."""
+    """What is advised of a parameter outside the profile that leads the ranking, with the options that stand beside it.
+    A vehicle that never armed has its mission still before it: then the odds are those of the mission, too."""
     if not lead.is_advised:
         return _Advised((), check_first(lead))
-    query, before = case.query, replace(case.query, observed={}, repeats=())
+    query = case.query
     likely = {one.name: one.probability for one in hypotheses if one.probability >= BESIDE * lead.probability}
-    free = _off(case) - query.kept - _failsafes_held(case, case.findings)
-    beside = {name: query.reference[name] for name in sorted(free & likely.keys())}
+    free = (_off(case) & likely.keys()) - query.kept - _failsafes_held(case, case.findings)
+    beside = {name: value for name in sorted(free) if query.variables[name].accepts(value := query.reference[name])}
     odds = lead.probability + sum(likely[name] for name in beside)
     if was_refused(case.findings):
-        now = float(before.probability([{**query.config, **beside}])[0])
-        found = search(before, sorted(free))
-        more, reached = found[smallest_good(found)] if found else ({}, now)
-        beside = {**beside, **more} if reached >= now + BESIDE else beside
-        odds *= max(now, reached) if beside else now
-    acceptable = {name: value for name, value in beside.items() if query.variables[name].accepts(value)}
-    changes = to_fix(query, acceptable, odds).changes if acceptable else ()
+        odds *= float(replace(query, observed={}, repeats=()).probability([query.config])[0])
+    changes = to_fix(query, beside, odds).changes if beside else ()
     return _Advised((outside_fix(lead, odds, case.run, changes),), None, lead.why)
 
 
@@ -653,8 +647,11 @@ def _refused_otherwise(case: _Case, health: Health) -> str | None:
     """Said where the run ended at a refusal to arm that speaks of no option of the profile: for what an operator has to
     do, or for none of the complaints that the profile tells apart. What options do in flight is no cause of it."""
     said = next((one for one in health.findings if one.kind == "prearm"), None)
-    if said is None or case.run.refused_by or said.parameters:
+    if said is None or case.run.refused_by:
         return None
+    if said.parameters:
+        read = listed(said.parameters)
+        return f"{said.title}: that check reads {read}; look there first"
     if said.suspect == "operation":
         return f"{said.title}: that check reads no parameter of the profile, so none explains it"
     complaints = [one for one in case.profile.schema.metrics if _is_of_one_complaint(one)]
