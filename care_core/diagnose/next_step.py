@@ -80,15 +80,15 @@ def _undone(diagnosis: Diagnosis) -> str:
     """What can be put right at once, empty where nothing is said to be that."""
     findings = diagnosis.health.findings
     part, first = mend_first(findings), next(iter(diagnosis.hypotheses), None)
-    if first is not None and first.what == "parameter" and first.name not in diagnosis.run.config:
-        return _looked_at(first.name, diagnosis)
     if part is not None:
         return "charge or replace the battery" if part.kind in ("battery", "prearm") else ""
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
-    if refused is not None:
+    if refused is not None and not refused.parameters:
         return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"
     if first is not None and first.what == "parameter" and any(one.title.startswith(first.name) for one in findings):
         return f"put {first.name} back as the findings say"
+    if first is not None and first.what == "parameter" and first.name not in diagnosis.run.config:
+        return _looked_at(first.name, diagnosis)
     return ""
 
 

@@ -54,7 +54,7 @@ def test_a_log_without_defaults_is_held_against_the_firmwares() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["STAT_RUNTIME", "INS_GYR2OFFS_X", "COMPASS_DEV_ID", "SIM_WIND_SPD", "LOG_BITMASK", "COMPASS_PRIO1_ID"]
+    "name", ["STAT_RUNTIME", "INS_GYR2OFFS_X", "COMPASS_DEV_ID", "SIM_WIND_SPD", "NTF_LED_BRIGHT", "COMPASS_PRIO1_ID"]
 )
 def test_what_nobody_chose_and_what_moves_nothing_is_no_suspect(name: str) -> None:
     assert not list(off_parameters(setting(name, 3.0, 1.0), COPTER, (), None))
