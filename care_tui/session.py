@@ -82,7 +82,7 @@ class Session(Struct, eq=False):
         causes = [cause for fault in self.diagnosis.faults for cause in fault.causes]
         alone = {cause.option.name: cause.suggested for cause in causes if cause.suggested is not None}
         for found in (suggested, alone, *others):
-            values = {**found, **values}
+            values = {**values, **{name: value for name, value in found.items() if name not in values}}
         return values
 
     def alone(self) -> dict[tuple[str, float], float]:

@@ -369,5 +369,5 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
         )
     answer = case.reading.question.ask(changes)
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
-    (fix,) = believed([Fix(answer.changes, answer.p_ok, predicted)], case.diagnosis.hypotheses)
+    (fix,) = believed([Fix(answer.changes, answer.p_ok, predicted)], case.diagnosis.hypotheses, options)
     return fix if changes else replace(fix, p_fixed=odds_as_driven(answer.p_ok, case.diagnosis.hypotheses))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 from care_core.diagnose.parts import LATE_S, set_wrong
 from care_core.diagnose.records import Cause, Fault, Fix, Hypothesis, ObjectiveResult
@@ -29,14 +29,23 @@ ALIKE = 0.02
 """Shares of a limit that are no difference to an operator."""
 
 
-def believed(fixes: Sequence[Fix], hypotheses: Sequence[Hypothesis]) -> tuple[Fix, ...]:
-    """The fixes with the probability that something failed which no parameter repairs taken off their promise."""
-    share = _repairable(hypotheses)
+def believed(fixes: Sequence[Fix], hypotheses: Sequence[Hypothesis], modelled: Container[str]) -> tuple[Fix, ...]:
+    """The fixes of the profile's options with the probability that something else did it taken off their promise.
+
+    Args:
+        modelled: the options of the profile.
+    """
+    share = _repairable(hypotheses) - _outside(hypotheses, modelled)
     return tuple(replace(fix, p_fixed=fix.p_fixed * share) for fix in fixes)
 
 
 def _repairable(hypotheses: Sequence[Hypothesis]) -> float:
     return 1.0 - sum(one.probability for one in hypotheses if one.what in ("hardware", "world") and one.name)
+
+
+def _outside(hypotheses: Sequence[Hypothesis], modelled: Container[str]) -> float:
+    """Probability of a parameter that the profile does not model."""
+    return sum(one.probability for one in hypotheses if one.what == "parameter" and one.name not in modelled)
 
 
 def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = ()) -> str | None:
@@ -91,9 +100,11 @@ def odds_as_driven(probability: float, hypotheses: Sequence[Hypothesis]) -> floa
     return max(0.0, min(probability * _repairable(hypotheses), _repairable(hypotheses) - lasting))
 
 
-def believed_causes(faults: Sequence[Fault], hypotheses: Sequence[Hypothesis]) -> tuple[Fault, ...]:
+def believed_causes(
+    faults: Sequence[Fault], hypotheses: Sequence[Hypothesis], modelled: Container[str]
+) -> tuple[Fault, ...]:
     """The faults with the same taken off what each cause promises alone."""
-    share = _repairable(hypotheses)
+    share = _repairable(hypotheses) - _outside(hypotheses, modelled)
 
     def scaled(cause: Cause) -> Cause:
         return cause if cause.p_fixed is None else replace(cause, p_fixed=cause.p_fixed * share)

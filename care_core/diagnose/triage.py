@@ -210,7 +210,7 @@ def diagnose(
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     if abstained is None and lead is None:
         faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)
-    faults = believed_causes(faults, hypotheses)
+    faults = believed_causes(faults, hypotheses, query.config)
     report("done", 1.0)
     return Diagnosis(
         profile=choice,
@@ -277,7 +277,7 @@ def _of_options(
     found = _fixes(case, options, held_too)
     if idle := _idle(case, judged, found[:1]):
         found = _fixes(case, options, held_too | idle)
-    fixes = believed(found, hypotheses)
+    fixes = believed(found, hypotheses, query.config)
     if against is not None:
         return _Advised(fixes, against)
     abstained = (

@@ -95,7 +95,7 @@ def test_a_part_that_left_no_trace_stops_no_advice() -> None:
 
 
 def test_what_no_parameter_repairs_comes_off_the_promise() -> None:
-    (fix,) = believed([fix_with(0.9)], motor(0.2))
+    (fix,) = believed([fix_with(0.9)], motor(0.2), {one.name for one in motor(0.2)})
     assert fix.p_fixed == pytest.approx(0.9 * 0.8)
 
 
@@ -247,3 +247,11 @@ def test_a_battery_failsafe_is_lowered_for_no_battery_that_may_not_be_full(
     case = SimpleNamespace(run=run, query=SimpleNamespace(model=profile.model), profile=profile)
     held = _failsafes_held(cast(Any, case), [] if finding is None else [finding])
     assert held == (frozenset({"BATT_LOW_VOLT"}) if is_held else frozenset())
+
+
+def test_a_parameter_that_the_profile_does_not_model_takes_its_share_off_what_options_promise() -> None:
+    outside = (Hypothesis("parameter", "RTL_LOIT_TIME", 0.8), Hypothesis("chance", "", 0.2))
+    (fix,) = believed([fix_with(0.9)], outside, ("LAND_SPEED",))
+    assert fix.p_fixed == pytest.approx(0.18)
+    (fix,) = believed([fix_with(0.9)], outside, ("RTL_LOIT_TIME",))
+    assert fix.p_fixed == pytest.approx(0.9)
