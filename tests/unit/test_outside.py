@@ -231,6 +231,19 @@ def test_options_that_stand_beside_it_are_changed_with_it(recorded: Path) -> Non
 
 
 def test_its_fix_has_the_notes_of_its_documentation() -> None:
-    found = lead("FRAME_TYPE", 19, [named("FRAME_TYPE", ("FRAME_TYPE", 1.0))])
+    found = lead("GPS_TYPE2", 19, [named("GPS_TYPE2", ("GPS_TYPE2", 0.0))])
     fix = outside_fix(found, 0.7, made_run())  # type: ignore[arg-type]
     assert fix.changes[0].notes == ("takes effect after a reboot",)
+
+
+def test_how_a_vehicle_is_built_its_operator_knows() -> None:
+    found = lead("FRAME_TYPE", 19, [named("FRAME_TYPE", ("FRAME_TYPE", 0.0))])
+    assert not found.is_advised  # type: ignore[attr-defined]
+    unknown = lead("FRAME_CLASS", 14, [named("FRAME_CLASS")])
+    assert check_first(unknown) == "check first FRAME_CLASS 14: FRAME_CLASS is wrong"  # type: ignore[arg-type]
+
+
+def test_the_value_that_every_screening_flight_had_is_harmless() -> None:
+    tipped = Signs(frozenset({"tipped"}), frozenset({"tipped", "upset"}))
+    assert "FRAME_TYPE" not in suspects(setting("FRAME_TYPE", 1, 0), tipped)
+    assert "FRAME_TYPE" in suspects(setting("FRAME_TYPE", 13, 0), tipped)

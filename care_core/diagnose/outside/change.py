@@ -16,8 +16,10 @@ from care_core.records import Record
 from care_core.run import Run, shown
 from care_core.variables import Change, Role, ValueType, Variable
 
-LEARNED: frozenset[ParameterRole] = frozenset(("choice", "wiring"))
-"""Roles of parameters that flights speak for: a calibration is of one vehicle alone."""
+LEARNED: frozenset[ParameterRole] = frozenset(("choice",))
+"""Roles of parameters that flights speak for: wiring and calibration are of one vehicle alone."""
+BUILT_AS = "frame"
+"""The part whose parameters say how the vehicle is built, which its operator alone knows, whatever the default is."""
 ENOUGH = 0.4
 """Probability of a parameter from which its change is advised: nothing else is then as likely by far."""
 
@@ -28,7 +30,8 @@ class Advisable(Record):
 
     name: str
     value: float
-    wanted: float
+    wanted: float | None
+    """None where only that its value is wrong follows."""
     probability: float
     why: str
     is_found: bool
@@ -55,10 +58,10 @@ def leading_outside(
     finding = next((one for one in every_finding(findings) if first.name in one.parameters), None)
     measured = None if finding is None else dict(finding.wanted).get(first.name)
     wanted = suspect.back if measured is None and suspect is not None else measured
-    if wanted is None or wanted == setting.value:
+    if finding is None and suspect is None:
         return None
     is_learned = suspect is not None and suspect.is_learned and meaning.role in LEARNED
-    is_carried = (measured is not None or is_learned) and meaning.role != "safety"
+    is_carried = (measured is not None or is_learned) and meaning.role != "safety" and meaning.part != BUILT_AS
     return Advisable(
         first.name,
         float(setting.value),
@@ -66,12 +69,15 @@ def leading_outside(
         first.probability,
         finding.title if finding is not None else suspect.text if suspect is not None else "",
         is_found=finding is not None,
-        is_advised=is_carried and first.probability >= ENOUGH,
+        is_advised=is_carried and wanted not in (None, setting.value) and first.probability >= ENOUGH,
     )
 
 
 def outside_fix(one: Advisable, odds: float, run: Run, beside: Sequence[Change] = ()) -> Fix:
-    """Its change as a fix, with those of the profile's options that are made with it."""
+    """Its change as a fix, with those of the profile's options that are made with it. Raises ValueError where no value
+    is wanted."""
+    if one.wanted is None:
+        raise ValueError(f"no value of {one.name} is known to be right")
     option = outside_option(one.name, one.wanted, vehicle_of_run(run))
     notes = ("takes effect after a reboot",) if option.reboot_required else ()
     return Fix((Change(option, one.value, one.wanted, notes), *beside), odds, {})
@@ -107,5 +113,6 @@ def _type(fact: Fact | None) -> ValueType:
 
 def check_first(one: Advisable) -> str:
     """What to look at where no change is advised."""
-    why = f": {one.why}" if one.why and not one.why.startswith(one.name) else ""
-    return f"check first {one.name} {shown(one.value)} (usually {shown(one.wanted)}){why}"
+    why = f": {one.why}" if one.why and not one.why.startswith(f"{one.name} {shown(one.value)}") else ""
+    usual = "" if one.wanted is None else f" (usually {shown(one.wanted)})"
+    return f"check first {one.name} {shown(one.value)}{usual}{why}"

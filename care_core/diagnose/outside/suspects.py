@@ -119,9 +119,11 @@ def _wrong(one: OffParameter, flights: Sequence[Flight], blocks: Mapping[Role, i
 def _lost(one: OffParameter, flights: Sequence[Flight]) -> float:
     """Probability that the value loses a mission, by the screening flights: at its value, or as much of the way to the
     bound that was lost as it is off."""
+    reference = flights[0].reference
+    if math.isclose(reference, one.value, rel_tol=1e-4, abs_tol=1e-6):
+        return HARMLESS  # every flight had it
     if same := _at(one, flights):
         return _share(same)
-    reference = flights[0].reference
     side = [flight for flight in flights if (flight.value - reference) * (one.value - reference) > 0]
     if one.is_code or not side:
         return _share(flights)
