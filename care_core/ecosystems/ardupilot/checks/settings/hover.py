@@ -37,6 +37,10 @@ _RAISED = LIMITS.add("times its default that a gain is raised", 1.5, "", "a choi
 _HOVER = LIMITS.add("times MOT_THST_HOVER that hovering takes", 1.6, "", "a choice: loads and winds take less")
 _EDGE_S, _FEWEST = 4.0, 20
 _SURE = LIMITS.add("probability that what ends the outputs keeps it down", 0.9, "", "both flights that stayed down so")
+_TOO_LITTLE = LIMITS.add(
+    "range of the outputs that surely keeps it down", 0.65, "", "the flights that stayed down so had 0.6 to 0.65"
+)
+_UNSURE = LIMITS.add("the same where nearly all is left", 0.2, "", "0.75 flew where no motor was weak")
 _GAIN = LIMITS.add("probability of a raised gain", 0.8, "", "a choice: no healthy flight swings so")
 _FEEDS = LIMITS.add("probability of a hover throttle that is wrong", 0.9, "", "it is measured")
 _FEEDS_LOST = LIMITS.add("probability that it costs the mission", 0.02, "", "0 of 4 flights at half and twice failed")
@@ -54,6 +58,8 @@ class Kept(Record):
     parameter: str
     wanted: float
     evidence: str
+    share: float
+    """What is left of the range as shipped."""
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -77,7 +83,7 @@ def _kept_down(flight: Flight) -> Iterator[Finding]:
             evidence=f"{span[1] - span[0]:.0f} s at full throttle without rising; {kept.evidence}",
             source="CTUN.ThO, RCOU",
             suspect="parameter",
-            probability=_SURE,
+            probability=float(np.interp(kept.share, (_TOO_LITTLE, _KEPT), (_SURE, _UNSURE))),
             parameters=(kept.parameter,),
             wanted=((kept.parameter, kept.wanted),),
         )
@@ -110,7 +116,7 @@ def kept_from_range(flight: Flight) -> Kept | None:
     if share >= _KEPT or (highest is not None and highest < least + spin * (most - least) - _REACHED * span):
         return None
     reached = "" if highest is None else f"the outputs end at {highest:.0f} us of {whole['MOT_PWM_MAX']:.0f}, for "
-    return Kept(name, whole[name], f"{reached}{name} is {shown(driven[name])} (as shipped {whole[name]:g})")
+    return Kept(name, whole[name], f"{reached}{name} is {shown(driven[name])} (as shipped {whole[name]:g})", share)
 
 
 def _highest_output(flight: Flight) -> float | None:

@@ -52,6 +52,12 @@ _USUAL = {"low": 3.5, "critical": 3.3}
 _SAID_WITHIN_S = 1.0
 _BY_VOLTAGE, _BY_CHARGE = ("BATT_LOW_VOLT", "BATT_CRT_VOLT"), ("BATT_LOW_MAH", "BATT_CRT_MAH")
 """The thresholds of the failsafe that rest on a measured voltage, and on a measured current."""
+_WELL_ABOVE_V = LIMITS.add(
+    "volts a cell above the level that is advised, from which it surely acted early",
+    0.2,
+    "V",
+    "a choice: at 3.7 V a cell half of a full pack is left, and a weak or long flight passes what lies just above 3.5",
+)
 _SAID = re.compile(r"Battery 1 is (low|critical) ([\d.]+)\s?V used ([\d.]+) ?mAh", re.IGNORECASE)
 
 
@@ -61,6 +67,7 @@ class Acted(Record):
     time_s: float
     parameter: str
     evidence: str
+    probability: float
 
 
 def find(flight: Flight) -> Iterator[Finding]:
@@ -81,7 +88,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             evidence=acted.evidence,
             source="MSG of the battery failsafe; BAT",
             suspect="parameter",
-            probability=_ACTED,
+            probability=acted.probability,
             parameters=(acted.parameter,),
         )
 
@@ -205,35 +212,39 @@ def early_failsafe(flight: Flight) -> Acted | None:
     level = "low" if said is None else said[1].casefold()
     volts = float(np.interp(failsafe, battery.table.t, battery.table["Volt"])) if said is None else float(said[2])
     by_charge = None if said is None else _by_charge(flight, level, volts, float(said[3]), battery)
-    parameter, evidence = by_charge or _by_voltage(flight, level, volts, battery) or ("", "")
-    return Acted(failsafe, parameter, evidence) if parameter else None
+    acted = by_charge or _by_voltage(flight, level, volts, battery)
+    return None if acted is None else Acted(failsafe, *acted)
 
 
-def _by_charge(flight: Flight, level: str, volts: float, used: float, battery: Battery) -> tuple[str, str] | None:
+def _by_charge(
+    flight: Flight, level: str, volts: float, used: float, battery: Battery
+) -> tuple[str, str, float] | None:
     name = _BY_CHARGE[level == "critical"]
     reserve, capacity = flight.setting(name) or 0.0, flight.setting("BATT_CAPACITY") or 0.0
     if reserve <= 0 or capacity <= 0 or used < (1 - _SLACK) * (capacity - reserve):
         return None
     if used > _MOST_USED * capacity or volts / battery.cells < _LEFT:
         return None
-    return name, (
+    evidence = (
         f"{name}={reserve:g}{_default(flight, name)} acted with {used:.0f} of {capacity:.0f} mAh used, while the pack "
         f"still held {volts:.1f} V, {volts / battery.cells:.2f} V for each of {battery.cells} cells"
     )
+    return name, evidence, _ACTED
 
 
-def _by_voltage(flight: Flight, level: str, volts: float, battery: Battery) -> tuple[str, str] | None:
+def _by_voltage(flight: Flight, level: str, volts: float, battery: Battery) -> tuple[str, str, float] | None:
     name = _BY_VOLTAGE[level == "critical"]
     limit = flight.setting(*(LOW_VOLT if level == "low" else (name,))) or 0.0
     rest = battery.rest_v
     is_full = rest is None or rest / battery.cells >= _FULL
     if not is_full or limit / battery.cells <= _ADVISED[level]:
         return None
-    return name, (
+    evidence = (
         f"failsafe at {volts:.1f} V, {volts / battery.cells:.2f} V for each of {battery.cells} cells, of a pack that "
         f"was full; {name}={limit:g}{_default(flight, name)} asks for it at {limit / battery.cells:.2f} V a cell, "
         f"{_USUAL[level]} is usual"
     )
+    return name, evidence, _ACTED * min(1.0, (limit / battery.cells - _ADVISED[level]) / _WELL_ABOVE_V)
 
 
 def _default(flight: Flight, name: str) -> str:
