@@ -126,11 +126,11 @@ def test_parameters_of_modes_that_were_not_flown_change_nothing(names: set[str])
 
 def test_the_phases_of_a_run_come_from_its_mission_and_its_switches() -> None:
     run = made_run()
-    assert "navigation" not in phases_of(run, has_risen=False)
+    assert "navigation" not in phases_of(run, has_begun=False)
     flown = replace(run, mission=replace(run.mission, asked=(("returns", 1.0),)), modes=("Auto", "Loiter"))
-    assert {"navigation", "rtl", "land", "manual"} <= phases_of(flown, has_risen=True)
+    assert {"navigation", "rtl", "land", "manual"} <= phases_of(flown, has_begun=True)
     fenced = replace(flown, settings=setting("FENCE_ENABLE", 1))
-    assert "fence" in phases_of(fenced, has_risen=True)
+    assert "fence" in phases_of(fenced, has_begun=True)
 
 
 def test_the_first_sign_is_what_failed_first_and_a_failsafe_of_the_firmware() -> None:
@@ -140,6 +140,40 @@ def test_the_first_sign_is_what_failed_first_and_a_failsafe_of_the_firmware() ->
     signs = signs_of(made_run(), [late], health)
     assert signs.first == {"tipped", "failsafe_estimator"}
     assert signs_of(made_run(), [late], NOTHING_SEEN).first == {"slow_cruise"}
+
+
+ROVER = {"firmware": "ArduRover V4.5.4", "vehicle": "rover"}
+
+
+def test_a_rover_has_no_phases_but_its_way() -> None:
+    run = made_run()
+    driven = replace(run, log=replace(run.log, facts=ROVER), shortfall=("0 of 3 waypoints were reached",))
+    assert signs_of(driven, [], NOTHING_SEEN).every == {"stuck"}
+    assert "no_takeoff" in signs_of(replace(driven, log=run.log), [], NOTHING_SEEN).every
+    late = ObjectiveResult(TIME, 190.0, TIME.threshold, "fault")
+    profile = load_profile("ardurover")
+    assert signs_of(made_run(), [late], NOTHING_SEEN, profile.schema, object()).first == {"slow_cruise"}  # type: ignore[arg-type]
+
+
+def test_what_a_rover_does_the_wrong_way_round_is_straying_and_a_wait_is_no_progress() -> None:
+    for title, sign in (("it turns against its steering", "strays"), ("it waits to be set off", "stuck")):
+        health = Health("", (), (Finding("drive", title, 0.0, 9.0, "critical", "", "THR"),))
+        assert signs_of(made_run(), [], health).first == {sign}
+
+
+def test_a_value_that_all_flights_had_is_harmless() -> None:
+    reference = flights_of("COMPASS_OFS_X", "rover")[0].reference
+    off = off_parameters(setting("COMPASS_OFS_X", reference, 0.0), replace(COPTER, kind="rover"), (), None)
+    strays = Signs(frozenset({"strays"}), frozenset({"strays"}))
+    assert all(one.weight < 0.03 for one in outside_suspects(off, strays, EVERYTHING, "rover"))  # type: ignore[arg-type]
+
+
+def test_a_refusal_is_known_by_what_was_said_alone() -> None:
+    said = "AHRS: not using configured AHRS type; SERVO1_MAX is less than SERVO1_TRIM; SERVO1_MAX is 800 (default 2000)"
+    health = Health("", (), (Finding("prearm", "arming was refused", 0.0, 9.0, "critical", said, "MSG"),))
+    assert signs_of(made_run(), [], health).refusals == {"servo#_max is less than servo#_trim"}
+    alone = replace(health.findings[0], evidence="AHRS: not using configured AHRS type")
+    assert signs_of(made_run(), [], Health("", (), (alone,))).refusals == {"ahrs: not using configured ahrs type"}
 
 
 def named(name: str, *wanted: tuple[str, float]) -> Finding:

@@ -171,6 +171,20 @@ def test_what_is_calibrated_as_it_should_be_is_not_named() -> None:
     assert refused("Accels inconsistent", INS_ACC2OFFS_Y=(-3.5, 0)).parameters == ("INS_ACC2OFFS_Y",)
 
 
+@pytest.mark.parametrize(
+    ("text", "settings", "named"),
+    [
+        ("servo function 33 unassigned", {"FRAME_TYPE": (2, 0), "SERVO1_FUNCTION": (26, 26)}, "FRAME_TYPE"),
+        ("check steering and throttle config", {"SERVO1_FUNCTION": (109, 26)}, "SERVO1_FUNCTION"),
+        ("check skid steering config", {"SERVO3_FUNCTION": (74, 70)}, "SERVO3_FUNCTION"),
+        ("Board (5.0v) out of range 5.5-5.8v", {"BRD_VBUS_MIN": (5.5, 4.3)}, "BRD_VBUS_MIN"),
+        ("AHRS: ExternalAHRS: Invalid backend", {"AHRS_EKF_TYPE": (11, 3)}, "AHRS_EKF_TYPE"),
+    ],
+)
+def test_refusals_of_rovers_and_boards_name_what_they_read(text: str, settings: dict[str, Off], named: str) -> None:
+    assert named in refused(text, **settings).parameters
+
+
 def test_a_refusal_where_nothing_that_it_reads_is_off_stays_as_it_is() -> None:
     for text in ("Need Position Estimate", "GPS 1: Bad fix", "Check mag field (xy diff:130>100)"):
         finding = refused(text, EK3_SRC1_POSXY=(3, 3), GPS_TYPE=(1, 1), COMPASS_OFS_X=(43, 0), GPS_RATE_MS=(200, 200))

@@ -43,6 +43,7 @@ def suspects_outside(
     off = list(off_parameters(run.settings, vehicle, modelled, good))
     if not off:
         return ()
-    has_risen = any(event.text == "took off" for event in health.timeline)
+    begins = "armed" if vehicle.kind == "rover" else "took off"
+    has_begun = any(event.text.startswith(begins) for event in health.timeline)
     signs = signs_of(run, broken, health, schema, query)
-    return outside_suspects(off, signs, phases_of(run, has_risen), vehicle.kind)
+    return outside_suspects(off, signs, phases_of(run, has_begun), vehicle.kind)

@@ -9,6 +9,7 @@ from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.mechanisms import columns
 from care_core.diagnose.records import ObjectiveResult
 from care_core.ecosystems.findings import Event, Finding, FindingKind, Health, every_finding
+from care_core.ecosystems.vehicles import vehicle_of
 from care_core.metadata.causal_map import Sign
 from care_core.metadata.screening import plain_refusal
 from care_core.profile.schema import Schema
@@ -22,6 +23,8 @@ OF_KIND: Mapping[FindingKind, Sign] = {
 }  # fmt: skip
 _OF_TITLE: tuple[tuple[re.Pattern[str], Sign], ...] = (
     (re.compile(r"oscillates"), "oscillates"),
+    (re.compile(r"waits to be set off"), "stuck"),
+    (re.compile(r"^it (drives|turns) against|runs away"), "strays"),
     (re.compile(r"heading does not follow"), "heading"),
     (re.compile(r"battery failsafe|not charged|battery sags"), "failsafe_battery"),
     (re.compile(r"ground station"), "failsafe_gcs"),
@@ -45,6 +48,12 @@ LONGER_S = 5.0
 """Seconds by which a phase has to exceed what the configuration as driven gives."""
 _SHARE = 0.3
 """Share of all that was too long from which a phase counts."""
+
+
+_EXPLAINS = re.compile(r"[A-Z][A-Z0-9]*_[A-Z0-9_]+ is -?\d")
+"""What the evidence of a refusal adds of the parameters that its check reads."""
+_STARTING = plain_refusal("AHRS: not using configured AHRS type")
+"""Said at every start until the estimator runs: beside another refusal it keeps nothing from arming."""
 
 
 class Signs(Record):
@@ -73,7 +82,8 @@ def signs_of(
     found = list(_of_findings(health.findings))
     every = set(_of_every_finding(health.findings))
     told = [sign for event in health.timeline if _counts(event) for sign in _of_text(event.text)]
-    short = list(_of_shortfall(run.shortfall))
+    flies = vehicle_of(run.log.facts, {name: (setting,) for name, setting in run.settings.items()}).kind != "rover"
+    short = list(_of_shortfall(run.shortfall, flies))
     missed = [sign for result in broken for sign in _of_objective(result, run, schema, query)]
     every |= {*found, *told, *short, *missed}
     if refusals := _refusals(health.findings):
@@ -85,7 +95,9 @@ def signs_of(
 
 def _refusals(findings: Iterable[Finding]) -> frozenset[str]:
     refused = [one for one in every_finding(findings) if one.kind == "prearm" and one.severity != "info"]
-    return frozenset(plain_refusal(text) for one in refused for text in one.evidence.split("; "))
+    told = (text for one in refused for text in one.evidence.split("; ") if not _EXPLAINS.match(text))
+    said = frozenset(map(plain_refusal, told))
+    return said - {_STARTING} or said
 
 
 def _of_findings(findings: Iterable[Finding]) -> Iterator[Sign]:
@@ -117,13 +129,12 @@ def _of_text(text: str) -> Iterator[Sign]:
     return (sign for pattern, sign in _OF_EVENT if pattern.search(text))
 
 
-def _of_shortfall(shortfall: Iterable[str]) -> Iterator[Sign]:
+def _of_shortfall(shortfall: Iterable[str], flies: bool) -> Iterator[Sign]:
     for text in shortfall:
         if text.startswith("it came down"):
             yield "elsewhere"
         elif re.match(r"0 of \d+ waypoints", text):
-            yield "no_takeoff"
-            yield "stuck"
+            yield from ("no_takeoff", "stuck") if flies else ("stuck",)
         elif "waypoints were reached" in text:
             yield "stuck"
 
@@ -144,7 +155,7 @@ def _of_objective(
 
 
 def _slow(run: Run, schema: Schema, query: CounterfactualQuery) -> Iterator[Sign]:
-    """The phases that took longer than the configuration as driven explains."""
+    """The phases that took longer than the configuration as driven explains. A drive has no phases but the way."""
     longer: dict[Sign, float] = {}
     for metric in schema.metrics:
         how = metric.extract
@@ -152,6 +163,8 @@ def _slow(run: Run, schema: Schema, query: CounterfactualQuery) -> Iterator[Sign
             continue
         sign, seconds = _PHASES[how.args["phase"]], _excess(metric.name, run, query)
         longer[sign] = longer.get(sign, 0.0) + max(0.0, seconds)
+    if not longer:
+        yield "slow_cruise"
     whole = sum(longer.values())
     yield from (sign for sign, seconds in longer.items() if seconds >= max(LONGER_S, _SHARE * whole))
 

@@ -74,13 +74,17 @@ def _suspect(one: OffParameter, weight: float, flown: str) -> OutsideSuspect:
     return OutsideSuspect(one.name, one.value, one.back, weight, one.meaning.role, bool(flown), text)
 
 
-def phases_of(run: Run, has_risen: bool) -> frozenset[Read]:
-    """When the firmware read parameters in this run."""
+def phases_of(run: Run, has_begun: bool) -> frozenset[Read]:
+    """When the firmware read parameters in this run.
+
+    Args:
+        has_begun: whether it took off; for what drives, whether it armed.
+    """
     read: set[Read] = {"always", "arming", "battery", "radio", "gcs"}
-    if run.mission.ended or has_risen:
+    if run.mission.ended or has_begun:
         read |= {"takeoff"}
     modes = {mode.casefold() for mode in run.modes}
-    if has_risen:
+    if has_begun:
         read |= {"navigation", "hold", "land"}
         asked = dict(run.mission.asked)
         if asked.get("returns") or any("rtl" in mode for mode in modes):

@@ -27,7 +27,7 @@ from care_core.ecosystems.ardupilot.checks import (
     vibration,
     way_home,
 )
-from care_core.ecosystems.ardupilot.checks.settings import heading, hover, level, supply
+from care_core.ecosystems.ardupilot.checks.settings import driven, heading, hover, level, supply
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
@@ -36,6 +36,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     hover.CHECK,
     level.CHECK,
     supply.CHECK,
+    driven.CHECK,
     attitude.CHECK,
     barometer.CHECK,
     battery.CHECK,

@@ -1,0 +1,86 @@
+"""Rovers that are driven against their steering or throttle, and those that wait to be set off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from care_core.ecosystems.ardupilot.checks.settings import driven
+from care_core.ecosystems.ardupilot.flight import Flight
+from care_core.ecosystems.findings import Finding
+from care_core.logs.base import Table
+from care_core.run import Setting
+from tests.flights import flight_of
+
+T = np.arange(0.0, 120.0, 0.4)
+UNDER_WAY = (T > 15) & (T < 110)
+ROVER = {"firmware": "ArduRover V4.5.4 (e47fb132)", "vehicle": "rover"}
+WIRED = {"SERVO1_FUNCTION": 26.0, "SERVO3_FUNCTION": 70.0, "SERVO1_REVERSED": 0.0, "SERVO3_REVERSED": 0.0}
+
+
+def drive(steers: float = 1.0, drives: float = 1.0, throttle: float = 30.0, **settings: float) -> Flight:
+    """A drive in Auto on a winding way; `steers` and `drives` say how the vehicle answers to what it asks."""
+    asked = np.where(UNDER_WAY, 1500 * np.sin(T / 4), 0.0)
+    pushed = np.where(UNDER_WAY, throttle, 0.0)
+    wanted = np.where(UNDER_WAY & (throttle > 0), 4.0, 0.0)
+    tables = {
+        "THR": Table(T, {"ThrOut": pushed, "DesSpeed": wanted, "Speed": drives * pushed / 8}),
+        "STER": Table(T, {"SteerOut": asked, "TurnRate": steers * asked / 60}),
+        "MODE": Table(np.array([0.0]), {"ModeNum": np.array([10.0])}),
+        "ARM": Table(np.array([10.0, 115.0]), {"ArmState": np.array([1.0, 0.0])}),
+    }
+    known = {name: (Setting(name, value, "PARM"),) for name, value in {**WIRED, **settings}.items()}
+    return flight_of(tables, known, ROVER, 120.0)
+
+
+def found(flight: Flight) -> Finding:
+    (finding,) = driven.CHECK.find(flight)
+    return finding
+
+
+def test_a_drive_that_answers_to_what_it_asks_is_fine() -> None:
+    assert not list(driven.CHECK.find(drive()))
+    assert not list(driven.CHECK.find(drive(SERVO1_REVERSED=1.0, SERVO3_REVERSED=1.0)))
+
+
+@pytest.mark.parametrize("driven_as", [0.0, 1.0])
+def test_steering_that_acts_the_wrong_way_is_turned_round_whatever_its_default(driven_as: float) -> None:
+    finding = found(drive(steers=-1.0, SERVO1_REVERSED=driven_as))
+    assert finding.title == "it turns against its steering"
+    assert finding.wanted == (("SERVO1_REVERSED", 1.0 - driven_as),)
+
+
+def test_a_throttle_that_acts_the_wrong_way_is_turned_round() -> None:
+    finding = found(drive(drives=-1.0, SERVO3_REVERSED=1.0))
+    assert (finding.title, finding.parameters) == ("it drives against its throttle", ("SERVO3_REVERSED",))
+    assert finding.wanted == (("SERVO3_REVERSED", 0.0),)
+
+
+def test_a_board_that_is_turned_in_its_own_eyes_tells_nothing_of_its_outputs() -> None:
+    assert not list(driven.CHECK.find(drive(steers=-1.0, drives=-1.0, AHRS_ORIENTATION=4.0)))
+
+
+def test_skid_steering_has_no_one_output_to_turn_round() -> None:
+    skid = {"SERVO1_FUNCTION": 73.0, "SERVO3_FUNCTION": 74.0}
+    assert not list(driven.CHECK.find(drive(steers=-1.0, drives=-1.0, **skid)))
+
+
+def test_what_is_controlled_as_a_balance_bot_and_is_none_runs_away() -> None:
+    tables = drive(drives=1.0, throttle=-40.0, FRAME_CLASS=3.0)
+    thr = tables.one("THR", "DesSpeed")
+    assert thr is not None
+    thr["DesSpeed"][UNDER_WAY] = 4.0
+    finding = found(tables)
+    assert finding.wanted == (("FRAME_CLASS", 1.0),)
+
+
+@pytest.mark.parametrize(("name", "value", "usual"), [("AUTO_KICKSTART", 2.0, 0.0), ("AUTO_TRIGGER_PIN", 55.0, -1.0)])
+def test_one_that_waits_to_be_set_off_names_what_it_waits_for(name: str, value: float, usual: float) -> None:
+    finding = found(drive(throttle=0.0, **{name: value}))
+    assert finding.title == "it waits to be set off"
+    assert finding.wanted == ((name, usual),)
+
+
+def test_one_that_was_set_off_and_one_that_waits_for_nothing_are_fine() -> None:
+    assert not list(driven.CHECK.find(drive(AUTO_KICKSTART=2.0)))
+    assert not list(driven.CHECK.find(drive(throttle=0.0)))
