@@ -62,7 +62,7 @@ def names() -> Iterable[str]:
 def facts_of(name: str, releases: Iterable[Release] = ALL) -> tuple[Fact, ...]:
     """What these releases say of a parameter, the newest last; several where they differ."""
     wanted = frozenset(releases)
-    return tuple(_fact(name, row, row.releases & wanted) for row in _rows().get(name, ()) if row.releases & wanted)
+    return tuple(_fact(name, row, row.releases & wanted) for row in _rows_of(name) if row.releases & wanted)
 
 
 def fact_of(name: str, kind: str, version: tuple[int, ...] | None = None) -> Fact | None:
@@ -123,14 +123,30 @@ def _codes(text: str) -> Iterator[float]:
 @cache
 def _rows() -> Mapping[str, list[_Row]]:
     found: dict[str, list[_Row]] = {}
-    lines = (line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#"))
-    next(lines)
-    for line in lines:
-        pattern, releases, *cells = line.split("\t")
-        row = _Row(_releases(releases), tuple(cells))
+    for pattern, line in _lines():
+        row = _row(line)
         for name in expanded(pattern):
             found.setdefault(name, []).append(row)
     return found
+
+
+@cache
+def _rows_of(name: str) -> tuple[_Row, ...]:
+    """The rows of one parameter: whoever asks of a few need not read them all."""
+    like = ((pattern, line) for pattern, line in _lines() if name.startswith(pattern.partition("{")[0]))
+    return tuple(_row(line) for pattern, line in like if name in expanded(pattern))
+
+
+@cache
+def _lines() -> tuple[tuple[str, str], ...]:
+    """The lines of the table with their patterns."""
+    lines = [line for line in read_small_text(_TABLE).splitlines() if not line.startswith("#")][1:]
+    return tuple((line.partition("\t")[0], line) for line in lines)
+
+
+def _row(line: str) -> _Row:
+    _, releases, *cells = line.split("\t")
+    return _Row(_releases(releases), tuple(cells))
 
 
 @cache

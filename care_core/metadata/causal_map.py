@@ -15,7 +15,7 @@ from care_core.files import read_small_text
 from care_core.metadata.aliases import aliases_of
 from care_core.metadata.ardupilot import VEHICLES
 from care_core.metadata.fact import expanded
-from care_core.records import Record, replace
+from care_core.records import Record
 
 TABLE = Path(__file__).with_name("ardupilot_map.tsv")
 
@@ -60,11 +60,15 @@ class Meaning(Record):
     """How a run shows that it is wrong, where it can matter."""
 
 
+_Cells = tuple[str, str, str, str]
+"""Role, part, read and signs as the table has them."""
+
+
 class _Map(Record):
     """The rows of one kind of vehicle."""
 
-    names: Mapping[str, Meaning]
-    families: Mapping[str, Meaning]
+    names: Mapping[str, _Cells]
+    families: Mapping[str, _Cells]
     """By what their names begin with."""
 
 
@@ -78,24 +82,27 @@ def meaning_of(name: str, kind: str) -> Meaning | None:
     beginnings = (one[:length] for one in names for length in range(len(one), 0, -1))
     found = next((held.names[one] for one in names if one in held.names), None)
     found = found or next((held.families[one] for one in beginnings if one in held.families), None)
-    return None if found is None else replace(found, name=name)
+    return None if found is None else _meaning(name, found)
+
+
+@cache
+def _meaning(name: str, cells: _Cells) -> Meaning:
+    role, part, read, signs = cells
+    return Meaning(name, _words(ROLES, role)[0], part, frozenset(_words(READS, read)), frozenset(_words(SIGNS, signs)))
 
 
 @cache
 def _map_of(vehicle: str) -> _Map:
     """The map of the vehicle with this letter: a row for it counts before one for all."""
-    names: dict[str, Meaning] = {}
-    families: dict[str, Meaning] = {}
+    names: dict[str, _Cells] = {}
+    families: dict[str, _Cells] = {}
     rows = [line.split("\t") for line in read_small_text(TABLE).splitlines() if not line.startswith("#")][1:]
     for pattern, vehicles, role, part, read, signs in sorted(rows, key=lambda row: row[1] != ""):
         if vehicles and vehicle not in vehicles:
             continue
         for one in expanded(pattern):
             start = one.removesuffix("*")
-            known = names if one == start else families
-            known[start] = Meaning(
-                start, _words(ROLES, role)[0], part, frozenset(_words(READS, read)), frozenset(_words(SIGNS, signs))
-            )
+            (names if one == start else families)[start] = role, part, read, signs
     return _Map(names, families)
 
 

@@ -36,20 +36,26 @@ def plain_refusal(text: str) -> str:
 
 def flights_of(name: str, kind: str) -> tuple[Flight, ...]:
     """The screening flights of a parameter on a kind of vehicle; empty where it was not screened."""
-    return _flights().get((name, VEHICLES.get(kind, "")), ())
+    return tuple(map(_flight, _lines().get((name, VEHICLES.get(kind, "")), ())))
 
 
 @cache
-def _flights() -> Mapping[tuple[str, str], tuple[Flight, ...]]:
-    found: dict[tuple[str, str], list[Flight]] = {}
+def _lines() -> Mapping[tuple[str, str], tuple[str, ...]]:
+    """The lines of each parameter and vehicle."""
+    found: dict[tuple[str, str], list[str]] = {}
     lines = (line for line in read_small_text(TABLE).splitlines() if not line.startswith("#"))
     next(lines)
     for line in lines:
-        name, vehicle, reference, value, first, others, refusals = line.split("\t")
-        early, later, why = _signs(first), _signs(others), frozenset(filter(None, refusals.split("; ")))
-        flight = Flight(float(reference), float(value), bool(early), early, early | later, why)
-        found.setdefault((name, vehicle), []).append(flight)
-    return {key: tuple(flights) for key, flights in found.items()}
+        name, vehicle, rest = line.split("\t", 2)
+        found.setdefault((name, vehicle), []).append(rest)
+    return {key: tuple(rests) for key, rests in found.items()}
+
+
+@cache
+def _flight(cells: str) -> Flight:
+    reference, value, first, others, refusals = cells.split("\t")
+    early, later, why = _signs(first), _signs(others), frozenset(filter(None, refusals.split("; ")))
+    return Flight(float(reference), float(value), bool(early), early, early | later, why)
 
 
 def _signs(text: str) -> frozenset[Sign]:

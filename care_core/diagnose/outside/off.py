@@ -54,15 +54,15 @@ def off_parameters(
     for name, setting in settings.items():
         if name in modelled or _is_nobodys(name) or not isinstance(setting.value, (int, float)):
             continue
-        meaning = meaning_of(name, vehicle.kind)
-        if meaning is None or meaning.role in UNCHOSEN:
-            continue
         default = _default(setting, vehicle)
         before = None if good is None or name not in good else good[name].value
         last_good = float(before) if isinstance(before, (int, float)) else None
         is_changed = None if good is None else last_good is None or not same_value(last_good, setting.value)
         back = default if default is not None else last_good
         if back is None or (same_value(default, setting.value) and not is_changed):
+            continue
+        meaning = meaning_of(name, vehicle.kind)
+        if meaning is None or meaning.role in UNCHOSEN:
             continue
         yield OffParameter(
             name,
