@@ -113,6 +113,8 @@ def _type(fact: Fact | None) -> ValueType:
 
 def check_first(one: Advisable) -> str:
     """What to look at where no change is advised."""
+    if one.is_found and one.why.startswith(one.name):  # it was changed on the way: no single value was driven
+        return f"check first: {one.why}"
     why = f": {one.why}" if one.why and not one.why.startswith(f"{one.name} {shown(one.value)}") else ""
     usual = "" if one.wanted is None else f" (usually {shown(one.wanted)})"
     return f"check first {one.name} {shown(one.value)}{usual}{why}"
