@@ -14,7 +14,7 @@ from collections.abc import Collection, Iterator, Mapping
 from care_core.causal.counterfactual import Config
 from care_core.causal.model import Model
 from care_core.configs.driven import option_setting, option_value, same_value
-from care_core.ecosystems.vehicles import vehicle_of
+from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.metadata.ardupilot import firmware_default
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
@@ -77,7 +77,7 @@ def reference_of(run: Run, schema: Schema, model: Model, good: Good | None = Non
 
 def _vendors(run: Run, schema: Schema) -> dict[str, tuple[float, float]]:
     """Options whose default in the log no release of the firmware has, with the firmware's."""
-    kind = vehicle_of(run.log.facts, {name: (setting,) for name, setting in run.settings.items()}).kind
+    kind = vehicle_of_run(run).kind
     found: dict[str, tuple[float, float]] = {}
     for option in schema.options:
         setting = option_setting(option, run.settings)

@@ -11,9 +11,10 @@ from typing import Literal
 
 from care_core.configs.driven import option_value, readable, same_value
 from care_core.diagnose.judging import thresholds_in_force
-from care_core.diagnose.outside.change import outside_option, vehicle_of_run
+from care_core.diagnose.outside.change import outside_option
 from care_core.diagnose.records import Diagnosis, ObjectiveResult, Status
 from care_core.diagnose.verdict import status_of, verdict_of
+from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.profile.schema import Schema
 from care_core.records import Record, replace
 from care_core.run import Run

@@ -15,7 +15,7 @@ from care_core.diagnose.outside.signs import signs_of
 from care_core.diagnose.outside.suspects import outside_suspects, phases_of
 from care_core.diagnose.records import ObjectiveResult, OutsideSuspect
 from care_core.ecosystems.findings import Health
-from care_core.ecosystems.vehicles import vehicle_of
+from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.logs.formats import format_named
 from care_core.profile.schema import Schema
 from care_core.run import Run, Setting
@@ -38,7 +38,7 @@ def suspects_outside(
     """
     if format_named(run.log.format).ecosystem != "ardupilot":
         return ()
-    vehicle = vehicle_of(run.log.facts, {name: (setting,) for name, setting in run.settings.items()})
+    vehicle = vehicle_of_run(run)
     modelled = {name for option in schema.options for name in readable(option)} if schema is not None else set()
     off = list(off_parameters(run.settings, vehicle, modelled, good))
     if not off:

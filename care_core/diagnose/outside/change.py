@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from care_core.diagnose.records import Fix, Hypothesis, OutsideSuspect
 from care_core.ecosystems.findings import Finding, every_finding
-from care_core.ecosystems.vehicles import vehicle_of
+from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import Role as ParameterRole
@@ -81,11 +81,6 @@ def outside_fix(one: Advisable, odds: float, run: Run, beside: Sequence[Change] 
     option = outside_option(one.name, one.wanted, vehicle_of_run(run))
     notes = ("takes effect after a reboot",) if option.reboot_required else ()
     return Fix((Change(option, one.value, one.wanted, notes), *beside), odds, {})
-
-
-def vehicle_of_run(run: Run) -> Vehicle:
-    """What drove or flew a run."""
-    return vehicle_of(run.log.facts, {name: (setting,) for name, setting in run.settings.items()})
 
 
 def outside_option(name: str, default: float | None, vehicle: Vehicle) -> Variable:

@@ -9,7 +9,7 @@ from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.mechanisms import columns
 from care_core.diagnose.records import ObjectiveResult
 from care_core.ecosystems.findings import Event, Finding, FindingKind, Health, every_finding
-from care_core.ecosystems.vehicles import vehicle_of
+from care_core.ecosystems.vehicles import vehicle_of_run
 from care_core.metadata.causal_map import Sign
 from care_core.metadata.screening import plain_refusal
 from care_core.profile.schema import Schema
@@ -82,7 +82,7 @@ def signs_of(
     found = list(_of_findings(health.findings))
     every = set(_of_every_finding(health.findings))
     told = [sign for event in health.timeline if _counts(event) for sign in _of_text(event.text)]
-    flies = vehicle_of(run.log.facts, {name: (setting,) for name, setting in run.settings.items()}).kind != "rover"
+    flies = vehicle_of_run(run).kind != "rover"
     short = list(_of_shortfall(run.shortfall, flies))
     missed = [sign for result in broken for sign in _of_objective(result, run, schema, query)]
     every |= {*found, *told, *short, *missed}

@@ -16,7 +16,7 @@ from care_core.ecosystems.vehicles.motors import (
     switched_off,
 )
 from care_core.ecosystems.vehicles.self_written import is_self_written
-from care_core.ecosystems.vehicles.vehicle import UNLIKE_ROVERS, Kind, Vehicle, flies, vehicle_of
+from care_core.ecosystems.vehicles.vehicle import UNLIKE_ROVERS, Kind, Vehicle, flies, vehicle_of, vehicle_of_run
 from care_core.metadata.aliases import ParameterAlias, alias_in, aliases_of, renamed
 
 __all__ = [
@@ -47,5 +47,6 @@ __all__ = [
     "switched_off",
     "unrecorded_changes",
     "vehicle_of",
+    "vehicle_of_run",
     "way_of",
 ]

@@ -9,6 +9,7 @@ from typing import Literal
 from care_core.ecosystems.vehicles.frames import CLASSES, TYPES, frame_of
 from care_core.ecosystems.vehicles.settings import Driven, code
 from care_core.records import Record
+from care_core.run import Run
 
 Kind = Literal[
     "copter", "plane", "quadplane", "rover", "sub", "heli", "tracker", "blimp", "px4", "unknown"
@@ -86,6 +87,11 @@ def vehicle_of(facts: Mapping[str, str], settings: Driven, motors: int | None = 
     own = _OWN_NAME.sub("", firmware)
     kind = _kind(own, facts, settings)
     return Vehicle(kind, _name(kind, facts, settings, motors), firmware, _version(own))
+
+
+def vehicle_of_run(run: Run) -> Vehicle:
+    """The vehicle of a run that was read."""
+    return vehicle_of(run.log.facts, {name: (setting,) for name, setting in run.settings.items()})
 
 
 def _kind(firmware: str, facts: Mapping[str, str], settings: Driven) -> Kind:
