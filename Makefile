@@ -10,7 +10,7 @@ ifneq ($(wildcard ../shared),)
 export CARE_SHARED ?= $(abspath ../shared)
 endif
 
-.PHONY: demo test check bench docs profiles screenshots man walk fuzz mutate damage kills matrix sbom clean
+.PHONY: demo test check bench docs profiles screenshots man walk fuzz mutate damage kills matrix offline dist sbom clean
 
 demo: $(BASE)
 	@$(BIN)/care demo; code=$$?; if [ $$code -ne 1 ]; then echo "care demo ended with $$code, not with 1 (fault found)" >&2; exit 1; fi
@@ -62,6 +62,15 @@ kills: $(DEV)
 
 matrix:
 	$(PYTHON) -m benchmarks.tools.matrix
+
+# The wheel and the source archive, as a package index takes them.
+dist: $(DEV)
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/twine check --strict dist/*.whl dist/*.tar.gz
+
+# An archive for each Python and machine that installs without a network: make offline PYTHONS=3.12 MACHINES=aarch64.
+offline: $(DEV)
+	$(BIN)/python -m benchmarks.tools.offline $(if $(PYTHONS),--python $(PYTHONS)) $(if $(MACHINES),--machine $(MACHINES)) $(if $(EXTRAS),--extras $(EXTRAS))
 
 # What a base installation holds, by name, version and license: build/sbom.json (CycloneDX).
 sbom:

@@ -12,20 +12,12 @@ from pathlib import Path
 from typing import Literal
 
 from care_core.errors import CareError
+from care_core.extras import DISTRIBUTION, EXTRAS, install_command
 from care_core.records import Record
 
 Status = Literal["ok", "warn", "fail"]
 
-DISTRIBUTION = "care-tui"
-EXTRAS = {
-    "learn": "train profiles, write Parquet",
-    "px4": "read PX4 logs (.ulg)",
-    "serve": "the app in a browser",
-    "fleet": "triage many logs on several computers",
-}
-"""What an extra is for; one that is not named here speaks for itself."""
 _DEVELOPMENT = "dev"
-_AGAIN = f"pip install --force-reinstall {DISTRIBUTION}"
 _NEWEST_PYTHON = (3, 13)
 _LITTLE_BYTES, _NOTHING_BYTES = 200_000_000, 20_000_000
 """Below the one a log unpacked to a temporary file may not fit (the largest recorded one takes 160 MB), below the other
@@ -80,9 +72,7 @@ def _packages() -> Iterator[Checked]:
             wanted.setdefault(marker[1] if marker else "", []).append(name)
     missing = {extra: [name for name in names if not _is_installed(name)] for extra, names in wanted.items()}
     if lost := missing.pop("", []):
-        yield Checked(
-            "packages", "fail", f"missing: {', '.join(lost)}", f"pip install --force-reinstall {DISTRIBUTION}"
-        )
+        yield Checked("packages", "fail", f"missing: {', '.join(lost)}", install_command())
     else:
         yield Checked("packages", "ok", f"all {len(wanted.get('', ()))} that are needed are installed")
     for extra, lacking in missing.items():
@@ -91,7 +81,7 @@ def _packages() -> Iterator[Checked]:
         use = EXTRAS.get(extra, "")
         if lacking:
             yield Checked(f"extra {extra}", "warn", f"not installed{f': {use}' if use else ''} ({', '.join(lacking)})",
-                          f"pip install '{DISTRIBUTION}[{extra}]' where you need it.")  # fmt: skip
+                          f"{install_command(extra)} where you need it.")  # fmt: skip
         else:
             yield Checked(f"extra {extra}", "ok", f"installed{f': {use}' if use else ''}")
 
@@ -129,7 +119,7 @@ def _profiles() -> Iterator[Checked]:
         else:
             sound.append(folder.name)
     if not folders:
-        yield Checked("profiles", "fail", "there is none", _AGAIN)
+        yield Checked("profiles", "fail", "there is none", install_command())
     elif sound:
         yield Checked("profiles", "ok", f"{len(sound)} load and agree with themselves: {', '.join(sound)}")
 

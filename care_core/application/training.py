@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 from care_core import plain_yaml
 from care_core.errors import UsageError
+from care_core.extras import install_hint
 from care_core.files import PROFILE_FILE, read_small_text
 from care_core.profile.model import ARRAYS_FILE, MODEL_FILE, write_model
 from care_core.profile.reading import parse_schema, read_schema
 from care_core.profile.store import CARD_FILE, load_profile
 from care_core.records import asdict
-from care_core.tables.rows import INSTALL_LEARN
 
 if TYPE_CHECKING:
     from care_core.causal.model import Model
@@ -37,7 +37,9 @@ def _learning() -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as err:
-        raise UsageError(f"Learning needs {err.name}, which is not installed.", hint=f"{INSTALL_LEARN}.") from err
+        raise UsageError(
+            f"Learning needs {err.name}, which is not installed.", hint=f"{install_hint('learn')}."
+        ) from err
 
 
 def train_profile(runs: Path, schema_path: Path, out: Path, *, seed: int, resamples: int, progress: Progress) -> None:

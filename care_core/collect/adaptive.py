@@ -17,6 +17,7 @@ import numpy as np
 from care_core.collect.sampling import points
 from care_core.collect.space import Config, Floats, Space
 from care_core.errors import UsageError
+from care_core.extras import install_hint
 from care_core.records import Record
 
 CANDIDATES = 384
@@ -138,10 +139,8 @@ def _fitted(runs: Floats, scores: Floats) -> _Process:
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
     except ModuleNotFoundError as err:
-        from care_core.tables.rows import INSTALL_LEARN
-
         message = f"Adaptive sampling needs {err.name}, which is not installed."
-        raise UsageError(message, hint=f"{INSTALL_LEARN}.") from err
+        raise UsageError(message, hint=f"{install_hint('learn')}.") from err
     known = np.flatnonzero(np.isfinite(scores))[-MOST_RUNS:]
     lengths = np.full(runs.shape[1], 1.0)
     kernel = ConstantKernel(1.0, (0.05, 20.0)) * Matern(lengths, (0.1, 30.0), nu=2.5) + WhiteKernel(0.3, (0.01, 2.0))

@@ -15,6 +15,7 @@ import numpy as np
 
 from care_core.collect.space import Config, Floats, Space
 from care_core.errors import UsageError
+from care_core.extras import install_hint
 from care_core.records import Record
 
 Method = Literal["sobol", "latin_hypercube", "uniform", "one_at_a_time", "adaptive"]
@@ -176,8 +177,6 @@ def quasi_monte_carlo() -> Any:
     try:
         from scipy.stats import qmc
     except ModuleNotFoundError as err:
-        from care_core.tables.rows import INSTALL_LEARN
-
         message = f"Planning a campaign needs {err.name}, which is not installed."
-        raise UsageError(message, hint=f"{INSTALL_LEARN}.") from err
+        raise UsageError(message, hint=f"{install_hint('learn')}.") from err
     return qmc

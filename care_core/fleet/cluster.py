@@ -23,7 +23,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeVar
 
 from care_core.errors import UsageError
-from care_core.fleet.sources import INSTALL
+from care_core.extras import install_hint
 from care_core.parallel import Failed
 from care_core.starting import isolated_children
 
@@ -56,7 +56,9 @@ def connected(scheduler: str | None = None, *, workers: int = 1, memory: str | N
 
         import_module("cryptography")  # for the certificate of a local cluster
     except ModuleNotFoundError as err:
-        raise UsageError(f"A fleet needs {err.name}, which is not installed.", hint=f"{INSTALL}.") from err
+        raise UsageError(
+            f"A fleet needs {err.name}, which is not installed.", hint=f"{install_hint('fleet')}."
+        ) from err
     if scheduler is None:
         _check_memory(memory)
         with _local(workers, memory) as client:

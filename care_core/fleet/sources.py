@@ -16,12 +16,11 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from care_core.errors import LogError, UsageError
+from care_core.extras import install_hint
 from care_core.limits import MEBIBYTE, megabytes
 from care_core.logs.finding import SHARED_SUFFIX, find_logs, is_log, is_recorder_folder
 from care_core.logs.formats import log_suffixes
 from care_core.records import Record
-
-INSTALL = "Install what it needs with: pip install 'care-tui[fleet]'"
 
 COPIED_BYTES = 2048 * MEBIBYTE
 """The largest log that is copied from behind a URL."""
@@ -117,7 +116,7 @@ def _behind_url(url: str) -> list[Source]:
     try:
         from fsspec.core import url_to_fs
     except ModuleNotFoundError as err:
-        raise UsageError("URLs cannot be opened here.", hint=f"{INSTALL}.", where=shown(url)) from err
+        raise UsageError("URLs cannot be opened here.", hint=f"{install_hint('fleet')}.", where=shown(url)) from err
     try:
         store, path = url_to_fs(url)
         if _is_local(store):

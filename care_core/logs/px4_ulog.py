@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from care_core.errors import LogError
+from care_core.extras import install_hint
 from care_core.files import open_regular
 from care_core.logs import formats
 from care_core.logs.base import Channel, Table, Wanted
@@ -161,7 +162,7 @@ def _parse(path: Path, topics: Sequence[str] | None) -> Any:
     except ImportError as err:
         raise LogError(
             "PX4 logs need pyulog, which is not installed.",
-            hint="Install it with: pip install 'care-tui[px4]'",
+            hint=f"{install_hint('px4')}.",
             where=str(path),
         ) from err
     try:

@@ -11,10 +11,10 @@ from care_core.diagnose.records import Confidence, What
 from care_core.diagnose.verdict import RunStatus
 from care_core.ecosystems.findings import FindingKind, Severity
 from care_core.errors import UsageError
+from care_core.extras import install_hint
 from care_core.fleet.fleet_report import Fleet
 from care_core.fleet.rows import Explained, Row, copies_of, distinct
 from care_core.fleet.shared import FEWEST, Kind, Pattern, Since, Trait, Unit
-from care_core.fleet.sources import INSTALL
 from care_core.fleet.suggest import Effect, Outlook, Silence, Suggestion
 from care_core.numbers import six_digits
 from care_core.outputs import REMOVE_HINT, check_replaceable
@@ -257,7 +257,7 @@ def check_parquet_path(path: Path) -> None:
         raise UsageError("The table's name ends in .parquet.", hint="Rename it.", where=str(path))
     if not path.parent.is_dir():
         raise UsageError("The folder does not exist.", hint="Make it first.", where=str(path.parent))
-    parquet.check_parquet(f"{INSTALL}.")
+    parquet.check_parquet(f"{install_hint('fleet')}.")
 
 
 def write_parquet(path: Path, fleet: Fleet) -> None:

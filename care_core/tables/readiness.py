@@ -10,11 +10,11 @@ from pathlib import Path
 
 from care_core import limits
 from care_core.errors import UsageError
+from care_core.extras import install_hint
 from care_core.files import read_small_text
 from care_core.profile.schema import Schema
 from care_core.records import Record
 from care_core.tables.parquet import SUFFIX, read_parquet
-from care_core.tables.rows import INSTALL_LEARN
 from care_core.variables import Role, Variable
 
 MIN_RUNS = 30
@@ -115,7 +115,7 @@ def _parquet_rows(path: Path) -> list[dict[str, object]]:
         return read_parquet(path)
     except ImportError as err:
         raise UsageError(
-            "Parquet cannot be read here.", hint=f"{INSTALL_LEARN}, or use .csv.", where=str(path)
+            "Parquet cannot be read here.", hint=f"{install_hint('learn')}, or use .csv.", where=str(path)
         ) from err
 
 

@@ -9,6 +9,7 @@ from care_core.diagnose.judging import judge
 from care_core.ecosystems.registry import run_model
 from care_core.errors import UsageError
 from care_core.extract.read import read_runs
+from care_core.extras import install_hint
 from care_core.logs.opening import open_log
 from care_core.outputs import REMOVE_HINT, check_replaceable, write_output
 from care_core.profile.schema import Schema
@@ -22,7 +23,6 @@ KIND = "runs"
 """What `outputs` calls such a table."""
 CONDITIONS = "conditions"
 """A column that a table may have: runs with one value in it met the same conditions, others did not."""
-INSTALL_LEARN = "Install what it needs with: pip install 'care-tui[learn]'"
 
 TableRow = dict[str, str | int | float | None]
 
@@ -75,4 +75,4 @@ def check_table_path(path: Path, kind: str = KIND) -> None:
     if not path.parent.is_dir():
         raise UsageError("The folder does not exist.", hint="Make it first.", where=str(path.parent))
     if path.suffix.lower() == parquet.SUFFIX:
-        parquet.check_parquet(f"{INSTALL_LEARN}, or write .csv.")
+        parquet.check_parquet(f"{install_hint('learn')}, or write .csv.")

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from care_core.errors import UsageError
+from care_core.extras import install_hint
 from care_tui.commands.arguments import ConfigPaths, ProfileName
 from care_tui.console import emit, say
 from care_tui.settings import SERVER
@@ -31,8 +32,7 @@ def serve(
     try:
         from care_tui.web import HOST, TokenServer
     except ModuleNotFoundError as err:
-        hint = "Install it with: pip install 'care-tui[serve]'"
-        raise UsageError(f"'{err.name}' is not installed.", hint=hint) from err
+        raise UsageError(f"'{err.name}' is not installed.", hint=f"{install_hint('serve')}.") from err
 
     _check_free(HOST, port)
     os.environ[SERVER] = str(os.getpid())
