@@ -8,6 +8,7 @@ import pytest
 
 from care_core.ecosystems.ardupilot.examining import find
 from care_core.ecosystems.findings import Finding, every_finding
+from care_core.logs.base import Table
 from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import meaning_of
 from care_core.metadata.fact import expanded
@@ -250,3 +251,24 @@ def test_a_compass_beside_a_parameter_that_cannot_hold_is_not_called_wrong() -> 
     found = find(flight_of(made.tables(), known, made.facts, END_S))
     assert [(one.kind, one.parameters) for one in found if one.suspect == "hardware"] == []
     assert any("COMPASS_OFS_Z" in one.parameters for one in found)
+
+
+def test_what_later_attempts_no_longer_say_had_passed() -> None:
+    made = Made()
+    del made.rows["ARM"]
+    made.table["CTUN"]["ThO"][:] = 0.0
+    starting, lasting = "AHRS: not using configured AHRS type", "SERVO2_MAX is less than SERVO2_TRIM"
+    said = [*((t, starting) for t in (12.0, 14.0)), *((t, lasting) for t in (12.0, 14.0, 16.2, 18.3, 20.5))]
+    made.rows["MSG"] = [(t, {"Message": f"Arm: {text}"}) for t, text in sorted(said)]
+    off = {"EK3_VELNE_M_NSE": (0.3, 0.5), "SERVO2_MAX": (1452, 1900), "SERVO2_TRIM": (1500, 1500)}
+    known = {name: (Setting(name, value, "PARM", default),) for name, (value, default) in off.items()}
+
+    def named(tables: Mapping[str, Table]) -> tuple[str, ...]:
+        flight = flight_of(tables, {**made.known, **known}, made.facts, END_S)
+        return next(one.parameters for one in every_finding(find(flight)) if one.kind == "prearm")
+
+    assert named(made.tables()) == ("SERVO2_MAX",)
+    made.rows["MSG"] = made.rows["MSG"][:4]  # nobody tried often enough to tell
+    assert "SERVO2_MAX" in named(made.tables())
+    made.rows["MSG"] = [row for row in made.rows["MSG"] if starting in str(row[1]["Message"])]
+    assert named(made.tables()) == ("EK3_VELNE_M_NSE",)

@@ -7,8 +7,9 @@ import pytest
 
 from care_core.ecosystems.ardupilot.checks.settings.rotations import matrix
 from care_core.ecosystems.findings import Finding
-from care_core.run import Setting
-from tests.flights import ARMED_S, DOWN_S, HOVER, UP_S, Made
+from care_core.ecosystems.measures import Mission, find_extractor
+from care_core.run import Setting, Unavailable, Value, is_known
+from tests.flights import ARMED_S, DOWN_S, END_S, HOVER, UP_S, Made, flight_of
 
 FAILSAFE_S = 60.0
 
@@ -85,6 +86,38 @@ def test_a_current_before_the_motors_turn(offset: float) -> None:
     made.drive("BATT_AMP_OFFSET", offset, 0.0)
     made.table["BAT"]["EnrgTot"] = np.cumsum(made.table["BAT"]["Volt"] * made.table["BAT"]["Curr"]) / 36000.0
     assert naming(made, "BATT_AMP_OFFSET").wanted == (("BATT_AMP_OFFSET", 0.0),)
+
+
+def energy_of(made: Made) -> Value:
+    tables = made.tables()
+    model = flight_of(tables, made.known, made.facts, END_S)
+    return find_extractor("energy_used").compute(Mission(model, tables, ARMED_S, DOWN_S, True, {}), {})
+
+
+def test_no_energy_follows_from_a_current_that_is_measured_wrongly() -> None:
+    made = MadeWithDefaults()
+    assert is_known(energy_of(made))
+    made.settings["BATT_AMP_PERVLT"] = 17.0
+    made.table["BAT"]["Curr"] += 8.5 - 0.5
+    made.table["BAT"]["EnrgTot"] = np.cumsum(made.table["BAT"]["Volt"] * made.table["BAT"]["Curr"]) / 36000.0
+    made.drive("BATT_AMP_OFFSET", -0.5, 0.0)
+    energy = energy_of(made)
+    assert isinstance(energy, Unavailable)
+    assert "BATT_AMP_OFFSET" in energy.reason
+    assert energy.hint == "put BATT_AMP_OFFSET back to 0"
+
+
+def test_no_energy_without_a_monitor_is_the_monitors_parameter() -> None:
+    made = MadeWithDefaults()
+    made.table.pop("BAT")
+    without = energy_of(made)
+    assert isinstance(without, Unavailable)
+    assert "LOG_BITMASK" in without.hint  # nobody set the monitor otherwise: it was not recorded
+    made.drive("BATT_MONITOR", 20, 4)
+    energy = energy_of(made)
+    assert isinstance(energy, Unavailable)
+    assert "BATT_MONITOR=20" in energy.reason
+    assert energy.hint == "put BATT_MONITOR back to 4"
 
 
 def test_a_monitor_without_what_a_failsafe_rests_on() -> None:

@@ -24,7 +24,8 @@ OF_KIND: Mapping[FindingKind, Sign] = {
 _OF_TITLE: tuple[tuple[re.Pattern[str], Sign], ...] = (
     (re.compile(r"oscillates"), "oscillates"),
     (re.compile(r"waits to be set off"), "stuck"),
-    (re.compile(r"^it (drives|turns) against|runs away"), "strays"),
+    (re.compile(r"^it (drives|turns) against|runs away|trim of the .* not its middle|TURN_RADIUS"), "strays"),
+    (re.compile(r"an output ends before"), "stuck"),
     (re.compile(r"heading does not follow"), "heading"),
     (re.compile(r"battery failsafe|not charged|battery sags"), "failsafe_battery"),
     (re.compile(r"ground station"), "failsafe_gcs"),
@@ -52,8 +53,6 @@ _SHARE = 0.3
 
 _EXPLAINS = re.compile(r"[A-Z][A-Z0-9]*_[A-Z0-9_]+ is -?\d")
 """What the evidence of a refusal adds of the parameters that its check reads."""
-_STARTING = plain_refusal("AHRS: not using configured AHRS type")
-"""Said at every start until the estimator runs: beside another refusal it keeps nothing from arming."""
 
 
 class Signs(Record):
@@ -96,8 +95,7 @@ def signs_of(
 def _refusals(findings: Iterable[Finding]) -> frozenset[str]:
     refused = [one for one in every_finding(findings) if one.kind == "prearm" and one.severity != "info"]
     told = (text for one in refused for text in one.evidence.split("; ") if not _EXPLAINS.match(text))
-    said = frozenset(map(plain_refusal, told))
-    return said - {_STARTING} or said
+    return frozenset(map(plain_refusal, told))
 
 
 def _of_findings(findings: Iterable[Finding]) -> Iterator[Sign]:

@@ -27,7 +27,7 @@ from care_core.ecosystems.ardupilot.checks import (
     vibration,
     way_home,
 )
-from care_core.ecosystems.ardupilot.checks.settings import driven, heading, hover, level, supply
+from care_core.ecosystems.ardupilot.checks.settings import driven, heading, hover, level, outputs, supply
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
@@ -37,6 +37,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     level.CHECK,
     supply.CHECK,
     driven.CHECK,
+    outputs.CHECK,
     attitude.CHECK,
     barometer.CHECK,
     battery.CHECK,

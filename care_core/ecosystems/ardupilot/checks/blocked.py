@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.settings import outputs
 from care_core.ecosystems.ardupilot.flight import STANDS_MS, Flight
 from care_core.ecosystems.ardupilot.spans import during
 from care_core.ecosystems.ardupilot.statistics import lasting
@@ -44,7 +45,7 @@ def find(flight: Flight) -> Iterator[Finding]:
         still &= np.abs(np.interp(driven.t, turned.t, turned["TurnRate"])) < TURNING_DPS
     pushed = np.abs(driven["ThrOut"]) >= THROTTLE_PERCENT
     spans = lasting(driven.t, still & pushed & flight.drives_itself(driven.t), _LASTS_S)
-    if spans:
+    if spans and not outputs.wrong_neutrals(flight):  # else what is asked is not what drives
         start, end = spans[0]
         most = float(np.abs(driven["ThrOut"])[(driven.t >= start) & (driven.t <= end)].max())
         yield Finding(

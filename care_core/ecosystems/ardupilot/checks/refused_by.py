@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from care_core.ecosystems.ardupilot.checks.settings.supply import wrong_scale
@@ -32,6 +33,8 @@ OUTSIDE = LIMITS.add(
 _REPEATED_S = LIMITS.add(
     "how long before the last a refusal counts", 30.0, "s", "AP_Arming repeats complaints every 30 s"
 )
+_ONE_ROUND_S = LIMITS.add("time in which one attempt tells its refusals", 1.0, "s", "a choice: texts wait for a link")
+_PASSED = LIMITS.add("attempts without a refusal that had passed", 3.0, "", "a choice: texts can be lost")
 _FAR = LIMITS.add(
     "far off its default", 1.5, "times", "a choice: what is tuned is seldom off by more and fails a check"
 )
@@ -81,8 +84,14 @@ class _Held(NamedTuple):
 
 
 def standing(flight: Flight) -> tuple[Refusal, ...]:
-    """The refusals that stood when arming was last refused."""
-    return tuple(one for one in flight.refusals if flight.refusals[-1].time_s - one.time_s < _REPEATED_S)
+    """The refusals that stood when arming was last refused. What several attempts to arm no longer told had passed: the
+    estimator that was still starting, a gyro that was not yet quiet."""
+    late = [one for one in flight.refusals if flight.refusals[-1].time_s - one.time_s < _REPEATED_S]
+    told = {one.why: one.time_s for one in late}
+    attempts = sorted(one.time_s for one in late if one.was_tried)
+    rounds = [t for before, t in pairwise((-math.inf, *attempts)) if t - before > _ONE_ROUND_S]
+    passed = {why for why, last in told.items() if sum(t > last + _ONE_ROUND_S for t in rounds) >= _PASSED}
+    return tuple(one for one in late if one.why not in passed)
 
 
 def refusing(flight: Flight) -> tuple[Refusing, ...]:

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from care_core.ecosystems.ardupilot.checks.settings.supply import not_measured, wrong_current
+from care_core.ecosystems.ardupilot.flight import as_flight
 from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
 from care_core.ecosystems.ardupilot.measures.flown_mission import NEEDS
@@ -18,7 +20,7 @@ from care_core.ecosystems.coverage import EXTREME, SUM, Bears, Samples
 from care_core.ecosystems.measures import Args, Mission, RestsOn, extractor, has, missing
 from care_core.ecosystems.plausible import is_alive
 from care_core.logs.base import Table, Wanted, merge_needs
-from care_core.run import Unavailable, Value, is_known
+from care_core.run import Unavailable, Value, is_known, shown
 
 _BATTERY: Wanted = {"BAT": ("Inst", "Instance", "Volt", "Curr", "EnrgTot")}
 _LEAST_V = 2.0
@@ -58,6 +60,8 @@ def energy_used(mission: Mission, args: Args) -> Value:
     span = span_of_phase(mission, args) if "phase" in args else (mission.start_s, mission.end_s)
     if isinstance(span, Unavailable):
         return span
+    if wrong := mission.shared(_measured_wrongly):
+        return wrong
     table = mission.tables.get("BAT")
     if table is None or not len(table):
         return missing("BAT")
@@ -74,6 +78,16 @@ def energy_used(mission: Mission, args: Args) -> Value:
     return doubt or Unavailable(
         "BAT says the same current throughout, or none", "is BATT_MONITOR one that measures current?"
     )
+
+
+def _measured_wrongly(mission: Mission) -> Unavailable | None:
+    """Why no energy follows from how the battery is measured: without a current, or with one that is off."""
+    flight = as_flight(mission.model)
+    wrong = not_measured(flight) or wrong_current(flight)
+    if wrong is None:
+        return None
+    back = " and ".join(f"put {name} back to {shown(value)}" for name, value in wrong.wanted)
+    return Unavailable(f"{wrong.title}: {wrong.evidence}", back)
 
 
 def _energy(battery: Table, start_s: float, end_s: float) -> float | Unavailable | None:

@@ -75,8 +75,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     scale = wrong_scale(flight)
     if scale is not None:
         yield scale
-    yield from _not_measured(flight)
-    yield from _offset(flight)
+    yield from filter(None, (not_measured(flight), wrong_current(flight)))
     acted = None if scale is not None else early_failsafe(flight)
     if acted is not None:
         yield Finding(
@@ -138,21 +137,21 @@ def _scale_finding(flight: Flight, parameter: str, wanted: float, rest: float, e
     )
 
 
-def _not_measured(flight: Flight) -> Iterator[Finding]:
+def not_measured(flight: Flight) -> Finding | None:
     """A monitor that measures no voltage or no current, and is not the one that was to: wrong where a failsafe rests on
-    it."""
+    it. None where both are measured."""
     default = flight.default_left("BATT_MONITOR")
     if not default or not flight.watched:
-        return
+        return None
     table = _first(flight)
     lacking = next((field for field in ("Volt", "Curr") if table is None or not _says(table, field)), None)
     if lacking is None:
-        return
+        return None
     what, thresholds = ("voltage", _BY_VOLTAGE) if lacking == "Volt" else ("current", _BY_CHARGE)
     rests = next((name for name in thresholds if (flight.setting(name) or 0.0) > 0.0), "")
     refused = flight.refused_for("battery") is not None
     value = shown(flight.setting("BATT_MONITOR"))
-    yield Finding(
+    return Finding(
         kind="battery",
         title=f"the battery's {what} is not measured",
         onset_s=0.0,
@@ -173,18 +172,18 @@ def _says(table: Table, field: str) -> bool:
     return bool(np.isfinite(values).any()) and (field != "Volt" or bool(np.nanmax(values) > _RUNS_V))
 
 
-def _offset(flight: Flight) -> Iterator[Finding]:
-    """A current that flows before the motors turn, and would not at the default of its offset."""
+def wrong_current(flight: Flight) -> Finding | None:
+    """A current that flows before the motors turn, and would not at the default of its offset; None where none does."""
     table = _first(flight)
     rest = None if table is None or "Curr" not in table.columns else _at_rest(flight, table, "Curr")
     default, offset = flight.default_left("BATT_AMP_OFFSET"), flight.setting("BATT_AMP_OFFSET")
     scale = flight.setting("BATT_AMP_PERVLT", "BATT_AMP_PERVOLT")
     if rest is None or default is None or offset is None or not scale or abs(rest) < _AT_REST_A:
-        return
+        return None
     if abs(rest + (offset - default) * scale) > _NONE_A:
-        return
+        return None
     wanted = _near(offset + rest / scale, default)
-    yield Finding(
+    return Finding(
         kind="battery",
         title="the battery's current is measured wrongly",
         onset_s=0.0,
