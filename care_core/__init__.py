@@ -12,11 +12,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from care_core.application.api import apply, inspect, open_log, triage, verify, what_if
+    from care_core.application.api import apply, compare, inspect, open_log, triage, verify, what_if
     from care_core.application.case import Case, Request
     from care_core.errors import CareError
 
-__all__ = ["CareError", "Case", "Request", "apply", "inspect", "open_log", "triage", "verify", "what_if"]
+__all__ = ["CareError", "Case", "Request", "apply", "compare", "inspect", "open_log", "triage", "verify", "what_if"]
 
 _HOMES = {
     "CareError": "care_core.errors",

@@ -42,6 +42,7 @@ _BEGINNINGS = tuple(
         ("SARIF", rb'\{\s*"\$schema": "[^"]*sarif[^"]*",.{,400}"name": "care lint"'),
         ("page", rb'<!doctype html>.{,600}<meta name="generator" content="care">'),
         ("Markdown", rb"# Triage of [^\n]*\n\n(?:\*\*[A-Z ]+\*\*|Profile|No profile)"),
+        ("Markdown", rb"# Comparison of [^\n]* and [^\n]*\n\n- \*\*A\*\* "),
         ("record", rb"# Verified fixes\n\nOf \d+ fixes "),
         ("card", rb"# Model card: [^\n]*\n"),
         ("model", rb'\{\s*"model_version": \d+,\s*"schema_digest": '),

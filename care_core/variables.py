@@ -42,6 +42,11 @@ SAME_SHARE, SAME_LEAST = 0.05, 0.5
 leg more is one."""
 
 
+def asks_alike(one: float, other: float) -> bool:
+    """Whether two numbers that missions ask for are those of the same mission."""
+    return math.isclose(one, other, rel_tol=SAME_SHARE, abs_tol=SAME_LEAST)
+
+
 def is_variable_name(name: str) -> bool:
     """Whether a profile may call a variable so: one word in every table, file and command."""
     return _NAME.fullmatch(name) is not None
@@ -94,7 +99,7 @@ class Threshold(Record):
             value = context.get(name)
             if not isinstance(value, (int, float)):
                 return f"the limit of {self.source} is for another mission, or {name} is not known"
-            if abs(value - wanted) > max(SAME_SHARE * abs(wanted), SAME_LEAST):
+            if not asks_alike(value, wanted):
                 return f"the limit of {self.source} is for a mission with {name} {wanted:g}, this one has {value:.4g}"
         return ""
 

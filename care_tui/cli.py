@@ -28,6 +28,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
     "opening": (OPEN,),
     "serving": ("serve",),
     "diagnosing": ("triage", "demo"),
+    "comparing": ("compare",),
     "fleet": ("fleet",),
     "bundling": ("bundle",),
     "asking": ("whatif", "verify"),

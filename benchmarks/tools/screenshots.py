@@ -25,7 +25,13 @@ from care_tui.widgets.step_bar import STEPS
 
 SIZE = (80, 24)
 SAMPLE = "arducopter_failed.BIN"
-PAGE = (900, 2280)
+PAGE, COMPARED = (900, 2280), (900, 2300)
+_ROOT = Path(__file__).parents[2]
+PAIRS = {
+    "flight": (_ROOT / "tests" / "data" / "arducopter_good.BIN", _ROOT / "samples" / SAMPLE),
+    "drive": (_ROOT / "tests" / "data" / "move_base_good.bag", _ROOT / "samples" / "move_base_drive.bag"),
+}
+"""A good run and a failed one, beside each other in a page each."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 QUIET = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--hide-scrollbars",
@@ -55,19 +61,22 @@ async def draw(folder: Path) -> None:
 
 
 def photograph(folder: Path) -> None:
-    """The head of the HTML report as a browser shows it."""
+    """The head of the HTML report, and two runs side by side, as a browser shows them."""
     browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
     if browser is None:
-        print(f"no report.png: none of {', '.join(BROWSERS)} is installed")
+        print(f"no pictures of pages: none of {', '.join(BROWSERS)} is installed")
         return
-    with tempfile.TemporaryDirectory() as name:
-        page = Path(name, "report.html")
-        write_atomically(page, care_core.triage(bundled("samples", SAMPLE)).report("html"))
-        picture = folder / "report.png"
-        command = [browser, *QUIET, f"--user-data-dir={name}/browser", f"--window-size={PAGE[0]},{PAGE[1]}",
-                   f"--screenshot={picture}", page.as_uri()]  # fmt: skip
-        subprocess.run(command, check=True, capture_output=True, timeout=120)
-    print(picture)
+    pages = {"report": (PAGE, care_core.triage(bundled("samples", SAMPLE)).report("html"))}
+    for name, (good, failed) in PAIRS.items():
+        pages[f"compare-{name}"] = COMPARED, care_core.compare(good, failed).report("html")
+    for name, ((wide, high), text) in pages.items():
+        with tempfile.TemporaryDirectory() as made:
+            page, picture = Path(made, f"{name}.html"), folder / f"{name}.png"
+            write_atomically(page, text)
+            command = [browser, *QUIET, f"--user-data-dir={made}/browser", f"--window-size={wide},{high}",
+                       f"--screenshot={picture}", page.as_uri()]  # fmt: skip
+            subprocess.run(command, check=True, capture_output=True, timeout=120)
+        print(picture)
 
 
 def main() -> None:

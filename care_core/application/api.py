@@ -11,6 +11,7 @@ from care_core.errors import CareError, LogError
 from care_core.records import replace
 
 if TYPE_CHECKING:
+    from care_core.application.comparing import Compared
     from care_core.configs.edit import EditedFile
     from care_core.diagnose.whatif import Answer
     from care_core.logs.base import Log
@@ -71,6 +72,13 @@ def what_if(asked: Case | Request | str | Path, changes: Mapping[str, float]) ->
     return reading.question.ask({option_named(name, schema).name: value for name, value in changes.items()})
 
 
+def compare(a: Request | str | Path, b: Request | str | Path, progress: Progress = _silent) -> Compared:
+    """Two runs side by side, A the one to compare with: `compare(good, failed).report()`. Raises CareError."""
+    from care_core.application.comparing import compare as put_beside
+
+    return put_beside(_request(a), _request(b), progress)
+
+
 def verify(
     report: str | Path,
     log: Request | str | Path,
@@ -89,7 +97,7 @@ def verify(
         CareError: the report is none, suggests no change or one of no parameter of its profile, no such profile is
             installed, or the log cannot be read.
     """
-    from care_core.diagnose.verify import verify as compare
+    from care_core.diagnose.verify import verify as hold_against
     from care_core.profile.store import load_profile
     from care_core.report.reading import read_report
     from care_core.report.suggested import report_profile
@@ -104,7 +112,7 @@ def verify(
     if case.reading is None and case.log is not None:
         fitting(case.log, str(chosen.path))  # a run without a mission is compared, one of another robot is not
     schema = chosen.schema if case.reading is None else case.reading.profile.schema
-    verification = compare(promise, case.diagnosis, schema, asked.thresholds)
+    verification = hold_against(promise, case.diagnosis, schema, asked.thresholds)
     return verify_document(promised, case.diagnosis.run, verification)
 
 

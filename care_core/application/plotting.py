@@ -77,7 +77,7 @@ def drawn_of(case: OpenRun, sharing: Sharing = EVERYTHING) -> Drawing:
     return Drawing(
         faults=diagnosis.faults,
         plots=tuple(replace(plot, source=text(plot.source), lines=_named(plot.lines, text)) for plot in plots if plot),
-        marks=_marks(case, span),
+        marks=marks_in(case, span),
         deadlines=tuple(_deadlines(case, span)),
         start_s=span[0],
         end_s=span[1],
@@ -123,13 +123,13 @@ def ranked(case: OpenRun, sharing: Sharing = EVERYTHING) -> tuple[list[list[Sign
 
     groups = list(_groups(signals_of(case)))
     if not sharing.positions:
-        meaning = _meanings(log_of(case))
+        meaning = meanings(log_of(case))
         groups = [group for group in groups if not any(meaning(one.channel, one.field).is_position for one in group)]
     ordered = sorted(groups, key=rank)
     return ordered, sum(rank(group)[0] < 2 for group in ordered)
 
 
-def _meanings(log: Log) -> Callable[[str, str], Field]:
+def meanings(log: Log) -> Callable[[str, str], Field]:
     """What a signal of a log means, by channel and field; what a dictionary lacks is judged by its name."""
     ecosystem, channels = ecosystem_of(log.format), {channel.name: channel for channel in log.channels()}
 
@@ -155,7 +155,7 @@ def _plot(
 ) -> Plot | None:
     """The plot of a group, None where the log has no number for it in the span."""
     channel = group[0].channel
-    meaning = _meanings(log_of(case))(channel, group[0].field)
+    meaning = meanings(log_of(case))(channel, group[0].field)
     unit, words = meaning.unit, meaning.label
     lines, drawn = [], []
     for one in group:
@@ -164,10 +164,10 @@ def _plot(
             continue
         drawn.append(one.field)
         wrap = {"deg": 360.0, "rad": 6.2832}.get(unit) if words == "heading" else None
-        lines.append(Line(one.field, _segments(*found, span, wrap)))
+        lines.append(Line(one.field, segments(*found, span, wrap)))
         wanted = values.get(one.wanted) if one.wanted else None
         if wanted is not None and len(wanted[1]):
-            lines.append(Line(one.wanted_name, _segments(*wanted, span, wrap), is_wanted=True))
+            lines.append(Line(one.wanted_name, segments(*wanted, span, wrap), is_wanted=True))
     if not lines:
         return None
     findings = [one for found in case.diagnosis.health.findings for one in (found, *found.below)]
@@ -183,7 +183,7 @@ def _plot(
     )
 
 
-def _segments(
+def segments(
     t: NDArray[np.float64], values: NDArray[np.float64], span: tuple[float, float], wrap: float | None
 ) -> tuple[tuple[Point, ...], ...]:
     """A line as few points in pieces; angles that turn over at `wrap` are broken there."""
@@ -258,14 +258,14 @@ def _bands(findings: Collection[Finding], channel: str, span: tuple[float, float
             yield Band(one.onset_s, one.end_s, one.severity, one.title)
 
 
-def _marks(case: OpenRun, span: tuple[float, float]) -> tuple[Mark, ...]:
+def marks_in(case: OpenRun, span: tuple[float, float], most: int = MOST_MARKS) -> tuple[Mark, ...]:
     """The gravest of what happened in the span, in order of time; what two sources say at one time once."""
     inside = {
         (round(mark.time_s), mark.words.casefold()[:_SAME]): mark
         for mark in sorted(marks_of(case.diagnosis), key=lambda mark: -mark.rank)
         if span[0] <= mark.time_s <= span[1]
     }
-    gravest = sorted(inside.values(), key=lambda mark: (mark.rank, mark.time_s))[:MOST_MARKS]
+    gravest = sorted(inside.values(), key=lambda mark: (mark.rank, mark.time_s))[:most]
     return tuple(sorted(gravest, key=lambda mark: mark.time_s))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from care_core.configs.driven import readable, same_value
@@ -33,11 +33,15 @@ def compare(judged: Judged, good: Log, profile: Profile) -> Since:
     except CareError as err:
         info = log_info(run_model(good), log_digest(good.path))
         before = {name: history[-1] for name, history in good.settings().items()}
-        return Since(str(good.path), _changes(run, before, profile), (*_strange(run, info, before), err.message))
+        return Since(
+            str(good.path),
+            changed_parameters(before, run.settings, profile.schema.options),
+            (*_strange(run, info, before), err.message),
+        )
     before = dict(other.run.settings)
     return Since(
         log=str(good.path),
-        changes=_changes(run, before, profile),
+        changes=changed_parameters(before, run.settings, profile.schema.options),
         warnings=(*_strange(run, other.run.log, before), *_not_good(other)),
     )
 
@@ -56,12 +60,16 @@ def _noted(cause: Cause, since: Since) -> Cause:
     return replace(cause, notes=(*cause.notes, *map(Note, dict.fromkeys(notes))))
 
 
-def _changes(run: Run, before: Mapping[str, Setting], profile: Profile) -> tuple[ParameterChange, ...]:
-    options = {parameter: option for option in profile.schema.options for parameter in readable(option)}
-    names = sorted({*run.settings, *before})
-    first = [name for name in options if name in names]
-    rest = [name for name in names if name not in options and not is_self_written(name)]
-    return tuple(_differences([*first, *rest], before, run.settings, options))
+def changed_parameters(
+    before: Mapping[str, Setting], after: Mapping[str, Setting], options: Iterable[Variable]
+) -> tuple[ParameterChange, ...]:
+    """The parameters that differ between two configurations as driven, those of options first; what a vehicle writes
+    itself is left out, unless it is one."""
+    by_parameter = {parameter: option for option in options for parameter in readable(option)}
+    names = sorted({*after, *before})
+    first = [name for name in by_parameter if name in names]
+    rest = [name for name in names if name not in by_parameter and not is_self_written(name)]
+    return tuple(_differences([*first, *rest], before, after, by_parameter))
 
 
 def _differences(
@@ -74,15 +82,21 @@ def _differences(
             yield ParameterChange(name, options.get(name), old, new)
 
 
+def different_facts(one: LogInfo, other: LogInfo) -> Iterator[tuple[str, str, str]]:
+    """What two logs say otherwise of their robot: which fact, and what each says."""
+    for fact, text in other.facts.items():
+        if fact in one.facts and one.facts[fact] != text:
+            yield fact, one.facts[fact], text
+
+
 def _strange(run: Run, other: LogInfo, before: Mapping[str, Setting]) -> Iterator[str]:
     """Why the good log may not be comparable at all."""
     if other.sha256 == run.log.sha256:
         yield "it is the same log"
     if other.format != run.log.format:
         yield f"its format is {other.format}, this log's is {run.log.format}"
-    for fact, text in run.log.facts.items():
-        if fact in other.facts and other.facts[fact] != text:
-            yield f"its {fact} is {other.facts[fact]}, this log's is {text}"
+    for fact, its, text in different_facts(other, run.log):
+        yield f"its {fact} is {its}, this log's is {text}"
     if not before:
         yield "it holds no parameters"
     elif not before.keys() & run.settings.keys():

@@ -21,6 +21,7 @@ from care_core.configs.driven import same_value
 from care_core.history.store import Triaged
 from care_core.records import Record, replace
 from care_core.run import Robot
+from care_core.variables import asks_alike
 
 Direction = Literal["worse", "better", "none", "constant", "too few"]
 
@@ -29,8 +30,6 @@ LEAST_RUNS = 5
 """With four runs in perfect order the probability is 2 / 4! = 0.08: fewer can show nothing."""
 _COUNTED, _DRAWN = 7, 9999
 """Up to so many runs all orders are counted (7! = 5040); of more so many are drawn, always the same."""
-_SAME_SHARE, _SAME = 0.05, 0.5
-"""Missions are one and the same where all they ask for agrees so far: a home that is metres off moves a way by 1 %."""
 
 Floats = NDArray[np.float64]
 
@@ -141,9 +140,7 @@ def _missions(runs: Iterable[Triaged]) -> list[list[Triaged]]:
 
 
 def _same(a: Mapping[str, float], b: Mapping[str, float]) -> bool:
-    return a.keys() == b.keys() and all(
-        math.isclose(a[name], b[name], rel_tol=_SAME_SHARE, abs_tol=_SAME) for name in a
-    )
+    return a.keys() == b.keys() and all(asks_alike(a[name], b[name]) for name in a)
 
 
 def _trends(runs: Sequence[Triaged]) -> Iterator[Trend]:

@@ -14,6 +14,7 @@ from markupsafe import Markup
 
 from care_core.diagnose.verdict import STATUS_WORDS
 from care_core.records import Record
+from care_core.report.comparison import CompareDocument, head_of, sections_of
 from care_core.report.document import FaultEntry, FixEntry, Report
 from care_core.report.path_drawing import MOST, paths_svg
 from care_core.report.plots import NOTHING_DRAWN, Drawing, Plot, plot_figure
@@ -37,6 +38,29 @@ class Part(Record):
 
 def to_html(report: Report, drawing: Drawing = NOTHING_DRAWN) -> str:
     """A page to mail or to keep beside the log."""
+    parts = [part for part in _parts(report, drawing) if part.content]
+    name = Path(report.log.path).name
+    return _pages().get_template("page.html").render(report=report, name=name, facts=_facts(report), parts=parts)
+
+
+def comparison_html(document: CompareDocument, drawing: Drawing = NOTHING_DRAWN) -> str:
+    """Two runs side by side as a page, with the signals of both over each other."""
+    names = [Path(side.log).name for side in (document.a, document.b)]
+    return (
+        _pages()
+        .get_template("comparison.html")
+        .render(
+            document=document,
+            names=names,
+            head=list(head_of(document)),
+            sections=sections_of(document),
+            drawing=drawing,
+        )
+    )
+
+
+def _pages() -> Environment:
+    """The templates, which escape every text."""
     pages = Environment(
         loader=FileSystemLoader(Path(__file__).with_name("templates")),
         autoescape=True,
@@ -52,9 +76,7 @@ def to_html(report: Report, drawing: Drawing = NOTHING_DRAWN) -> str:
         "share": "{:.0%}".format,
         "shown": shown,
     }
-    parts = [part for part in _parts(report, drawing) if part.content]
-    name = Path(report.log.path).name
-    return pages.get_template("page.html").render(report=report, name=name, facts=_facts(report), parts=parts)
+    return pages
 
 
 def _parts(report: Report, drawing: Drawing) -> Iterator[Part]:

@@ -72,9 +72,9 @@ def _sections(report: Report) -> Iterator[Iterable[str]]:
 
 
 def _head(report: Report) -> Iterator[str]:
-    yield f"# Triage of {_escape(Path(report.log.path).name)}"
+    yield f"# Triage of {escaped(Path(report.log.path).name)}"
     verdict = report.verdict
-    for line in (f"**{verdict.word}**{_escape(verdict.told)}", *map(_escape, verdict.lines[1:])):
+    for line in (f"**{verdict.word}**{escaped(verdict.told)}", *map(escaped, verdict.lines[1:])):
         yield from ("", f"{line}.")
 
 
@@ -89,8 +89,8 @@ def _objective(one: ObjectiveEntry) -> str:
     if one.measured:
         parts.append(f" {one.measured}")
     wanted = one.wanted
-    parts += [f", wanted {_escape(wanted)}"] if wanted else []
-    parts += [f": {_escape(one.reason)}"] if one.reason else []
+    parts += [f", wanted {escaped(wanted)}"] if wanted else []
+    parts += [f": {escaped(one.reason)}"] if one.reason else []
     return "".join(parts)
 
 
@@ -114,16 +114,16 @@ def _fix(report: Report, fix: FixEntry) -> Iterator[str]:
     yield from ("", *_fenced("\n".join(report.apply), "sh"))
     if fix.alternatives:
         yield from ("", "Or:", "")
-        yield from (f"- {_escape(other.sentence(report.odds_as_driven))}" for other in fix.alternatives)
+        yield from (f"- {escaped(other.sentence(report.odds_as_driven))}" for other in fix.alternatives)
 
 
 def _since(since: SinceEntry) -> Iterator[str]:
-    yield from ("", f"## Changed since {_code(Path(since.log).name)}", "")
-    lines = [f"- {_escape(warning)}" for warning in since.warnings]
+    yield from ("", f"## Changed since {code(Path(since.log).name)}", "")
+    lines = [f"- {escaped(warning)}" for warning in since.warnings]
     for change in since.changes:
         option = f" ({change.option})" if change.option and change.option != change.parameter else ""
-        values = f"{_escape(shown(change.from_))} → {_escape(shown(change.to))}"
-        lines.append(f"- {_code(change.parameter)}{option}: {values}")
+        values = f"{escaped(shown(change.from_))} → {escaped(shown(change.to))}"
+        lines.append(f"- {code(change.parameter)}{option}: {values}")
     yield from _at_most(lines)
     if not since.changes:
         yield "No parameter that anybody sets."
@@ -139,9 +139,9 @@ def _account(report: Report) -> Iterator[str]:
 def _origin(report: Report) -> Iterator[str]:
     log, profile = report.log, report.profile
     sha256 = f", SHA-256 `{log.sha256}`" if log.sha256 else ""
-    yield from ("", f"Log {_code(Path(log.path).name)}, {log.format}, {log.duration_s:.0f} s{sha256}.")
+    yield from ("", f"Log {code(Path(log.path).name)}, {log.format}, {log.duration_s:.0f} s{sha256}.")
     if profile is not None:
-        yield _escape(f"Profile {profile.title} {profile.version} ({profile.platform}).")
+        yield escaped(f"Profile {profile.title} {profile.version} ({profile.platform}).")
     for damage in log.damage[:5]:
         yield f"Damage: {_clipped(damage.what)}."
     if len(log.damage) > 5:
@@ -161,7 +161,7 @@ def _at_most(lines: list[str]) -> Iterator[str]:
 
 
 def _clipped(text: str) -> str:
-    return _escape(text if len(text) <= _MOST_CHARACTERS else f"{text[: _MOST_CHARACTERS - 4]} ...")
+    return escaped(text if len(text) <= _MOST_CHARACTERS else f"{text[: _MOST_CHARACTERS - 4]} ...")
 
 
 def _folded(title: str, text: str, language: str) -> Iterator[str]:
@@ -175,12 +175,12 @@ def _fenced(text: str, language: str) -> Iterator[str]:
     yield from (f"{fence}{language}", text, fence)
 
 
-def _escape(text: str) -> str:
+def escaped(text: str) -> str:
     """A text that is no markup, calls nobody by name and becomes no link."""
     return _LINKS.sub(r"\\", _SPECIAL.sub(r"\\\1", text)).replace("@", "(at)")
 
 
-def _code(text: str) -> str:
+def code(text: str) -> str:
     """A code span: nothing in it is escaped, so its fence is longer than any run of backticks inside."""
     fence = "`" * (1 + _longest_run(text))
     pad = " " if "`" in text else ""

@@ -41,6 +41,14 @@ def fleet() -> None:
     _print(fleet_schema())
 
 
+@app.command("compare")
+def compare() -> None:
+    """Print the JSON Schema of 'care compare --json'."""
+    from care_core.report.comparison import compare_schema
+
+    _print(compare_schema())
+
+
 @app.command("doctor")
 def doctor() -> None:
     """Print the JSON Schema of 'care doctor --json'."""
