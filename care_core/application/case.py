@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from care_core.logs.base import Log
     from care_core.logs.digest import Sha256
     from care_core.profile.store import Profile
-    from care_core.run import ProfileChoice, Setting
+    from care_core.run import ProfileChoice, Robot, Setting
     from care_core.variables import Variable
 
 Progress = Callable[[str, float], None]
@@ -99,10 +99,11 @@ def open_case(request: Request, progress: Progress) -> Case:
             except NoMissionError as err:
                 reason = err.message[:1].lower() + err.message[1:].rstrip(".")
                 choice = replace(choice, fit=Fit("no", (*choice.fit.reasons, reason)))
+        robot = _robot(log, request)
         if reading is None:
-            diagnosis = _of_robot(_plainly(model, choice, health, request, configs, sha256), log, request)
+            diagnosis = _of_robot(_plainly(model, choice, health, request, configs, sha256), robot)
             return Case(diagnosis, (), log, None, request.configs)
-        diagnosis = _of_robot(_diagnose(reading, request, progress), log, request)
+        diagnosis = _of_robot(_diagnose(reading, request, robot, progress), robot)
     return Case(diagnosis, reading.profile.schema.options, log, reading, request.configs)
 
 
@@ -131,11 +132,15 @@ def _model_of(log: Log, profile: Profile | None, configs: Sequence[ConfigFile]) 
     return model
 
 
-def _of_robot(diagnosis: Diagnosis, log: Log, request: Request) -> Diagnosis:
-    """The diagnosis with whose run it is."""
+def _robot(log: Log, request: Request) -> Robot | None:
+    """Whose log it is, by the operator or else by the log itself."""
     from care_core.extract.identity import identify, named
 
-    robot = named(request.robot) if request.robot else identify(log)
+    return named(request.robot) if request.robot else identify(log)
+
+
+def _of_robot(diagnosis: Diagnosis, robot: Robot | None) -> Diagnosis:
+    """The diagnosis with whose run it is."""
     run = diagnosis.run
     return replace(diagnosis, run=replace(run, log=replace(run.log, robot=robot)))
 
@@ -313,17 +318,19 @@ def _as_driven(path: Path | None) -> Good | None:
     return Good(settings, f"the configuration of {path.name}")
 
 
-def _diagnose(reading: Reading, request: Request, progress: Progress) -> Diagnosis:
+def _diagnose(reading: Reading, request: Request, robot: Robot | None, progress: Progress) -> Diagnosis:
+    from care_core.application.last_good import last_good
     from care_core.diagnose.triage import triage
     from care_core.logs.opening import open_log
 
     progress("judging the objectives", 0.6)
+    log = reading.judged.run.log
     return triage(
         reading.judged,
         reading.profile,
         reading.choice,
         keep=request.keep,
-        since=None if request.since is None else open_log(request.since),
+        since=last_good(robot, log) if request.since is None else open_log(request.since),
         health=reading.health,
         top=request.top,
         progress=progress,

@@ -74,6 +74,7 @@ from care_core.run import Evidence, LogInfo, MissionInfo, ProfileChoice, Run, Se
 from care_core.text import listed
 from care_core.variables import Variable
 
+FROM_HISTORY = "what was changed since this robot's last good run in the history counts as evidence"
 BESIDE = 0.3
 """Share of the leading parameter's probability from which an option is changed with it."""
 MIN_CONTRIBUTION = 0.02
@@ -109,7 +110,7 @@ def triage(
     choice: ProfileChoice,
     *,
     keep: Collection[str] = (),
-    since: Log | None = None,
+    since: Log | Mapping[str, Setting] | None = None,
     health: Health = NOTHING_SEEN,
     top: int = 5,
     progress: Progress | None = None,
@@ -119,22 +120,26 @@ def triage(
     Args:
         health: what happened in the log, with the findings that compete with parameters.
         keep: options that must stay as they are.
-        since: the log of a good run; what changed since then is told as evidence.
+        since: the log of a good run; what changed since then is told as evidence. Or the parameters of one that a
+            history holds: what changed counts, and is told of those that may have lost this run.
         top: most causes to report per fault.
 
     Raises:
         CareError: the profile has no usable model, or no such option.
     """
     check_wishes(profile.schema, keep, {})
-    good = None if since is None else {name: history[-1] for name, history in since.settings().items()}
+    remembered = since if isinstance(since, Mapping) else None
+    log = None if isinstance(since, Mapping) else since
+    good = remembered if log is None else {name: history[-1] for name, history in log.settings().items()}
     diagnosis = diagnose(judged, profile, choice, keep=keep, health=health, top=top, good=good, progress=progress)
     notes = provenance.notes(profile.schema, judged.run, judged.configs, judged.given)
-    diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *notes))
-    if since is None:
+    told = (FROM_HISTORY,) if remembered and diagnosis.outside else ()
+    diagnosis = replace(diagnosis, notes=(*diagnosis.notes, *notes, *told))
+    if log is None:
         return diagnosis
     if progress is not None:
         progress("comparing with the good log", 0.95)
-    return with_evidence(diagnosis, compare(judged, since, profile))
+    return with_evidence(diagnosis, compare(judged, log, profile))
 
 
 def diagnose(

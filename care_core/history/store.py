@@ -196,6 +196,16 @@ class History(Record):
             newest.setdefault((triaged.recording or str(number), triaged.mission, of_profile), triaged)
         return tuple(newest.values())
 
+    def runs_of(self, robot: str) -> Iterator[Triaged]:
+        """The remembered triages of the robot with this id, the latest first, each read when it is asked for. Raises
+        HistoryError."""
+        numbers = self._read("select id from triages where robot = ? order by id desc", (robot,))
+        for (number,) in numbers:
+            columns = "at, log_path, mission, document, about, settings"
+            yield from (
+                self._triaged(*row) for row in self._read(f"select {columns} from triages where id = ?", (number,))
+            )
+
     def triage_of(self, sha256: str, terms: str = "") -> Triaged | None:
         """The last triage of a log by what it holds, judged by these terms; None where there is none. Raises
         HistoryError."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterator, Mapping
 
 from care_core.configs.driven import same_value
-from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX
+from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import Meaning, meaning_of
@@ -28,7 +28,7 @@ class OffParameter(Record):
     default: float
     meaning: Meaning
     is_changed: bool | None
-    """Whether it differs from the last good run; None where none is known."""
+    """Whether it differs from the last good run; None where that is not known."""
     is_out_of_range: bool
     """Whether it lies outside its documented range, or is no documented code."""
     is_code: bool
@@ -49,7 +49,8 @@ def off_parameters(
 
     Args:
         modelled: parameters of the profile's options, by their names in the log.
-        good: the parameters of the last good run, None where none is known.
+        good: the parameters of the last good run, None where none is known; a history keeps none that a vehicle writes
+            itself.
     """
     for name, setting in settings.items():
         if name in modelled or _is_nobodys(name) or not isinstance(setting.value, (int, float)):
@@ -57,7 +58,8 @@ def off_parameters(
         default = _default(setting, vehicle)
         before = None if good is None or name not in good else good[name].value
         last_good = float(before) if isinstance(before, (int, float)) else None
-        is_changed = None if good is None else last_good is None or not same_value(last_good, setting.value)
+        is_unknown = good is None or (name not in good and is_self_written(name))
+        is_changed = None if is_unknown else last_good is None or not same_value(last_good, setting.value)
         back = default if default is not None else last_good
         if back is None or (same_value(default, setting.value) and not is_changed):
             continue
