@@ -27,6 +27,7 @@ OPEN = "open"
 FAMILIES: Mapping[str, tuple[str, ...]] = {
     "opening": (OPEN,),
     "serving": ("serve",),
+    "assisting": ("mcp",),
     "diagnosing": ("triage", "demo"),
     "comparing": ("compare",),
     "fleet": ("fleet",),

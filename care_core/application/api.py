@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from care_core.configs.edit import EditedFile
     from care_core.diagnose.whatif import Answer
     from care_core.logs.base import Log
+    from care_core.report.document import TriageDocument
     from care_core.report.inspection import InspectDocument
     from care_core.report.verification import VerifyDocument
 
@@ -80,7 +81,7 @@ def compare(a: Request | str | Path, b: Request | str | Path, progress: Progress
 
 
 def verify(
-    report: str | Path,
+    report: TriageDocument | str | Path,
     log: Request | str | Path,
     profile: str | None = None,
     mission: int | None = None,
@@ -89,6 +90,7 @@ def verify(
     """What became of a report's promise in the run of a later log, which is triaged for that.
 
     Args:
+        report: its file, or the document itself.
         log: also the whole request, which then says what the others would.
         profile: another than that of the report, by name or folder.
         reference: the configuration that the run is judged against, as in the triage that wrote the report.
@@ -103,7 +105,10 @@ def verify(
     from care_core.report.suggested import report_profile
     from care_core.report.verification import promise_of, verify_document
 
-    promised, path = read_report(report), Path(report)
+    if isinstance(report, (str, Path)):
+        promised, path = read_report(report), Path(report)
+    else:
+        promised, path = report, Path(report.log.path)
     good = None if reference is None else Path(reference)
     asked = log if isinstance(log, Request) else Request(Path(log), profile, mission=mission, reference=good)
     chosen = load_profile(asked.profile) if asked.profile else report_profile(promised, path)

@@ -33,6 +33,11 @@ def _profiles(ctx: typer.Context) -> None:
 @app.command("list")
 def list_profiles() -> None:
     """List the installed profiles, your own among them."""
+    emit(listed_profiles())
+
+
+def listed_profiles() -> str:
+    """A line for each installed profile. What is wrong with one that is left out goes to stderr."""
     from care_core.extract.select import sound_profiles
 
     sound, problems = sound_profiles()
@@ -42,12 +47,17 @@ def list_profiles() -> None:
     for problem in problems:
         say(f"care: {problem}")
     widths = [max((len(row[column]) for row in rows), default=0) for column in range(2)]
-    emit("".join(f"{name:<{widths[0]}}  {version:<{widths[1]}}  {platform}\n" for name, version, platform in rows))
+    return "".join(f"{name:<{widths[0]}}  {version:<{widths[1]}}  {platform}\n" for name, version, platform in rows)
 
 
 @app.command("show")
 def show(name: Annotated[str, typer.Argument(metavar="PROFILE")]) -> None:
     """Show what a profile knows. Its variables, ranges and thresholds, and which effects its runs cannot tell."""
+    emit(shown_profile(name))
+
+
+def shown_profile(name: str) -> str:
+    """What a profile knows, in lines. Raises ProfileError."""
     from care_core.profile.store import load_profile
 
     profile = load_profile(name)
@@ -58,7 +68,7 @@ def show(name: Annotated[str, typer.Argument(metavar="PROFILE")]) -> None:
     lines += ["", *_identified(profile)]
     verified = _verified(schema)
     lines += ["", verified] if verified else []
-    emit("\n".join(lines) + "\n")
+    return "\n".join(lines) + "\n"
 
 
 def _identified(profile: Profile) -> list[str]:
