@@ -7,6 +7,8 @@ import shlex
 import sys
 from pathlib import Path
 
+from care_core.starting import interpreter
+
 DISTRIBUTION = "care-tui"
 EXTRAS = {
     "learn": "train profiles, write Parquet",
@@ -28,11 +30,11 @@ def install_command(extra: str = "") -> str:
     here = Path(sys.prefix)
     if (here / "uv-receipt.toml").is_file():
         again = wanted if extra else f"--reinstall {DISTRIBUTION}"
-        return f"uv pip install --python {shlex.quote(sys.executable)} {again}"
+        return f"uv pip install --python {shlex.quote(interpreter())} {again}"
     if (here / "pipx_metadata.json").is_file():
         return f"pipx runpip {DISTRIBUTION} install {wanted}"
     is_active = os.environ.get("VIRTUAL_ENV") == sys.prefix
-    return f"{'' if is_active else f'{shlex.quote(sys.executable)} -m '}pip install {wanted}"
+    return f"{'' if is_active else f'{shlex.quote(interpreter())} -m '}pip install {wanted}"
 
 
 def install_hint(extra: str) -> str:

@@ -26,6 +26,11 @@ def script_command(script: str, *words: str) -> list[str]:
     return [sys.executable, *_flags(), script, *words]
 
 
+def interpreter() -> str:
+    """Where the interpreter is that runs this program."""
+    return sys.executable
+
+
 def python_command(code: str, *words: str) -> list[str]:
     """The command that runs `code` in an interpreter that imports from where this one does."""
     places = [place for place in sys.path if os.path.isabs(place)]

@@ -17,8 +17,9 @@ from mcp import StdioServerParameters
 from mcp.client.client import Client
 from mcp.client.stdio import stdio_client
 
+import care_core
+from care_core.application.case import Case, Request
 from care_core.errors import UsageError
-from care_tui.assistant import tools
 from care_tui.assistant.answers import MOST_BYTES, part_of
 from care_tui.assistant.folders import Folders
 from care_tui.assistant.server import server
@@ -163,9 +164,14 @@ def test_the_history_tells_of_logs_below_the_folders_alone(folder: Path, care: C
 
 def test_a_log_that_changes_is_read_again(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = Path(shutil.copy(folder / GOOD, tmp_path))
-    count = []
-    triage = tools.care_core.triage
-    monkeypatch.setattr(tools.care_core, "triage", lambda request: count.append(request) or triage(request))
+    count: list[Request] = []
+    triage = care_core.triage
+
+    def counted(request: Request) -> Case:
+        count.append(request)
+        return triage(request)
+
+    monkeypatch.setattr(care_core, "triage", counted)
     asked = Tools([tmp_path])
     assert "OK" in asked.triage(GOOD)
     assert asked.triage(GOOD, part=1)
