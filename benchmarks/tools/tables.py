@@ -7,6 +7,7 @@ between the two lines is what `TABLES[NAME]` makes.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,12 +16,17 @@ from typer.main import get_command
 
 from care_core.lint.rules import RULES
 from care_core.logs.formats import FORMATS
+from care_core.metadata.causal_map import meaning_of
+from care_core.metadata.screening import flights_of, screened
 from care_core.profile.store import load_profile
 from care_core.report.formats import FILE_FORMATS
 from care_tui.cli import command_line
 from care_tui.manual import EXIT_STATUS, first_sentence
 
 PROFILES = Path(__file__).parents[2] / "profiles"
+SCREENED = {"arducopter": "copter", "ardurover": "rover"}
+"""The kind of vehicle of each profile whose vehicles' other parameters were screened."""
+MOST_PARTS = 16
 _TABLE = re.compile(r"<!-- table: (?P<name>[\w ]+) -->\n.*?<!-- end of table -->", re.DOTALL)
 
 
@@ -105,6 +111,33 @@ def _profile(folder: Path) -> Iterator[str]:
     yield f"{skill.calibration_error:.3f}"
 
 
+def screening() -> str:
+    """Which parameters outside the profiles were flown wrong one at a time, by vehicle and by what they belong to."""
+    header = (
+        "profile",
+        "parameters it models",
+        "others screened",
+        "values flown",
+        "of these lost",
+        "screened, by part",
+    )
+    return table(header, (_screened(profile, kind) for profile, kind in SCREENED.items()))
+
+
+def _screened(profile: str, kind: str) -> Iterator[str]:
+    names = screened(kind)
+    flights = [flight for name in names for flight in flights_of(name, kind)]
+    parts = Counter(meaning.part for name in names if (meaning := meaning_of(name, kind)) is not None)
+    yield f"`{profile}`"
+    yield str(len(load_profile(PROFILES / profile).schema.options))
+    yield str(len(names))
+    yield str(len(flights))
+    yield str(sum(flight.is_lost for flight in flights))
+    rest = parts.most_common()[MOST_PARTS:]
+    told = (f"{part} {count}" for part, count in parts.most_common(MOST_PARTS))
+    yield f"{', '.join(told)}, {len(rest)} other parts {sum(count for _, count in rest)}"
+
+
 TABLES: dict[str, Callable[[], str]] = {
     "commands": commands,
     "exit codes": exit_codes,
@@ -112,4 +145,5 @@ TABLES: dict[str, Callable[[], str]] = {
     "log formats": log_formats,
     "profiles": profiles,
     "report formats": report_formats,
+    "screening": screening,
 }

@@ -39,6 +39,11 @@ def flights_of(name: str, kind: str) -> tuple[Flight, ...]:
     return tuple(map(_flight, _lines().get((name, VEHICLES.get(kind, "")), ())))
 
 
+def screened(kind: str) -> tuple[str, ...]:
+    """The parameters that were screened on a kind of vehicle."""
+    return tuple(name for name, letter in _lines() if letter == VEHICLES.get(kind))
+
+
 @cache
 def _lines() -> Mapping[tuple[str, str], tuple[str, ...]]:
     """The lines of each parameter and vehicle."""

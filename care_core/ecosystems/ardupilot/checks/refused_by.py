@@ -88,8 +88,8 @@ def standing(flight: Flight) -> tuple[Refusal, ...]:
     estimator that was still starting, a gyro that was not yet quiet."""
     late = [one for one in flight.refusals if flight.refusals[-1].time_s - one.time_s < _REPEATED_S]
     told = {one.why: one.time_s for one in late}
-    attempts = sorted(one.time_s for one in late if one.was_tried)
-    rounds = [t for before, t in pairwise((-math.inf, *attempts)) if t - before > _ONE_ROUND_S]
+    times = sorted(one.time_s for one in late)
+    rounds = [t for before, t in pairwise((-math.inf, *times)) if t - before > _ONE_ROUND_S]
     passed = {why for why, last in told.items() if sum(t > last + _ONE_ROUND_S for t in rounds) >= _PASSED}
     return tuple(one for one in late if one.why not in passed)
 
