@@ -44,7 +44,7 @@ from care_core.diagnose.implied import implied
 from care_core.diagnose.judging import Judged, check_wishes, query_of, unread_options
 from care_core.diagnose.next_step import bench, trial, was_refused, was_upset
 from care_core.diagnose.outside import suspects_outside
-from care_core.diagnose.outside.change import Advisable, check_first, leading_outside, outside_fix
+from care_core.diagnose.outside.change import Advisable, check_first, leading_outside, outside_fix, shown_fix
 from care_core.diagnose.parts import mend_first, unmended
 from care_core.diagnose.ranking import (
     Suspect,
@@ -168,16 +168,17 @@ def diagnose(
             health.findings, failed=bool(missed), shown=said, verdict=choice.fit.verdict, outside=_weights(outside)
         )
         lead = leading_outside(told, outside, health.findings, run)
+        fix = shown_fix(lead, run)
         return Diagnosis(
             choice,
             run,
             objectives,
             (),
-            None,
+            fix,
             notes=(*_set_wrong(judged, told, said), *(() if run.checks else (_reference(judged),))),
             missions=judged.missions,
             health=health,
-            abstained=None if lead is None else check_first(lead),
+            abstained=None if lead is None or fix is not None else check_first(lead),
             hypotheses=told,
             outside=outside,
         )

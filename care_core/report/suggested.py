@@ -14,7 +14,7 @@ from care_core.ecosystems.vehicles import Kind, aliases_of
 from care_core.ecosystems.vehicles.vehicle import Vehicle
 from care_core.errors import ConfigError, nearest
 from care_core.metadata.ardupilot import known_in
-from care_core.metadata.causal_map import meaning_of
+from care_core.metadata.causal_map import Role, meaning_of
 from care_core.profile.schema import Schema
 from care_core.profile.store import Profile, installed_profile
 from care_core.records import Record, replace
@@ -26,6 +26,11 @@ from care_core.variables import Variable, is_parameter_name
 _KINDS: tuple[Kind, ...] = ("copter", "quadplane", "rover")
 """Whose parameters have names of their own."""
 _KINDS_BY_WORD: dict[str, Kind] = {kind: kind for kind in _KINDS}
+BY_REPORTS: frozenset[Role] = frozenset(("choice",))
+"""Roles of parameters outside the profile that a report may set: how a vehicle is built, wired and calibrated, and what
+protects it, is set by nobody but its operator."""
+BY_HAND: frozenset[Role] = frozenset(("wiring", "calibration"))
+"""Those that a report tells and its operator sets."""
 _MAKE_ANEW = "Do not act on this report: make one from the log with 'care triage LOG'."
 
 
@@ -59,17 +64,20 @@ def fix_sets(fix: FixEntry) -> Iterator[tuple[str, FixSet]]:
         yield f"fix.alternatives[{place}]", one
 
 
-def suggested_changes(one: FixSet, schema: Schema, path: Path, key: str) -> tuple[SuggestedChange, ...]:
+def suggested_changes(
+    one: FixSet, schema: Schema, path: Path, key: str, roles: frozenset[Role] = BY_REPORTS
+) -> tuple[SuggestedChange, ...]:
     """The changes of a fix, or of an alternative, as the profile knows them.
 
     Args:
         key: where in the report it stands.
+        roles: of the parameters outside the profile that it may be of.
 
     Raises:
         ConfigError: a change is of no option, of a parameter that is not the option's, or twice there.
     """
     changes = tuple(
-        _suggested(change, schema, path, f"{key}.changes[{place}]") for place, change in enumerate(one.changes)
+        _suggested(change, schema, path, f"{key}.changes[{place}]", roles) for place, change in enumerate(one.changes)
     )
     if not changes:
         raise _strange("there is no change", path, f"{key}.changes")
@@ -95,9 +103,12 @@ def check_acceptable(change: SuggestedChange, path: Path) -> None:
     raise _strange(said, path, f"{change.key}.to")
 
 
-def _suggested(change: ChangeEntry, schema: Schema, path: Path, key: str) -> SuggestedChange:
+def _suggested(change: ChangeEntry, schema: Schema, path: Path, key: str, roles: frozenset[Role]) -> SuggestedChange:
     options = {option.name: option for option in schema.options}
-    option = options.get(change.option) or _outside(change.option, schema)
+    option = options.get(change.option) or _outside(change.option, schema, roles)
+    if option is None and _outside(change.option, schema, BY_HAND) is not None:
+        said = f"{clean(change.option)} belongs to how this vehicle is wired or calibrated, which no report sets"
+        raise ConfigError(f"{said}.", hint="Set it by hand, where it is right.", where=f"{path}: {key}.option")
     if option is None:
         said = f"profile '{schema.name}' has no parameter '{clean(change.option)}'"
         raise _strange(f"{said}. {nearest(change.option, options)}".rstrip(), path, f"{key}.option")
@@ -113,12 +124,11 @@ def _suggested(change: ChangeEntry, schema: Schema, path: Path, key: str) -> Sug
     return SuggestedChange(driven, _digits(before), _digits(value), change.assumed, key)
 
 
-def _outside(name: str, schema: Schema) -> Variable | None:
-    """A parameter that no option of the profile sets, as far as a report may suggest it: one that the firmware
-    documents and an operator chooses. How a vehicle is built and wired, and what protects it, no report sets."""
+def _outside(name: str, schema: Schema, roles: frozenset[Role]) -> Variable | None:
+    """A parameter that no option of the profile sets, where the firmware documents it and it has one of these roles."""
     vehicle = Vehicle(_KINDS_BY_WORD.get(schema.match.get("vehicle", ""), "unknown"), "", "", None)
     meaning = meaning_of(name, vehicle.kind) if is_parameter_name(name) else None
-    if meaning is None or meaning.role != "choice" or not known_in(name):
+    if meaning is None or meaning.role not in roles or not known_in(name):
         return None
     return outside_option(name, None, vehicle)
 

@@ -32,7 +32,7 @@ from care_core.report.document import (
 )
 from care_core.report.published import Document, publish, publishable
 from care_core.report.reading import profile_of
-from care_core.report.suggested import fix_sets, suggested_changes
+from care_core.report.suggested import BY_HAND, BY_REPORTS, fix_sets, suggested_changes
 from care_core.run import Run
 from care_core.text import clean, wrapped
 from care_core.variables import Threshold
@@ -149,7 +149,10 @@ def promise_of(report: TriageDocument, schema: Schema, path: Path) -> Promise:
         },
         sets=tuple(
             PromisedSet(
-                {one.option.name: (one.before, one.value) for one in suggested_changes(fix, schema, path, key)},
+                {
+                    one.option.name: (one.before, one.value)
+                    for one in suggested_changes(fix, schema, path, key, BY_REPORTS | BY_HAND)
+                },
                 fix.odds,
                 {name: (predicted.low, predicted.high) for name, predicted in fix.predicted.items()},
             )

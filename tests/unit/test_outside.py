@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 import care_core
 from care_core.application.case import Case, predict
-from care_core.diagnose.outside.change import check_first, leading_outside, outside_fix, outside_option
+from care_core.diagnose.outside.change import (
+    Advisable,
+    check_first,
+    leading_outside,
+    outside_fix,
+    outside_option,
+    shown_fix,
+)
 from care_core.diagnose.outside.off import off_parameters
 from care_core.diagnose.outside.signs import Signs, signs_of
 from care_core.diagnose.outside.suspects import outside_suspects, phases_of
@@ -24,7 +31,7 @@ from care_core.metadata.screening import flights_of, plain_refusal
 from care_core.profile.store import load_profile
 from care_core.records import replace
 from care_core.report.document import ChangeEntry, FixSet
-from care_core.report.suggested import suggested_changes
+from care_core.report.suggested import BY_HAND, BY_REPORTS, suggested_changes
 from care_core.run import Setting
 from tests.made import TIME, made_run
 
@@ -228,9 +235,19 @@ def test_a_report_sets_what_an_operator_chooses_and_no_wiring_or_protection() ->
     schema = load_profile("arducopter").schema
     (change,) = suggested_changes(entry("RTL_LOIT_TIME", 5000), schema, Path("r"), "fix")
     assert change.option.parameters == ("RTL_LOIT_TIME",)
-    for name in ("FRAME_CLASS", "SERVO1_FUNCTION", "BATT_LOW_MAH", "ARMING_CHECK", "SCR_USER1", "NO_SUCH", "a b"):
-        with pytest.raises(ConfigError, match="cannot be acted on"):
+    for name in ("FRAME_CLASS", "SERVO1_FUNCTION", "SERVO1_TRIM", "COMPASS_ORIENT", "SCR_USER1"):
+        with pytest.raises(ConfigError, match="wired or calibrated, which no report sets"):
             suggested_changes(entry(name, 1.0), schema, Path("r"), "fix")
+    for name in ("BATT_LOW_MAH", "ARMING_CHECK", "NO_SUCH", "a b"):
+        for roles in (BY_REPORTS, BY_REPORTS | BY_HAND):
+            with pytest.raises(ConfigError, match="cannot be acted on"):
+                suggested_changes(entry(name, 1.0), schema, Path("r"), "fix", roles)
+
+
+def test_a_calibration_that_was_advised_can_be_verified_and_not_applied() -> None:
+    schema = load_profile("ardurover").schema
+    (change,) = suggested_changes(entry("SERVO1_TRIM", 1500.0), schema, Path("r"), "fix", BY_REPORTS | BY_HAND)
+    assert (change.option.name, change.value) == ("SERVO1_TRIM", 1500.0)
 
 
 @pytest.fixture(scope="module")
@@ -288,3 +305,15 @@ def test_the_value_that_every_screening_flight_had_is_harmless() -> None:
     tipped = Signs(frozenset({"tipped"}), frozenset({"tipped", "upset"}))
     assert "FRAME_TYPE" not in suspects(setting("FRAME_TYPE", 1, 0), tipped)
     assert "FRAME_TYPE" in suspects(setting("FRAME_TYPE", 13, 0), tipped)
+
+
+def test_what_the_log_shows_is_changed_without_odds_where_no_objective_could_be_judged() -> None:
+    lead = Advisable("SERVO3_MAX", 1620.0, 2000.0, 0.67, "an output ends", is_found=True, is_advised=True)
+    run = made_run()
+    rover = replace(run, log=replace(run.log, facts=ROVER))
+    fix = shown_fix(lead, rover)
+    assert fix is not None
+    assert [(one.option.name, one.suggested) for one in fix.changes] == [("SERVO3_MAX", 2000.0)]
+    assert fix.odds is None
+    for other in (None, replace(lead, is_found=False), replace(lead, is_advised=False)):
+        assert shown_fix(other, rover) is None

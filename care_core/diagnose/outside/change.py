@@ -12,7 +12,7 @@ from care_core.metadata import ardupilot
 from care_core.metadata.causal_map import Role as ParameterRole
 from care_core.metadata.causal_map import meaning_of
 from care_core.metadata.fact import Fact
-from care_core.records import Record
+from care_core.records import Record, replace
 from care_core.run import Run, shown
 from care_core.variables import Change, Role, ValueType, Variable
 
@@ -81,6 +81,14 @@ def outside_fix(one: Advisable, odds: float, run: Run, beside: Sequence[Change] 
     option = outside_option(one.name, one.wanted, vehicle_of_run(run))
     notes = ("takes effect after a reboot",) if option.reboot_required else ()
     return Fix((Change(option, one.value, one.wanted, notes), *beside), odds, {})
+
+
+def shown_fix(lead: Advisable | None, run: Run) -> Fix | None:
+    """The change that the log itself shows, where no objective could be judged and nothing has odds; None where it
+    shows none."""
+    if lead is None or not lead.is_advised or not lead.is_found:
+        return None
+    return replace(outside_fix(lead, lead.probability, run), shown_by=lead.why)
 
 
 def outside_option(name: str, default: float | None, vehicle: Vehicle) -> Variable:
