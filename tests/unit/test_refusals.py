@@ -272,3 +272,16 @@ def test_what_later_attempts_no_longer_say_had_passed() -> None:
     assert "SERVO2_MAX" in named(made.tables())
     made.rows["MSG"] = [row for row in made.rows["MSG"] if starting in str(row[1]["Message"])]
     assert named(made.tables()) == ("EK3_VELNE_M_NSE",)
+
+
+@pytest.mark.parametrize("text", ["Need 3D Fix", "Need Position Estimate", "Throttle too high", "High GPS HDOP"])
+def test_what_real_vehicles_were_refused_for_in_passing_names_nothing_that_is_calibrated(text: str) -> None:
+    """A real copter's parameters that are off their defaults for good: compass, accelerometers, radio, battery."""
+    calibrated: dict[str, Off] = {
+        "COMPASS_OFS_X": (-37.2, 0), "COMPASS_OFS_Y": (81.5, 0), "INS_ACCOFFS_X": (0.11, 0), "INS_ACCSCAL_Z": (0.99, 1),
+        "RC3_MIN": (982, 1100), "RC3_TRIM": (982, 1500), "BATT_CAPACITY": (5200, 3300), "MOT_THST_HOVER": (0.27, 0.35),
+        "AHRS_TRIM_X": (0.008, 0), "RTL_ALT": (3000, 1500), "WPNAV_SPEED": (800, 500), "EK3_MAG_CAL": (3, 3),
+    }  # fmt: skip
+    finding = refused(text, **calibrated)
+    assert finding.parameters == ()
+    assert finding.suspect in ("operation", "world", "parameter")
