@@ -397,6 +397,15 @@ def test_outputs_that_end_before_it_rises(parameter: str, value: float, shipped:
     assert "the outputs end at 1600 us of 2000" in finding.evidence
 
 
+def test_a_range_that_one_motor_alone_spends_is_that_motors_weakness() -> None:
+    made = MadeWithDefaults()
+    stays_down(made)
+    made.drive("MOT_SPIN_MAX", 0.6, 0.95)
+    for number, output in enumerate(made.table["RCOU"].values()):
+        output[made.after(ARMED_S + 3, DOWN_S)] = 1600.0 if number == 3 else 1380.0
+    assert not [one for one in made.find() if "MOT_SPIN_MAX" in one.parameters]
+
+
 def test_a_throttle_that_swings_names_the_gain_that_was_raised() -> None:
     made = MadeWithDefaults()
     flying = made.after(UP_S + 1, DOWN_S - 1)

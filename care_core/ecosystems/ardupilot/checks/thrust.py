@@ -45,7 +45,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     driven = flight.throttle
     if not flight.is_copter or flight.kind == "heli" or driven is None:
         return  # what a helicopter records as throttle is its collective pitch
-    if hover.kept_from_range(flight) is not None and hover.spent_on_ground(flight) is not None:
+    if hover.kept_down(flight) is not None:
         return  # a parameter keeps it down
     t, throttle = driven
     flown = during(flight.flown or flight.watched, t) & (throttle > _FLYING)

@@ -11,12 +11,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from care_core.ecosystems.ardupilot.flight import Flight
-from care_core.ecosystems.ardupilot.spans import during
+from care_core.ecosystems.ardupilot.spans import Span, during
 from care_core.ecosystems.ardupilot.statistics import lasting, smooth
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding
 from care_core.logs.base import Wanted
-from care_core.numbers import median
+from care_core.numbers import known_median, median
 from care_core.records import Record
 from care_core.run import shown
 
@@ -27,6 +27,9 @@ _SPENT = LIMITS.add("throttle that lifts any vehicle", 0.6875, "", "AP_MotorsMul
 _GROUNDED_S = LIMITS.add("such a throttle on the ground", 10.0, "s", "a choice: a take-off takes less")
 _KEPT = LIMITS.add("range of the outputs that is left", 0.9, "", "a choice: a share of the range as shipped")
 _REACHED = LIMITS.add("outputs that reach what is left of it", 0.05, "", "a choice: a share of the range as shipped")
+_ALL = LIMITS.add(
+    "output of the middle motor", 0.85, "", "a choice: a share of the highest; a weak motor leaves it 0.7"
+)
 _SWINGS = LIMITS.add(
     "throttle off its mean of three seconds",
     0.2,
@@ -72,8 +75,8 @@ def find(flight: Flight) -> Iterator[Finding]:
 
 
 def _kept_down(flight: Flight) -> Iterator[Finding]:
-    kept, span = kept_from_range(flight), spent_on_ground(flight)
-    if kept is not None and span is not None:
+    if (down := kept_down(flight)) is not None:
+        kept, span = down
         yield Finding(
             kind="thrust",
             title="too little thrust to take off",
@@ -89,7 +92,23 @@ def _kept_down(flight: Flight) -> Iterator[Finding]:
         )
 
 
-def spent_on_ground(flight: Flight) -> tuple[float, float] | None:
+def kept_down(flight: Flight) -> tuple[Kept, Span] | None:
+    """The parameter that keeps a copter on the ground, and when; None where none does, and where one motor alone is at
+    its end while the others have range left: that is a motor's own weakness."""
+    kept, span = kept_from_range(flight), _spent_on_ground(flight)
+    return None if kept is None or span is None or not _all_are_spent(flight, span) else (kept, span)
+
+
+def _all_are_spent(flight: Flight, span: Span) -> bool:
+    """Whether the outputs of half the motors are near the highest, for half of a time; where none are recorded, too."""
+    tables = [(n, flight.one("RCOU", f"C{n}")) for n in range(1, 5)]
+    outputs = [table.between(*span)[f"C{n}"] for n, table in tables if table is not None]
+    levels = [float(known_median(one)) for one in outputs if np.isfinite(one).any()]
+    least = flight.setting("MOT_PWM_MIN") or 0.0
+    return not levels or float(np.median(levels)) - least >= _ALL * (max(levels) - least)
+
+
+def _spent_on_ground(flight: Flight) -> Span | None:
     """The first span in which a copter that never flew spends its throttle; None where there is none."""
     if flight.throttle is None or flight.airborne:
         return None
