@@ -38,6 +38,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
     "past": ("history",),
     "watching": ("watch",),
     "logs": ("inspect", "params", "ingest"),
+    "recording": ("record",),
     "collecting": ("collect",),
     "learning": ("train", "update", "evaluate"),
     "doctor": ("doctor",),

@@ -6,7 +6,7 @@ One package each (`ardupilot`, `px4`, `ros`), and one line each in `registry`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Any, ClassVar, Generic, TypeVar
 
 from care_core.ecosystems.dialect import Dialect
@@ -15,7 +15,7 @@ from care_core.ecosystems.findings import Event, Finding, Health
 from care_core.logs import formats
 from care_core.logs.base import Channel, Log, Table, Wanted, merge_needs
 from care_core.logs.formats import LogFormat
-from care_core.records import Record
+from care_core.records import Record, field
 from care_core.run import Robot, Setting
 
 
@@ -91,6 +91,15 @@ class RunModel:
         return any(field not in self._read.get(name, ()) for name, fields in plan.items() for field in fields)
 
 
+class Recording(Record):
+    """What is to be in the next log. Topics of ROS, or parameters that have a vehicle log it."""
+
+    channels: tuple[str, ...] = ()
+    settings: Mapping[str, float] = field(default_factory=dict)
+    remarks: Mapping[str, str] = field(default_factory=dict)
+    """By parameter, what its value is for."""
+
+
 class Ecosystem(ABC):
     """Everything that the program knows of one ecosystem. What is heavy is imported by the method that needs it."""
 
@@ -151,6 +160,14 @@ class Ecosystem(ABC):
     def how_to_record(self, channel: str) -> str:
         """What to do to have a channel in the next log; "" where it is none of this ecosystem's."""
         return ""
+
+    def to_record(self, channels: Collection[str], vehicle: str) -> Recording:
+        """What to record, and what to set for it, to have these channels and what its health checks read.
+
+        Args:
+            vehicle: `copter`, `rover`, ..., where that decides; empty where it is not known.
+        """
+        return Recording(tuple(sorted(channels)))
 
     def stack(self, facts: Mapping[str, str]) -> str:
         """The name of its software under which tables of parameters know it: `ros1` and `ros2` differ."""

@@ -42,6 +42,8 @@ class Message(Record):
     at_times: bool = False
     """Whether it is written only while there is something to say, so that its silence is no hole: commands,
     controllers that steer, texts."""
+    log_bits: int = 0
+    """Bits of the parameter that has a vehicle write it; 0 where it always does, or nothing is known of it."""
     how_to_record: str = ""
     """What to do to have it in the next log: "set 'GPS' (4) in LOG_BITMASK"."""
 

@@ -10,8 +10,8 @@ from care_core.errors import LogError
 from care_core.files import read_small_text
 from care_core.folders import files_in, may_list
 from care_core.logs.ros_log import Flaw
-from care_core.logs.ros_metadata import FILE_NAME, Metadata, parse_metadata
-from care_core.records import Record, field
+from care_core.logs.ros_metadata import FILE_NAME, PARAMETERS_NAME, Metadata, parse_metadata
+from care_core.records import Record, field, replace
 
 ROS2_SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 ROS1_SUFFIXES = (".bag", ".bag.active")
@@ -117,10 +117,16 @@ def _siblings(path: Path, metadata: Metadata) -> list[str]:
 
 
 def _metadata_beside(folder: Path) -> Metadata:
+    """What the recorder wrote of a recording, and the parameters that `care record` wrote beside it."""
     try:
-        return parse_metadata(read_small_text(folder / FILE_NAME, errors="replace"))
+        metadata = parse_metadata(read_small_text(folder / FILE_NAME, errors="replace"))
     except OSError:
-        return Metadata()
+        metadata = Metadata()
+    try:
+        parameters = read_small_text(folder / PARAMETERS_NAME, errors="replace")
+    except OSError:
+        return metadata
+    return replace(metadata, custom={**metadata.custom, PARAMETERS_NAME: parameters})
 
 
 def parse_part(name: str) -> tuple[str, int] | None:

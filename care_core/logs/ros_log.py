@@ -274,7 +274,8 @@ class RosLog:
         """Every value of every parameter that the log tells.
 
         `<namespace>/<parameter>` for dynamic_reconfigure, `<node>.<parameter>` for `/parameter_events` and for
-        parameters that the recorder was given (`custom_data`); booleans as 0 or 1, lists as text.
+        parameters that the recorder was given (`custom_data`) or that `care record` wrote beside the recording;
+        booleans as 0 or 1, lists as text.
         """
         return self._settings
 
@@ -282,9 +283,9 @@ class RosLog:
     def _settings(self) -> Mapping[str, tuple[Setting, ...]]:
         types = {c.topic: short_name(c.type) for part in self._parts for c in part.connections.values()}
         fields = setting_fields(types)
-        told = settings_in(types, self.read(fields)) if fields else {}
+        told = settings_in(types, self.read(fields) if fields else {}, self._metadata.settings())
         self._broken_settings = dict(self._broken)
-        return {**self._metadata.settings(), **told}
+        return told
 
     def _gather(
         self, part: Part, decoders: Mapping[int, Decoder], at_most: Mapping[str, int]

@@ -10,6 +10,8 @@ from care_core.records import Record, field, replace
 from care_core.run import Setting
 
 FILE_NAME = "metadata.yaml"
+PARAMETERS_NAME = "care_parameters.yaml"
+"""Beside a recording the parameters of all nodes at its start, as `ros2 param dump` prints them."""
 
 _ROOT = "rosbag2_bagfile_information"
 _PARAMETERS = "ros__parameters"

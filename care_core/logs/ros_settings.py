@@ -41,9 +41,11 @@ def setting_fields(types: Mapping[str, str]) -> Wanted:
     return wanted
 
 
-def settings_in(types: Mapping[str, str], tables: Mapping[str, Table]) -> dict[str, tuple[Setting, ...]]:
-    """Per parameter the values it had, in time order and without repeats."""
-    histories: Histories = {}
+def settings_in(
+    types: Mapping[str, str], tables: Mapping[str, Table], before: Mapping[str, tuple[Setting, ...]]
+) -> dict[str, tuple[Setting, ...]]:
+    """Per parameter the values it had, in time order and without repeats; `before`, what was told of the start."""
+    histories: Histories = {name: list(history) for name, history in before.items()}
     for topic in sorted(tables):
         if types[topic] == _CONFIG:
             namespace = topic.rpartition("/")[0]

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from care_core import plain_yaml
 from care_core.errors import ConfigError, UsageError
 from care_core.files import read_small_text
 from care_core.history.store import SWITCH, HistoryError
@@ -62,6 +61,8 @@ def profile_of(report: TriageDocument) -> ProfileEntry:
 
 
 def _load(path: Path) -> Any:
+    from care_core import plain_yaml  # a triage with a history reads what it remembers, which is JSON
+
     try:
         text = read_small_text(path, encoding="utf-8-sig")
     except OSError as err:

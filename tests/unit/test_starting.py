@@ -114,6 +114,7 @@ STARTERS = {
     "care_core/collect/mission.py": {"subprocess", "sys.executable"},  # {python} of the operator's own command
     "care_core/collect/guard.py": {"subprocess"},
     "care_core/application/notifying.py": {"subprocess"},
+    "care_core/application/recorder.py": {"subprocess"},
     "care_tui/commands/watching.py": {"subprocess"},
     "care_tui/commands/doctor.py": {"subprocess"},
     "care_tui/web.py": {"textual_serve"},

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
 from care_core.ecosystems.ardupilot.dialect import ARDUPILOT_PARAM
-from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.base import Check, Ecosystem, Recording, RunModel
 from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.dictionary import Dictionary, find_message
 from care_core.ecosystems.findings import Event, Health
 from care_core.logs.base import Channel, Log
 from care_core.logs.formats import LogFormat
 from care_core.run import Robot
+
+_COPTER_BITS, _OTHER_BITS = 176126, 65535
+"""LOG_BITMASK as ArduCopter, Plane and Rover are delivered (their Parameters.cpp, 4.0 to 4.6)."""
 
 
 class ArduPilot(Ecosystem):
@@ -76,6 +79,23 @@ class ArduPilot(Ecosystem):
     def how_to_record(self, channel: str) -> str:
         known = find_message(self.messages(), channel.partition(" ")[0])
         return f"{known.how_to_record}, so that the vehicle writes {channel}" if known and known.how_to_record else ""
+
+    def to_record(self, channels: Collection[str], vehicle: str) -> Recording:
+        messages = self.messages()
+        known = [found for name in channels if (found := find_message(messages, name)) is not None]
+        bits = _COPTER_BITS if vehicle == "copter" else _OTHER_BITS
+        if vehicle == "copter":
+            for one in known:
+                bits |= one.log_bits
+        return Recording(
+            tuple(sorted(channels)),
+            {"LOG_BITMASK": bits, "LOG_DISARMED": 1, "LOG_BACKEND_TYPE": 1},
+            {
+                "LOG_BITMASK": "the firmware's default and what is read",
+                "LOG_DISARMED": "what refuses to arm is in the log, too",
+                "LOG_BACKEND_TYPE": "to the card",
+            },
+        )
 
 
 ECOSYSTEM = ArduPilot()

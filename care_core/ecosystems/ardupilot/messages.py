@@ -9,6 +9,7 @@ and receivers at up to 20 Hz, its main loop runs at 400 Hz, its gyros at 8 kHz.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import TypedDict
 
 from care_core.ecosystems.dictionary import Dictionary, Field, Message
 from care_core.logs.base import Wanted
@@ -31,9 +32,14 @@ def _axes(
     return {f"{name}{axis}": Field(unit, label, plausible=most) for axis in axes}
 
 
-def _set(bits: int, name: str) -> str:
+class _Logged(TypedDict):
+    log_bits: int
+    how_to_record: str
+
+
+def _set(bits: int, name: str) -> _Logged:
     """How to have messages written that bits of ArduCopter's LOG_BITMASK stand for."""
-    return f"set '{name}' ({bits}) in LOG_BITMASK"
+    return {"log_bits": bits, "how_to_record": f"set '{name}' ({bits}) in LOG_BITMASK"}
 
 
 _ATTITUDE, _NAVIGATION, _PID = _set(1 | 2, "attitude"), _set(32, "navigation tuning"), _set(4096, "PID")
@@ -68,7 +74,7 @@ def _along(axis: str, end: str, *, is_position: bool) -> Message:
             f"DA{end}": Field("m/s2", f"acceleration {axis} planned"),
         },
         at_times=True,
-        how_to_record=_NAVIGATION,
+        **_NAVIGATION,
     )
 
 
@@ -82,7 +88,7 @@ _FLIGHT: Dictionary = {
             "DesPitch": Field("deg", former=("PitchIn",)),
             "DesYaw": Field("deg", former=("NavYaw",)),
         },
-        moving=("Roll", "Pitch"), fastest_hz=1_000.0, slowest_s=30.0, how_to_record=_ATTITUDE,
+        moving=("Roll", "Pitch"), fastest_hz=1_000.0, slowest_s=30.0, **_ATTITUDE,
     ),
     "RATE": Message(
         {
@@ -93,7 +99,7 @@ _FLIGHT: Dictionary = {
             "POut": Field(label="pitch output, -1 to 1"),
             "YOut": Field(label="yaw output, -1 to 1"),
         },
-        fastest_hz=_GYROS_HZ, how_to_record=_ATTITUDE,
+        fastest_hz=_GYROS_HZ, **_ATTITUDE,
     ),
     "POS": Message(
         {
@@ -102,7 +108,7 @@ _FLIGHT: Dictionary = {
             "Alt": _placed("m", "height above the sea"),
             "RelHomeAlt": Field("m", "height above home", plausible=_HEIGHT_M, step=_STEP_M),
         },
-        moving=("Lat", "Lng"), fastest_hz=1_000.0, slowest_s=30.0, how_to_record=_ATTITUDE,
+        moving=("Lat", "Lng"), fastest_hz=1_000.0, slowest_s=30.0, **_ATTITUDE,
     ),
     "CTUN": Message(
         {
@@ -116,7 +122,7 @@ _FLIGHT: Dictionary = {
             "ThI": Field(former=("ThrIn",)),
             "ThrOut": Field(label="throttle"),
         },
-        how_to_record=_set(16, "control tuning"),
+        **_set(16, "control tuning"),
     ),
     "PSCN": _along("north", "N", is_position=True),
     "PSCE": _along("east", "E", is_position=True),
@@ -139,29 +145,29 @@ _FLIGHT: Dictionary = {
             "Lng": Field("deg", plausible=_LONGITUDE),
             "Alt": Field("m", plausible=_HEIGHT_M),
         },
-        in_bursts=True, at_times=True, how_to_record=_set(256, "mission commands"),
+        in_bursts=True, at_times=True, **_set(256, "mission commands"),
     ),
     "MODE": Message({"ModeNum": Field(former=("Mode",))}, at_times=True),
     **{name: Message({}, at_times=True) for name in ("ARM", "ERR", "EV", "MISE")},
     "PM": Message({"NL": Field(former=("NLoop",))}),
     **{name: Message({}, in_bursts=True, at_times=True) for name in ("PARM", "MSG", "RALY", "FNCE")},
-    **{name: Message({}, fastest_hz=_GYROS_HZ, how_to_record=_PID) for name in ("PIDR", "PIDP", "PIDY")},
-    "MOTB": Message({}, how_to_record=_set(131072, "motors")),
+    **{name: Message({}, fastest_hz=_GYROS_HZ, **_PID) for name in ("PIDR", "PIDP", "PIDY")},
+    "MOTB": Message({}, **_set(131072, "motors")),
 }  # fmt: skip
 _SENSORS: Dictionary = {
     "IMU": Message(
         _axes("Gyr", "rad/s", "rotation", most=(-100, 100)) | _axes("Acc", "m/s2", "acceleration", most=(-1e3, 1e3)),
-        ("IMU2", "IMU3"), "I", fastest_hz=_GYROS_HZ, how_to_record=_set(128, "IMU"),
+        ("IMU2", "IMU3"), "I", fastest_hz=_GYROS_HZ, **_set(128, "IMU"),
     ),
     "GYR": Message({}, fastest_hz=_GYROS_HZ),
     "ACC": Message({}, fastest_hz=_GYROS_HZ),
     "VIBE": Message(
         _axes("Vibe", "m/s2", "vibration", most=(0, 1e3)) | {"Clip": Field(former=("Clip0",))},
-        instance="IMU", how_to_record=_set(128, "IMU"),
+        instance="IMU", **_set(128, "IMU"),
     ),
     "MAG": Message(
         _axes("Mag", "mGauss", "magnetic field", most=(-32768, 32767)), ("MAG2", "MAG3"), "I",
-        how_to_record=_set(8192, "compass"),
+        **_set(8192, "compass"),
     ),
     "BARO": Message(
         {"Alt": Field("m", "height by the barometer"), "Press": Field("Pa", "air pressure")}, ("BAR2", "BAR3"), "I"
@@ -173,12 +179,12 @@ _SENSORS: Dictionary = {
             "HDop": Field(label="horizontal dilution", plausible=(0, 655.35)),
             "Spd": Field("m/s", "speed over ground"),
         },
-        ("GPS2", "GPSB"), "I", fastest_hz=100.0, how_to_record=_set(4, "GPS"),
+        ("GPS2", "GPSB"), "I", fastest_hz=100.0, **_set(4, "GPS"),
     ),
     "GPA": Message({}, ("GPA2",), "I"),
     "BAT": Message(
         _BATTERY_FIELDS, ("CURR", "BAT2", "CUR2", "CURR2"), "Inst", fastest_hz=100.0, slowest_s=60.0,
-        how_to_record=_set(512, "battery monitor"),
+        **_set(512, "battery monitor"),
     ),
     **{name: Message(_OLD_BATTERY_FIELDS) for name in ("CURR", "CUR2", "CURR2")},
     "RCOU": Message(
@@ -186,10 +192,10 @@ _SENSORS: Dictionary = {
             f"C{n}": Field("us", "motor and servo outputs", (f"Ch{n}", f"Chan{n}", f"Mot{n}"))
             for n in range(1, 15)
         },
-        ("MOT",), how_to_record=_set(1024, "RC output"),
+        ("MOT",), **_set(1024, "RC output"),
     ),
     "RCIN": Message(
-        {f"C{n}": Field("us", former=(f"Ch{n}", f"Chan{n}")) for n in range(1, 15)}, how_to_record=_set(64, "RC input")
+        {f"C{n}": Field("us", former=(f"Ch{n}", f"Chan{n}")) for n in range(1, 15)}, **_set(64, "RC input")
     ),
     "RFND": Message({"Dist": Field("m", former=("Dist1",))}, instance="Instance"),
     "ESC": Message({"RPM": Field("1/min")}, instance="Instance"),

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import Any
 
-from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.base import Check, Ecosystem, Recording, RunModel
 from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.dictionary import Dictionary
 from care_core.ecosystems.findings import Event, Health
@@ -55,6 +55,11 @@ class Px4(Ecosystem):
 
     def dialect(self, format: LogFormat, parameters: Iterable[str]) -> Dialect:
         return QGC_PARAMS
+
+    def to_record(self, channels: Collection[str], vehicle: str) -> Recording:
+        refusals = "from boot until disarmed: what refuses to arm is in the log, too"
+        remarks = {"SDLOG_MODE": refusals, "SDLOG_PROFILE": "the default set, which the health checks read"}
+        return Recording((), {"SDLOG_MODE": 1, "SDLOG_PROFILE": 1}, remarks)
 
     def robots(self, log: Log) -> Iterator[Robot]:
         from care_core.ecosystems.vehicles.identity import robots

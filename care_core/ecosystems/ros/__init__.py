@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, cast
 
-from care_core.ecosystems.base import Check, Ecosystem, RunModel
+from care_core.ecosystems.base import Check, Ecosystem, Recording, RunModel
 from care_core.ecosystems.dialect import Dialect
 from care_core.ecosystems.dictionary import Dictionary, Field, find_field
 from care_core.ecosystems.findings import Event, Health
@@ -26,6 +26,10 @@ _STATUS = "/_action/status"
 """How the topics end on which ROS 2 actions tell of their goals."""
 _DRIVES = "move_base", "navigate", "nav", "goto"
 """Part of the name of an action that drives: of a robot with an arm as well, its drive is judged."""
+
+
+_ALSO = ("/amcl_pose", "/diagnostics", "/rosout", "/scan", "/tf", "/tf_static")
+"""What health checks read of most robots, under the names that most give them."""
 
 
 class Ros(Ecosystem):
@@ -101,6 +105,9 @@ class Ros(Ecosystem):
         if "/_" in channel:
             return f"ros2 bag record --include-hidden-topics {channel}"
         return f"record it: rosbag record {channel}, or ros2 bag record {channel}" if channel.startswith("/") else ""
+
+    def to_record(self, channels: Collection[str], vehicle: str) -> Recording:
+        return Recording(tuple(sorted({*channels, *_ALSO})))
 
     def stack(self, facts: Mapping[str, str]) -> str:
         return "ros1" if facts.get("ros") == "1" else "ros2"

@@ -24,6 +24,7 @@ from care_core.ecosystems.ros.messages import (
     BATTERY,
     CLOUD,
     DIAGNOSTICS,
+    FAULT_EVENT,
     FRAME,
     LOCALISED,
     MESSAGES,
@@ -38,7 +39,7 @@ from care_core.ecosystems.ros.messages import (
 )
 from care_core.ecosystems.ros.motion import Commands, Following, Odometry, commands_of, following, odometry_of
 from care_core.ecosystems.ros.namespaces import is_of, robot_namespaces
-from care_core.ecosystems.ros.node_messages import LogMessage, Report, log_messages, reports
+from care_core.ecosystems.ros.node_messages import LogMessage, Report, faults, log_messages, reports
 from care_core.ecosystems.ros.sensors import Battery, Scans, battery_of, scans_of
 from care_core.logs.base import Channel, Table, Wanted, merge_needs
 from care_core.numbers import Floats, median, quantile
@@ -358,7 +359,7 @@ class Drive(RunModel):
     @cached_property
     def reports(self) -> tuple[Report, ...]:
         """What diagnostics said, changes of level only."""
-        return tuple(reports(self.of(DIAGNOSTICS)))
+        return (*reports(self.of(DIAGNOSTICS)), *faults(self.of(FAULT_EVENT)))
 
 
 def way_through(goals: Iterable[Goal], commands: Commands | None) -> float:

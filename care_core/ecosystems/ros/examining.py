@@ -6,7 +6,16 @@ from care_core.ecosystems.findings import Finding, Health
 from care_core.ecosystems.ranking import rank_findings
 from care_core.ecosystems.ros.checks import CHECKS
 from care_core.ecosystems.ros.drive import STREAM_MESSAGES, Drive
-from care_core.ecosystems.ros.messages import BATTERY, DIAGNOSTICS, MESSAGES, ODOMETRY, ROBOT, SCAN, type_of
+from care_core.ecosystems.ros.messages import (
+    BATTERY,
+    DIAGNOSTICS,
+    FAULT_EVENT,
+    MESSAGES,
+    ODOMETRY,
+    ROBOT,
+    SCAN,
+    type_of,
+)
 from care_core.ecosystems.ros.other_robots import other_robots
 from care_core.ecosystems.ros.timeline import READS, timeline
 from care_core.logs.base import merge_needs
@@ -49,7 +58,8 @@ def _too_little(drive: Drive) -> str:
     drives = drive.odometry is not None or drive.commands is not None
     senses = bool(drive.scans or drive.batteries)
     longest = max(len(table) for _, table in drive.of(*ROBOT)) if drives or senses else 0
-    speaks = bool(drive.log_messages or drive.goals) or any(True for _ in drive.of(DIAGNOSTICS))
+    is_watched = any(True for type in (DIAGNOSTICS, FAULT_EVENT) for _ in drive.of(type))
+    speaks = bool(drive.log_messages or drive.goals) or is_watched
     unread = [fact.removeprefix(_UNREAD) for fact in drive.facts if fact.startswith(_UNREAD)]
     if longest < STREAM_MESSAGES and not speaks and unread:
         return f"its messages are {' and '.join(unread)}, not ROS 1, CDR or JSON: only when they came is known"

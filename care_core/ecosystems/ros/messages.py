@@ -29,6 +29,8 @@ VIEWER_LOG = ("foxglove.Log", "foxglove_msgs/Log")
 """Messages of nodes as viewers have them, with names and levels of their own."""
 ROSOUT = ("rosgraph_msgs/Log", "rcl_interfaces/Log", *VIEWER_LOG)
 DIAGNOSTICS = "diagnostic_msgs/DiagnosticArray"
+FAULT_EVENT = "ros2_medkit_msgs/FaultEvent"
+"""What ros2_medkit's fault manager says when a fault of the robot is confirmed, changes or is cleared."""
 STATUS = "action_msgs/GoalStatusArray"
 TREE = "nav2_msgs/BehaviorTreeLog"
 RECOVERY = "move_base_msgs/RecoveryStatus"
@@ -57,6 +59,7 @@ AT_TIMES = (
     *ROSOUT,
     LOCALISED,
     TREE,
+    FAULT_EVENT,
     RECOVERY,
     TRANSITION,
     "nav_msgs/Path",
@@ -140,6 +143,9 @@ MESSAGES: Mapping[str, RosMessage] = {
     ),
     **dict.fromkeys(ROSOUT, _reads("level", "name", "msg", "message")),
     DIAGNOSTICS: _reads("status.level", "status.name", "status.message"),
+    FAULT_EVENT: _reads(
+        "event_type", "fault.fault_code", "fault.severity", "fault.description", "fault.reporting_sources"
+    ),
     STATUS: _reads("status_list.goal_info.goal_id.uuid", "status_list.status"),
     TREE: _reads("event_log.node_name", "event_log.previous_status", "event_log.current_status"),
     RECOVERY: _reads("recovery_behavior_name"),

@@ -9,7 +9,7 @@ from enum import IntEnum
 
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Event
-from care_core.ecosystems.ros.messages import DIAGNOSTICS, MESSAGES, ROSOUT, VIEWER_LOG, holds, type_of
+from care_core.ecosystems.ros.messages import DIAGNOSTICS, FAULT_EVENT, MESSAGES, ROSOUT, VIEWER_LOG, holds, type_of
 from care_core.logs.base import Table
 from care_core.records import Record
 
@@ -63,6 +63,8 @@ class Report(Record):
     name: str
     level: int
     message: str
+    by: str = "diagnostics"
+    """Who says so."""
 
     @property
     def word(self) -> str:
@@ -126,6 +128,26 @@ def reports(tables: Iterable[tuple[str, Table]]) -> Iterator[Report]:
                 if now.get(str(name)) != code:
                     now[str(name)] = code
                     yield Report(time_s, topic, str(name), code, str(message))
+
+
+_SEVERITIES = {0: 0, 1: 1, 2: 2, 3: 2}
+"""Severities of ros2_medkit_msgs/Fault (info, warning, error, critical) as levels of diagnostics."""
+_CLEARED = "fault_cleared"
+
+
+def faults(tables: Iterable[tuple[str, Table]]) -> Iterator[Report]:
+    """Every fault that ros2_medkit confirmed, and its end, as a change of level."""
+    for topic, table in tables:
+        if not holds(table, FAULT_EVENT):
+            continue
+        now: dict[str, int] = {}
+        columns = (table[name] for name in MESSAGES[FAULT_EVENT].reads)
+        for time_s, event, code, severity, text, sources in zip(table.t.tolist(), *columns, strict=True):
+            name = " of ".join([str(code), *map(str, list(sources)[:1])])
+            level = 0 if event == _CLEARED else _SEVERITIES.get(int(severity), 2)
+            if now.get(name) != level:
+                now[name] = level
+                yield Report(time_s, topic, name, level, str(text), "ros2_medkit")
 
 
 def spoken(model: RunModel) -> Iterator[Event]:

@@ -18,6 +18,7 @@ from care_core.ecosystems.ros.messages import (
     BATTERY,
     COMMANDS,
     DIAGNOSTICS,
+    FAULT_EVENT,
     GOALS,
     ODOMETRY,
     RECOVERY,
@@ -45,7 +46,7 @@ _TEXT = 110
 _URGENT = {2: 0, 3: 1, 1: 2}
 """An error of diagnostics comes before silence, and that before a warning."""
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e-?\d+)?")
-READS = reading(ODOMETRY, *COMMANDS, BATTERY, DIAGNOSTICS, TREE, RECOVERY, TRANSITION, *GOALS, *ROSOUT)
+READS = reading(ODOMETRY, *COMMANDS, BATTERY, DIAGNOSTICS, FAULT_EVENT, TREE, RECOVERY, TRANSITION, *GOALS, *ROSOUT)
 
 
 def timeline(drive: Drive) -> tuple[Event, ...]:
@@ -138,7 +139,7 @@ def _diagnostics(drive: Drive) -> Iterator[Event]:
     bad = [report for report in drive.reports if report.level > 0]
     worst: dict[str, Event] = {}
     for report in sorted(bad, key=lambda report: (_URGENT.get(report.level, 3), report.time_s)):
-        text = f"diagnostics {report.word} {report.name}" + (f': "{_cut(report.message)}"' if report.message else "")
+        text = f"{report.by} {report.word} {report.name}" + (f': "{_cut(report.message)}"' if report.message else "")
         kind = "error" if report.level == 2 else "diagnostics"
         worst.setdefault(report.name, Event(report.time_s, kind, text, report.topic))
     yield from list(worst.values())[:_REPORTS]

@@ -10,7 +10,7 @@ from care_core.ecosystems.findings import Finding, FindingKind, Severity
 from care_core.ecosystems.ros.checks.planner import FAILS
 from care_core.ecosystems.ros.checks.timing import is_late
 from care_core.ecosystems.ros.drive import Drive
-from care_core.ecosystems.ros.messages import DIAGNOSTICS, GOALS, ROSOUT, reading
+from care_core.ecosystems.ros.messages import DIAGNOSTICS, FAULT_EVENT, GOALS, ROSOUT, reading
 from care_core.ecosystems.ros.node_messages import Level, LogMessage, Report
 
 LIMITS = Limits()
@@ -58,7 +58,7 @@ def _diagnostics(drive: Drive) -> Iterator[Finding]:
         again = (f", {len(bad)} times" if len(bad) > 1 else "") + (", and so to the end" if stays else "")
         yield Finding(
             kind=about(f"{name} {first.message}"),
-            title=f"diagnostics: {name}: {first.message or 'error'}",
+            title=f"{first.by}: {name}: {first.message or 'error'}",
             onset_s=first.time_s,
             end_s=drive.duration_s if stays else last[name].time_s,
             severity=drive.severity(first.time_s, "critical" if first.level == BAD else "warning"),
@@ -109,4 +109,5 @@ def gist(text: str, most: int = 80) -> str:
     return f"{lines[-1][:most]}{place}"
 
 
-CHECK = Check("messages", "errors of nodes and of diagnostics", reading(DIAGNOSTICS, *ROSOUT, *GOALS), LIMITS, find)
+_READS = reading(DIAGNOSTICS, FAULT_EVENT, *ROSOUT, *GOALS)
+CHECK = Check("messages", "errors of nodes and of diagnostics", _READS, LIMITS, find)
