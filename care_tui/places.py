@@ -10,19 +10,46 @@ from care_core.files import read_small_text
 from care_core.folders import entries_in, files_in
 from care_core.records import Record
 
-PLACES = (
-    Path(),
-    Path("logs"),
-    Path("APM/LOGS"),
-    Path.home() / "logs",
-    Path.home() / ".ros",
-    Path.home() / ".ros" / "bags",
-    Path.home() / "APM" / "LOGS",
-    Path.home() / "Documents" / "Mission Planner" / "logs",
-    Path.home() / "Documents" / "QGroundControl" / "Telemetry",
-    Path.home() / "Documents" / "QGroundControl" / "Logs",
+WINDOWS_HOMES = Path("/mnt/c/Users")
+"""Where Linux on Windows (WSL) sees the home folders in which ground stations keep their logs."""
+
+
+def usual_places() -> tuple[Path, ...]:
+    """Where `care` without a log looks for the newest one: here, and where recorders and ground stations put theirs."""
+    from platformdirs import user_documents_path
+
+    home = Path.home()
+    seen_from_wsl = sorted(WINDOWS_HOMES.glob("*/Documents")) + sorted(WINDOWS_HOMES.glob("*/OneDrive/Documents"))
+    documents = dict.fromkeys((home / "Documents", user_documents_path(), *seen_from_wsl))
+    return (
+        Path(),
+        Path("logs"),  # MAVProxy in the folder of --aircraft, simulators
+        Path("dataflash"),  # MAVProxy's dataflash_logger
+        Path("APM/LOGS"),
+        home / "logs",
+        home / ".ros",
+        home / ".ros" / "bags",
+        home / "APM" / "LOGS",
+        home / "Mission Planner" / "logs",  # where Mono takes the home folder for Documents
+        home / "apmplanner2" / "dataflashLogs",
+        home / "apmplanner2" / "tlogs",
+        Path("/var/log/flight-stack"),  # mavlink-router on a companion computer
+        *(place / station for place in documents for station in _OF_STATIONS),
+    )
+
+
+_OF_STATIONS = tuple(
+    Path(*parts)
+    for parts in (
+        ("Mission Planner", "logs"),
+        ("QGroundControl", "Logs"),
+        ("QGroundControl", "Telemetry"),
+        ("QGroundControl Daily", "Logs"),
+        ("QGroundControl Daily", "Telemetry"),
+    )
 )
-"""Where `care` without a log looks for the newest one: here, and where recorders and ground stations put theirs."""
+"""Below the user's folder for documents."""
+PLACES = usual_places()
 
 DEEP = 3
 """Folders below a place that are looked into: Mission Planner sorts by vehicle and system."""

@@ -33,7 +33,7 @@ from care_tui.commands.arguments import (
     sharing_for,
 )
 from care_tui.commands.past import NoHistory, mention
-from care_tui.console import Progress, emit, painted
+from care_tui.console import Progress, emit, painted, say
 
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
@@ -46,9 +46,14 @@ SAMPLE = "arducopter_failed.BIN"
 @app.command()
 def triage(
     logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG...", help="The log to read; more of the same configuration: what they share."),
-    ],
+        list[Path] | None,
+        typer.Argument(
+            metavar="[LOG...]",
+            help="The log to read, the newest one of the usual places if absent; more of the same configuration: what"
+            " they share.",
+            show_default=False,
+        ),
+    ] = None,
     profile: ProfileName = None,
     config: ConfigPaths = None,
     json: AsJson = False,
@@ -76,10 +81,11 @@ def triage(
     if len(formats) > 1:
         raise UsageError(f"Only one of --{' and --'.join(formats)} can be printed.", hint="Leave the others out.")
     format = formats[0] if formats else _format_of(out)
+    first, *others = logs or [_newest()]
     request = Request(
-        logs[0],
+        first,
         profile,
-        repeats=tuple(logs[1:]),
+        repeats=tuple(others),
         configs=tuple(config or ()),
         keep=tuple(keep or ()),
         thresholds=bounds(threshold or ()),
@@ -131,6 +137,18 @@ def demo() -> None:
         case = care_core.triage(path, progress)
     emit(_written(case, None, None, to_file=False))
     raise typer.Exit(verdict_of(case.diagnosis).exit_code)
+
+
+def _newest() -> Path:
+    """The newest log of the usual places, which is said. Raises UsageError where there is none."""
+    from care_tui.commands.opening import newest_log
+    from care_tui.settings import load_settings
+
+    found = newest_log(load_settings(None).places)
+    if found is None:
+        raise UsageError("There is no log in the usual places.", hint="Name one.")
+    say(f"the newest log is {found}")
+    return found
 
 
 def _format_of(out: Path | None) -> str | None:
