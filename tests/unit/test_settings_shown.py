@@ -221,6 +221,18 @@ def test_a_board_that_is_told_a_wrong_mounting(number: int) -> None:
     assert naming(made, "AHRS_ORIENTATION").wanted == (("AHRS_ORIENTATION", 0.0),)
 
 
+@pytest.mark.parametrize("orient", [0.0, 6.0])
+def test_a_compass_inside_a_turned_board_that_is_said_to_be_outside(orient: float) -> None:
+    made = MadeWithDefaults()
+    compasses(made)
+    made.drive("AHRS_ORIENTATION", 2, 0)  # rightly
+    made.drive("COMPASS_EXTERNAL", 1, 0)
+    turn(made, "MAG", np.linalg.inv(mounting(2)))
+    assert naming(made, "COMPASS_EXTERNAL").wanted == (("COMPASS_EXTERNAL", 0.0),)
+    made.drive("COMPASS_ORIENT", orient, 0)
+    assert bool([one for one in made.find() if "COMPASS_EXTERNAL" in one.parameters]) == (orient == 0)
+
+
 def test_a_mounting_off_its_default_that_is_right_is_none() -> None:
     made = MadeWithDefaults()
     compasses(made)

@@ -106,14 +106,23 @@ class _Compass:
     @property
     def mounting(self) -> str:
         """The parameter that says how it is mounted: its own, or within the board the board's."""
-        external = "COMPASS_EXTERNAL" if self.number == 1 else f"COMPASS_EXTERN{self.number}"
-        return f"COMPASS_ORIENT{self._digit}" if self.flight.setting(external) else "AHRS_ORIENTATION"
+        return self._mounting(is_outside=bool(self.flight.setting(self._external)))
+
+    @property
+    def _external(self) -> str:
+        return "COMPASS_EXTERNAL" if self.number == 1 else f"COMPASS_EXTERN{self.number}"
+
+    def _mounting(self, *, is_outside: bool) -> str:
+        return f"COMPASS_ORIENT{self._digit}" if is_outside else "AHRS_ORIENTATION"
 
     def undone(self) -> Iterator[tuple[str, float, Floats]]:
         """Each parameter of it that is off its default: its name, its default, and the field with it undone."""
         mounted = self.flight.default_left(self.mounting)
         if mounted is not None and (field := self.mounted(mounted)) is not None:
             yield self.mounting, mounted, field
+        place = self.flight.default_left(self._external)
+        if mounted is None and place is not None and (field := self._placed(bool(place))) is not None:
+            yield self._external, place, field
         for axis, moved in enumerate(_MOTORS):
             shift, by_motors = (f"COMPASS_{what}{self._digit}_{'XYZ'[axis]}" for what in ("OFS", "MOT"))
             default, value = self.flight.default_left(shift), self.flight.setting(shift)
@@ -135,6 +144,10 @@ class _Compass:
         shift = np.array([[self.flight.setting(f"COMPASS_OFS{self._digit}_{axis}") or 0.0] for axis in "XYZ"])
         turned: Floats = after @ before.T @ (self.field - shift) + shift
         return turned
+
+    def _placed(self, is_outside: bool) -> Floats | None:
+        """The field if it were said to be outside the board, or in it."""
+        return self.mounted(self.flight.setting(self._mounting(is_outside=is_outside)) or 0.0)
 
     def _moved(self, axis: int, by: float | Floats) -> Floats:
         field: Floats = self.field.copy()
