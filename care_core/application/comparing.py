@@ -154,14 +154,16 @@ def compare(a: Request, b: Request, progress: Progress) -> Compared:
         CareError: one of the logs cannot be read, or the operator named what is not there.
     """
     other = open_case(b, lambda step, share: progress(f"B: {step}", 0.5 * share))
+    one = replace(a, profile=b.profile or a.profile)
+    return beside(one, other, lambda step, share: progress(f"A: {step}", 0.5 + 0.5 * share))
 
-    def open_a(request: Request) -> Case:
-        return open_case(request, lambda step, share: progress(f"A: {step}", 0.5 + 0.5 * share))
 
-    if b.profile is not None or other.reading is None:
-        return Compared(open_a(replace(a, profile=b.profile)), other)
-    one = open_a(replace(a, profile=str(other.reading.profile.path)))
-    return Compared(open_a(a) if one.reading is None else one, other)
+def beside(a: Request, other: Case, progress: Progress) -> Compared:
+    """Open a log and put it beside an open run, judged by that one's profile where it can be. Raises CareError."""
+    if a.profile is not None or other.reading is None:
+        return Compared(open_case(a, progress), other)
+    one = open_case(replace(a, profile=str(other.reading.profile.path)), progress)
+    return Compared(open_case(a, progress) if one.reading is None else one, other)
 
 
 def _from_start(case: OpenRun, sources: Sequence[Source]) -> Mapping[Source, Values]:
