@@ -48,12 +48,13 @@ def record(found: ToRecord, out: Path, say: Say) -> int:
     if out.exists():
         raise UsageError("There is something of that name.", hint="Name a new folder with --out.", where=str(out))
     words = recorder_words(found, out, is_humble="--topics" not in _asked(ros2, "bag", "record", "--help"))
-    recorder = subprocess.Popen([ros2, *words[1:]], stdin=subprocess.DEVNULL, stdout=sys.stderr)
+    # Ctrl+C goes to this process alone, which tells the recorder once: told twice it would leave its index unwritten.
+    recorder = subprocess.Popen([ros2, *words[1:]], stdin=subprocess.DEVNULL, stdout=sys.stderr, start_new_session=True)
     asked: dict[str, str] = {}
     try:
         _keep_parameters(ros2, asked, out, recorder, say)
         return recorder.wait()
-    except KeyboardInterrupt:  # the terminal told the recorder as well
+    except KeyboardInterrupt:
         return 0
     finally:
         _end(recorder)

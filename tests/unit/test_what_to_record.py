@@ -91,7 +91,8 @@ FAKE = """#!/bin/bash
 case "$1 $2" in
   "bag record")
     if [ "$3" = --help ]; then echo "--topics"; exit; fi
-    mkdir "$4"; echo "$@" > "$4/words"; trap 'touch "$PWD/indexed"; exit 0' INT; while true; do sleep 0.05; done ;;
+    mkdir "$4"; echo "$@" > "$4/words"; trap 'echo told >> "$PWD/indexed"; sleep 0.3; exit 0' INT
+    while true; do sleep 0.05; done ;;
   "node list") printf '%s\\n' /controller_server /planner_server /silent ;;
   "param dump")
     case "$3" in
@@ -113,16 +114,19 @@ def test_the_recorder_is_run_and_ended_with_the_parameters_beside_it(tmp_path: P
     code = "from care_tui.start import main; main()"
     words = [sys.executable, "-c", code, "record", "nav2", "--run", "-o", "out"]
     environment = {**os.environ, "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
-    running = subprocess.Popen(words, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
+    running = subprocess.Popen(
+        words, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
     kept = tmp_path / "out" / "care_parameters.yaml"
     until_s = time.monotonic() + 20
     while not kept.exists() and time.monotonic() < until_s:
         time.sleep(0.02)
     assert "FollowPath.max_vel_x: 0.2" in kept.read_text(encoding="utf-8"), "at once, not when it ends"
     time.sleep(0.2)
-    running.send_signal(number)
+    os.killpg(running.pid, number)  # as a terminal does
     running.communicate(timeout=20)
-    assert (tmp_path / "indexed").exists(), "the recorder wrote its index before it ended"
+    told = (tmp_path / "indexed").read_text(encoding="utf-8")
+    assert told == "told\n", "the recorder was told once, and wrote its index"
     assert "/parameter_events" in (tmp_path / "out" / "words").read_text(encoding="utf-8")
     assert "tolerance: 0.5" in kept.read_text(encoding="utf-8")
 
