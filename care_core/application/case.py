@@ -362,7 +362,6 @@ def changes_of(fix: Fix) -> dict[str, float]:
 def predict(case: Case, changes: Mapping[str, float]) -> Fix:
     """These changes with what they would bring; without any, what the same configuration would bring again. What a
     failed part or what the run met explains is taken off, as for the suggestion."""
-    from care_core.diagnose.advice import believed, odds_as_driven
     from care_core.diagnose.records import Fix
 
     if case.reading is None:
@@ -374,7 +373,6 @@ def predict(case: Case, changes: Mapping[str, float]) -> Fix:
         raise CareError(
             f"What {', '.join(strange)} does beside other changes is not known.", hint="Tick it alone, or untick it."
         )
-    answer = case.reading.question.ask(changes)
+    answer = replace(case.reading.question, failure=case.diagnosis.failure).ask(changes)
     predicted = {outlook.objective.variable.name: outlook.predicted for outlook in answer.outlooks}
-    (fix,) = believed([Fix(answer.changes, answer.p_ok, predicted)], case.diagnosis.hypotheses, options)
-    return fix if changes else replace(fix, p_fixed=odds_as_driven(answer.p_ok, case.diagnosis.hypotheses))
+    return Fix(answer.changes, answer.p_ok, predicted)

@@ -8,7 +8,7 @@ and for another day apart (`Model.training.carry_over`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from typing import Literal
 
@@ -105,8 +105,17 @@ class CounterfactualQuery(Record, eq=False, dict=True):
         Objectives that move together (DESIGN: time and energy) share one cause: the least likely of a group counts
         once; the rest multiply. What no mechanism predicts counts with its base rate.
         """
-        p_ok = {name: self.p_ok(name, configs) for name in self.model.outcomes if name in self.thresholds}
-        total = np.full(len(configs), float(np.prod(list(self.base_rates().values()))))
+        base = float(np.prod(list(self.base_rates().values())))
+        kept = self.all_kept([name for name in self.model.outcomes if name in self.thresholds], configs)
+        return np.full(len(configs), base) if kept is None else base * kept
+
+    def all_kept(self, objectives: Sequence[str], configs: Sequence[Config]) -> FloatArray | None:
+        """Probability that each of these keeps its threshold, shape (m,), those that move together counted once; None
+        where none has one."""
+        p_ok = {name: self.p_ok(name, configs) for name in objectives if name in self.thresholds}
+        if not p_ok:
+            return None
+        total = np.ones(len(configs))
         for group in self._groups(p_ok):
             total *= np.min([p_ok[name] for name in group], axis=0)
         return total
@@ -120,12 +129,15 @@ class CounterfactualQuery(Record, eq=False, dict=True):
                 rates[name] = summary.share_meeting(bound)
         return rates
 
-    def epistemic_ratio(self, configs: Sequence[Config]) -> FloatArray:
-        """How little training says about the objectives there: 0 (known) to 1, the least known one's; shape (m,)."""
+    def epistemic_ratio(self, configs: Sequence[Config], objectives: Collection[str] | None = None) -> FloatArray:
+        """How little training says about the objectives there (all when None): 0 (known) to 1, the least known one's;
+        shape (m,). Of one that no mechanism predicts it says nothing."""
+        if objectives is not None and not self.model.outcomes.keys() & objectives:
+            return np.ones(len(configs))
         keys = [
             key
             for name, outcome in self.model.outcomes.items()
-            if name in self.thresholds
+            if name in self.thresholds and (objectives is None or name in objectives)
             for key in ([stage.mechanism for stage in outcome.stages] or [outcome.mechanism])
         ]
         least: FloatArray = np.max([self._epistemic_ratio(key, configs) for key in keys], axis=0)

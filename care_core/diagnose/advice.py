@@ -1,25 +1,32 @@
-"""Which of the fixes that were found is advised, if any: right, or silent."""
+"""Which of the fixes that were found is advised, if any: by what it adds to the odds of running the mission again."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 
 from care_core.diagnose.parts import LATE_S, set_wrong
+from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Cause, Fault, Fix, Hypothesis, ObjectiveResult
 from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ranking import LIKELY
 from care_core.records import replace
 from care_core.run import FitVerdict
 
-ENOUGH = 0.5
-"""A change less likely than this to repair the run is no advice."""
+COST = 0.02
+"""Odds that one change has to bring for the work of making it and the doubt of having changed too much."""
+WORTH = 0.15
+"""Odds that advice has to add to those of the run as driven, beyond what its changes cost: with less, the same mission
+may as well be run again. Of 15 changes on recorded failures that added as much and were less likely than not to repair
+the run, 12 held what repaired it."""
 CHANCY = 0.75
-"""Odds of the reference configuration below which missions fail by chance as well: less is then enough, in proportion,
-and one good run after a change proves little, nor one bad run much."""
+"""Odds of the reference configuration below which missions fail by chance as well: one good run after a change proves
+little then, nor one bad run much."""
+TOLD_APART = 4.0
+"""How many times likelier good runs have to be with the change than without for it to be known that it works."""
+MOST_RUNS = 10
+"""More than so many runs in a row nobody makes to know."""
 
-STANDS_OUT = 0.12
-"""Probability that a change must add to that of the run as driven: below it no parameter stands out."""
 NECESSARY = 0.15
 """Share of the failures of this configuration, before anything of the run is known, that a change must take away where
 it leaves the likeliest cause as it is: of 125 changes on recorded flights those below were wrong, 110 above right."""
@@ -29,23 +36,26 @@ ALIKE = 0.02
 """Shares of a limit that are no difference to an operator."""
 
 
-def believed(fixes: Sequence[Fix], hypotheses: Sequence[Hypothesis], modelled: Container[str]) -> tuple[Fix, ...]:
-    """The fixes of the profile's options with the probability that something else did it taken off their promise.
-
-    Args:
-        modelled: the options of the profile.
-    """
-    share = _repairable(hypotheses) - _outside(hypotheses, modelled)
-    return tuple(replace(fix, p_fixed=fix.p_fixed * share) for fix in fixes)
-
-
-def _repairable(hypotheses: Sequence[Hypothesis]) -> float:
-    return 1.0 - sum(one.probability for one in hypotheses if one.what in ("hardware", "world") and one.name)
+def promised(fixes: Sequence[Fix], promise: Promise) -> tuple[Fix, ...]:
+    """The fixes of the profile's options with what they promise for the next run."""
+    if not fixes:
+        return ()
+    driven = promise.query.config
+    configs = [{**driven, **{one.option.name: one.suggested for one in fix.changes}} for fix in fixes]
+    odds = map(float, promise.odds(configs))
+    return tuple(replace(fix, p_fixed=share) for fix, share in zip(fixes, odds, strict=True))
 
 
-def _outside(hypotheses: Sequence[Hypothesis], modelled: Container[str]) -> float:
-    """Probability of a parameter that the profile does not model."""
-    return sum(one.probability for one in hypotheses if one.what == "parameter" and one.name not in modelled)
+def promised_causes(faults: Sequence[Fault], promise: Promise) -> tuple[Fault, ...]:
+    """The faults with what each cause promises where only that is changed."""
+
+    def alone(cause: Cause) -> Cause:
+        if cause.p_fixed is None or cause.suggested is None:
+            return cause
+        changed = {**promise.query.config, cause.option.name: cause.suggested}
+        return replace(cause, p_fixed=float(promise.odds([changed])[0]))
+
+    return tuple(replace(fault, causes=tuple(map(alone, fault.causes))) for fault in faults)
 
 
 def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = ()) -> str | None:
@@ -89,45 +99,20 @@ def _beyond(fix: Fix, result: ObjectiveResult) -> float:
     return sign * (predicted.value - bound.bound) / (abs(bound.bound) or 1.0)
 
 
-def odds_as_driven(probability: float, hypotheses: Sequence[Hypothesis]) -> float:
-    """Probability that the next run meets every limit as driven, given that this one failed: what a parameter or a
-    failed part brought about stays as long as they do, whatever of this run's noise is drawn anew.
-
-    Args:
-        probability: what the mechanisms give the configuration as driven.
-    """
-    lasting = sum(one.probability for one in hypotheses if one.what == "parameter")
-    return max(0.0, min(probability * _repairable(hypotheses), _repairable(hypotheses) - lasting))
-
-
-def believed_causes(
-    faults: Sequence[Fault], hypotheses: Sequence[Hypothesis], modelled: Container[str]
-) -> tuple[Fault, ...]:
-    """The faults with the same taken off what each cause promises alone."""
-    share = _repairable(hypotheses) - _outside(hypotheses, modelled)
-
-    def scaled(cause: Cause) -> Cause:
-        return cause if cause.p_fixed is None else replace(cause, p_fixed=cause.p_fixed * share)
-
-    return tuple(replace(fault, causes=tuple(map(scaled, fault.causes))) for fault in faults)
-
-
 def no_stand_out(fix: Fix, as_driven: float, hypotheses: Sequence[Hypothesis], necessary: float) -> str | None:
-    """Why a fix is not advised that changes no cause which stands in the ranking, or adds little, else None.
+    """Why a fix is not advised that changes no cause which stands in the ranking, else None.
 
     Args:
         as_driven: probability that the next run meets every limit without it, as the fix's.
         necessary: share of this configuration's failures that it takes away.
     """
-    odds = f"with {_changes(fix)} the odds are {fix.p_fixed:.0%}, as driven {as_driven:.0%}"
-    if fix.p_fixed - as_driven < STANDS_OUT:
-        return f"no parameter stands out: {odds}"
     chance = sum(one.probability for one in hypotheses if one.what == "chance")
     changed = {change.option.name for change in fix.changes}
     leader = _leader(hypotheses)
     is_cause = any(one.name in changed and one.probability > chance for one in hypotheses if one.what == "parameter")
     if is_cause and (leader in changed or necessary >= NECESSARY):
         return None
+    odds = f"with {_changes(fix)} the odds are {fix.p_fixed:.0%}, as driven {as_driven:.0%}"
     return f"no parameter stands out: {odds}, and nothing in this run says that it was the cause"
 
 
@@ -147,7 +132,7 @@ def explained(fix: Fix, as_driven: float, hypotheses: Sequence[Hypothesis], faul
 
 def _leader(hypotheses: Sequence[Hypothesis]) -> str:
     """The likeliest parameter, empty where none is told."""
-    return next((one.name for one in hypotheses if one.what == "parameter"), "")
+    return next((one.name for one in hypotheses if one.what == "parameter" and one.name), "")
 
 
 def _changes(fix: Fix) -> str:
@@ -170,40 +155,49 @@ def unrecorded(fix: Fix, verdict: FitVerdict) -> str | None:
     return f"the log does not hold {', '.join(names)}: record it, or name the configuration with --config"
 
 
-def enough(odds: float) -> float:
-    """Probability of meeting every limit from which on a change is advice.
-
-    Args:
-        odds: probability that the reference configuration meets every limit in such a mission. Where missions fail by
-            chance no change is surer than that, and one that comes near it is what there is to be done.
-    """
-    return ENOUGH * min(1.0, odds / CHANCY)
+def adds_enough(odds: float, as_driven: float, changes: int) -> bool:
+    """Whether so many changes add enough to the odds of running the same mission again, whatever those are: on robots
+    that fail by chance no change is sure."""
+    return odds - COST * changes - as_driven >= WORTH
 
 
-def falls_short(fix: Fix, broken: Sequence[ObjectiveResult], odds: float, as_driven: float | None = None) -> str | None:
-    """Why a fix is not advised that is too unlikely to repair the run, with what it reaches, else None.
+def is_worth(fix: Fix, as_driven: float) -> bool:
+    """Whether a fix adds enough to the odds as driven."""
+    return adds_enough(fix.p_fixed, as_driven, len(fix.changes))
 
-    Args:
-        odds: as for `enough`.
-        as_driven: what the promise stands beside.
-    """
-    if fix.p_fixed >= enough(odds):
+
+def falls_short(fix: Fix, broken: Sequence[ObjectiveResult], as_driven: float) -> str | None:
+    """Why a fix is not advised that adds too little, with what it reaches, else None."""
+    if is_worth(fix, as_driven):
         return None
     reached = "; ".join(filter(None, (_reached(fix, result) for result in broken)))
     limit = f"; with it {reached}" if reached else ""
-    without = "" if as_driven is None else f", as driven {as_driven:.0%}"
-    best = f"the best found, {_changes(fix)}, has {fix.p_fixed:.0%}{without}"
-    return f"no change is likely enough to meet every limit: {best}{limit}"
+    best = f"the best found, {_changes(fix)}, has {fix.p_fixed:.0%}, as driven {as_driven:.0%}"
+    return f"no change adds enough to the odds of meeting every limit: {best}{limit}"
 
 
 def by_chance(fix: Fix, now: float, odds: float) -> str | None:
-    """What an operator has to know of a change where the reference configuration misses limits too, else None."""
+    """What an operator has to know of a change where the reference configuration misses limits too, else None.
+
+    Args:
+        now: probability that the next run meets every limit as driven.
+        odds: probability that a run with the reference settings does, before anything of this run is known.
+    """
     if odds >= CHANCY:
         return None
+    runs = MOST_RUNS + 1 if fix.p_fixed <= now else math.ceil(math.log(TOLD_APART) / math.log(fix.p_fixed / now))
+    to_know = f"run it {runs} times to know" if runs <= MOST_RUNS else "no few runs tell whether it helped"
     return (
-        f"such missions fail by chance too: by the model the reference meets every limit in {odds:.0%} of them, this "
-        f"change in {fix.p_fixed:.0%}, the run as it was in {now:.0%}; one run proves little, repeat it"
+        f"such missions fail by chance too, {_in_five(odds)} with the reference settings: this configuration fails "
+        f"{_in_five(now)}, with the change {_in_five(fix.p_fixed)}; {to_know}"
     )
+
+
+def _in_five(odds: float) -> str:
+    """Failures in a few missions, in words that nobody takes for more than they are."""
+    lost = 1.0 - odds
+    few = min(range(2, 11), key=lambda n: abs(round(lost * n) / n - lost) + 0.005 * n)
+    return f"{round(lost * few)} in {few}"
 
 
 def _reached(fix: Fix, result: ObjectiveResult) -> str:

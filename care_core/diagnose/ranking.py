@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import math
-import random
-from collections.abc import Callable, Collection, Container, Mapping, Sequence
-from itertools import permutations
+from collections.abc import Collection, Container, Mapping, Sequence
 
 import numpy as np
 
 from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.graph import Edge
-from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import columns
 from care_core.causal.model import EffectRecord, Model
 from care_core.causal.paths import CausalPath, Ways
@@ -26,8 +22,6 @@ FELT = 0.05
 """Effect times support, in standard deviations, from which an edge is taken to carry something of this run."""
 HARDLY = 0.01
 """Share of its acceptable range by which an option may be off its reference and be as good as at it."""
-PERMUTATIONS = 12
-"""Sampled orders of reset per Shapley estimate, each also taken backwards."""
 
 
 class Suspect(Record):
@@ -64,11 +58,11 @@ def suspects(
 ) -> tuple[Suspect, ...]:
     """Options off their reference that have a causal path to the objective, the likeliest cause first.
 
-    The contribution is a Shapley value (Shapley 1953) over these options: how much the probability of keeping the
-    threshold rise when the option goes back to its reference, averaged over the orders in which the others may go back,
-    so an interaction is shared by those who take part in it and the contributions add up to the whole change. What they
-    leave unexplained, much where training runs were few, is laid to the options that this run's symptoms point at. Of
-    options with the same share, the one goes first whose reset alone meets every objective.
+    The contribution is how much the probability of keeping the threshold rises when the option goes back to its
+    reference: the mean of what it brings as the first that goes back and as the last, so an interaction counts for
+    those who take part in it. What the contributions leave unexplained, much where training runs were few, is laid to
+    the options that this run's symptoms point at. Of options with the same share, the one goes first whose reset alone
+    meets every objective.
 
     Options whose effect is not identified are among them, to be told and not to be ranked (`is_identified`): theirs is
     an association.
@@ -82,8 +76,7 @@ def suspects(
     effects = {name: query.model.effects.get((name, objective)) for name in paths}
     names = list(paths)
     learned = [name for name in names if effects[name] is not None and objective in query.model.outcomes]
-    shares = _shapley(learned, lambda sets: query.p_ok(objective, [_reset(query, s) for s in sets]))
-    contribution = {**dict.fromkeys(names, 0.0), **dict(zip(learned, map(float, shares), strict=True))}
+    contribution = {**dict.fromkeys(names, 0.0), **_contributions(query, objective, learned)}
     unexplained = max(0.0, 1.0 - sum(max(0.0, share) for share in contribution.values()))
     pointer = pointers(query, objective, _acting_where_it_failed(query, objective, names, said), known, said)
     found = [
@@ -97,7 +90,7 @@ def suspects(
         )
         for name in names
     ]
-    alone = query.probability([_reset(query, frozenset((name,))) for name in names]) if names else ()
+    alone = query.probability([back_at_reference(query, frozenset((name,))) for name in names]) if names else ()
     repairs = dict(zip(names, map(float, alone), strict=True))
     return tuple(
         sorted(found, key=lambda s: (-round(s.weight, 2), -round(repairs[s.option], 2), -s.total_effect, s.option))
@@ -178,32 +171,21 @@ def _mediators(query: CounterfactualQuery) -> frozenset[str]:
     return frozenset(found)
 
 
-def _reset(query: CounterfactualQuery, names: frozenset[str]) -> dict[str, float]:
+def back_at_reference(query: CounterfactualQuery, names: frozenset[str]) -> dict[str, float]:
+    """This run's configuration with these options at their reference."""
     return {**query.config, **{name: query.reference[name] for name in names}}
 
 
-def _shapley(names: Sequence[str], worth: Callable[[Sequence[frozenset[str]]], FloatArray]) -> FloatArray:
-    """Shapley values over all orders where those are few, else over `_orders`."""
+def _contributions(query: CounterfactualQuery, objective: str, names: Sequence[str]) -> dict[str, float]:
+    """Of each option: the mean of what it brings as the first that goes back and as the last."""
     if not names:
-        return np.zeros(0)
-    orders = _orders(len(names))
-    chains = [[frozenset(names[i] for i in order[:k]) for k in range(len(names) + 1)] for order in orders]
-    distinct = list(dict.fromkeys(subset for chain in chains for subset in chain))
-    value = dict(zip(distinct, worth(distinct), strict=True))
-    shares = np.zeros(len(names))
-    for order, chain in zip(orders, chains, strict=True):
-        shares[list(order)] += np.diff([value[subset] for subset in chain])
-    mean: FloatArray = shares / len(orders)
-    return np.where(np.abs(mean) > ROUNDING, mean, 0.0)
-
-
-def _orders(count: int) -> list[tuple[int, ...]]:
-    """All orders of so many places, or sampled ones, each with its reverse; one seed, so the answer repeats."""
-    if math.factorial(count) <= 2 * PERMUTATIONS:
-        return list(permutations(range(count)))
-    rng = random.Random(0)  # numpy's generators take as long to import as all of this
-    drawn = [tuple(rng.sample(range(count), count)) for _ in range(PERMUTATIONS)]
-    return drawn + [order[::-1] for order in drawn]
+        return {}
+    every = frozenset(names)
+    sets = [frozenset(), every, *(frozenset((name,)) for name in names), *(every - {name} for name in names)]
+    driven, back, *each = query.p_ok(objective, [back_at_reference(query, one) for one in sets])
+    first, last = np.array(each[: len(names)]) - driven, back - np.array(each[len(names) :])
+    mean = (first + last) / 2
+    return dict(zip(names, map(float, np.where(np.abs(mean) > ROUNDING, mean, 0.0)), strict=True))
 
 
 def describe_path(path: CausalPath, query: CounterfactualQuery, run: Run) -> tuple[PathNode, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
+from care_core.diagnose.noisy_or import NoisyOr, What
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.ecosystems.ranking import lost_by
 from care_core.metadata.causal_map import Role as ParameterRole
@@ -15,7 +16,6 @@ from care_core.variables import Change, Kind, Threshold, Variable
 
 Status = Literal["ok", "fault", "not_evaluated"]
 Confidence = Literal["high", "medium", "low"]
-What = Literal["parameter", "hardware", "world", "chance"]
 
 
 class Need(Record):
@@ -231,12 +231,15 @@ class Experiment(Record):
 
 
 class Hypothesis(Record):
-    """One explanation of the failure; those of a diagnosis add up to 1."""
+    """One explanation of the failure. Those of a diagnosis add up to 1: each has the probability that it acted and none
+    that is told before it did."""
 
     what: What
     name: str
-    """The option, or the finding's title; empty for chance, and for a part or circumstance that left no signal."""
+    """The option, or the finding's title; empty for chance, and for a parameter that the profile does not know."""
     probability: float
+    acts: float = 0.0
+    """Probability that it acted, whatever else did: causes are not exclusive."""
 
 
 class OutsideSuspect(Record):
@@ -312,6 +315,8 @@ class Diagnosis(Record):
     health: Health = NOTHING_SEEN
     hypotheses: tuple[Hypothesis, ...] = ()
     """What explains the failure, the likeliest first; empty where nothing failed."""
+    failure: NoisyOr | None = None
+    """The causes behind the hypotheses; None where no model can be asked."""
     outside: tuple[OutsideSuspect, ...] = ()
     """The suspects among the parameters that the profile does not model, the likeliest first."""
 

@@ -13,21 +13,22 @@ from care_core.causal.model import EffectRecord
 from care_core.diagnose import provenance
 from care_core.diagnose.advice import (
     NECESSARY,
-    believed,
-    believed_causes,
+    WORTH,
     by_chance,
     explained,
     falls_short,
+    is_worth,
     nearest,
     no_stand_out,
-    odds_as_driven,
     outweighed,
+    promised,
+    promised_causes,
     unrecorded,
     untried,
 )
+from care_core.diagnose.blame import blame
 from care_core.diagnose.circumstances import battery_is_low, circumstances, unusual
 from care_core.diagnose.fixes import (
-    GAIN_FOR_ONE_MORE,
     MAX_ALTERNATIVES,
     Assignment,
     best_alone,
@@ -39,19 +40,20 @@ from care_core.diagnose.fixes import (
     smallest_good,
     to_fix,
 )
-from care_core.diagnose.hypotheses import explain, speaking, unasked
+from care_core.diagnose.hypotheses import hypotheses_of, speaking, unasked
 from care_core.diagnose.implied import implied
 from care_core.diagnose.judging import Judged, check_wishes, query_of, unread_options
 from care_core.diagnose.next_step import bench, trial, was_refused, was_upset
+from care_core.diagnose.noisy_or import NoisyOr
 from care_core.diagnose.outside import suspects_outside
 from care_core.diagnose.outside.change import Advisable, check_first, leading_outside, outside_fix, shown_fix
 from care_core.diagnose.parts import mend_first, unmended
+from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import (
     Suspect,
     describe_path,
     deviating,
     not_ruled_out,
-    suspects,
 )
 from care_core.diagnose.records import (
     Cause,
@@ -184,9 +186,8 @@ def diagnose(
         )
     report("ranking the causes", 0.7)
     query = query_of(judged, profile, keep)
-    weighed = {
-        result.variable.name: suspects(query, result.variable.name, schema.known, run.evidence) for result in broken
-    }
+    blamed = blame(judged, profile, query, health, good)
+    weighed, outside, failure = blamed.suspects, blamed.outside, blamed.failure
     found = {name: tuple(one for one in group if one.is_identified) for name, group in weighed.items()}
     unranked = {name: tuple(one for one in group if not one.is_identified) for name, group in weighed.items()}
     case = _Case(profile, choice, run, query, _reference(judged), unranked, health.findings)
@@ -196,27 +197,25 @@ def diagnose(
         Fault(result, () if unheard[name] else _causes(case, result, found[name], top))
         for name, result in ((result.variable.name, result) for result in broken)
     )
-    outside = suspects_outside(run, broken, health, schema, query, good)
-    hypotheses = explain(
-        query, broken, weighed, run.refused_by, health.findings, said, choice.fit.verdict, _weights(outside)
-    )
+    hypotheses = hypotheses_of(failure)
     report("searching for a fix", 0.85)
-    as_driven = odds_as_driven(float(query.probability([query.config])[0]), hypotheses)
+    promise = Promise(failure, query, [result.variable.name for result in broken])
+    as_driven = promise.as_driven()
     out_of_reach = next(filter(None, unheard.values()), None)
     part = _part(case, health.findings)
     lead = leading_outside(hypotheses, outside, health.findings, run)
     if lead is not None and (part is None or lead.is_found):
-        advised = _of_outside(lead, case, hypotheses)
+        advised = _of_outside(lead, case, hypotheses, promise)
     else:
         lead = None
         against = (part and unmended(part)) or out_of_reach or outweighed(hypotheses, health.findings)
         options = {s.option for group in found.values() for s in group}
-        advised = _of_options(case, judged, faults, hypotheses, options, as_driven, against)
+        advised = _of_options(case, judged, faults, hypotheses, options, promise, against)
     fixes, abstained = advised.fixes, advised.abstained
     unsure = abstained is not None or any(fault.causes[0].confidence != "high" for fault in faults if fault.causes)
     if abstained is None and lead is None:
         faults = tuple(replace(fault, causes=_as_in_fix(case, fault, fixes[0])) for fault in faults)
-    faults = believed_causes(faults, hypotheses, query.config)
+    faults = _as_ranked(promised_causes(faults, promise), failure)
     report("done", 1.0)
     return Diagnosis(
         profile=choice,
@@ -234,6 +233,7 @@ def diagnose(
         tell_more=_tell_more(case, faults, health) if unsure and not out_of_reach else (),
         health=health,
         hypotheses=hypotheses,
+        failure=failure,
         outside=outside,
     )
 
@@ -246,7 +246,7 @@ class _Advised(Record):
     why: str = ""
 
 
-def _of_outside(lead: Advisable, case: _Case, hypotheses: Sequence[Hypothesis]) -> _Advised:
+def _of_outside(lead: Advisable, case: _Case, hypotheses: Sequence[Hypothesis], promise: Promise) -> _Advised:
     """What is advised of a parameter outside the profile that leads the ranking, with the options that stand beside it.
     A vehicle that never armed has its mission still before it: then the odds are those of the mission, too."""
     if not lead.is_advised:
@@ -255,7 +255,7 @@ def _of_outside(lead: Advisable, case: _Case, hypotheses: Sequence[Hypothesis]) 
     likely = {one.name: one.probability for one in hypotheses if one.probability >= BESIDE * lead.probability}
     free = (_off(case) & likely.keys()) - query.kept - _failsafes_held(case, case.findings)
     beside = {name: value for name in sorted(free) if query.variables[name].accepts(value := query.reference[name])}
-    odds = lead.probability + sum(likely[name] for name in beside)
+    odds = promise.without([lead.name, *beside])
     if was_refused(case.findings):
         odds *= float(replace(query, observed={}, repeats=()).probability([query.config])[0])
     changes = to_fix(query, beside, odds).changes if beside else ()
@@ -268,7 +268,7 @@ def _of_options(
     faults: tuple[Fault, ...],
     hypotheses: Sequence[Hypothesis],
     options: Collection[str],
-    as_driven: float,
+    promise: Promise,
     against: str | None,
 ) -> _Advised:
     """What is advised of the options of the profile.
@@ -277,21 +277,21 @@ def _of_options(
         options: those that may have moved what broke.
         against: why nothing is advised whatever is found, None where nothing stands against it.
     """
-    query, broken = case.query, judged.broken
+    broken, as_driven = judged.broken, promise.as_driven()
     held = _failsafes_held(case, case.findings)
     held_too = held | _leads(faults)
     found = _fixes(case, options, held_too)
-    if idle := _idle(case, judged, found[:1]):
+    if idle := _idle(judged, found[:1], promise):
         found = _fixes(case, options, held_too | idle)
-    fixes = believed(found, hypotheses, query.config)
+    fixes = promised(found, promise)
     if against is not None:
         return _Advised(fixes, against)
     abstained = (
         _abstains(case, faults, fixes, held, as_driven)
-        or falls_short(fixes[0], broken, _odds(query), as_driven)
+        or falls_short(fixes[0], broken, as_driven)
         or untried(fixes[0], case.profile.schema.learned_elsewhere)
         or unrecorded(fixes[0], case.choice.fit.verdict)
-        or no_stand_out(fixes[0], as_driven, hypotheses, _necessary(case, broken, fixes[0]))
+        or no_stand_out(fixes[0], as_driven, hypotheses, _necessary(promise, fixes[0]))
     )
     shown = None if abstained is None else _shown_by_run(case, hypotheses)
     return _Advised(fixes, abstained) if shown is None else _Advised((shown,), None)
@@ -364,32 +364,20 @@ def _leads(faults: Sequence[Fault]) -> set[str]:
     return {one.option.name for one in causes if one.is_lead} - {one.option.name for one in causes if not one.is_lead}
 
 
-def _idle(case: _Case, judged: Judged, fixes: Sequence[Fix]) -> set[str]:
+def _idle(judged: Judged, fixes: Sequence[Fix], promise: Promise) -> set[str]:
     """Options that a fix changes beside others for nothing that this run broke: it met all else, as far as can be."""
-    broken = judged.broken
     if not fixes or any(result.status == "not_evaluated" for result in judged.results):
         return set()
     names = {change.option.name for change in fixes[0].changes}
-    return {name for name in names if len(names) > 1 and _necessary(case, broken, fixes[0], names - {name}) < NECESSARY}
+    return {name for name in names if len(names) > 1 and _necessary(promise, fixes[0], names - {name}) < NECESSARY}
 
 
-def _necessary(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix, given: Collection[str] = frozenset()) -> float:
-    """The largest share of the failures of a broken objective that the fix takes away (Pearl's probability of
-    necessity, where a change harms no run), before anything of this run is known.
-
-    Args:
-        given: options of the fix that are changed already.
-    """
-    before = replace(case.query, observed={}, repeats=())
+def _necessary(promise: Promise, fix: Fix, given: Collection[str] = frozenset()) -> float:
+    """Probability of necessity of a fix. `given`: options of it that are changed already."""
+    driven = promise.query.config
     changed = {one.option.name: one.suggested for one in fix.changes}
     first = {name: value for name, value in changed.items() if name in given}
-    configs = [{**before.config, **first}, {**before.config, **changed}]
-    shares = [0.0]
-    for name in (result.variable.name for result in broken):
-        if name in before.model.outcomes:
-            here, there = (float(one) for one in 1.0 - before.p_ok(name, configs))
-            shares.append(1.0 - there / here if here > 0 else 0.0)
-    return max(shares)
+    return promise.necessity({**driven, **changed}, {**driven, **first})
 
 
 def _set_wrong(judged: Judged, explained: Sequence[Hypothesis], said: Mapping[str, Evidence]) -> Iterator[str]:
@@ -501,6 +489,16 @@ def _as_in_fix(case: _Case, fault: Fault, fix: Fix) -> tuple[Cause, ...]:
     return tuple(map(as_in_fix, fault.causes))
 
 
+def _as_ranked(faults: Sequence[Fault], failure: NoisyOr) -> tuple[Fault, ...]:
+    """The faults with their causes in the order of the hypotheses: which of them acted is told in one order alone."""
+
+    def ranked(causes: tuple[Cause, ...]) -> tuple[Cause, ...]:
+        order = sorted(causes, key=lambda one: (one.is_lead, -round(failure.acts(("parameter", one.option.name)), 2)))
+        return tuple(replace(one, rank=rank) for rank, one in enumerate(order, start=1))
+
+    return tuple(replace(fault, causes=ranked(fault.causes)) for fault in faults)
+
+
 def _confidence(case: _Case, result: ObjectiveResult, suspect: Suspect, in_support: bool, support: float) -> Confidence:
     """High where the option explains most of a fault that is one wherever in its interval the threshold lies, nearly
     every resample gives it a path there, the log holds its value, and no option that the training runs cannot judge is
@@ -600,14 +598,12 @@ def _abstains(
         rival = next(iter(case.unranked[fault.objective.variable.name]), None)
         if rival is not None and rival.weight > max((cause.contribution for cause in fault.causes), default=0.0):
             return f"'{rival.option}' is as likely a cause, and the training runs cannot tell what it does"
-    now = float(case.query.probability([case.query.config])[0])
-    enough = max(MIN_PROBABILITY, now + GAIN_FOR_ONE_MORE)
     has_cause = any(not cause.is_lead for fault in faults for cause in fault.causes)
-    if has_cause and fixes and fixes[0].p_fixed >= enough:
+    if has_cause and fixes and is_worth(fixes[0], as_driven):
         return None
     if any(cause.option.name in held for fault in faults for cause in fault.causes if not cause.is_lead):
         return f"charge or replace the battery first: {', '.join(sorted(held))} is not lowered while it is not full"
-    unsafe = needs_unsafe(case.query, enough)
+    unsafe = needs_unsafe(case.query, max(MIN_PROBABILITY, as_driven + WORTH))
     if unsafe is not None:
         return f"only '{unsafe}' past its default is likely to help, and a safety parameter is never made looser"
     if not has_cause:
@@ -618,7 +614,7 @@ def _abstains(
     pinned = f", with {', '.join(sorted(case.query.kept))} kept as it is" if case.query.kept else ""
     broken = [fault.objective for fault in faults]
     best = nearest(_resets(case, faults), broken)
-    short = falls_short(best, broken, _odds(case.query), as_driven) if best else None
+    short = falls_short(best, broken, as_driven) if best else None
     return f"{short or 'no change inside the acceptable ranges is likely enough to meet every limit'}{pinned}"
 
 
@@ -709,9 +705,8 @@ def _odds(query: CounterfactualQuery) -> float:
     return float(replace(query, observed={}, repeats=()).probability([query.reference])[0])
 
 
-def _if_hidden(case: _Case, fix: Fix) -> str:
+def _if_hidden(case: _Case, fix: Fix, now: float) -> str:
     """What is left of a fix's promise where something unrecorded moved options and objectives together."""
-    now = float(case.query.probability([case.query.config])[0])
     names = {change.option.name for change in fix.changes}
     effects = [effect for (option, _), effect in case.query.model.effects.items() if option in names]
     doubt = max((effect.doubtful for effect in effects), default=1.0)
@@ -736,7 +731,7 @@ def _notes(case: _Case, broken: Sequence[ObjectiveResult], fix: Fix | None, as_d
     if fix is not None and not fix.shown_by:
         notes += filter(None, [by_chance(fix, as_driven, _odds(case.query))])
     if fix is not None and not fix.shown_by and case.profile.schema.observational:
-        notes.append(_if_hidden(case, fix))
+        notes.append(_if_hidden(case, fix, as_driven))
     if not case.run.mission.fits and case.run.mission.mismatch not in notes:
         notes.append(case.run.mission.mismatch)
     unread = unread_options(case.profile.schema, case.run) & set(_off(case))

@@ -390,13 +390,11 @@ def alone(share: float, as_driven: float | None) -> str:
 
 def hypothesis_text(one: Hypothesis, findings: Sequence[SeenFinding] = (), outside: Sequence[SeenSuspect] = ()) -> str:
     """An explanation in a clause; a finding that is itself a symptom stands for what the log does not show."""
+    if one.what == "parameter" and not one.name:
+        return "a parameter that the profile does not know"
     if one.what == "parameter":
         return f"the parameter {next((suspect.text for suspect in outside if suspect.name == one.name), one.name)}"
     if one.name:
         is_symptom = any(finding.title == one.name and finding.kind in SYMPTOMS for finding in findings)
         return f"{one.name}; the log does not show why" if is_symptom else one.name
-    unnamed = {
-        "hardware": "a hardware fault that this log cannot show",
-        "world": "something in the environment (wind, obstacle, load)",
-    }
-    return unnamed.get(one.what, "bad luck: this mission sometimes fails with the reference settings too")
+    return "bad luck: this mission sometimes fails with the reference settings too"

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from care_core.causal.counterfactual import CounterfactualQuery
+from care_core.causal.counterfactual import Config, CounterfactualQuery
+from care_core.causal.kernel import FloatArray
 from care_core.configs.driven import option_value
+from care_core.diagnose.blame import blame
 from care_core.diagnose.fixes import change_notes, prediction
 from care_core.diagnose.judging import Judged, query_of
+from care_core.diagnose.noisy_or import NoisyOr
+from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import ObjectiveResult, Prediction
 from care_core.ecosystems.findings import NOTHING_SEEN, Health
 from care_core.ecosystems.ranking import lost_by
@@ -55,12 +59,14 @@ class Question(Record, eq=False):
     objectives: tuple[ObjectiveResult, ...]
     lost_by: tuple[str, ...] = ()
     """What this run was lost by and no prediction knows of."""
+    failure: NoisyOr | None = None
+    """The causes that may have lost this run; None where nothing was lost."""
 
     def ask(self, changes: Mapping[str, float]) -> Answer:
         """The prediction for this run with these options changed; option names must be the profile's."""
         query = self.query
         config = {**query.config, **changes}
-        then, now = query.probability([config, query.config])
+        then, now = self._odds([config, query.config])
         return Answer(
             changes=tuple(
                 Change(
@@ -81,6 +87,13 @@ class Question(Record, eq=False):
             p_ok=float(then),
             p_ok_now=float(now),
         )
+
+    def _odds(self, configs: Sequence[Config]) -> FloatArray:
+        """Probability that every objective is met: of a run that failed as its report promises it."""
+        if self.failure is None:
+            return self.query.probability(configs)
+        broken = [result.variable.name for result in self.objectives if result.status == "fault"]
+        return Promise(self.failure, self.query, broken).odds(configs)
 
     def warnings(self, name: str, value: float) -> tuple[str, ...]:
         """What speaks against believing or setting this value."""
@@ -107,13 +120,15 @@ def question(judged: Judged, profile: Profile, choice: ProfileChoice, health: He
     """Get a run ready to be asked. Raises UsageError for one without a mission, whose outcome nobody can predict."""
     if judged.run.checks:
         raise UsageError("No mission was flown, so no outcome of one can be predicted.", hint=NO_MISSION_HINT)
+    query = query_of(judged, profile)
     asked = Question(
         profile=choice,
         schema=profile.schema,
         run=judged.run,
-        query=query_of(judged, profile),
+        query=query,
         objectives=judged.results,
         lost_by=lost_by(health.findings, is_judged=bool(judged.broken)),
+        failure=blame(judged, profile, query, health).failure if judged.broken else None,
     )
     asked.ask({})  # The mechanisms invert their covariance when first asked, which nobody should wait for at a key.
     return asked

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from care_core.causal.counterfactual import CounterfactualQuery, known_value
+from care_core.causal.counterfactual import Config, CounterfactualQuery, known_value
+from care_core.causal.kernel import FloatArray
 from care_core.causal.model import Model
+from care_core.diagnose.noisy_or import NoisyOr, What
+from care_core.diagnose.promise import Promise
 from care_core.diagnose.ranking import deviating
-from care_core.diagnose.records import Confidence, Diagnosis, What
+from care_core.diagnose.records import Confidence, Diagnosis
 from care_core.diagnose.verdict import RunStatus, verdict_of
 from care_core.ecosystems.findings import FindingKind, Severity
 from care_core.records import Record, field, replace
@@ -55,6 +58,15 @@ class Asked(Record):
     config: Mapping[str, float]
     observed: Mapping[str, float]
     thresholds: Mapping[str, tuple[Op, float]]
+    failure: NoisyOr | None = None
+    """The causes that may have lost it; None where nothing was lost."""
+
+    def odds(self, model: Model, broken: Sequence[str], configs: Sequence[Config]) -> FloatArray:
+        """Probability that the next run meets every limit under each configuration, shape (m,), as its report has it."""
+        query = self.query(model)
+        return (
+            query.probability(configs) if self.failure is None else Promise(self.failure, query, broken).odds(configs)
+        )
 
     def query(self, model: Model) -> CounterfactualQuery:
         """The run, ready to be asked what other values would have done."""
@@ -116,11 +128,6 @@ class Row(Record):
             return None
         return first
 
-    @property
-    def broken(self) -> float:
-        """Probability that something failed which no parameter repairs."""
-        return sum(one.probability for one in self.explained if one.what in ("hardware", "world") and one.name)
-
 
 def row_of(log: str, diagnosis: Diagnosis, query: CounterfactualQuery | None = None) -> Row:
     """The row of a diagnosed run.
@@ -170,7 +177,7 @@ def row_of(log: str, diagnosis: Diagnosis, query: CounterfactualQuery | None = N
         change={} if diagnosis.fix is None else {one.option.name: one.suggested for one in diagnosis.fix.changes},
         p_fixed=None if diagnosis.fix is None else diagnosis.fix.odds,
         off={} if query is None else {name: query.reference[name] for name in deviating(query.config, query.reference)},
-        asked=None if query is None else _asked(query),
+        asked=None if query is None else _asked(query, diagnosis.failure),
     )
 
 
@@ -200,7 +207,7 @@ def by_folder(row: Row) -> Row:
     return row if row.robot or not row.folder else replace(row, robot=row.folder, called=row.folder)
 
 
-def _asked(query: CounterfactualQuery) -> Asked:
+def _asked(query: CounterfactualQuery, failure: NoisyOr | None) -> Asked:
     """Only what the model reads of the run."""
     stages = {stage.variable for outcome in query.model.outcomes.values() for stage in outcome.stages}
     known = {name: known_value(query.observed, name) for name in (*query.model.outcomes, *sorted(stages))}
@@ -208,4 +215,5 @@ def _asked(query: CounterfactualQuery) -> Asked:
         dict(query.config),
         {name: value for name, value in known.items() if value is not None},
         {name: (bound.op, bound.bound) for name, bound in query.thresholds.items()},
+        failure,
     )

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from care_core.causal.model import Model
 from care_core.configs.driven import same_value
-from care_core.diagnose.advice import enough
+from care_core.diagnose.advice import adds_enough
 from care_core.diagnose.fixes import GAIN_FOR_ONE_MORE
 from care_core.errors import CareError
 from care_core.fleet.rows import Row, distinct
@@ -133,7 +133,7 @@ def _tried(
     name: str, model: Model, candidates: Sequence[tuple[Variable, float]], rows: Sequence[Row], unit: Unit
 ) -> list[Suggestion]:
     """Every candidate with what it would do to each robot. A run is asked all of them at once."""
-    robots: dict[str, list[tuple[Row, _Answer | None]]] = {}
+    robots: dict[str, list[tuple[Row, Probabilities | None]]] = {}
     for row in rows:
         robots.setdefault(name_of(row, unit), []).append((row, _answer(row, model, candidates)))
     return [
@@ -151,25 +151,17 @@ def _tried(
     ]
 
 
-class _Answer(Record, eq=False):
-    """What a model says of a run: the probabilities that it meets every limit, unchanged and then with each candidate,
-    and the one from which on a change of this run is advice."""
-
-    probabilities: Probabilities
-    enough: float
-
-
-def _answer(row: Row, model: Model, candidates: Sequence[tuple[Variable, float]]) -> _Answer | None:
-    """None where no model can be asked."""
+def _answer(row: Row, model: Model, candidates: Sequence[tuple[Variable, float]]) -> Probabilities | None:
+    """The probabilities that a run meets every limit, unchanged and then with each candidate; None where no model can
+    be asked."""
     # A worker may have had a profile of the same name and version that was trained on other variables.
     if row.asked is None or any(
         name not in row.asked.config for one in model.mechanisms.values() for name in one.inputs
     ):
         return None
-    config, query = row.asked.config, row.asked.query(model)
+    config = row.asked.config
     changed = [{**config, option.name: value} for option, value in candidates]
-    odds = replace(query, observed={}).probability([{**config, **row.off}])[0]
-    return _Answer((1.0 - row.broken) * query.probability([config, *changed]), enough(float(odds)))
+    return row.asked.odds(model, row.breaches, [config, *changed])
 
 
 class _Run(Record, eq=False):
@@ -178,7 +170,7 @@ class _Run(Record, eq=False):
     row: Row
     option: str
     value: float
-    answer: _Answer | None
+    answer: Probabilities | None
     place: int
 
     @property
@@ -188,11 +180,11 @@ class _Run(Record, eq=False):
 
     @property
     def now(self) -> float | None:
-        return None if self.answer is None else float(self.answer.probabilities[0])
+        return None if self.answer is None else float(self.answer[0])
 
     @property
     def then(self) -> float | None:
-        return None if self.answer is None else float(self.answer.probabilities[1 + self.place])
+        return None if self.answer is None else float(self.answer[1 + self.place])
 
     @property
     def gain(self) -> float:
@@ -200,8 +192,8 @@ class _Run(Record, eq=False):
 
     @property
     def is_helped(self) -> bool:
-        is_likely = self.answer is not None and self.then is not None and self.then >= self.answer.enough
-        return is_likely and self.gain >= GAIN_FOR_ONE_MORE
+        is_asked = self.now is not None and self.then is not None and not self.has_it
+        return is_asked and adds_enough(self.then or 0.0, self.now or 0.0, 1)
 
 
 def _outlook(robot: str, runs: Sequence[_Run]) -> Outlook:

@@ -7,7 +7,8 @@ from datetime import datetime
 from pathlib import Path, PurePosixPath
 from typing import Any, Final, Literal
 
-from care_core.diagnose.records import Confidence, What
+from care_core.diagnose.noisy_or import What
+from care_core.diagnose.records import Confidence
 from care_core.diagnose.verdict import RunStatus
 from care_core.ecosystems.findings import FindingKind, Severity
 from care_core.errors import UsageError

@@ -41,7 +41,6 @@ def test_the_row_of_a_diagnosis() -> None:
     assert row.objectives == {"success": 1.0, "mission_time": 190.0}
     assert row.change == {"land_speed": 50.0}
     assert [finding.kind for finding in row.findings] == ["motor"]
-    assert row.broken == pytest.approx(0.2)
 
 
 def test_a_robot_that_is_only_guessed_is_none_and_its_folder_may_stand_for_it() -> None:

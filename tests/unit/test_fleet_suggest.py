@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from unittest.mock import Mock
 
 import pytest
 
 from care_core.application.case import Request
 from care_core.application.fleet import triage_one
-from care_core.diagnose.advice import enough, falls_short
-from care_core.diagnose.records import Fix
+from care_core.diagnose.noisy_or import NoisyOr
 from care_core.fleet.fleet_report import together
 from care_core.fleet.rows import Explained, NamedCause, Row
 from care_core.fleet.sources import Source
@@ -59,10 +57,18 @@ def test_the_row_of_a_flight_says_what_its_triage_says(failed: Row, fine: Row) -
     assert failed.asked.config[option_of(failed)] == SLOW
     model = load_profile("arducopter").model
     (value,) = failed.change.values()
-    then = failed.asked.query(model).probability([{**failed.asked.config, option_of(failed): value}])
-    # The row asks the same model the same question as the triage did, which took failed parts off its promise.
-    assert failed.p_fixed == pytest.approx((1 - failed.broken) * then[0])
+    then = failed.asked.odds(model, failed.breaches, [{**failed.asked.config, option_of(failed): value}])
+    # The row asks the same model and the same causes the same question as the triage did.
+    assert failed.p_fixed == pytest.approx(then[0])
     assert (fine.status, fine.breaches, fine.main) == ("ok", (), None)
+
+
+def broken_part(row: Row) -> Row:
+    """The row of a run that a part explains better than anything else."""
+    assert row.asked is not None
+    causes = NoisyOr({("hardware", "motor 2 lost thrust"): 0.95, ("parameter", option_of(row)): 0.1})
+    explained = (Explained("hardware", "motor 2 lost thrust", 0.9, "motor"),)
+    return replace(row, explained=explained, asked=replace(row.asked, failure=causes))
 
 
 def option_of(row: Row) -> str:
@@ -71,7 +77,7 @@ def option_of(row: Row) -> str:
 
 def test_a_change_that_helps_most_and_harms_none(failed: Row, fine: Row) -> None:
     option = option_of(failed)
-    broken = replace(on("broken", failed), explained=(Explained("hardware", "motor 2 lost thrust", 0.9, "motor"),))
+    broken = broken_part(on("broken", failed))
     found = only([on("a", failed), on("b", failed), on("c", failed), broken, on("good", fine)])
     assert isinstance(found, Suggestion)
     assert (found.option.name, found.value) == (option, failed.change[option])
@@ -99,8 +105,7 @@ def test_a_change_that_harms_a_robot_which_does_well_is_not_suggested(failed: Ro
 
 
 def test_no_change_where_it_helps_no_majority_or_one_robot_alone(failed: Row, fine: Row) -> None:
-    parts = (Explained("hardware", "motor 2 lost thrust", 0.9, "motor"),)
-    broken = [replace(on(f"x{n}", failed), explained=parts) for n in range(2)]
+    broken = [broken_part(on(f"x{n}", failed)) for n in range(2)]
     found = only([on("a", failed), on("b", failed), *broken])
     assert isinstance(found, Silence)
     assert "2 of the 4 robots that fail" in found.reason
@@ -111,32 +116,20 @@ def test_no_change_where_it_helps_no_majority_or_one_robot_alone(failed: Row, fi
 
 
 def test_a_robot_is_helped_where_most_of_its_failures_are(failed: Row) -> None:
-    parts = (Explained("hardware", "motor 2 lost thrust", 0.9, "motor"),)
-    again = [replace(on("a", failed), recording=f"{n}", explained=parts) for n in range(2)]
+    again = [replace(broken_part(on("a", failed)), recording=f"{n}") for n in range(2)]
     found = only([on("a", failed), *again, on("b", failed), on("c", failed)])
     assert isinstance(found, Suggestion)
     assert [one.name for one in found.having("helped")] == ["b", "c"]
     assert [one.name for one in found.having("not helped")] == ["a"]
 
 
-def test_what_is_enough_goes_by_the_odds_of_the_reference(failed: Row, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert failed.asked is not None
-    query = replace(failed.asked.query(load_profile("arducopter").model), observed={})
-    odds = float(query.probability([{**query.config, **failed.off}])[0])
-    assert falls_short(promising(enough(0.3)), [], 0.3) is None  # as for a single run
-    assert falls_short(promising(enough(0.3) - 0.01), [], 0.3)
-    for least, helped in ((0.2, ["a", "b"]), (0.99, [])):
-        told = Mock(return_value=least)
-        monkeypatch.setattr("care_core.fleet.suggest.enough", told)
+def test_a_robot_is_helped_by_what_a_change_adds(failed: Row, monkeypatch: pytest.MonkeyPatch) -> None:
+    for worth, helped in ((0.0, ["a", "b"]), (0.99, [])):
+        monkeypatch.setattr("care_core.diagnose.advice.WORTH", worth)
         found = only([on("a", failed), on("b", failed)])
         best = found if isinstance(found, Suggestion) else found.best
         assert best is not None
         assert [one.name for one in best.having("helped")] == helped
-        assert [call.args[0] for call in told.call_args_list] == pytest.approx([odds, odds])
-
-
-def promising(probability: float) -> Fix:
-    return Fix(changes=(), p_fixed=probability, predicted={})
 
 
 def test_what_another_version_of_the_profile_judged_is_not_asked(failed: Row) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.diagnose.hypotheses import unasked, weigh
+from care_core.diagnose.hypotheses import UNMODELLED, UNTOLD, hypotheses_of, unasked, with_findings
+from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, NoisyOr
 from care_core.diagnose.records import Hypothesis
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.records import replace
@@ -34,6 +37,11 @@ def finding(
     )
 
 
+def weigh(options: Mapping[str, float], chance: float, findings: Sequence[Finding]) -> tuple[Hypothesis, ...]:
+    causes = with_findings({("parameter", name): share for name, share in options.items()}, findings)
+    return hypotheses_of(NoisyOr({CHANCE: chance, UNKNOWN: UNMODELLED, **causes}))
+
+
 def lead(found: tuple[Hypothesis, ...]) -> tuple[str, str]:
     return found[0].what, found[0].name
 
@@ -42,65 +50,66 @@ def lead(found: tuple[Hypothesis, ...]) -> tuple[str, str]:
     st.dictionaries(st.sampled_from(["a", "b", "c"]), st.floats(0, 1)),
     st.floats(0, 1),
     st.lists(st.builds(finding, st.floats(0, 1), st.sampled_from(["info", "warning", "critical"]))),
-    st.sampled_from(["fits", "partly", "no"]),
 )
-def test_probabilities_add_up_to_one(options: dict[str, float], chance: float, findings: list[Finding], v: str) -> None:
-    found = weigh(options, chance, findings, v)  # type: ignore[arg-type]
+def test_probabilities_add_up_to_one(options: dict[str, float], chance: float, findings: list[Finding]) -> None:
+    found = weigh(options, chance, findings)
+    assert all(one.probability <= one.acts <= 1.0 for one in found if one.what != "chance")
     assert sum(one.probability for one in found) == pytest.approx(1.0)
     assert [one.probability for one in found] == sorted((one.probability for one in found), reverse=True)
 
 
 def test_a_configuration_that_fails_leads_where_no_part_speaks() -> None:
-    assert lead(weigh({"LAND_SPEED": 0.9, "RTL_ALT": 0.05}, 0.02, [], "fits")) == ("parameter", "LAND_SPEED")
+    assert lead(weigh({"LAND_SPEED": 0.9, "RTL_ALT": 0.05}, 0.02, [])) == ("parameter", "LAND_SPEED")
 
 
 def test_a_part_that_surely_failed_leads_over_a_doubtful_parameter() -> None:
-    found = weigh({"LAND_SPEED": 0.3}, 0.02, [finding(0.9)], "fits")
+    found = weigh({"LAND_SPEED": 0.3}, 0.02, [finding(0.9)])
     assert lead(found) == ("hardware", "motor 2 lost thrust")
-    assert weigh({"LAND_SPEED": 0.03}, 0.02, [finding(0.9)], "fits")[0].probability > 0.8
+    assert weigh({"LAND_SPEED": 0.03}, 0.02, [finding(0.9)])[0].probability > 0.8
+
+
+def test_two_causes_may_both_have_acted() -> None:
+    first, second = weigh({"LAND_SPEED": 0.95}, 0.02, [finding(0.9)])[:2]
+    assert first.name == "LAND_SPEED"
+    assert first.acts > 0.9
+    assert second.probability < 0.1
+    assert second.acts == pytest.approx(0.9 * 0.95, abs=0.02)
 
 
 def test_a_part_that_surely_failed_and_that_missions_survive_does_not_lead_over_a_likely_parameter() -> None:
     few = replace(finding(0.95, "warning"), mission_lost=0.15)
-    assert lead(weigh({"LAND_SPEED": 0.4}, 0.02, [few], "fits")) == ("parameter", "LAND_SPEED")
-    assert lead(weigh({"LAND_SPEED": 0.02}, 0.02, [few], "fits")) == ("hardware", "motor 2 lost thrust")
+    assert lead(weigh({"LAND_SPEED": 0.4}, 0.02, [few])) == ("parameter", "LAND_SPEED")
+    assert lead(weigh({"LAND_SPEED": 0.02}, 0.02, [few])) == ("hardware", "motor 2 lost thrust")
 
 
 def test_a_part_that_failed_after_the_run_was_failing_explains_little() -> None:
     stuck = Finding("planner", "the controller is stuck", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
-    assert lead(weigh({"occdist_scale": 0.6}, 0.3, [stuck, finding(0.98)], "fits")) == ("parameter", "occdist_scale")
+    assert lead(weigh({"occdist_scale": 0.6}, 0.3, [stuck, finding(0.98)])) == ("parameter", "occdist_scale")
     sooner = replace(stuck, onset_s=60.0)
-    assert lead(weigh({"occdist_scale": 0.6}, 0.3, [sooner, finding(0.98)], "fits"))[0] == "hardware"
+    assert lead(weigh({"occdist_scale": 0.6}, 0.3, [sooner, finding(0.98)]))[0] == "hardware"
 
 
 def test_a_sensor_that_failed_after_the_run_was_failing_keeps_its_weight() -> None:
     swings = Finding("tuning", "roll oscillates", 20.0, 70.0, "critical", "", "", "parameter", 0.85)
     late = replace(finding(0.97), onset_s=60.0)
-    share = {kind: weigh({"D": 0.6}, 0.05, [swings, replace(late, kind=kind)], "fits") for kind in ("motor", "compass")}
-    of_part = {kind: next(one.probability for one in found if one.what == "hardware") for kind, found in share.items()}
+    share = {kind: weigh({"D": 0.6}, 0.05, [swings, replace(late, kind=kind)]) for kind in ("motor", "compass")}
+    of_part = {kind: next(one.acts for one in found if one.what == "hardware") for kind, found in share.items()}
     assert of_part["compass"] > 5 * of_part["motor"]
 
 
 def test_a_doubtful_sign_of_how_it_was_set_takes_nothing_from_a_part_that_surely_failed() -> None:
     swings = Finding("tuning", "pitch oscillates", 20.0, 70.0, "warning", "", "", "parameter", 0.2)
-    assert lead(weigh({"a": 0.3}, 0.1, [swings, finding(0.85)], "fits"))[0] == "hardware"
+    assert lead(weigh({"a": 0.3}, 0.1, [swings, finding(0.85)]))[0] == "hardware"
 
 
-def test_a_finding_that_speaks_of_how_it_was_set_raises_the_options() -> None:
+def test_a_finding_that_names_a_parameter_raises_it() -> None:
     stuck = Finding("planner", "the controller is stuck", 20.0, 70.0, "critical", "", "", "parameter", 0.6)
-    assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, [], "fits"))[0] == "chance"
-    assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, [stuck], "fits")) == ("parameter", "a")
-    assert lead(weigh({"a": 0.01}, 0.3, [stuck], "fits"))[0] == "chance"
+    assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, []))[0] == "chance"
+    assert lead(weigh({"a": 0.2, "b": 0.1}, 0.3, [replace(stuck, parameters=("b",))])) == ("parameter", "b")
 
 
 def test_what_comes_after_the_impact_explains_nothing() -> None:
-    assert lead(weigh({"LAND_SPEED": 0.6}, 0.02, [finding(0.95, after_impact=True)], "fits"))[0] == "parameter"
-
-
-def test_where_no_profile_fits_no_parameter_is_named() -> None:
-    found = weigh({"LAND_SPEED": 0.9}, 0.1, [finding(0.6)], "no")
-    assert not [one for one in found if one.what == "parameter"]
-    assert lead(found)[0] == "hardware"
+    assert lead(weigh({"LAND_SPEED": 0.6}, 0.02, [finding(0.95, after_impact=True)]))[0] == "parameter"
 
 
 def test_without_a_model_only_a_failure_is_explained() -> None:
@@ -114,25 +123,21 @@ def test_a_critical_finding_names_its_options_where_no_objective_has_a_value() -
     shown = {swings.title: Evidence(30.0, "the steering oscillates", "found", options=("P", "FF"))}
     found = unasked([swings], shown=shown, verdict="fits")
     assert {one.name for one in found[:2]} == {"P", "FF"}
-    assert found[0].probability == pytest.approx(found[1].probability)
+    assert found[0].acts == pytest.approx(found[1].acts)
     assert found[0].probability > 0.35
     assert lead(unasked([swings]))[0] != "parameter", "without the rule it names none"
     assert unasked([replace(swings, severity="warning")], shown=shown, verdict="fits") == ()
 
 
 def test_what_the_operator_did_counts_as_met() -> None:
-    assert lead(weigh({}, 0.0, [finding(0.9, suspect="operation")], "no"))[0] == "world"
+    assert lead(weigh({}, 0.0, [finding(0.9, suspect="operation")]))[0] == "world"
 
 
-def test_what_left_no_signal_weighs_as_much_as_chance_and_thrice_where_the_profile_fits_in_part() -> None:
-    for verdict, times in (("fits", 1.0), ("partly", 3.0)):
-        found = {one.what: one.probability for one in weigh({}, 0.0, (), verdict)}  # type: ignore[arg-type]
-        assert found["hardware"] / found["chance"] == pytest.approx(times)
-        assert found["world"] / found["chance"] == pytest.approx(times)
-
-
-def test_what_left_no_trace_weighs_alike_and_more_where_the_profile_fits_in_part() -> None:
-    fits = {one.what: one.probability for one in weigh({}, 0.0, (), "fits")}
-    assert fits == pytest.approx({"chance": 1 / 3, "hardware": 1 / 3, "world": 1 / 3})
-    partly = {one.what: one.probability for one in weigh({}, 0.0, (), "partly")}
-    assert partly == pytest.approx({"chance": 1 / 7, "hardware": 3 / 7, "world": 3 / 7})
+def test_what_no_signal_shows_has_a_share_of_its_own() -> None:
+    found = {(one.what, one.name): one.probability for one in weigh({"a": 0.5}, 0.1, ())}
+    assert found["parameter", ""] > 0.01
+    for verdict, share in UNTOLD.items():
+        shown = unasked([finding(0.9)], verdict=verdict)
+        rest = next(one for one in shown if one.what == "chance")
+        assert rest.name == "chance, or what no log shows"
+        assert 0.1 * share < rest.probability < share

@@ -1,19 +1,13 @@
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from care_core.causal.graph import CausalGraph
 from care_core.causal.model import EdgeRecord
 from care_core.diagnose.ranking import (
     _mediators,
-    _shapley,
     best_paths,
     describe_path,
     deviating,
@@ -25,36 +19,27 @@ from care_core.records import replace
 from care_core.variables import Threshold
 from tests.planted import BOUNDS, DEFAULTS, OPTIONS, SCHEMA, planted_query, planted_run, query_of, with_variable
 
-GAMES = st.integers(1, 6).flatmap(
-    lambda n: st.tuples(st.just(n), st.lists(st.floats(0, 1), min_size=2**n, max_size=2**n))
-)
 
-
-@given(GAMES)
-def test_shapley_values_add_up_to_the_whole_change(game: tuple[int, list[float]]) -> None:
-    n, worth = game
-    names = [f"x{i}" for i in range(n)]
-
-    def probability(sets: Sequence[frozenset[str]]) -> NDArray[np.float64]:
-        return np.array([worth[sum(2 ** names.index(name) for name in s)] for s in sets])
-
-    assert _shapley(names, probability).sum() == pytest.approx(worth[-1] - worth[0], abs=1e-9)
-
-
-def test_shapley_values_share_an_interaction_and_ignore_a_bystander() -> None:
-    def probability(sets: Sequence[frozenset[str]]) -> NDArray[np.float64]:
-        return np.array([0.8 * ({"a", "b"} <= s) + 0.1 * ("c" in s) for s in sets])
-
-    np.testing.assert_allclose(_shapley(["a", "b", "c", "d"], probability), [0.4, 0.4, 0.1, 0.0], atol=1e-12)
-    assert _shapley([], probability).shape == (0,)
-
-
-def test_contributions_add_up_to_what_a_full_reset_would_bring(planted: Profile) -> None:
-    here = planted_query(planted, speed=1.4, planner=2, reserve=45, accel=0.6)
-    found = suspects(here, "time")
+def test_an_option_that_is_off_alone_costs_what_its_reset_brings(planted: Profile) -> None:
+    here = planted_query(planted, speed=1.4)
     before, after = here.predict("time", [here.config, {**here.config, **DEFAULTS}]).p_ok
-    assert sum(s.contribution for s in found) == pytest.approx(after - before)
-    assert [s.contribution for s in found] == sorted((s.contribution for s in found), reverse=True)
+    (found,) = [one for one in suspects(here, "time") if one.contribution]
+    assert found.option == "speed"
+    assert found.contribution == pytest.approx(after - before)
+
+
+def test_a_contribution_is_the_mean_of_going_back_first_and_last(planted: Profile) -> None:
+    here = planted_query(planted, speed=1.4, planner=2)
+    changes: tuple[dict[str, float], ...] = (
+        {},
+        {"speed": DEFAULTS["speed"]},
+        {"planner": DEFAULTS["planner"]},
+        DEFAULTS,
+    )
+    driven, speed_back, planner_back, all_back = here.p_ok("time", [{**here.config, **one} for one in changes])
+    found = {one.option: one.contribution for one in suspects(here, "time")}
+    assert found["speed"] == pytest.approx(((speed_back - driven) + (all_back - planner_back)) / 2)
+    assert found["planner"] == pytest.approx(((planner_back - driven) + (all_back - speed_back)) / 2)
 
 
 def test_of_equal_shares_the_one_goes_first_that_repairs_the_run_alone(planted: Profile) -> None:

@@ -1,0 +1,47 @@
+"""Which causes may have broken a judged run: what a report and a what-if both begin with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from care_core.causal.counterfactual import CounterfactualQuery
+from care_core.diagnose.hypotheses import failure_of, speaking
+from care_core.diagnose.judging import Judged
+from care_core.diagnose.noisy_or import NoisyOr
+from care_core.diagnose.outside import suspects_outside
+from care_core.diagnose.ranking import Suspect, suspects
+from care_core.diagnose.records import OutsideSuspect
+from care_core.ecosystems.findings import Health
+from care_core.profile.store import Profile
+from care_core.records import Record, replace
+from care_core.run import Run, Setting
+
+
+class Blame(Record, eq=False):
+    """What may have broken a run."""
+
+    run: Run
+    """The run with what its findings say of its options as evidence."""
+    suspects: Mapping[str, tuple[Suspect, ...]]
+    """Per objective that it missed the options that may have moved it, the likeliest first."""
+    outside: tuple[OutsideSuspect, ...]
+    failure: NoisyOr
+
+
+def blame(
+    judged: Judged,
+    profile: Profile,
+    query: CounterfactualQuery,
+    health: Health,
+    good: Mapping[str, Setting] | None = None,
+) -> Blame:
+    """The causes of a run that missed an objective. `good`: the parameters of the last good run, where one is known."""
+    schema, broken = profile.schema, judged.broken
+    said = speaking(health.findings, schema, judged.run.config)
+    run = replace(judged.run, evidence=(*judged.run.evidence, *said.values()))
+    found = {
+        result.variable.name: suspects(query, result.variable.name, schema.known, run.evidence) for result in broken
+    }
+    outside = suspects_outside(run, broken, health, schema, query, good)
+    weights = {one.name: one.weight for one in outside}
+    return Blame(run, found, outside, failure_of(query, broken, found, run.refused_by, health.findings, said, weights))

@@ -1,0 +1,90 @@
+"""What the next run has, with changes or as driven, given that this one failed.
+
+Two answers are joined, each with what the other lacks: the mechanisms know what options do together and how this run
+differed from what they expect; the noisy-OR of its causes knows parts, what was met, parameters outside the profile and
+chance. Their logits are averaged (Genest and Zidek 1986, section 3: a logarithmic pool). On the flown resets of the
+development failures of four robots (545 of one option, or of what was advised) either answer alone has a larger Brier
+score on some robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from care_core.causal.counterfactual import Config, CounterfactualQuery
+from care_core.causal.kernel import FloatArray
+from care_core.configs.driven import same_value
+from care_core.diagnose.noisy_or import CHANCE, Key, NoisyOr
+from care_core.records import Record, replace
+
+BY_CAUSES = 1.0 / 3.0
+"""Weight of the noisy-OR; between 0.3 and 0.5 the Brier scores of the four robots change by less than 0.004."""
+SURE = 0.002
+"""No promise is nearer than this to 0 or 1."""
+
+
+class Promise(Record, eq=False):
+    """A run that failed, ready to be asked for the odds of the next one."""
+
+    failure: NoisyOr
+    query: CounterfactualQuery
+    broken: Sequence[str]
+    """The objectives that it missed."""
+
+    def odds(self, configs: Sequence[Config]) -> FloatArray:
+        """Probability that every objective is met under each configuration, shape (m,): no more than what is left of
+        this run's failure once what a change does not touch is counted, and than what the changed causes explain."""
+        gone = [self._changed(config) for config in configs]
+        driven = self._pooled([self.query.config], [frozenset()])[0]
+        at_most = [driven + self.failure.acts_among(keys) for keys in gone]
+        return np.minimum(self._pooled(configs, gone), at_most)
+
+    def as_driven(self) -> float:
+        """Probability that the next run meets every limit without a change."""
+        return float(self.odds([self.query.config])[0])
+
+    def without(self, parameters: Collection[str]) -> float:
+        """Probability that the next run meets every limit once these parameters are right, whatever they are now: of
+        those that no mechanism knows the causes tell alone."""
+        gone: list[Key] = [("parameter", name) for name in parameters]
+        return float(self.failure.repaired(gone) * self._others_kept([self.query.config])[0])
+
+    def necessity(self, changed: Config, given: Config) -> float:
+        """The largest share of the failures of a broken objective that changes take away (Pearl's probability of
+        necessity, where a change harms no run), before anything of this run is known.
+
+        Args:
+            changed: the configuration with all changes. given: with those that are made already.
+        """
+        before = replace(self.query, observed={}, repeats=())
+        shares = [0.0]
+        for name in self.broken:
+            if name in before.model.outcomes:
+                here, there = (float(one) for one in 1.0 - before.p_ok(name, [given, changed]))
+                shares.append(1.0 - there / here if here > 0 else 0.0)
+        return max(shares)
+
+    def _changed(self, config: Config) -> frozenset[Key]:
+        driven = self.query.config
+        names = (name for name in driven if not same_value(config.get(name, driven[name]), driven[name]))
+        return frozenset(("parameter", name) for name in names)
+
+    def _pooled(self, configs: Sequence[Config], gone: Sequence[frozenset[Key]]) -> FloatArray:
+        options = {("parameter", name) for name in self.query.config}
+        untouched = [key for key in self.failure.loses if key not in options and key != CHANCE]
+        mechanisms = self.query.probability(configs) * (1.0 - self.failure.acts_among(untouched))
+        causes = np.array([self.failure.repaired(keys) for keys in gone]) * self._others_kept(configs)
+        logit = (1.0 - BY_CAUSES) * _logit(mechanisms) + BY_CAUSES * _logit(causes)
+        return np.asarray(1.0 / (1.0 + np.exp(-logit)))
+
+    def _others_kept(self, configs: Sequence[Config]) -> FloatArray:
+        """Probability that the objectives which this run did not miss are met."""
+        kept = self.query.all_kept([name for name in self.query.model.outcomes if name not in self.broken], configs)
+        return np.ones(len(configs)) if kept is None else kept
+
+
+def _logit(share: FloatArray) -> FloatArray:
+    clipped = np.clip(share, SURE, 1.0 - SURE)
+    return np.asarray(np.log(clipped / (1.0 - clipped)))
