@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 from care_core.diagnose.verdict import exit_code, status_of
 from care_core.errors import ExitCode
@@ -14,6 +15,7 @@ Check = Callable[[Report], bool]
 CONTRADICTIONS: dict[str, Check] = {}
 _DOWN = ("crash", "takeoff")
 _UPSET = ("attitude", "crash", "motor", "takeoff", "thrust")
+_ROUNDED, _UNTOLD = 1e-3, 0.06
 _EXIT = {"OK": ExitCode.OK, "FAULT": ExitCode.FAULT, "NOT EVALUATED": ExitCode.NOT_EVALUATED}
 
 
@@ -156,6 +158,53 @@ def _(report: Report) -> bool:
 def _(report: Report) -> bool:
     odds = [one.probability for one in report.hypotheses]
     return bool(odds) and (abs(sum(odds) - 1.0) > 1e-3 or odds != sorted(odds, reverse=True))
+
+
+@_named("a cause that acts less often than it is told")
+def _(report: Report) -> bool:
+    return any(not one.probability - 1e-6 <= one.acts <= 1.0 for one in report.hypotheses)
+
+
+@_named("a promise of more than what failed leaves")
+def _(report: Report) -> bool:
+    parts = [one.acts for one in report.hypotheses if one.what in ("hardware", "world")]
+    return _odds(report) > 1.0 - max(parts, default=0.0) + _ROUNDED
+
+
+@_named("a change that gains more than its parameters explain")
+def _(report: Report) -> bool:
+    driven = report.odds_as_driven
+    acts = {one.name: one.acts for one in report.hypotheses if one.what == "parameter"}
+    gained = 0.0 if driven is None else _odds(report) - driven
+    # What has no line of its own acts in less than this share of such failures.
+    return gained > sum(acts.get(name, _UNTOLD) for name in _changed(report)) + _ROUNDED
+
+
+@_named("a run that failed and is as likely as not to do well as driven, without chance")
+def _(report: Report) -> bool:
+    chance = sum(one.acts for one in report.hypotheses if one.what == "chance")
+    return report.odds_as_driven is not None and report.odds_as_driven > max(0.1, chance) + _ROUNDED
+
+
+@_named("one cause whose change alone promises more than all of the changes")
+def _(report: Report) -> bool:
+    alone = [one.p_fixed for fault in report.faults for one in fault.causes if [one.option] == _changed(report)]
+    return any(one is not None and abs(one - _odds(report)) > _ROUNDED for one in alone) and _odds(report) > 0.0
+
+
+@_named("causes in another order than the explanations")
+def _(report: Report) -> bool:
+    acts = {one.name: one.acts for one in report.hypotheses if one.what == "parameter"}
+    for fault in report.faults:
+        told = [acts[one.option] for one in fault.causes if one.option in acts]
+        if any(later > sooner + 0.02 for sooner, later in pairwise(told)):
+            return True
+    return False
+
+
+def _odds(report: Report) -> float:
+    """What the change promises, 0 where nothing is promised."""
+    return 0.0 if report.fix is None or report.fix.odds is None else report.fix.odds
 
 
 @_named("an explanation by a finding that the page does not have")

@@ -32,6 +32,8 @@ NO_LIMIT = "no limit of this mission is known; what happened is told below"
 NO_LIMITS = "no limits for time and energy, no causes by parameters"
 MOST_FINDINGS = 2
 """Findings that the sentence names."""
+AS_WELL = 0.1
+"""Difference from which on it is told that a cause may have acted beside those above it."""
 LINE, LINES = 80, 2
 """Columns, and lines of a headline: what was missed first and what ended the run; the rest stands below."""
 BUT = "but "
@@ -389,7 +391,13 @@ def alone(share: float, as_driven: float | None) -> str:
 
 
 def hypothesis_text(one: Hypothesis, findings: Sequence[SeenFinding] = (), outside: Sequence[SeenSuspect] = ()) -> str:
-    """An explanation in a clause; a finding that is itself a symptom stands for what the log does not show."""
+    """An explanation in a clause, with how likely it acted beside those above it where that is another matter."""
+    too = f"; {one.acts:.0%} that it acted as well" if one.acts - one.probability >= AS_WELL else ""
+    return f"{_explanation(one, findings, outside)}{too}"
+
+
+def _explanation(one: Hypothesis, findings: Sequence[SeenFinding], outside: Sequence[SeenSuspect]) -> str:
+    """A finding that is itself a symptom stands for what the log does not show."""
     if one.what == "parameter" and not one.name:
         return "a parameter that the profile does not know"
     if one.what == "parameter":

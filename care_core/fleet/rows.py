@@ -62,11 +62,10 @@ class Asked(Record):
     """The causes that may have lost it; None where nothing was lost."""
 
     def odds(self, model: Model, broken: Sequence[str], configs: Sequence[Config]) -> FloatArray:
-        """Probability that the next run meets every limit under each configuration, shape (m,), as its report has it."""
-        query = self.query(model)
-        return (
-            query.probability(configs) if self.failure is None else Promise(self.failure, query, broken).odds(configs)
-        )
+        """Probability that the next run meets every limit under each configuration, shape (m,), as a report says it."""
+        if self.failure is None:
+            return self.query(model).probability(configs)
+        return Promise(self.failure, self.query(model), broken).odds(configs)
 
     def query(self, model: Model) -> CounterfactualQuery:
         """The run, ready to be asked what other values would have done."""

@@ -39,7 +39,7 @@ def needs(objective: Variable, frame: pd.DataFrame, schema: Schema) -> FloatArra
     """
     ratio = relative(frame, schema)[objective.name].to_numpy(dtype=float)
     values = frame[objective.name].to_numpy(dtype=float)
-    at_reference = _is_reference(frame, schema) & np.isfinite(values)
+    at_reference = is_reference(frame, schema) & np.isfinite(values)
     typical = float(np.median(ratio[at_reference])) if at_reference.any() else np.nan
     need = np.asarray(typical * values / ratio) if objective.nominal else np.full(len(frame), typical)
     missions = missions_of(frame, schema)
@@ -97,7 +97,8 @@ def _count(parts: NDArray[np.int64]) -> float:
     return float(sizes.sum() ** 2 / (sizes**2).sum()) if len(sizes) else 0.0
 
 
-def _is_reference(frame: pd.DataFrame, schema: Schema) -> NDArray[np.bool_]:
+def is_reference(frame: pd.DataFrame, schema: Schema) -> NDArray[np.bool_]:
+    """Which runs were made with every option at its reference; shape (n,)."""
     at = np.ones(len(frame), dtype=bool)
     for option in schema.options:
         if option.default is not None:

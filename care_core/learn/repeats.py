@@ -16,9 +16,10 @@ import pandas as pd
 
 from care_core.causal.kernel import FloatArray
 from care_core.causal.mechanisms import JITTER, LEAST, Mechanism, transformed
-from care_core.causal.model import UNKNOWN_CARRY_OVER, NoiseCarryOver, OutcomeRecord
+from care_core.causal.model import UNKNOWN_CARRY_OVER, NoiseCarryOver, OutcomeRecord, ReferenceRuns
 from care_core.learn.outcomes import find_stages
-from care_core.learn.relative import configurations_of
+from care_core.learn.relative import configurations_of, is_reference
+from care_core.learn.skill import all_met
 from care_core.profile.schema import Schema
 from care_core.tables.rows import CONDITIONS
 
@@ -27,6 +28,13 @@ MOST_RUNS = 800
 """Runs behind the errors of a pair; a kernel over n runs costs n^3 time."""
 
 Pairs = Sequence[tuple[int, int]]
+
+
+def reference_runs(frame: pd.DataFrame, schema: Schema) -> ReferenceRuns:
+    """How many runs were made with every option at its reference, and how many of them missed an objective: what is
+    counted of missions that fail by chance."""
+    at = is_reference(frame, schema)
+    return ReferenceRuns(runs=int(at.sum()), failed=int((all_met(frame, schema)[at] == 0.0).sum()))
 
 
 def carry_over(

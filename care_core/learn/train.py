@@ -36,7 +36,7 @@ from care_core.learn.outcomes import (
 )
 from care_core.learn.processes import answers, kept_processes
 from care_core.learn.relative import of_ratios, relative
-from care_core.learn.repeats import carry_over
+from care_core.learn.repeats import carry_over, reference_runs
 from care_core.learn.robustness import robustness
 from care_core.learn.skill import cross_validated_skill
 from care_core.learn.structure import Structure, learn_structure
@@ -448,5 +448,6 @@ def _training(frame: pd.DataFrame, schema: Schema, structure: Structure, setting
         screened_out=tuple(structure.dropped_options),
         direct_edges=tuple((a, b, p) for a, b, p in structure.direct),
         moves_together=groups_that_move_together(schema, relative(frame, schema)),
+        reference=reference_runs(frame, schema),
         notes=tuple(structure.notes),
     )
