@@ -31,6 +31,7 @@ bench: $(DEV)
 docs: $(BASE)
 	$(BIN)/python -m care_core.report.extractors docs/extractors.md
 	$(BIN)/python -m care_core.report.checks docs/checks.md
+	$(BIN)/python -m care_core.report.estimates docs/estimates.md
 	$(BIN)/python -m benchmarks.tools.documents
 
 profiles: $(DEV)

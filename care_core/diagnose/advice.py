@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from care_core.diagnose.estimates import CHANCY, COST, NECESSARY, WORTH
 from care_core.diagnose.parts import LATE_S, set_wrong
 from care_core.diagnose.promise import Promise
 from care_core.diagnose.records import Cause, Fault, Fix, Hypothesis, ObjectiveResult
@@ -13,23 +14,11 @@ from care_core.ecosystems.ranking import LIKELY
 from care_core.records import replace
 from care_core.run import FitVerdict
 
-COST = 0.02
-"""Odds that one change has to bring for the work of making it and the doubt of having changed too much."""
-WORTH = 0.15
-"""Odds that advice has to add to those of the run as driven, beyond what its changes cost: with less, the same mission
-may as well be run again. Of 15 changes on recorded failures that added as much and were less likely than not to repair
-the run, 12 held what repaired it."""
-CHANCY = 0.75
-"""Odds of the reference configuration below which missions fail by chance as well: one good run after a change proves
-little then, nor one bad run much."""
 TOLD_APART = 4.0
 """How many times likelier good runs have to be with the change than without for it to be known that it works."""
 MOST_RUNS = 10
 """More than so many runs in a row nobody makes to know."""
 
-NECESSARY = 0.15
-"""Share of the failures of this configuration, before anything of the run is known, that a change must take away where
-it leaves the likeliest cause as it is: of 125 changes on recorded flights those below were wrong, 110 above right."""
 LITTLE = 0.5
 """Share of its cause's probability below which what a change adds has to be explained."""
 ALIKE = 0.02
@@ -110,7 +99,7 @@ def no_stand_out(fix: Fix, as_driven: float, hypotheses: Sequence[Hypothesis], n
     changed = {change.option.name for change in fix.changes}
     leader = _leader(hypotheses)
     is_cause = any(one.name in changed and one.probability > chance for one in hypotheses if one.what == "parameter")
-    if is_cause and (leader in changed or necessary >= NECESSARY):
+    if is_cause and (leader in changed or necessary >= NECESSARY.value):
         return None
     odds = f"with {_changes(fix)} the odds are {fix.p_fixed:.0%}, as driven {as_driven:.0%}"
     return f"no parameter stands out: {odds}, and nothing in this run says that it was the cause"
@@ -158,7 +147,7 @@ def unrecorded(fix: Fix, verdict: FitVerdict) -> str | None:
 def adds_enough(odds: float, as_driven: float, changes: int) -> bool:
     """Whether so many changes add enough to the odds of running the same mission again, whatever those are: on robots
     that fail by chance no change is sure."""
-    return odds - COST * changes - as_driven >= WORTH
+    return odds - COST.value * changes - as_driven >= WORTH.value
 
 
 def is_worth(fix: Fix, as_driven: float) -> bool:
@@ -183,7 +172,7 @@ def by_chance(fix: Fix, now: float, odds: float) -> str | None:
         now: probability that the next run meets every limit as driven.
         odds: probability that a run with the reference settings does, before anything of this run is known.
     """
-    if odds >= CHANCY:
+    if odds >= CHANCY.value:
         return None
     runs = MOST_RUNS + 1 if fix.p_fixed <= now else math.ceil(math.log(TOLD_APART) / math.log(fix.p_fixed / now))
     to_know = f"run it {runs} times to know" if runs <= MOST_RUNS else "no few runs tell whether it helped"

@@ -21,6 +21,18 @@ import numpy as np
 from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.kernel import FloatArray
 from care_core.causal.model import ReferenceRuns
+from care_core.diagnose.estimates import (
+    DOUBT,
+    LATE,
+    LEARNED_WEIGHT,
+    MISSED,
+    MISSION_LOST_CRITICAL,
+    MISSION_LOST_INFO,
+    MISSION_LOST_WARNING,
+    REFUSING,
+    UNMODELLED,
+    UNTOLD,
+)
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, Key, NoisyOr, What
 from care_core.diagnose.parts import is_late, set_wrong
 from care_core.diagnose.ranking import Suspect, back_at_reference, deviating
@@ -30,24 +42,12 @@ from care_core.profile.schema import Schema
 from care_core.records import replace
 from care_core.run import Evidence, FitVerdict
 
-MISSION_LOST: Mapping[Severity, float] = {"critical": 0.95, "warning": 0.6, "info": 0.05}
+MISSION_LOST: Mapping[Severity, float] = {
+    "critical": MISSION_LOST_CRITICAL.value, "warning": MISSION_LOST_WARNING.value, "info": MISSION_LOST_INFO.value,
+}  # fmt: skip
 """Probability that a mission fails with what a finding shows, by how severe it is, where the finding does not say."""
-UNMODELLED = 0.02
-"""Probability that a parameter which the profile does not know loses a mission, beside those that the log holds."""
-UNTOLD: Mapping[FitVerdict, float] = {"fits": 0.15, "partly": 0.3, "no": 0.3}
+UNTOLD_BY_FIT: Mapping[FitVerdict, float] = {"fits": UNTOLD.value / 2, "partly": UNTOLD.value, "no": UNTOLD.value}
 """Probability of what no log shows, where no model can be asked."""
-MISSED = 0.02
-"""What training may have missed of a parameter that is off."""
-REFUSING = 0.98
-"""What an option loses that the check reads which refused this mission."""
-LEARNED_WEIGHT = 5.0
-"""Runs at the reference that what is learned of it counts for, beside those that were counted."""
-LATE = 0.1
-"""Share of its weight that a part keeps which failed when the run was failing already, by a finding that speaks of how
-it was set."""
-DOUBT = 0.01
-"""Probability that nothing which is told holds: of 84 leading explanations above 95 % on recorded failures of four
-robots all 84 were right, which leaves 0.006 (Jeffreys)."""
 LEAST = 0.005
 """Hypotheses less likely than this have no line of their own."""
 UNNAMED = "chance, or what no log shows"
@@ -92,26 +92,26 @@ def failure_of(
     else:
         unlearned = float(before.epistemic_ratio([before.config], names)[0])
         pointed = _pointed_at(found)
-        options = {n: _either(q, MISSED, unlearned * pointed.get(n, 0.0)) for n, q in options.items()}
+        options = {n: _either(q, MISSED.value, unlearned * pointed.get(n, 0.0)) for n, q in options.items()}
     for finding in (one for one in findings if one.title in shown):
         for option, share in _named_by(finding, shown[finding.title].options, found).items():
             options[option] = _either(options.get(option, 0.0), share)
-    options.update({one.option: REFUSING for group in found.values() for one in group if one.option in refused})
+    options.update({one.option: REFUSING.value for group in found.values() for one in group if one.option in refused})
     causes: dict[Key, float] = {("parameter", name): q for name, q in {**outside, **options}.items()}
-    return NoisyOr({CHANCE: chance, UNKNOWN: UNMODELLED, **with_findings(causes, findings)})
+    return NoisyOr({CHANCE: chance, UNKNOWN: UNMODELLED.value, **with_findings(causes, findings)})
 
 
 def hypotheses_of(failure: NoisyOr) -> tuple[Hypothesis, ...]:
     """Every explanation, the likeliest first: the probability that it acted and none above it did; they add up to 1.
     What is less likely than `LEAST` is told with what the profile does not know, or with chance where it knows nothing.
     """
-    told = {key: (1.0 - DOUBT) * share for key, share in failure.ranking().items()}
+    told = {key: (1.0 - DOUBT.value) * share for key, share in failure.ranking().items()}
     rest = UNKNOWN if UNKNOWN in told else CHANCE
     shares = {key: share for key, share in told.items() if share >= LEAST and key != rest}
     shares[rest] = 1.0 - sum(shares.values())
     ranked = sorted(shares.items(), key=lambda entry: (-entry[1], entry[0]))
     return tuple(
-        Hypothesis(what, name, share, max(share, (1.0 - DOUBT) * failure.acts((what, name))))
+        Hypothesis(what, name, share, max(share, (1.0 - DOUBT.value) * failure.acts((what, name))))
         for (what, name), share in ranked
     )
 
@@ -135,7 +135,7 @@ def unasked(
         for option in named:
             share = finding.probability * mission_lost(finding) / len(named)
             options["parameter", option] = max(options.get(("parameter", option), 0.0), share)
-    failure = NoisyOr({CHANCE: UNTOLD[verdict], **with_findings(options, findings)})
+    failure = NoisyOr({CHANCE: UNTOLD_BY_FIT[verdict], **with_findings(options, findings)})
     return tuple(replace(one, name=UNNAMED) if one.what == "chance" else one for one in hypotheses_of(failure))
 
 
@@ -174,7 +174,8 @@ def _kept(before: CounterfactualQuery, broken: Sequence[str], configs: Sequence[
 
 def _chance(learned: float, counted: ReferenceRuns) -> float:
     """The share of missions that the reference loses: as learned, and as counted where training flew it."""
-    return (LEARNED_WEIGHT * learned + counted.failed) / (LEARNED_WEIGHT + counted.runs)
+    weight = LEARNED_WEIGHT.value
+    return (weight * learned + counted.failed) / (weight + counted.runs)
 
 
 def _pointed_at(found: Mapping[str, Sequence[Suspect]]) -> dict[str, float]:
@@ -202,7 +203,9 @@ def with_findings(causes: Mapping[Key, float], findings: Iterable[Finding]) -> d
         named: list[Key] = [("parameter", name) for name in finding.parameters]
         shares = dict.fromkeys(named, whole / max(1, len(named)))
         if finding.suspect in _WHAT:
-            shares[_WHAT[finding.suspect], finding.title] = whole * (LATE if is_late(finding, by_setting) else 1.0)
+            shares[_WHAT[finding.suspect], finding.title] = whole * (
+                LATE.value if is_late(finding, by_setting) else 1.0
+            )
         found |= {key: max(found.get(key, 0.0), share) for key, share in shares.items()}
     return found
 

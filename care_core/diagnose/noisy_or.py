@@ -14,6 +14,7 @@ import math
 from collections.abc import Container, Mapping
 from typing import Literal
 
+from care_core.diagnose.estimates import REPEATS
 from care_core.records import Record
 
 What = Literal["parameter", "hardware", "world", "chance"]
@@ -24,8 +25,6 @@ UNKNOWN: Key = ("parameter", "")
 """A parameter that the profile does not know."""
 MOST = 0.99
 """No cause is surer than this to lose a mission by itself."""
-REPEATS = 0.8
-"""Share of what went wrong by chance that goes wrong again under the same conditions."""
 
 
 class NoisyOr(Record, eq=False):
@@ -65,7 +64,7 @@ class NoisyOr(Record, eq=False):
         left = self._kept((CHANCE,), gone)
         chance = self._share(CHANCE)
         by_causes = (1.0 - chance) * left - self._kept(())
-        by_luck = (1.0 - REPEATS) * chance * left
+        by_luck = (1.0 - REPEATS.value) * chance * left
         return min(1.0, max(0.0, (by_causes + by_luck) / self.failed))
 
     def _share(self, key: Key) -> float:

@@ -16,11 +16,10 @@ import numpy as np
 from care_core.causal.counterfactual import Config, CounterfactualQuery
 from care_core.causal.kernel import FloatArray
 from care_core.configs.driven import same_value
+from care_core.diagnose.estimates import BY_CAUSES
 from care_core.diagnose.noisy_or import CHANCE, Key, NoisyOr
 from care_core.records import Record, replace
 
-BY_CAUSES = 1.0 / 3.0
-"""Weight of the noisy-OR; between 0.3 and 0.5 the Brier scores of the four robots change by less than 0.004."""
 SURE = 0.002
 """No promise is nearer than this to 0 or 1."""
 
@@ -76,7 +75,7 @@ class Promise(Record, eq=False):
         untouched = [key for key in self.failure.loses if key not in options and key != CHANCE]
         mechanisms = self.query.probability(configs) * (1.0 - self.failure.acts_among(untouched))
         causes = np.array([self.failure.repaired(keys) for keys in gone]) * self._others_kept(configs)
-        logit = (1.0 - BY_CAUSES) * _logit(mechanisms) + BY_CAUSES * _logit(causes)
+        logit = (1.0 - BY_CAUSES.value) * _logit(mechanisms) + BY_CAUSES.value * _logit(causes)
         return np.asarray(1.0 / (1.0 + np.exp(-logit)))
 
     def _others_kept(self, configs: Sequence[Config]) -> FloatArray:

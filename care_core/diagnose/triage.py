@@ -12,8 +12,6 @@ from care_core.causal.counterfactual import CounterfactualQuery
 from care_core.causal.model import EffectRecord
 from care_core.diagnose import provenance
 from care_core.diagnose.advice import (
-    NECESSARY,
-    WORTH,
     by_chance,
     explained,
     falls_short,
@@ -28,6 +26,7 @@ from care_core.diagnose.advice import (
 )
 from care_core.diagnose.blame import blame
 from care_core.diagnose.circumstances import battery_is_low, circumstances, unusual
+from care_core.diagnose.estimates import NECESSARY, WORTH
 from care_core.diagnose.fixes import (
     MAX_ALTERNATIVES,
     Assignment,
@@ -369,7 +368,9 @@ def _idle(judged: Judged, fixes: Sequence[Fix], promise: Promise) -> set[str]:
     if not fixes or any(result.status == "not_evaluated" for result in judged.results):
         return set()
     names = {change.option.name for change in fixes[0].changes}
-    return {name for name in names if len(names) > 1 and _necessary(promise, fixes[0], names - {name}) < NECESSARY}
+    return {
+        name for name in names if len(names) > 1 and _necessary(promise, fixes[0], names - {name}) < NECESSARY.value
+    }
 
 
 def _necessary(promise: Promise, fix: Fix, given: Collection[str] = frozenset()) -> float:
@@ -603,7 +604,7 @@ def _abstains(
         return None
     if any(cause.option.name in held for fault in faults for cause in fault.causes if not cause.is_lead):
         return f"charge or replace the battery first: {', '.join(sorted(held))} is not lowered while it is not full"
-    unsafe = needs_unsafe(case.query, max(MIN_PROBABILITY, as_driven + WORTH))
+    unsafe = needs_unsafe(case.query, max(MIN_PROBABILITY, as_driven + WORTH.value))
     if unsafe is not None:
         return f"only '{unsafe}' past its default is likely to help, and a safety parameter is never made looser"
     if not has_cause:

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.diagnose.hypotheses import UNMODELLED, UNTOLD, hypotheses_of, unasked, with_findings
+from care_core.diagnose.estimates import UNMODELLED
+from care_core.diagnose.hypotheses import UNTOLD_BY_FIT, hypotheses_of, unasked, with_findings
 from care_core.diagnose.noisy_or import CHANCE, UNKNOWN, NoisyOr
 from care_core.diagnose.records import Hypothesis
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
@@ -39,7 +40,7 @@ def finding(
 
 def weigh(options: Mapping[str, float], chance: float, findings: Sequence[Finding]) -> tuple[Hypothesis, ...]:
     causes = with_findings({("parameter", name): share for name, share in options.items()}, findings)
-    return hypotheses_of(NoisyOr({CHANCE: chance, UNKNOWN: UNMODELLED, **causes}))
+    return hypotheses_of(NoisyOr({CHANCE: chance, UNKNOWN: UNMODELLED.value, **causes}))
 
 
 def lead(found: tuple[Hypothesis, ...]) -> tuple[str, str]:
@@ -136,7 +137,7 @@ def test_what_the_operator_did_counts_as_met() -> None:
 def test_what_no_signal_shows_has_a_share_of_its_own() -> None:
     found = {(one.what, one.name): one.probability for one in weigh({"a": 0.5}, 0.1, ())}
     assert found["parameter", ""] > 0.01
-    for verdict, share in UNTOLD.items():
+    for verdict, share in UNTOLD_BY_FIT.items():
         shown = unasked([finding(0.9)], verdict=verdict)
         rest = next(one for one in shown if one.what == "chance")
         assert rest.name == "chance, or what no log shows"

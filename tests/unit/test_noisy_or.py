@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from care_core.diagnose.noisy_or import CHANCE, REPEATS, Key, NoisyOr
+from care_core.diagnose.estimates import REPEATS
+from care_core.diagnose.noisy_or import CHANCE, Key, NoisyOr
 
 A: Key = ("parameter", "a")
 B: Key = ("hardware", "b")
@@ -44,7 +45,7 @@ def test_a_ranking_says_what_acts_where_nothing_above_it_does() -> None:
 @pytest.mark.parametrize("gone", [(), (A,), (B,), (A, B), (A, B, C)])
 def test_a_repair_holds_as_often_as_in_missions_that_are_drawn_again(gone: tuple[Key, ...]) -> None:
     acts, lost = drawn(CAUSES)
-    again = np.random.default_rng(2).random(len(lost)) < REPEATS
+    again = np.random.default_rng(2).random(len(lost)) < REPEATS.value
     stays = acts[CHANCE] & again
     for key in (A, B, C):
         stays |= acts[key] & (key not in gone)
