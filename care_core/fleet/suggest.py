@@ -1,9 +1,8 @@
 """One change for a fleet: right for most of the robots that fail and harmful to none that does not, or none.
 
 Every run is asked the same question by its own profile's model: how likely would it have met all its limits with this
-option at this value, under what it met. A robot is helped where most of its failed runs would then be likely enough to
-be repaired, as for a single run: likelier than not, or less where the reference fails by chance too. A part that failed
-is repaired by no value: its probability is taken off, as for a single run.
+option at this value, under what it met. A robot is helped where the change adds enough to the odds of most of its
+failed runs, as for a single run, and a part that failed is repaired by no value.
 """
 
 from __future__ import annotations
