@@ -27,7 +27,7 @@ from care_core.ecosystems.ardupilot.checks import (
     vibration,
     way_home,
 )
-from care_core.ecosystems.ardupilot.checks.settings import driven, heading, hover, level, outputs, supply
+from care_core.ecosystems.ardupilot.checks.settings import charge, driven, heading, hover, level, outputs, supply
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
@@ -36,6 +36,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     hover.CHECK,
     level.CHECK,
     supply.CHECK,
+    charge.CHECK,
     driven.CHECK,
     outputs.CHECK,
     attitude.CHECK,
