@@ -106,8 +106,9 @@ class HistoryPage(Page):
 
     def leads_to(self) -> str:
         runs, index = self._found.answer, self.screen.choices.highlighted
-        others = self._marked is not None and isinstance(runs, list) and index is not None
-        return "Both in full" if others and runs[index] != self._marked else self.ENTER
+        if self._marked is None or not isinstance(runs, list) or index is None or runs[index] == self._marked:
+            return self.ENTER
+        return "Both in full"
 
     def moved(self, index: int) -> None:
         self.screen.refresh_bindings()  # on the marked run Enter leads elsewhere
