@@ -70,7 +70,7 @@ dist: $(DEV)
 	$(BIN)/twine check --strict dist/*.whl dist/*.tar.gz
 
 # An archive for each Python and machine that installs without a network: make offline PYTHONS=3.12 MACHINES=aarch64.
-offline: $(DEV)
+offline: $(BASE)
 	$(BIN)/python -m benchmarks.tools.offline $(if $(PYTHONS),--python $(PYTHONS)) $(if $(MACHINES),--machine $(MACHINES)) $(if $(EXTRAS),--extras $(EXTRAS))
 
 # What a base installation holds, by name, version and license: build/sbom.json (CycloneDX).

@@ -67,6 +67,13 @@ def open_and_warm(request: Request, progress: Progress) -> Case:
     return case
 
 
+def comparison_of(a: Request, b: Request, progress: Progress) -> str:
+    """Two logs side by side, A the one to compare with, in lines for a terminal. Raises CareError."""
+    from care_core.application.comparing import compare
+
+    return compare(a, b, progress).report()
+
+
 def save_text(path: Path, text: str) -> None:
     """Write a file; it is whole or not there at all. Of one that is there the operator was asked; a log is kept."""
     from care_core.outputs import write_output
@@ -84,6 +91,7 @@ class Engine(Record):
     commands: Callable[[Diagnosis], list[str]] = commands_of
     save: Callable[[Path, str], None] = save_text
     remember: Callable[[Diagnosis, Request], CareError | None] = remember_triage
+    compare: Callable[[Request, Request, Progress], str] = comparison_of
 
 
 def as_care_error(err: Exception) -> CareError:

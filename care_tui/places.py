@@ -13,6 +13,9 @@ from care_core.records import Record
 WINDOWS_HOMES = Path("/mnt/c/Users")
 """Where Linux on Windows (WSL) sees the home folders in which ground stations keep their logs."""
 
+_AIRCRAFT = "*/logs/*-*-*/flight*"
+"""Where MAVProxy puts the flights of an --aircraft, below the folder that it was started in."""
+
 
 def usual_places() -> tuple[Path, ...]:
     """Where `care` without a log looks for the newest one: here, and where recorders and ground stations put theirs."""
@@ -24,6 +27,7 @@ def usual_places() -> tuple[Path, ...]:
     return (
         Path(),
         Path("logs"),  # MAVProxy in the folder of --aircraft, simulators
+        *sorted({flight.parent.parent for flight in Path().glob(_AIRCRAFT)}),
         Path("dataflash"),  # MAVProxy's dataflash_logger
         Path("APM/LOGS"),
         home / "logs",

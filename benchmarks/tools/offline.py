@@ -21,7 +21,7 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from benchmarks.tools.matrix import PYTHONS, ROOT, built
+from benchmarks.tools.matrix import PYTHONS, ROOT
 
 MACHINES = ("x86_64", "aarch64")
 LIBCS = ("manylinux2014", "manylinux_2_17", "manylinux_2_24", "manylinux_2_26", "manylinux_2_27", "manylinux_2_28")
@@ -56,7 +56,7 @@ def main() -> None:
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="care-offline-") as made:
-        wheel = next(one for one in built(Path(made) / "dist") if one.suffix == ".whl")
+        wheel = own_wheel(Path(made) / "dist")
         for python in args.python.split(","):
             for machine in args.machine.split(","):
                 began_s = time.monotonic()
@@ -68,6 +68,15 @@ def main() -> None:
                 path.write_bytes(packed(wheels, wheel, args.extras, python, machine))
                 took_s = time.monotonic() - began_s
                 print(f"{path}  {path.stat().st_size / 1e6:.0f} MB, {len(wheels)} wheels, {took_s:.0f} s", flush=True)
+
+
+def own_wheel(folder: Path) -> Path:
+    """The program's wheel, made by pip alone: the bytes that a package index gets. Ends the program where it fails."""
+    words = [sys.executable, "-I", "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    done = subprocess.run([*words, "--wheel-dir", str(folder), str(ROOT)], capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"no wheel: {done.stderr.strip()[-600:]}")
+    return next(folder.glob("*.whl"))
 
 
 def downloaded(wheel: Path, extras: str, python: str, machine: str, folder: Path) -> list[Path]:

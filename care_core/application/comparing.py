@@ -34,7 +34,9 @@ _STEP_S = 0.2
 _APART = 1 / 3
 """Signals go apart where they differ by this share of what the signals of their channel range over (5 to 95 %), ..."""
 _FOR_S = 2.0
-"""... for so long, each averaged over as long."""
+"""... for so long, each averaged over as long, after they were together."""
+_LEAST_APART = {"deg": 2.0, "deg/s": 3.0, "m": 0.2, "m/s": 0.1, "m/s2": 0.2, "rad": 0.03, "rad/s": 0.05}
+"""What apart is at least, by unit: less is noise of sensors and of the ground."""
 _LEAST_S = 5.0
 """Runs that overlap for less are not compared by their signals."""
 
@@ -124,7 +126,8 @@ class Compared(Record, eq=False):
             key = signal.channel, meaning.unit
             spans[key] = max(spans.get(key, 0.0), _range(one[1], other[1]))
         for signal, one, other, meaning in pairs:
-            at = _departure(one, other, spans[signal.channel, meaning.unit])
+            least = _LEAST_APART.get(meaning.unit, 1e-9)
+            at = _departure(one, other, max(_APART * spans[signal.channel, meaning.unit], least))
             if at is not None:
                 name = text(f"{meaning.label} ({signal.name})" if meaning.label else signal.name)
                 found.append(Departure(name, *at, meaning.unit))
@@ -210,8 +213,9 @@ def _distance(one: Values, other: Values) -> float:
     return float(np.mean(np.abs(a - b)) / span) if span > 0 else 0.0
 
 
-def _departure(one: Values, other: Values, span: float) -> tuple[float, float, float] | None:
-    """When two signals go apart by a share of the span, and what each reads then; None where they do not."""
+def _departure(one: Values, other: Values, most: float) -> tuple[float, float, float] | None:
+    """When two signals that were together go apart by more than `most`, and what each reads then; None where they do
+    not: what differs from the start on, as heights above another home do, tells of another place."""
     import numpy as np
 
     grids = _grids(one, other)
@@ -223,8 +227,9 @@ def _departure(one: Values, other: Values, span: float) -> tuple[float, float, f
         return None
     window = np.ones(steps)
     a, b = (np.convolve(line, window / steps, mode="valid") for line in (a, b))  # noise is no difference
-    is_apart = np.abs(a - b) > max(_APART * span, 1e-9)
+    is_apart = np.abs(a - b) > most
     starts = np.flatnonzero(np.convolve(is_apart, window, mode="valid") >= steps)
+    starts = starts[np.logical_or.accumulate(~is_apart)[starts]]
     if not len(starts):
         return None
     place = int(starts[0])

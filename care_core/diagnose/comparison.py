@@ -23,6 +23,8 @@ _SAID = frozenset(("error", "warning", "message"))
 _NUMBERS = re.compile(r"-?\d+(?:\.\d+)?")
 _HEAD = re.compile(r"(?:[^,(:]|\([^)]*\)|,(?! )|:(?! \d))+")
 """Of an event its words before the first remark or number."""
+_CAME_TO = re.compile(r", (\w+) after [\d.]+ s")
+"""What a goal came to."""
 _UNTIL = re.compile(r" until [\d.]+ s$| \((?:\d+ times|until)[^)]*\)")
 
 
@@ -184,7 +186,7 @@ def _events(a: Diagnosis, b: Diagnosis) -> Iterator[EventPair]:
         for early, late in zip_longest(one.get(key, ()), other.get(key, ())):
             event = late or early
             times = (None if early is None else _at(early, a)), (None if late is None else _at(late, b))
-            pairs.append(EventPair(_what(event), *times, is_said=event.kind in _SAID))
+            pairs.append(EventPair(_what(event) + _came_to(early, late), *times, is_said=event.kind in _SAID))
     return iter(sorted(pairs, key=lambda pair: pair.at_s))
 
 
@@ -209,7 +211,15 @@ def _timed(diagnosis: Diagnosis) -> Iterator[Event]:
 def _what(event: Event) -> str:
     """What happened, without what it came to."""
     head = _HEAD.match(event.text)
-    return _UNTIL.sub("", (head[0] if head else event.text).rstrip()).rstrip(".")
+    text = _UNTIL.sub("", (head[0] if head else event.text).rstrip())
+    return text if text.endswith("...") else text.rstrip(".")
+
+
+def _came_to(early: Event | None, late: Event | None) -> str:
+    """What a goal of both runs came to, where that is not the same."""
+    ends = [None if one is None else _CAME_TO.search(one.text) for one in (early, late)]
+    one, other = ("" if end is None else end[1] for end in ends)
+    return f", {one} in A, {other} in B" if one and other and one != other else ""
 
 
 def _at(event: Event, diagnosis: Diagnosis) -> float:

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from care_core.causal.model import EffectRecord, Model, SkillRecord
 from care_core.files import read_small_text
 from care_core.learn.identification import identify
+from care_core.metadata.causal_map import meaning_of
+from care_core.metadata.screening import screened
 from care_core.profile.schema import Schema
 from care_core.profile.store import CARD_FILE, Profile
 from care_core.variables import Role
@@ -27,6 +29,7 @@ def model_card(schema: Schema, model: Model) -> str:
         _skill(model),
         _effects(model),
         _support(schema, model),
+        _screened(schema),
         _limits(schema, model),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -153,6 +156,26 @@ def _support(schema: Schema, model: Model) -> str:
         if (s := model.summaries.get(o.name)) is not None
     ]
     return "## Support\n\n" + _table(("option", "in the training runs", "acceptable", "unit"), rows)
+
+
+def _screened(schema: Schema) -> str:
+    """What is known of parameters that the profile does not model, by what they belong to."""
+    kind = schema.match.get("vehicle", "")
+    modelled = {name for option in schema.options for name in option.parameters}
+    parts: dict[str, list[str]] = {}
+    for name in screened(kind):
+        meaning = meaning_of(name, kind)
+        if name not in modelled:
+            parts.setdefault(meaning.part if meaning is not None else "others", []).append(name)
+    if not parts:
+        return ""
+    rows = ((part, ", ".join(sorted(names))) for part, names in sorted(parts.items()))
+    text = (
+        f"## Parameters outside the profile that were screened\n\n{sum(map(len, parts.values()))} were flown or driven "
+        "in the simulator with wrong values, one at a time: of these it is known which values lose a mission, and how "
+        "that shows. Of any other only what documentation and source say.\n\n"
+    )
+    return text + _table(("part", "parameters"), rows)
 
 
 def _limits(schema: Schema, model: Model) -> str:

@@ -89,6 +89,8 @@ OFF: tuple[Off, ...] = (
     Off(("amcl",), "tf_broadcast", "nobody tells where odom is on the map", "amcl publishes that transform",
         "cannot-work"),
     Off(("move_base",), "recovery_behavior_enabled", "a robot that is stuck gives up at once", "move_base.cpp"),
+    Off(("StaticLayer",), "map_subscribe_transient_local", "a map that was sent before it listens never arrives",
+        "static_layer.cpp; map_server sends its map once, and keeps it for those that ask"),
     Off(INFLATIONS, "enabled", "plans may touch obstacles", "inflation_layer.cpp"),
 )  # fmt: skip
 

@@ -28,11 +28,14 @@ def part_of(text: str, part: int, again: str) -> str:
     parts = list(_parts(text, MOST_BYTES - _FRAME_BYTES))
     if not 1 <= part <= len(parts):
         raise UsageError(f"There is no part {part}: the answer has {len(parts)}.", hint=f"Ask for 1 to {len(parts)}.")
+    more = f"\nPart {part} of {len(parts)}: call {again} again with part={part + 1} for more."
+    return framed(parts[part - 1]) + (more if part < len(parts) else "")
+
+
+def framed(text: str) -> str:
+    """A text that may hold words of a log or the name of a file, marked as data."""
     mark = f"data-{secrets.token_hex(4)}"  # nobody who wrote a log can close it
-    lines = [DATA.format(mark=mark), f"<{mark}>", parts[part - 1], f"</{mark}>"]
-    if part < len(parts):
-        lines.append(f"Part {part} of {len(parts)}: call {again} again with part={part + 1} for more.")
-    return "\n".join(lines)
+    return "\n".join((DATA.format(mark=mark), f"<{mark}>", text, f"</{mark}>"))
 
 
 def _parts(text: str, most: int) -> Iterator[str]:

@@ -15,6 +15,7 @@ from mcp.types import ToolAnnotations
 from care_core.errors import CareError
 from care_core.text import clean
 from care_tui import __version__
+from care_tui.assistant.answers import framed
 from care_tui.assistant.tools import Tools
 
 INSTRUCTIONS = (
@@ -49,13 +50,14 @@ def serve(folders: Sequence[Path]) -> None:
 
 
 def _sentence_of_errors(tool: Callable[..., str]) -> Callable[..., str]:
-    """Have a tool answer what cannot be done in a sentence that the assistant reads."""
+    """Have a tool answer what cannot be done in a sentence that the assistant reads, and that may name what is in a log
+    or in its folder."""
 
     @wraps(tool)
     def safe(*args: Any, **named: Any) -> str:
         try:
             return tool(*args, **named)
         except CareError as err:
-            raise ToolError(clean(str(err))[:_MOST_CHARACTERS]) from None
+            raise ToolError(framed(clean(str(err))[:_MOST_CHARACTERS])) from None
 
     return safe

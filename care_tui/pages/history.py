@@ -8,11 +8,13 @@ from typing import ClassVar
 
 from textual.content import Content
 
+from care_core.application.case import Request
 from care_core.application.viewing import Past, past_runs
 from care_core.diagnose.verdict import fit_words
+from care_core.errors import CareError
 from care_core.text import clean
 from care_tui.pages.page import Fetch, Page, View, sentence
-from care_tui.render.rows import ASCII, Row, Rows, labelled, padded, text
+from care_tui.render.rows import ASCII, Row, Rows, error_rows, labelled, padded, plain_rows, text
 from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
 
@@ -25,7 +27,8 @@ class HistoryPage(Page):
     name = "History"
     HELP = (
         "Runs that were triaged before, the newest first, with the trend of every objective up to the one under the "
-        "cursor. Enter opens its log. x marks a run; then every other is compared with it. / filters, Esc leaves."
+        "cursor. Enter opens its log. x marks a run; then every other is compared with it, and Enter puts both logs "
+        "side by side in full. / filters, Esc leaves."
     )
     ENTER = "Its log"
     ACTIONS: ClassVar[frozenset[str]] = frozenset({"mark"})
@@ -34,6 +37,9 @@ class HistoryPage(Page):
         super().__init__(screen)
         self._found: Fetch[list[Past]] = Fetch(self, "history")
         self._marked: Past | None = None
+        self._compared: tuple[Past, Past | None] | None = None
+        self._whole: str | CareError | None = None
+        """What both logs of `_compared` are side by side; None as long as they are read."""
 
     def enter(self) -> None:
         self._found.start(past_runs)
@@ -57,7 +63,15 @@ class HistoryPage(Page):
         title = Content.assemble(f"History  {count}", ("  x marks one to compare with", "dim"))
         if self._marked is not None:
             title = Content.assemble("History  against ", (_named(self._marked), "bold"), ("  x again unmarks", "dim"))
-        return View(title, lambda i: Rows([]) if i is None else Rows(self._detail(i, runs)), listing)
+        return View(title, lambda i: Rows([]) if i is None else self._beside(i, runs), listing)
+
+    def _beside(self, index: int, runs: list[Past]) -> Rows:
+        """What stands beside a run: both logs in full where that was asked for."""
+        if self._compared != (runs[index], self._marked):
+            return Rows(self._detail(index, runs))
+        if isinstance(self._whole, CareError):
+            return error_rows(self._whole)
+        return sentence("Putting both side by side...") if self._whole is None else plain_rows(self._whole)
 
     def _item(self, past: Past) -> Content:
         mark = "*" if past == self._marked else " "
@@ -90,10 +104,36 @@ class HistoryPage(Page):
             return ""
         return f"{sparkline(known, ascii=self.glyphs is ASCII)}  {min(known):.4g} to {max(known):.4g}"
 
+    def leads_to(self) -> str:
+        runs, index = self._found.answer, self.screen.choices.highlighted
+        if self._marked is None or not isinstance(runs, list) or index is None or runs[index] == self._marked:
+            return self.ENTER
+        return "Both in full"
+
+    def moved(self, index: int) -> None:
+        self.screen.refresh_bindings()  # on the marked run Enter leads elsewhere
+
     def open(self, index: int | None) -> None:
         runs = self._found.answer
-        if isinstance(runs, list) and index is not None:
+        if not isinstance(runs, list) or index is None:
+            return
+        if self._marked is None or runs[index] == self._marked:
             self.walk.open_log(Path(runs[index].log))
+        else:
+            self._compare(self._marked, runs[index])
+
+    def _compare(self, a: Past, b: Past) -> None:
+        """Put the logs of two runs side by side, as far as they are still where they were."""
+        self._compared, self._whole = (b, a), None
+        one, other = (Request(Path(run.log), mission=run.mission or None) for run in (a, b))
+        compare = self.walk.engine.compare
+        self.screen.fetch("comparison", lambda job: compare(one, other, lambda *_: job.check()), self._receive)
+        self.screen.draw()
+
+    def _receive(self, whole: str | CareError) -> None:
+        self._whole = whole
+        if self.is_shown:
+            self.screen.draw()
 
     def mark(self) -> None:
         """Mark the run under the cursor to compare others with, or take the mark away."""

@@ -7,11 +7,12 @@ import re
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 
 import care_core
 from care_core.application import comparing
-from care_core.application.comparing import Compared
+from care_core.application.comparing import Compared, _departure
 from care_core.application.sharing import Sharing
 from care_core.errors import UsageError
 from care_core.report.comparison import (
@@ -66,6 +67,23 @@ def test_what_differs_first_is_said(drives: Compared) -> None:
     goals = [one for one in document.events if one.what.startswith("goal")]
     assert [one.what.partition(" at")[0] for one in goals] == [f"goal {n}" for n in range(1, 6)]
     assert all(one.a_s is not None and one.b_s is not None and one.a_s < one.b_s for one in goals)
+
+
+def test_what_a_goal_came_to_is_said_where_that_differs() -> None:
+    good, failed = (ROOT / "samples" / f"nav2_{name}.mcap" for name in ("good", "failed"))
+    document = compare_document(care_core.compare(good, failed).comparison())
+    assert document.first == "goal 1, reached in A, cancelled in B: at 15.9 s in A, at 60.2 s in B"
+    assert any(one.what.endswith("...") for one in document.events), "a message that was cut says so"
+
+
+def test_signals_that_were_never_together_or_only_rustle_go_not_apart() -> None:
+    t = np.arange(0.0, 60.0, 0.1)
+    flat = np.zeros_like(t)
+    assert _departure((t, flat + 60.0), (t, flat + 584.0), 20.0) is None, "heights above two homes"
+    assert _departure((t, flat), (t, np.where(t > 20.0, 0.08, 0.0)), 2.0) is None
+    at_s, one, other = _departure((t, flat), (t, np.where(t > 20.0, 9.0, 0.0)), 2.0) or (0.0, 0.0, 0.0)
+    assert at_s == pytest.approx(20.0, abs=2.0)
+    assert one == 0.0 < other
 
 
 def test_a_run_beside_itself_differs_in_nothing(flights: Compared) -> None:

@@ -94,6 +94,31 @@ async def test_past_runs_show_trends_and_two_are_compared() -> None:
         assert title(app).startswith("History  3 runs"), "x on the marked run takes the mark away"
 
 
+async def test_enter_puts_a_run_and_the_marked_one_side_by_side_in_full() -> None:
+    for number, (time_s, speed) in enumerate([(140.0, 50.0), (150.0, 40.0)], start=1):
+        assert remember_triage(run_of(number, time_s, speed)) is None
+    asked: list[tuple[Request, Request]] = []
+
+    def compare(a: Request, b: Request, _progress: object) -> str:
+        asked.append((a, b))
+        if len(asked) > 1:
+            raise CareError("No such file.", where=str(b.log))
+        return "First  at 2.6 s throttle goes apart"
+
+    engine = replace(fake_engine(lambda _request, _progress: Case(run_of(42, 187.0, 16.0))), compare=compare)
+    app = CareApp(Request(LOG), engine=replace(engine, remember=remember_triage), settings=Settings(places=()))
+    async with app.run_test(size=(80, 24)) as pilot:
+        await settle(pilot, "y", "j", "x", "k")
+        assert "Both in full" in hints(app)
+        await settle(pilot, "enter")
+        assert [one.log.name for one in asked[0]] == ["00000002.BIN", "00000042.BIN"], "the marked one is A"
+        assert "at 2.6 s throttle goes apart" in text(app)
+        await settle(pilot, "j", "j")
+        assert "mission_time" in text(app), "of another pair what the history knows comes first"
+        await settle(pilot, "enter")
+        assert "No such file." in text(app)
+
+
 async def test_enter_opens_the_log_of_a_past_run() -> None:
     for number in (1, 2):
         assert remember_triage(run_of(number, 140.0, 50.0)) is None

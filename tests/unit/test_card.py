@@ -69,3 +69,11 @@ def test_what_the_model_cannot_say_is_said(planted: Profile) -> None:
 def score_of_one() -> SkillRecord:
     """Skill where every run met its thresholds: there is no AUC."""
     return SkillRecord(runs=9, base_rate=1.0, log_loss=0.1, brier=0.0, calibration_error=0.1, curve=((0.9, 1.0, 9),))
+
+
+def test_a_vehicles_card_names_the_parameters_that_were_screened(planted: Profile) -> None:
+    assert "were screened" not in model_card(SCHEMA, planted.model)
+    card = model_card(replace(SCHEMA, match={"vehicle": "rover"}), planted.model)
+    compass = next(line for line in card.splitlines() if line.startswith("| compass |"))
+    assert "COMPASS_ORIENT" in compass
+    assert "WP_SPEED" not in card.partition("were screened")[2], "what a rover's profile models was not screened so"

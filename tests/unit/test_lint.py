@@ -289,6 +289,7 @@ def test_values_with_which_a_robot_cannot_work_are_found(tmp_path: Path, text: s
     assert found == ([(rule, key)] if rule else [])
 
 
+MAPPED = "\n      static_layer: {{plugin: 'nav2_costmap_2d::StaticLayer', map_subscribe_transient_local: {}}}"
 LAYERED = """local_costmap:
   local_costmap:
     ros__parameters:
@@ -309,6 +310,8 @@ LAYERED = """local_costmap:
         ("enabled: true", "enabled: false", "hinders"),
         ("raytrace_max_range: 3.0", "raytrace_max_range: 2.0", "contradiction"),
         ("obstacle_max_range: 2.5", "obstacle_max_range: 0.0", "cannot-work"),
+        ("[obstacle_layer]", f"[obstacle_layer, static_layer]{MAPPED.format('false')}", "hinders"),
+        ("[obstacle_layer]", f"[obstacle_layer, static_layer]{MAPPED.format('true')}", ""),
         ("max_range: 3.0}", "max_range: 3.0}\n      use_sim_time: true\namcl: {ros__parameters: {use_sim_time: false}}",
          "contradiction"),
         ("marking: true", "marking: true", ""),

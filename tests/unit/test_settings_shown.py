@@ -88,6 +88,60 @@ def test_a_current_before_the_motors_turn(offset: float) -> None:
     assert naming(made, "BATT_AMP_OFFSET").wanted == (("BATT_AMP_OFFSET", 0.0),)
 
 
+def drained(made: Made, volts: float, amperes: float) -> None:
+    """A full pack of three cells of which a flight leaves so many volts at rest, at so many amperes in flight."""
+    flying = made.after(UP_S, DOWN_S)
+    made.settings |= {"BATT_AMP_PERVLT": 17.0, "BATT_CAPACITY": 3300.0}
+    made.table["BAT"]["Volt"] = np.interp(made.t, [UP_S, DOWN_S], [12.6, volts]) - np.where(flying, 0.6, 0.0)
+    made.table["BAT"]["Curr"] = np.where(flying, amperes, 0.5) + made.noise(0.05)
+
+
+@pytest.mark.parametrize("scale", [6.0, 8.0, 40.0])
+def test_a_current_that_only_the_default_scale_makes_the_charge_that_was_used(scale: float) -> None:
+    made = MadeWithDefaults()
+    drained(made, 11.5, 60.0 * scale / 17.0)  # 1.5 of 3.3 Ah, and half of it by the voltage
+    made.drive("BATT_AMP_PERVLT", scale, 17.0)
+    finding = naming(made, "BATT_AMP_PERVLT")
+    assert finding.wanted == (("BATT_AMP_PERVLT", 17.0),)
+    assert "the voltage at rest says that 50 % were used" in finding.evidence
+    energy = energy_of(made)
+    assert isinstance(energy, Unavailable)
+    assert "BATT_AMP_PERVLT" in energy.reason
+
+
+def test_a_current_of_ones_own_scale_that_fits_the_voltage_or_a_pack_that_was_not_full_names_none() -> None:
+    made = MadeWithDefaults()
+    drained(made, 11.5, 60.0)
+    made.drive("BATT_AMP_PERVLT", 40.0, 17.0)
+    assert made.find() == ()
+    drained(made, 11.5, 140.0)
+    made.table["BAT"]["Volt"] -= 0.5
+    assert all("BATT_AMP_PERVLT" not in one.parameters for one in made.find())
+
+
+def test_a_current_that_does_not_answer_to_the_motors_is_the_pins() -> None:
+    made = MadeWithDefaults()
+    made.drive("BATT_CURR_PIN", 14, 12)
+    assert all("BATT_CURR_PIN" not in one.parameters for one in made.find()), "it does here"
+    made.table["BAT"]["Curr"] = 0.8 + made.noise(0.01)
+    assert naming(made, "BATT_CURR_PIN").wanted == (("BATT_CURR_PIN", 12.0),)
+
+
+@pytest.mark.parametrize("full", [6.0, 10.25, 16.8, 25.2])
+def test_a_full_pack_that_the_thrust_is_not_scaled_for(full: float) -> None:
+    made = MadeWithDefaults()
+    made.drive("MOT_BAT_VOLT_MAX", full, 0.0)
+    finding = naming(made, "MOT_BAT_VOLT_MAX")
+    assert (finding.severity, finding.wanted) == ("warning", (("MOT_BAT_VOLT_MAX", 12.6),))
+
+
+@pytest.mark.parametrize("full", [12.0, 12.6, 13.05])
+def test_a_full_pack_of_any_chemistry_is_none(full: float) -> None:
+    made = MadeWithDefaults()
+    made.drive("MOT_BAT_VOLT_MAX", full, 0.0)
+    assert made.find() == ()
+
+
 def energy_of(made: Made) -> Value:
     tables = made.tables()
     model = flight_of(tables, made.known, made.facts, END_S)

@@ -24,6 +24,7 @@ OF_STATIONS = {
     "QGroundControl in another language": "home/Dokumente/QGroundControl/Logs/log_4_UnknownDate.ulg",
     "MAVProxy": "here/mav.tlog",
     "MAVProxy for an aircraft": "here/logs/2026-11-20/flight3/flight.tlog",
+    "MAVProxy for an aircraft, from above it": "here/quad/logs/2026-11-20/flight3/flight.tlog",
     "MAVProxy's dataflash_logger": "here/dataflash/000003.BIN",
 }
 

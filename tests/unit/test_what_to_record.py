@@ -45,6 +45,10 @@ def test_a_ros_2_recorder_hears_hidden_topics_and_changes_of_parameters() -> Non
     assert "--topics" not in recorder_words(what_to_record("nav2"), Path("out"), is_humble=True)
 
 
+def test_of_any_robot_what_health_checks_read_is_recorded() -> None:
+    assert {"/odom", "/cmd_vel", "/battery_state", "/imu", "/scan", "/rosout"} < {*what_to_record("ros").topics}
+
+
 def test_a_ros_1_recorder_hears_dynamic_reconfigure(care: Care) -> None:
     outcome = care("record", "move_base", "-o", "out")
     assert outcome.code == 0

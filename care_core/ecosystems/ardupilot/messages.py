@@ -159,7 +159,8 @@ _SENSORS: Dictionary = {
         _axes("Gyr", "rad/s", "rotation", most=(-100, 100)) | _axes("Acc", "m/s2", "acceleration", most=(-1e3, 1e3)),
         ("IMU2", "IMU3"), "I", fastest_hz=_GYROS_HZ, **_set(128, "IMU"),
     ),
-    "GYR": Message({}, fastest_hz=_GYROS_HZ),
+    "GYR": Message({}, instance="I", fastest_hz=_GYROS_HZ),
+    **{name: Message({}, in_bursts=True, at_times=True) for name in ("ISBH", "ISBD")},
     "ACC": Message({}, fastest_hz=_GYROS_HZ),
     "VIBE": Message(
         _axes("Vibe", "m/s2", "vibration", most=(0, 1e3)) | {"Clip": Field(former=("Clip0",))},

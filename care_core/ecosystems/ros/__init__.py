@@ -28,7 +28,10 @@ _DRIVES = "move_base", "navigate", "nav", "goto"
 """Part of the name of an action that drives: of a robot with an arm as well, its drive is judged."""
 
 
-_ALSO = ("/amcl_pose", "/diagnostics", "/rosout", "/scan", "/tf", "/tf_static")
+_ALSO = (
+    "/amcl_pose", "/battery_state", "/cmd_vel", "/diagnostics", "/imu", "/odom", "/rosout", "/scan", "/tf",
+    "/tf_static",
+)  # fmt: skip
 """What health checks read of most robots, under the names that most give them."""
 
 

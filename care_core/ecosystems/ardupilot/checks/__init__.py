@@ -22,12 +22,13 @@ from care_core.ecosystems.ardupilot.checks import (
     radio,
     rate_loop,
     recorded,
+    spectrum,
     takeoff,
     thrust,
     vibration,
     way_home,
 )
-from care_core.ecosystems.ardupilot.checks.settings import driven, heading, hover, level, outputs, supply
+from care_core.ecosystems.ardupilot.checks.settings import charge, driven, heading, hover, level, outputs, supply
 from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check
 
@@ -36,6 +37,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     hover.CHECK,
     level.CHECK,
     supply.CHECK,
+    charge.CHECK,
     driven.CHECK,
     outputs.CHECK,
     attitude.CHECK,
@@ -57,6 +59,7 @@ CHECKS: tuple[Check[Flight], ...] = (
     prearm.CHECK,
     radio.CHECK,
     rate_loop.CHECK,
+    spectrum.CHECK,
     takeoff.CHECK,
     thrust.CHECK,
     vibration.CHECK,

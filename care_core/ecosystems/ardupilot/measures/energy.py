@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from care_core.ecosystems.ardupilot.checks.settings.supply import not_measured, wrong_current
+from care_core.ecosystems.ardupilot.checks.settings import charge, supply
 from care_core.ecosystems.ardupilot.flight import as_flight
 from care_core.ecosystems.ardupilot.instances import split
 from care_core.ecosystems.ardupilot.measures.events import NOT_FLOWN
@@ -83,7 +83,7 @@ def energy_used(mission: Mission, args: Args) -> Value:
 def _measured_wrongly(mission: Mission) -> Unavailable | None:
     """Why no energy follows from how the battery is measured: without a current, or with one that is off."""
     flight = as_flight(mission.model)
-    wrong = not_measured(flight) or wrong_current(flight)
+    wrong = supply.not_measured(flight) or supply.wrong_current(flight) or charge.wrong_current(flight)
     if wrong is None:
         return None
     back = " and ".join(f"put {name} back to {shown(value)}" for name, value in wrong.wanted)
