@@ -44,6 +44,7 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
     "doctor": ("doctor",),
     "shell": ("completion", "man"),
     "profiles": ("profiles",),
+    "graph": ("graph",),
     "checks": ("checks",),
     "formats": ("schema",),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -99,6 +99,14 @@ def sharing_for(positions: bool | None, *, anonymous: bool) -> Sharing | None:
     from care_core.application.sharing import Sharing
 
     return Sharing(positions=bool(positions), anonymous=anonymous)
+
+
+def chosen(flags: Mapping[str, bool]) -> str | None:
+    """The one format that is asked for by its flag, None for none. Raises UsageError for more than one."""
+    names = [name for name, is_wanted in flags.items() if is_wanted]
+    if len(names) > 1:
+        raise UsageError(f"Only one of --{' and --'.join(names)} can be printed.", hint="Leave the others out.")
+    return names[0] if names else None
 
 
 def bounds(texts: Iterable[str]) -> dict[str, float]:

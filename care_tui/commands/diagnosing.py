@@ -11,7 +11,7 @@ import care_core
 from care_core.application.case import Case, Request
 from care_core.application.history_writing import remember_triage
 from care_core.diagnose.verdict import exit_code, verdict_of
-from care_core.errors import ExitCode, LogError, UsageError
+from care_core.errors import ExitCode, LogError
 from care_core.records import replace
 from care_core.report.formats import format_of
 from care_tui.commands.arguments import (
@@ -30,10 +30,12 @@ from care_tui.commands.arguments import (
     Site,
     Thresholds,
     bounds,
+    chosen,
     sharing_for,
 )
+from care_tui.commands.opening import newest_named
 from care_tui.commands.past import NoHistory, mention
-from care_tui.console import Progress, emit, painted, say
+from care_tui.console import Progress, emit, painted
 
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
@@ -77,11 +79,8 @@ def triage(
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
     flags = {"json": json, "yaml": yaml, "markdown": markdown, "html": html, "junit": junit}
-    formats = [name for name, wanted in flags.items() if wanted]
-    if len(formats) > 1:
-        raise UsageError(f"Only one of --{' and --'.join(formats)} can be printed.", hint="Leave the others out.")
-    format = formats[0] if formats else _format_of(out)
-    first, *others = logs or [_newest()]
+    format = chosen(flags) or _format_of(out)
+    first, *others = logs or [newest_named()]
     request = Request(
         first,
         profile,
@@ -137,18 +136,6 @@ def demo() -> None:
         case = care_core.triage(path, progress)
     emit(_written(case, None, None, to_file=False))
     raise typer.Exit(verdict_of(case.diagnosis).exit_code)
-
-
-def _newest() -> Path:
-    """The newest log of the usual places, which is said. Raises UsageError where there is none."""
-    from care_tui.commands.opening import newest_log
-    from care_tui.settings import load_settings
-
-    found = newest_log(load_settings(None).places)
-    if found is None:
-        raise UsageError("There is no log in the usual places.", hint="Name one.")
-    say(f"the newest log is {found}")
-    return found
 
 
 def _format_of(out: Path | None) -> str | None:
