@@ -26,6 +26,7 @@ from care_tui.commands.arguments import (
     is_json,
 )
 from care_tui.commands.past import NoHistory, mention
+from care_tui.completing import changes
 from care_tui.console import Progress, emit
 
 app = typer.Typer()
@@ -35,7 +36,8 @@ app = typer.Typer()
 def whatif(
     log: LogPath,
     set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="OPTION=VALUE", help="Ask with this parameter changed.")
+        list[str] | None,
+        typer.Option("--set", metavar="OPTION=VALUE", help="Ask with this changed.", autocompletion=changes),
     ] = None,
     profile: ProfileName = None,
     config: ConfigPaths = None,

@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from care_core.application.case import Request
-from care_core.diagnose.verdict import verdict_of
 from care_tui.commands.arguments import (
     Anonymous,
     AsJson,
@@ -49,6 +48,7 @@ def compare(
     """Put two runs side by side. Parameters, what differs first, objectives, phases, findings. Ends as triage of B."""
     from care_core.application.comparing import FORMATS
     from care_core.application.comparing import compare as put_beside
+    from care_core.diagnose.verdict import verdict_of
 
     asked = chosen({"json": json, "markdown": markdown, "html": html})
     suffix = "" if out is None else out.suffix.lower()

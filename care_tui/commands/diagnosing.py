@@ -10,7 +10,6 @@ import typer
 import care_core
 from care_core.application.case import Case, Request
 from care_core.application.history_writing import remember_triage
-from care_core.diagnose.verdict import exit_code, verdict_of
 from care_core.errors import ExitCode, LogError
 from care_core.records import replace
 from care_core.report.formats import format_of
@@ -104,7 +103,13 @@ def triage(
         mention(remember_triage(case.diagnosis, request))
     text = _written(case, format, sharing, to_file=out is not None)
     emit(text, out, force=force, is_plain=format is None)
-    raise typer.Exit(verdict_of(case.diagnosis).exit_code)
+    raise typer.Exit(_exit_code(case))
+
+
+def _exit_code(case: Case) -> ExitCode:
+    from care_core.diagnose.verdict import verdict_of  # not for '--help' nor a shell that completes
+
+    return verdict_of(case.diagnosis).exit_code
 
 
 def _write_junit(
@@ -112,6 +117,7 @@ def _write_junit(
 ) -> ExitCode:
     """Triage each log by itself and write a suite for each; the gravest of their exit codes."""
     from care_core.application.suites import LogSuite, suite_of_log
+    from care_core.diagnose.verdict import exit_code
     from care_core.report.junit import to_junit
 
     found: list[LogSuite] = []
@@ -135,7 +141,7 @@ def demo() -> None:
     with Progress() as progress:
         case = care_core.triage(path, progress)
     emit(_written(case, None, None, to_file=False))
-    raise typer.Exit(verdict_of(case.diagnosis).exit_code)
+    raise typer.Exit(_exit_code(case))
 
 
 def _format_of(out: Path | None) -> str | None:

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from care_core.application.case import Request
-from care_tui.commands.arguments import AsJson, Force, Out, chosen, profile_names
+from care_tui.commands.arguments import AsJson, Force, Out, chosen
+from care_tui.completing import profile_names
 from care_tui.console import Progress, emit, say
 
 app = typer.Typer()

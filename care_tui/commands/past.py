@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from care_core.errors import CareError, UsageError, nearest
-from care_tui.commands.arguments import AsJson, Force, Out, is_json
+from care_tui.commands.arguments import AsJson, Force, Out, is_json, profile_option
 from care_tui.console import emit, say
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def mention(problem: CareError | None) -> None:
 
 @app.command()
 def history(
-    profile: Annotated[str | None, typer.Option("--profile", "-p", help="Only runs of this profile.")] = None,
+    profile: Annotated[str | None, profile_option("Only runs of this profile.")] = None,
     robot: Annotated[str | None, typer.Option("--robot", metavar="NAME", help="Only runs of this robot.")] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="How many triages are listed.")] = 20,
     json: AsJson = False,
