@@ -226,6 +226,7 @@ def _read(
 ) -> Reading:
     from care_core.diagnose.judging import read_and_judge, with_repeats
     from care_core.ecosystems.registry import run_model
+    from care_core.errors import NoRepeatsError, ProfileError
 
     progress("reading the log", 0.2)
     profile = with_own_limits(profile, request.site)
@@ -243,11 +244,15 @@ def _read(
     repeats = []
     for path in request.repeats:
         with opened(path) as (other, digest):
-            repeats.append(
-                read_and_judge(
+            try:
+                repeat = read_and_judge(
                     run_model(other), profile, configs=configs, thresholds=request.thresholds, good=good, sha256=digest
                 )
-            )
+            except ProfileError as err:  # of another robot, or without a mission
+                reason = err.message[:1].lower() + err.message[1:]
+                hint = "Triage them one by one."
+                raise NoRepeatsError(f"The logs are no repeats: {reason}", hint=hint, where=str(path)) from err
+            repeats.append(repeat)
     health = _linted(model, health, judged, configs, profile.schema.options, good)
     return Reading(profile, choice, configs, with_repeats(judged, repeats), health)
 

@@ -20,6 +20,7 @@ RENAMED = "named in metadata.yaml but not there"
 """The fact about a recording whose files were renamed since."""
 
 _PART = re.compile(r"^(?P<series>.+)_(?P<number>0|[1-9]\d*)\.bag(\.active)?$")
+_ROS2_PART = re.compile(r"(_\d+)?\.(db3|mcap)$")
 _DATE = re.compile(r"\d{4}(-\d\d){5}")
 """What `rosbag record` puts into the name of each part: when that part was begun."""
 
@@ -72,9 +73,7 @@ def _in_folder(folder: Path) -> Recording:
     if bags and len({_series(name) for name in bags}) == 1:
         return Recording(tuple(folder / name for name in bags), missing=_gaps(bags))
     if bags:
-        raise LogError(
-            f"The folder holds {len(bags)} recordings, not one.", hint="Name one log file in it.", where=str(folder)
-        )
+        raise _several(folder, len(bags))
     if FILE_NAME in names:
         raise LogError(
             "A ROS 2 bag folder without .db3 or .mcap files.",
@@ -82,6 +81,12 @@ def _in_folder(folder: Path) -> Recording:
             where=str(folder),
         )
     raise LogError("A folder, not a log.", hint="Name one log file in it.", where=str(folder))
+
+
+def _several(folder: Path, count: int) -> LogError:
+    return LogError(
+        f"The folder holds {count} recordings, not one.", hint="Name one log file in it.", where=str(folder)
+    )
 
 
 def _ros2_bag(folder: Path, present: Sequence[str]) -> Recording:
@@ -96,6 +101,8 @@ def _ros2_bag(folder: Path, present: Sequence[str]) -> Recording:
         files, missing = sorted([*files, *others], key=_natural), missing[renamed:]
     elif not listed:
         files = list(present)
+        if len({_ros2_series(name) for name in files}) > 1:
+            raise _several(folder, len(files))
     if len({_bare_suffix(name) for name in files}) > 1:
         raise LogError("The folder holds both .db3 and .mcap files.", hint="Name the one to read.", where=str(folder))
     flaws = tuple(Flaw(f"{name} is missing from the folder") for name in missing)
@@ -141,6 +148,11 @@ def _series(name: str) -> str:
     """What the parts of one split bag share: the name without number and time; the name itself of any other file."""
     match = _PART.match(name)
     return name if match is None else _DATE.sub("", match["series"])
+
+
+def _ros2_series(name: str) -> str:
+    """What the parts of one split ROS 2 bag share: the name without its number; its format is told apart elsewhere."""
+    return _ROS2_PART.sub("", name.lower().removesuffix(".zstd"))
 
 
 def _gaps(names: Sequence[str]) -> tuple[Flaw, ...]:

@@ -10,7 +10,7 @@ import typer
 import care_core
 from care_core.application.case import Case, Request
 from care_core.application.history_writing import remember_triage
-from care_core.errors import ExitCode, LogError
+from care_core.errors import ExitCode, LogError, NoRepeatsError, UsageError
 from care_core.records import replace
 from care_core.report.formats import format_of
 from care_tui.commands.arguments import (
@@ -34,9 +34,10 @@ from care_tui.commands.arguments import (
 )
 from care_tui.commands.opening import newest_named
 from care_tui.commands.past import NoHistory, mention
-from care_tui.console import Progress, emit, painted
+from care_tui.console import Progress, emit, painted, say
 
 if TYPE_CHECKING:
+    from care_core.application.each import Answered
     from care_core.application.sharing import Sharing
 
 app = typer.Typer()
@@ -51,7 +52,7 @@ def triage(
         typer.Argument(
             metavar="[LOG...]",
             help="The log to read, the newest one of the usual places if absent; more of the same configuration: what"
-            " they share.",
+            " they share; of several, or a folder of them: a line each.",
             show_default=False,
         ),
     ] = None,
@@ -62,6 +63,10 @@ def triage(
     markdown: Annotated[bool, typer.Option("--markdown", help="Print Markdown for a ticket or a forum.")] = False,
     html: Annotated[bool, typer.Option("--html", help="Print a page with paths and signals drawn.")] = False,
     junit: Annotated[bool, typer.Option("--junit", help="Print JUnit XML for a CI, each log by itself.")] = False,
+    open_page: Annotated[
+        bool,
+        typer.Option("--open", help="Write the page to --out or a file of this user's, and open it in the browser."),
+    ] = False,
     positions: Positions = None,
     anonymous: Anonymous = False,
     out: Out = None,
@@ -78,12 +83,17 @@ def triage(
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
     flags = {"json": json, "yaml": yaml, "markdown": markdown, "html": html, "junit": junit}
-    format = chosen(flags) or _format_of(out)
-    first, *others = logs or [newest_named()]
+    from care_core.application.each import logs_of
+    from care_tui.browser import show_page
+
+    format = chosen(flags) or ("html" if open_page else _format_of(out))
+    if open_page and format != "html":
+        raise UsageError(f"What a browser opens is a page, not {format}.", hint="Leave one of both out.")
+    found = logs_of(logs or [newest_named()])
     request = Request(
-        first,
+        found[0],
         profile,
-        repeats=tuple(others),
+        repeats=found[1:],
         configs=tuple(config or ()),
         keep=tuple(keep or ()),
         thresholds=bounds(threshold or ()),
@@ -97,37 +107,66 @@ def triage(
     sharing = sharing_for(positions, anonymous=anonymous)
     if format == "junit":
         raise typer.Exit(_write_junit(request, sharing, out, force=force, no_history=no_history))
-    with Progress() as progress:
-        case = care_core.triage(request, progress)
+    try:
+        if len(found) > len(logs or found):
+            raise NoRepeatsError("A folder of several logs is no one run.", hint="Name one of them.")
+        with Progress() as progress:
+            case = care_core.triage(request, progress)
+    except (LogError, NoRepeatsError) as err:
+        if format is not None or len(found) == 1:
+            raise
+        say(f"{err.where + ': ' if err.where else ''}{err.message} Each is triaged by itself.")
+        raise typer.Exit(_write_lines(request, out, force=force, no_history=no_history)) from None
     if not no_history:
         mention(remember_triage(case.diagnosis, request))
-    text = _written(case, format, sharing, to_file=out is not None)
-    emit(text, out, force=force, is_plain=format is None)
+    if open_page:
+        show_page(case.report("html", sharing), case.diagnosis.run.log, out, force=force)
+    else:
+        emit(_written(case, format, sharing, to_file=out is not None), out, force=force, is_plain=format is None)
     raise typer.Exit(_exit_code(case))
-
-
-def _exit_code(case: Case) -> ExitCode:
-    from care_core.diagnose.verdict import verdict_of  # not for '--help' nor a shell that completes
-
-    return verdict_of(case.diagnosis).exit_code
 
 
 def _write_junit(
     request: Request, sharing: Sharing | None, out: Path | None, *, force: bool, no_history: bool
 ) -> ExitCode:
     """Triage each log by itself and write a suite for each; the gravest of their exit codes."""
-    from care_core.application.suites import LogSuite, suite_of_log
+    from care_core.application.suites import suite_of_log
     from care_core.diagnose.verdict import exit_code
     from care_core.report.junit import to_junit
 
-    found: list[LogSuite] = []
+    answers = _each(request, no_history=no_history)
+    emit(to_junit([suite_of_log(one, sharing) for one in answers]), out, force=force)
+    return exit_code(*(one.status for one in answers))
+
+
+def _write_lines(request: Request, out: Path | None, *, force: bool, no_history: bool) -> ExitCode:
+    """Triage each log by itself and write a line for each; the gravest of their exit codes."""
+    from care_core.diagnose.verdict import exit_code
+    from care_core.report.watching import log_lines
+
+    answers = _each(request, no_history=no_history)
+    text = "".join(f"{line}\n" for line in log_lines([(one.log, one.status, one.says) for one in answers]))
+    emit(text if out else painted(text), out, force=force, is_plain=True)
+    return exit_code(*(one.status for one in answers))
+
+
+def _each(request: Request, *, no_history: bool) -> list[Answered]:
+    """Every log of a request by itself."""
+    from care_core.application.each import answer_of
+
+    answers = []
     with Progress() as progress:
         for log in (request.log, *request.repeats):
-            found.append(suite_of_log(replace(request, log=log, repeats=()), sharing, progress))
-            if found[-1].case is not None and not no_history:
-                mention(remember_triage(found[-1].case.diagnosis, request))
-    emit(to_junit([one.suite for one in found]), out, force=force)
-    return exit_code(*(one.status for one in found))
+            answers.append(answer_of(replace(request, log=log, repeats=()), progress))
+            if (case := answers[-1].case) is not None and not no_history:
+                mention(remember_triage(case.diagnosis, request))
+    return answers
+
+
+def _exit_code(case: Case) -> ExitCode:
+    from care_core.diagnose.verdict import verdict_of  # not for '--help' nor a shell that completes
+
+    return verdict_of(case.diagnosis).exit_code
 
 
 @app.command()
