@@ -44,6 +44,28 @@ def own_command(*words: str) -> list[str]:
     return python_command("from care_tui.start import main; main()", *words)
 
 
+def called() -> list[str]:
+    """How this program was called, for a command that is to work as it is printed in the same folder."""
+    import os
+    import shutil
+
+    given = sys.argv[0] if sys.argv else ""
+    if os.path.basename(given) == "__main__.py":
+        return [os.path.relpath(sys.executable) if _is_below(sys.executable) else sys.executable, "-m", "care_tui"]
+    on_path = shutil.which("care")
+    if not given or os.path.basename(given) != "care" or (on_path and os.path.samefile(on_path, given)):
+        return ["care"]
+    return [os.path.relpath(given) if _is_below(given) else given]
+
+
+def _is_below(path: str) -> bool:
+    """Whether a path lies below the current folder."""
+    import os
+
+    here = os.getcwd()
+    return os.path.commonpath((here, os.path.abspath(path))) == here
+
+
 def _leave(number: int, _frame: FrameType | None) -> None:
     """End as on an error, so that temporary files go: the system's own way leaves them.
 

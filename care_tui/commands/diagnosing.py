@@ -13,6 +13,7 @@ from care_core.application.history_writing import remember_triage
 from care_core.errors import ExitCode, LogError, NoRepeatsError, UsageError
 from care_core.records import replace
 from care_core.report.formats import format_of
+from care_core.text import command
 from care_tui.commands.arguments import (
     Anonymous,
     AsJson,
@@ -35,6 +36,7 @@ from care_tui.commands.arguments import (
 from care_tui.commands.opening import newest_named
 from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit, painted, say
+from care_tui.start import called
 
 if TYPE_CHECKING:
     from care_core.application.each import Answered
@@ -180,7 +182,14 @@ def demo() -> None:
     with Progress() as progress:
         case = care_core.triage(path, progress)
     emit(_written(case, None, None, to_file=False))
+    say(f"Now open it: {command(*called(), _short(path))}")
     raise typer.Exit(_exit_code(case))
+
+
+def _short(path: Path) -> str:
+    """The sample as it is called in a checkout, else by its path."""
+    here = Path("samples", path.name)
+    return str(here if here.exists() and here.samefile(path) else path)
 
 
 def _format_of(out: Path | None) -> str | None:

@@ -32,6 +32,9 @@ def history(
     limit: Annotated[int, typer.Option("--limit", min=1, help="How many triages are listed.")] = 20,
     json: AsJson = False,
     ascii: Annotated[bool, typer.Option("--ascii", help="Draw trends without block characters.")] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Robots and missions with too few runs to show a trend, too.")
+    ] = False,
     card: Annotated[
         Path | None,
         typer.Option("--card", metavar="FOLDER", help="Write this profile's verified fixes beside its card."),
@@ -68,7 +71,7 @@ def history(
         return
     document = history_document(triages, store.verifications(profile), limit)
     as_json = json or is_json(out)
-    text = history_json(document) if as_json else history_text(document, ascii=ascii)
+    text = history_json(document) if as_json else history_text(document, ascii=ascii, everything=everything)
     emit(text, out, force=force, is_plain=not as_json)
 
 
