@@ -49,21 +49,24 @@ def called() -> list[str]:
     import os
     import shutil
 
+    from care_core.starting import interpreter
+
     given = sys.argv[0] if sys.argv else ""
     if os.path.basename(given) == "__main__.py":
-        return [os.path.relpath(sys.executable) if _is_below(sys.executable) else sys.executable, "-m", "care_tui"]
+        return [_short(interpreter()), "-m", "care_tui"]
     on_path = shutil.which("care")
     if not given or os.path.basename(given) != "care" or (on_path and os.path.samefile(on_path, given)):
         return ["care"]
-    return [os.path.relpath(given) if _is_below(given) else given]
+    return [_short(given)]
 
 
-def _is_below(path: str) -> bool:
-    """Whether a path lies below the current folder."""
+def _short(path: str) -> str:
+    """A path as it is typed in the current folder, where it lies below that."""
     import os
 
     here = os.getcwd()
-    return os.path.commonpath((here, os.path.abspath(path))) == here
+    is_below = os.path.commonpath((here, os.path.abspath(path))) == here
+    return os.path.relpath(path) if is_below else path
 
 
 def _leave(number: int, _frame: FrameType | None) -> None:

@@ -377,7 +377,7 @@ class RosLog:
         own = [self._kept(times) for times in part.times_ns.values()]
         end_s = (max((int(times.max()) for times in own if len(times)), default=self._low_ns) - self._low_ns) / 1e9
         whole_s = self._metadata.duration_s
-        of = f" of about {log_time(whole_s)}" if whole_s and whole_s > end_s else ""
+        of = f" of about {log_time(whole_s, 0)}" if whole_s and whole_s > end_s else ""
         what = f"{where}read to {log_time(end_s)}{of}, cut at byte {flaw.byte}: {flaw.what}"
         return Damage(what, flaw.byte, end_s)
 

@@ -288,7 +288,7 @@ def holdings_text(document: InspectDocument, width: int = WIDTH) -> str:
 def _span(log: LogEntry) -> str:
     if not log.damage:
         return log_time(log.duration_s)
-    about = "" if log.read.about_s is None else f" of about {log_time(log.read.about_s)}"
+    about = "" if log.read.about_s is None else f" of about {log_time(log.read.about_s, 0)}"
     return f"read to {log_time(log.read.to_s)}{about}, see Damage"
 
 
