@@ -43,6 +43,11 @@ def to_html(report: Report, drawing: Drawing = NOTHING_DRAWN) -> str:
     return _pages().get_template("page.html").render(report=report, name=name, facts=_facts(report), parts=parts)
 
 
+def to_fragment(report: Report) -> str:
+    """The answer in short, to stand in a page of others."""
+    return _pages().get_template("fragment.html").render(report=report, name=Path(report.log.path).name)
+
+
 def comparison_html(document: CompareDocument, drawing: Drawing = NOTHING_DRAWN) -> str:
     """Two runs side by side as a page, with the signals of both over each other."""
     names = [Path(side.log).name for side in (document.a, document.b)]

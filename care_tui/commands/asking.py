@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-import care_core
+from care_core.application import api
 from care_core.application.case import Request, read_case
 from care_core.application.history_writing import remember
 from care_core.errors import UsageError
@@ -102,7 +102,7 @@ def verify(
     )
     with Progress() as progress:
         progress("reading the log", 0.0)
-        document = care_core.verify(report, request)
+        document = api.verify(report, request)
     if not no_history:
         verified = document.plain()
         mention(remember(lambda history: history.add_verification(verified)))

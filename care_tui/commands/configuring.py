@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-import care_core
+from care_core.application import api
 from care_core.errors import ConfigError, ExitCode, UsageError
 from care_core.text import clean
 from care_tui import __version__
@@ -67,7 +67,7 @@ def apply(
     if override:
         _write_or_print(override_of(report, config, alternative, profile), out, force=force)
         return
-    edited = care_core.apply(report, *config, alternative=alternative, profile=profile)
+    edited = api.apply(report, *config, alternative=alternative, profile=profile)
     for line in _told(edited):
         say(line)
     changed = [file for file in edited if file.edits]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-import care_core
+from care_core.application import api
 from care_core.application.case import Case, Request
 from care_core.application.history_writing import remember_triage
 from care_core.errors import ExitCode, LogError, NoRepeatsError, UsageError
@@ -113,7 +113,7 @@ def triage(
         if len(found) > len(logs or found):
             raise NoRepeatsError("A folder of several logs is no one run.", hint="Name one of them.")
         with Progress() as progress:
-            case = care_core.triage(request, progress)
+            case = api.triage(request, progress)
     except (LogError, NoRepeatsError) as err:
         if format is not None or len(found) == 1:
             raise
@@ -180,7 +180,7 @@ def demo() -> None:
     if not path.is_file():
         raise LogError("The bundled sample is missing.", hint="Install the program again.", where=str(path))
     with Progress() as progress:
-        case = care_core.triage(path, progress)
+        case = api.triage(path, progress)
     emit(_written(case, None, None, to_file=False))
     say(f"Now open it: {command(*called(), _short(path))}")
     raise typer.Exit(_exit_code(case))

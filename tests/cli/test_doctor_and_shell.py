@@ -132,6 +132,23 @@ def test_the_usual_options_tell_the_shell_that_asks(care: Care, shell: str, monk
     assert any(f"complete_{shell}" in path.read_text() for path in home.rglob("*") if path.is_file())
 
 
+def test_the_demo_ends_with_a_command_that_works_as_printed(tmp_path: Path) -> None:
+    """Called as the script of a venv, from inside the project, and from another folder."""
+    script = ROOT / ".venv" / "bin" / "care"
+    if not script.exists():
+        pytest.skip("the command is not installed in the project's venv")
+    for folder in (ROOT, tmp_path):
+        ended = subprocess.run([script, "demo"], cwd=folder, capture_output=True, text=True, check=False)
+        assert ended.returncode == 1
+        (line,) = [line for line in ended.stderr.splitlines() if line.startswith("Now open it: ")]
+        command = line.removeprefix("Now open it: ")
+        opened = subprocess.run(
+            ["sh", "-c", command], cwd=folder, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL
+        )
+        assert "The terminal app needs a terminal" in opened.stderr, command
+        assert (folder == ROOT) == ("samples/arducopter_failed.BIN" in command.split())
+
+
 def test_the_manual_page_is_that_of_the_help(care: Care) -> None:
     page = care("man").stdout
     assert page == (ROOT / "docs" / "care.1").read_text(encoding="utf-8"), "make man"
