@@ -91,7 +91,7 @@ def test_no_text_of_a_log_is_markup_in_a_notebook(case: care_core.Case) -> None:
         ({"keep": ("LAND_SPED",)}, "keep: The profile has no parameter 'LAND_SPED'. Did you mean 'LAND_SPEED'?"),
         ({"keep": "LAND_SPEED"}, "keep: This is one name, not several. Pass ('LAND_SPEED',)."),
         ({"mission": 7}, "mission: There is no mission 7"),
-        ({"profile": "nav2"}, "profile"),
+        ({"profile": "arducoptr"}, "There is no profile 'arducoptr'. Did you mean 'arducopter'?"),
     ],
     ids=lambda given: str(given)[:30],
 )
