@@ -307,7 +307,7 @@ def _damage_lines(damage: Sequence[DamageEntry]) -> Iterator[str]:
 
 def _place(entry: DamageEntry) -> str:
     byte = "" if entry.byte is None else f" at byte {entry.byte}"
-    return byte + ("" if entry.time_s is None else f" (at {log_time(entry.time_s)})")
+    return byte + ("" if entry.time_s is None else f", at {log_time(entry.time_s)}")
 
 
 def _parameter_lines(found: ParameterEntry) -> Iterator[str]:

@@ -116,7 +116,7 @@ def log_lines(logs: Sequence[tuple[Path, RunStatus, str]], width: int = WIDTH) -
     names = [_cut(clean(path.name), width // 3, "...", keep_end=True) for path, *_ in logs]
     room = width - _VERDICT - max(map(_columns, names), default=0) - 4
     return [
-        f"{STATUS_WORDS[status]:<{_VERDICT}}  {_padded(_cut(clean(says), room, '...'), room)}  {name}"
+        f"{STATUS_WORDS[status]:<{_VERDICT}}  {_padded(_cut(clean(says) or '-', room, '...'), room)}  {name}"
         for name, (_, status, says) in zip(names, logs, strict=True)
     ]
 

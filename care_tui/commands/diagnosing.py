@@ -84,10 +84,10 @@ def triage(
     no_history: NoHistory = False,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
-    flags = {"json": json, "yaml": yaml, "markdown": markdown, "html": html, "junit": junit}
     from care_core.application.each import logs_of
     from care_tui.browser import show_page
 
+    flags = {"json": json, "yaml": yaml, "markdown": markdown, "html": html, "junit": junit}
     format = chosen(flags) or ("html" if open_page else _format_of(out))
     if open_page and format != "html":
         raise UsageError(f"What a browser opens is a page, not {format}.", hint="Leave one of both out.")
