@@ -12,6 +12,7 @@ from care_core.folders import files_in, may_list
 from care_core.logs.ros_log import Flaw
 from care_core.logs.ros_metadata import FILE_NAME, PARAMETERS_NAME, Metadata, parse_metadata
 from care_core.records import Record, field, replace
+from care_core.text import command
 
 ROS2_SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 ROS1_SUFFIXES = (".bag", ".bag.active")
@@ -80,13 +81,16 @@ def _in_folder(folder: Path) -> Recording:
             hint="Copy them beside metadata.yaml.",
             where=str(folder),
         )
-    raise LogError("A folder, not a log.", hint="Name one log file in it.", where=str(folder))
+    hint = _one_or_all(folder) if names else "Name a log file."
+    raise LogError("A folder, not a log.", hint=hint, where=str(folder))
 
 
 def _several(folder: Path, count: int) -> LogError:
-    return LogError(
-        f"The folder holds {count} recordings, not one.", hint="Name one log file in it.", where=str(folder)
-    )
+    return LogError(f"The folder holds {count} recordings, not one.", hint=_one_or_all(folder), where=str(folder))
+
+
+def _one_or_all(folder: Path) -> str:
+    return f"Name one log file in it; '{command('care', 'triage', str(folder))}' has a line for each."
 
 
 def _ros2_bag(folder: Path, present: Sequence[str]) -> Recording:
