@@ -134,7 +134,7 @@ def _lines(document: GraphDocument, top: int) -> Iterator[str]:
     )
     yield from wrapped(
         f"Effects are in {document.effect_unit}; support is the share of {document.resamples} bootstrap resamples that"
-        " have an edge, of a path that of its weakest edge."
+        " have an edge. A path has the mean effect of its edges and the support of the weakest."
     )
     if document.cause:
         yield from ("", "The path of this run's cause (* below)")
@@ -147,6 +147,17 @@ def _lines(document: GraphDocument, top: int) -> Iterator[str]:
 def _of_objective(document: GraphDocument, node: NodeEntry, top: int) -> Iterator[str]:
     name = node.name
     yield from ("", f"{name} ({node.unit})" if node.unit else name)
+    yield from _parent_lines(document, name)
+    hidden = [({edge.source, edge.target} - {name}).pop() for edge in document.edges if _is_hidden_cause(edge, name)]
+    yield from wrapped(f"hidden common cause with {listed(hidden)}", "  ", "    ") if hidden else ()
+    paths = [path for path in document.paths if path.objective == name]
+    yield "  strongest paths" if paths else "  no path from a parameter"
+    for path in paths[:top]:
+        yield from wrapped(_way(path.nodes), f"  {path.ace:6.2f}  {min(path.edge_support, default=0.0):4.0%}  ")
+
+
+def _parent_lines(document: GraphDocument, name: str) -> Iterator[str]:
+    """The direct causes of a variable, the strongest first."""
     parents = [edge for edge in document.edges if edge.target == name and edge.kind == "directed"]
     felt = [edge for edge in parents if abs(edge.effect or 0.0) >= NO_EFFECT]
     width = max((len(edge.source) for edge in felt), default=0)
@@ -157,12 +168,6 @@ def _of_objective(document: GraphDocument, node: NodeEntry, top: int) -> Iterato
         yield from wrapped(f"{edge.source:<{width}} {mark}{edge.effect:+6.2f}  {edge.support:7.0%}{turns}", "  ")
     rest = [edge.source for edge in parents if edge not in felt]
     yield from wrapped(f"no measured effect of its own: {', '.join(rest)}", "  ", "    ") if rest else ()
-    hidden = [({edge.source, edge.target} - {name}).pop() for edge in document.edges if _is_hidden_cause(edge, name)]
-    yield from wrapped(f"hidden common cause with {listed(hidden)}", "  ", "    ") if hidden else ()
-    paths = [path for path in document.paths if path.objective == name]
-    yield "  strongest paths" if paths else "  no path from a parameter"
-    for path in paths[:top]:
-        yield from wrapped(_way(path.nodes), f"  {path.ace:6.2f}  {min(path.edge_support, default=0.0):4.0%}  ")
 
 
 def _is_hidden_cause(edge: EdgeEntry, name: str) -> bool:
