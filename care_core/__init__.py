@@ -29,4 +29,11 @@ if not TYPE_CHECKING:  # so that mistyped names are found where types are checke
     def __getattr__(name: str) -> Any:
         if name not in __all__:
             raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
-        return getattr(import_module(_HOMES.get(name, "care_core.application.api")), name)
+        if name in _HOMES:
+            return getattr(import_module(_HOMES[name]), name)
+        from care_core.application import api, speaking
+
+        return speaking.speaking_python(getattr(api, name))
+
+    def __dir__() -> list[str]:
+        return [*__all__]

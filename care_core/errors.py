@@ -2,6 +2,7 @@
 
     CareError
       UsageError        the command line asks for something that does not exist
+        NoRepeatsError  several logs are not runs of one configuration
       LogError          the log cannot be read at all
       ProfileError      the profile is missing, unsound, or does not fit the log
       ConfigError       a configuration file cannot be read
@@ -47,6 +48,10 @@ class CareError(Exception):
 
 class UsageError(CareError):
     """The command line names something that does not exist."""
+
+
+class NoRepeatsError(UsageError):
+    """The logs are not of one configuration, so no answer is one for all of them."""
 
 
 class LogError(CareError):

@@ -47,6 +47,8 @@ _BEGINNINGS = tuple(
         ("card", rb"# Model card: [^\n]*\n"),
         ("model", rb'\{\s*"model_version": \d+,\s*"schema_digest": '),
         ("JUnit", rb'<\?xml [^\n]*\n<testsuites>\s*<testsuite [^\n]* package="care" '),
+        ("DOT", rb"// Written by care\.\ndigraph "),
+        ("GraphML", rb"<\?xml [^\n]*\n<!-- Written by care\. -->\n<graphml "),
         ("patch", rb"--- as driven\n\+\+\+ suggested\n"),
         ("parameters", re.escape(PARAMETERS_SIGNATURE.encode())),
         ("runs", rb"log,mission,log_format,log_start,log_sha256[,\n]"),

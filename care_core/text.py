@@ -10,6 +10,8 @@ from collections.abc import Iterable, Sequence
 
 WIDTH = 80
 """Columns of plain text for people."""
+_MINUTES_FROM_S = 100.0
+"""A time of so many seconds is told in minutes as well: a watch and a video count those."""
 
 
 def clean(text: str) -> str:
@@ -72,19 +74,36 @@ def wrapped(text: str, first: str = "", rest: str | None = None, width: int = WI
     return [line.replace("\u00a0", " ") for line in lines]  # what must stand on one line was held together by them
 
 
-def clock(time_s: float | None) -> str:
-    """A time of a log to the second, 02:13, from an hour on 1:02:13."""
+def log_time(time_s: float | None, digits: int = 1) -> str:
+    """A time of a log, or how long one lasts, wherever people read it: 61.3 s, from 100 s on 312.4 s (5:12)."""
     if time_s is None or not math.isfinite(time_s):
         return "an unknown time"
-    minutes, seconds = divmod(round(time_s), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{seconds:02}" if hours else f"{minutes:02}:{seconds:02}"
+    shown = round(time_s, digits)
+    minutes = f" ({_minutes(shown)})" if abs(shown) >= _MINUTES_FROM_S else ""
+    return f"{shown:.{digits}f} s{minutes}"
+
+
+def log_times(times_s: Sequence[float | None]) -> list[str]:
+    """The same as the cells of a column: all of one width, second under second."""
+    cells = ["?" if time_s is None or not math.isfinite(time_s) else log_time(time_s) for time_s in times_s]
+    pairs = [cell.partition(" (") for cell in cells]
+    widths = [
+        max((len(pair[0]) for pair in pairs), default=0),
+        max((len(pair[1] + pair[2]) for pair in pairs), default=0),
+    ]
+    return [f"{head:>{widths[0]}}{gap + tail:<{widths[1]}}" for head, gap, tail in pairs]
 
 
 def seconds(time_s: float | None) -> str:
-    """A time of a log as exact as an operator needs it: 61.3 s, from ten minutes on 12:05, from an hour on 1:02:05."""
+    """A time of a log where a column of the app is narrow: 61.3 s, from ten minutes on 12:05, from an hour 1:02:05."""
     if time_s is None or not math.isfinite(time_s):
         return "?"
-    if abs(time_s) < 600:
-        return f"{time_s:.1f} s"
-    return clock(math.floor(time_s))
+    return f"{time_s:.1f} s" if abs(time_s) < 600 else _minutes(time_s)
+
+
+def _minutes(time_s: float) -> str:
+    """5:12, from an hour on 1:02:05."""
+    minutes, rest = divmod(math.floor(abs(time_s)), 60)
+    hours, minutes = divmod(minutes, 60)
+    sign = "-" if time_s < 0 else ""
+    return f"{sign}{hours}:{minutes:02}:{rest:02}" if hours else f"{sign}{minutes}:{rest:02}"

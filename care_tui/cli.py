@@ -44,10 +44,22 @@ FAMILIES: Mapping[str, tuple[str, ...]] = {
     "doctor": ("doctor",),
     "shell": ("completion", "man"),
     "profiles": ("profiles",),
+    "graph": ("graph",),
     "checks": ("checks",),
     "formats": ("schema",),
 }
-"""Modules of `care_tui.commands` with the commands that each holds, in the order of the help."""
+"""Modules of `care_tui.commands` with the commands that each holds."""
+GROUPS: Mapping[str, tuple[str, ...]] = {
+    "Answer a failed run": ("triage", "compare", "whatif", "inspect", "bundle", "demo"),
+    "Configuration": ("params", "diff", "lint", "apply"),
+    "The next run": ("record", "verify", "baseline"),
+    "Many logs": ("fleet", "watch", "history"),
+    "Profiles, and learning them": (
+        "profiles", "graph", "checks", "ingest", "collect", "train", "update", "evaluate",
+    ),
+    "Around it": ("serve", "mcp", "doctor", "completion", "man", "schema"),
+}  # fmt: skip
+"""The commands by what one wants, in the order of the help; the hidden one is in none."""
 
 
 class CareGroup(TyperGroup):
@@ -55,15 +67,35 @@ class CareGroup(TyperGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         own = {name for parameter in self.params for name in (*parameter.opts, "--help")}
-        return super().parse_args(ctx, args if ctx.resilient_parsing else route(args, self.commands, own))
+        if ctx.resilient_parsing:  # a shell completes: nothing is refused, and what stands behind a log is the app's
+            is_opened = bool(args) and args[0] not in self.commands and OPEN in self.commands and _is_path(args[0])
+            return super().parse_args(ctx, [OPEN, *args] if is_opened else args)
+        return super().parse_args(ctx, route(args, self.commands, own))
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The commands that are there, in the order of the help."""
+        wanted = [name for names in GROUPS.values() for name in names]
+        return [name for name in (*wanted, OPEN) if name in self.commands]
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """The commands by what one wants."""
+        width = max(map(len, self.list_commands(ctx)))
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                room = formatter.width - width - 4  # its indent, and the gap between the columns
+                formatter.write_dl(
+                    [(name.ljust(width), self.commands[name].get_short_help_str(room)) for name in names]
+                )
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
-        """The group's own options, and before them those of `care LOG`, whose command is hidden."""
+        """The commands, the options of `care LOG`, whose command is hidden, and the group's own."""
+        self.format_commands(ctx, formatter)
         opened = self.commands[OPEN]
         taken = [record for param in opened.params if (record := param.get_help_record(ctx)) is not None]
         with formatter.section("Options of 'care [LOG]'"):
             formatter.write_dl([record for record in taken if record[0].startswith("-")])
-        super().format_options(ctx, formatter)
+        with formatter.section("Options"):
+            formatter.write_dl([record for param in self.get_params(ctx) if (record := param.get_help_record(ctx))])
 
     def main(self, *args: Any, **extra: Any) -> Any:
         try:
@@ -131,8 +163,18 @@ def main() -> None:
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
     escape_the_rest()
-    completes = "_CARE_COMPLETE" in os.environ  # the shell's words are not the command's then
-    command_line(None if completes else sys.argv[1:])(prog_name="care")
+    words: list[str] | None = sys.argv[1:]
+    if "_CARE_COMPLETE" in os.environ:
+        words = _typed_words()
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115  # it would stand in the typed line
+    command_line(words)(prog_name="care")
+
+
+def _typed_words() -> list[str] | None:
+    """What stands behind `care` where a shell completes; None where the command itself is still being typed."""
+    typed = os.environ.get("_TYPER_COMPLETE_ARGS") or os.environ.get("COMP_WORDS", "")
+    words = typed.split()[1:]
+    return words if len(words) > 1 else None
 
 
 def _print_version(wanted: bool) -> None:

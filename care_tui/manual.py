@@ -61,7 +61,8 @@ def _page(context: Any) -> Iterator[str]:
 
 def _commands(context: Any, group: Any, path: str) -> Iterator[str]:
     """Every command with its help and options, those in groups too."""
-    for name, command in group.commands.items():
+    for name in group.list_commands(context):
+        command = group.commands[name]
         if command.hidden:
             continue
         with type(context)(command, info_name=name, parent=context) as inner:

@@ -44,6 +44,31 @@ def own_command(*words: str) -> list[str]:
     return python_command("from care_tui.start import main; main()", *words)
 
 
+def called() -> list[str]:
+    """How this program was called, for a command that is to work as it is printed in the same folder."""
+    import os
+    import shutil
+
+    from care_core.starting import interpreter
+
+    given = sys.argv[0] if sys.argv else ""
+    if os.path.basename(given) == "__main__.py":
+        return [_short(interpreter()), "-m", "care_tui"]
+    on_path = shutil.which("care")
+    if not given or os.path.basename(given) != "care" or (on_path and os.path.samefile(on_path, given)):
+        return ["care"]
+    return [_short(given)]
+
+
+def _short(path: str) -> str:
+    """A path as it is typed in the current folder, where it lies below that."""
+    import os
+
+    here = os.getcwd()
+    is_below = os.path.commonpath((here, os.path.abspath(path))) == here
+    return os.path.relpath(path) if is_below else path
+
+
 def _leave(number: int, _frame: FrameType | None) -> None:
     """End as on an error, so that temporary files go: the system's own way leaves them.
 

@@ -6,8 +6,10 @@ import asyncio
 import contextlib
 import secrets
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any
 
+import aiohttp_jinja2
 from aiohttp import WSCloseCode, WSMsgType, web
 from textual_serve.app_service import AppService
 from textual_serve.server import Server
@@ -15,6 +17,15 @@ from textual_serve.server import Server
 HOST = "127.0.0.1"
 COOKIE = "care_session"
 """With the port behind it, so that two servers of one machine do not log each other's browser out."""
+
+PAGE = Path(__file__).with_name("web_page")
+"""The folder of the page: that of textual-serve asks a stranger's server for its font."""
+_NONCE = "nonce"
+_POLICY = (
+    "default-src 'none'; script-src 'self' 'nonce-{nonce}'; style-src 'self' 'unsafe-inline'; font-src 'self'; "
+    "img-src data:; connect-src ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""What a page may fetch: nothing but from this server. A terminal sets styles of its own."""
 
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
@@ -36,8 +47,8 @@ class TokenServer(Server):
     server's.
     """
 
-    def __init__(self, command: str, port: int, token: str) -> None:
-        super().__init__(command, host=HOST, port=port, title="care")
+    def __init__(self, command: str, port: int, token: str, title: str) -> None:
+        super().__init__(command, host=HOST, port=port, title=title, templates_path=PAGE)
         self._token, self._session = token, secrets.token_urlsafe(24)
         self._cookie = f"{COOKIE}_{port}"
         self._hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
@@ -53,10 +64,27 @@ class TokenServer(Server):
 
         @web.middleware
         async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
-            return await self._admit(request, handler)
+            nonce = request[_NONCE] = secrets.token_urlsafe(16)
+            answer = await self._admit(request, handler)
+            if not answer.prepared:
+                answer.headers["Content-Security-Policy"] = _POLICY.format(host=request.host, nonce=nonce)
+            return answer
 
         app.middlewares.append(admit)
         return app
+
+    @aiohttp_jinja2.template("app_index.html")
+    async def handle_index(self, request: web.Request) -> dict[str, Any]:
+        """The page, with the word by which the browser knows its own scripts and styles (`_POLICY`)."""
+        font_size = request.query.get("fontsize", "")
+        socket = request.app.router["websocket"].url_for()
+        return {
+            "nonce": request[_NONCE],
+            "font_size": font_size if font_size.isascii() and font_size.isdigit() and len(font_size) < 3 else "16",
+            "app_websocket_url": f"ws://{request.host}{socket}",
+            "config": {"static": {"url": "/static/"}},
+            "application": {"name": self.title},
+        }
 
     async def _admit(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         if request.host not in self._hosts:

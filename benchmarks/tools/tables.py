@@ -58,7 +58,8 @@ def commands() -> str:
 
 
 def _commands(context: Any, group: Any, path: str) -> Iterator[tuple[str, str]]:
-    for name, command in group.commands.items():
+    for name in group.list_commands(context):
+        command = group.commands[name]
         if command.hidden:
             continue
         with type(context)(command, info_name=name, parent=context) as inner:

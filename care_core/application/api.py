@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from care_core.application.case import Case, Progress, Request, choose, fitting, open_case, read_case
-from care_core.errors import CareError, LogError
+from care_core.errors import CareError, LogError, UsageError
 from care_core.records import replace
 
 if TYPE_CHECKING:
@@ -66,6 +66,10 @@ def what_if(asked: Case | Request | str | Path, changes: Mapping[str, float]) ->
     """
     from care_core.diagnose.whatif import option_named
 
+    for name, value in changes.items():
+        if not isinstance(value, (int, float)):
+            hint = f"Pass changes={{'{name}': 40}}."
+            raise UsageError(f"The value of '{name}' is {value!r}, not a number.", hint=hint, where="changes")
     reading = asked.reading if isinstance(asked, Case) else read_case(_request(asked), _silent)
     if reading is None:
         raise CareError("There is no model to ask.", hint="Open a log that a profile with a model fits.")

@@ -23,7 +23,7 @@ from care_core.errors import CareError
 from care_core.outputs import BUNDLE_FOLDER
 from care_core.records import Record, replace
 from care_core.run import Setting, Unavailable, profile_title
-from care_core.text import clean, csv_table, seconds
+from care_core.text import clean, csv_table, log_time
 
 if TYPE_CHECKING:
     import numpy as np
@@ -245,7 +245,7 @@ def _readme(case: OpenRun, sharing: Sharing, names: Sequence[str], told: Iterabl
     positions = "with positions" if sharing.positions else "without positions"
     who = "Names, hosts, serial numbers, paths and dates were left out." if sharing.anonymous else ""
     lines = [
-        f"What an expert needs to look at a run: {name}, {log.format}, {seconds(log.duration_s)}.",
+        f"What an expert needs to look at a run: {name}, {log.format}, {log_time(log.duration_s)}.",
         f"Packed by 'care bundle' {positions}. {who}".rstrip(),
         "",
         "Files",

@@ -5,6 +5,7 @@ The work is imported by the function that needs it: the app draws its first fram
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, cast
 
 from care_core.application.open_run import OpenRun, Reading
 from care_core.errors import CareError
-from care_core.records import Record, field, replace
+from care_core.records import Record, field, force_setattr, replace
 
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
@@ -60,9 +61,33 @@ class Request(Record):
     robot: str | None = None
     """What the operator calls the robot; by what the log says when None."""
 
+    def __post_init__(self) -> None:
+        """Take paths as texts, and refuse what only Python can give: the command line checks its words itself.
+
+        Raises UsageError.
+        """
+        from care_core.errors import UsageError
+
+        for argument in ("log", "since", "site", "reference"):
+            if isinstance(given := getattr(self, argument), str):
+                force_setattr(self, argument, Path(given))
+        for name, bound in self.thresholds.items():
+            if isinstance(bound, bool) or not isinstance(bound, (int, float)) or not math.isfinite(bound):
+                hint = f"Pass thresholds={{'{name}': 120}}."
+                raise UsageError(f"The threshold '{name}' is {bound!r}, not a number.", hint=hint, where="thresholds")
+        for argument in ("configs", "keep", "repeats"):
+            if isinstance(given := getattr(self, argument), (str, Path)):
+                raise UsageError("This is one name, not several.", hint=f"Pass ({str(given)!r},).", where=argument)
+
 
 class Case(OpenRun, eq=False):
     """An open run that can be reported."""
+
+    def _repr_html_(self) -> str:
+        """The answer in short, for a notebook; nothing in it is markup of a log."""
+        from care_core.application.reporting import fragment_of
+
+        return fragment_of(self)
 
     def report(self, format: str = "text", sharing: Sharing | None = None) -> str:
         """The fix report in one of its formats; `sharing` is what of the run goes into it, by default what suits the
@@ -226,6 +251,7 @@ def _read(
 ) -> Reading:
     from care_core.diagnose.judging import read_and_judge, with_repeats
     from care_core.ecosystems.registry import run_model
+    from care_core.errors import NoRepeatsError, ProfileError
 
     progress("reading the log", 0.2)
     profile = with_own_limits(profile, request.site)
@@ -243,11 +269,15 @@ def _read(
     repeats = []
     for path in request.repeats:
         with opened(path) as (other, digest):
-            repeats.append(
-                read_and_judge(
+            try:
+                repeat = read_and_judge(
                     run_model(other), profile, configs=configs, thresholds=request.thresholds, good=good, sha256=digest
                 )
-            )
+            except ProfileError as err:  # of another robot, or without a mission
+                reason = err.message[:1].lower() + err.message[1:]
+                hint = "Triage them one by one."
+                raise NoRepeatsError(f"The logs are no repeats: {reason}", hint=hint, where=str(path)) from err
+            repeats.append(repeat)
     health = _linted(model, health, judged, configs, profile.schema.options, good)
     return Reading(profile, choice, configs, with_repeats(judged, repeats), health)
 

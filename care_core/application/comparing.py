@@ -69,11 +69,12 @@ class Compared(Record, eq=False):
             for name, case, span in zip("AB", (self.a, self.b), spans, strict=True)
             for mark in marks_in(self.sharing.of(case), span, _MARKS_EACH)
         ]
+        is_mission = any(case.diagnosis.run.mission.count for case in (self.a, self.b))
         return Drawing(
             plots=tuple(self._plots(end_s)),
             marks=tuple(sorted(marks, key=lambda mark: mark.time_s)),
             end_s=end_s,
-            is_mission=any(case.diagnosis.run.mission.count for case in (self.a, self.b)),
+            since=f"the start of each {'mission' if is_mission else 'log'}",
         )
 
     def _plots(self, end_s: float) -> Iterator[Plot]:

@@ -81,7 +81,6 @@ def drawn_of(case: OpenRun, sharing: Sharing = EVERYTHING) -> Drawing:
         deadlines=tuple(_deadlines(case, span)),
         start_s=span[0],
         end_s=span[1],
-        is_mission=diagnosis.run.mission.end_s > diagnosis.run.mission.start_s,
     )
 
 

@@ -18,6 +18,14 @@ def report_of(case: OpenRun, format: str, sharing: Sharing | None = None) -> str
     return row.write(Answer(shared.diagnosis, lambda: _drawn(shared, sharing)))
 
 
+def fragment_of(case: OpenRun) -> str:
+    """The answer in short as HTML for a page of others, with what goes to others."""
+    from care_core.report.document import build_document
+    from care_core.report.html import to_fragment
+
+    return to_fragment(build_document(Sharing(positions=False).of(case).diagnosis))
+
+
 def _drawn(case: OpenRun, sharing: Sharing) -> Drawing:
     from care_core.application.plotting import drawn_of
 

@@ -1,38 +1,24 @@
-"""Logs as test suites: each is triaged by itself, and one that cannot be read is an error and stops no other."""
+"""A log's answer as a test suite; one that cannot be read is an error."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from care_core.application.case import Case, Progress, Request, open_case
-from care_core.diagnose.verdict import RunStatus
-from care_core.errors import LogError
-from care_core.records import Record
+from care_core.application.each import Answered
 
 if TYPE_CHECKING:
     from care_core.application.sharing import Sharing
     from care_core.report.junit import Suite
 
 
-class LogSuite(Record, eq=False):
-    """A log as a suite, what became of it, and its case, None where it could not be read."""
-
-    suite: Suite
-    status: RunStatus
-    case: Case | None = None
-
-
-def suite_of_log(request: Request, sharing: Sharing | None, progress: Progress) -> LogSuite:
-    """Triage a log. Raises CareError for what is wrong with the request, not with the log."""
+def suite_of_log(answered: Answered, sharing: Sharing | None) -> Suite:
+    """The suite of a log that was triaged, with what of it goes to others."""
     from care_core.application.sharing import Sharing
     from care_core.report.document import build_document
     from care_core.report.junit import suite_of, unreadable
 
     sharing = sharing or Sharing(positions=False)
-    try:
-        case = open_case(request, progress)
-    except LogError as err:
-        name = f"log{request.log.suffix}" if sharing.anonymous else request.log.name
-        return LogSuite(unreadable(name, err.message), "unreadable")
-    document = build_document(sharing.of(case).diagnosis)
-    return LogSuite(suite_of(document), document.verdict.status, case)
+    if answered.case is None:
+        name = f"log{answered.log.suffix}" if sharing.anonymous else answered.log.name
+        return unreadable(name, answered.says)
+    return suite_of(build_document(sharing.of(answered.case).diagnosis))

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX, is_self_written
 from care_core.run import Setting, shown
-from care_core.text import clean, clock
+from care_core.text import clean, log_time
 from care_core.variables import Variable
 
 SEVEN_DIGITS = 1e-6
@@ -84,7 +84,7 @@ def remark(history: Sequence[Setting], *, source: bool = False) -> str:
     first, *later = history
     parts = []
     if later:
-        steps = "".join(f" -> {shown(one.value)} at {clock(one.changed_at_s)}" for one in later)
+        steps = "".join(f" -> {shown(one.value)} at {log_time(one.changed_at_s)}" for one in later)
         parts.append(f"{shown(first.value)}{steps}")
     if history[-1].default is not None and not same_value(history[-1].value, history[-1].default):
         parts.append(f"default {shown(history[-1].default)}")

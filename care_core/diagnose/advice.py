@@ -13,6 +13,7 @@ from care_core.ecosystems.findings import Finding
 from care_core.ecosystems.ranking import LIKELY
 from care_core.records import replace
 from care_core.run import FitVerdict
+from care_core.text import log_time
 
 TOLD_APART = 4.0
 """How many times likelier good runs have to be with the change than without for it to be known that it works."""
@@ -63,8 +64,8 @@ def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = (
     if sooner:
         earliest = min(sooner, key=lambda one: one.onset_s)
         return (
-            f"{earliest.title} from {earliest.onset_s:.0f} s on, before {rival.name}: that speaks of how the robot is "
-            "set, and training does not tell which parameter does it"
+            f"{earliest.title} from {log_time(earliest.onset_s, 0)} on, before {rival.name}: that speaks of how the "
+            "robot is set, and training does not tell which parameter does it"
         )
     return f"{rival.name}; that explains this failure better than any parameter: look at it first"
 

@@ -12,7 +12,7 @@ from care_core.ecosystems.findings import Finding, FindingKind, every_finding
 from care_core.logs.formats import format_named
 from care_core.records import replace
 from care_core.run import Check, Run, Unavailable, is_known
-from care_core.text import seconds
+from care_core.text import log_time
 
 DOWN: frozenset[FindingKind] = frozenset(("crash", "takeoff"))
 """What ends a flight on the ground against its will."""
@@ -30,7 +30,7 @@ def as_found(run: Run, findings: Sequence[Finding], accomplished: Collection[str
     crash = _crash_of(run, findings)
     if crash is None:
         return run
-    how = f"{crash.title} at {seconds(crash.onset_s)}"
+    how = f"{crash.title} at {log_time(crash.onset_s)}"
     met = [name for name, value in run.objectives.items() if value == 1.0 and name in accomplished]
     return replace(
         run,

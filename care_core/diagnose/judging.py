@@ -15,7 +15,7 @@ from care_core.diagnose.records import MissionVerdict, Need, ObjectiveResult, St
 from care_core.diagnose.reference import Good, Reference, reference_of
 from care_core.ecosystems.base import RunModel
 from care_core.ecosystems.findings import Finding
-from care_core.errors import UsageError, nearest
+from care_core.errors import NoRepeatsError, UsageError, nearest
 from care_core.extract.plain import read_plain_runs
 from care_core.extract.read import mission_number, read_runs
 from care_core.logs.digest import Sha256
@@ -133,7 +133,7 @@ def verdict(judged: Judged) -> MissionVerdict:
 
 
 def with_repeats(first: Judged, others: Sequence[Judged]) -> Judged:
-    """A run and others that repeat it. Raises UsageError: another configuration, or a log given twice."""
+    """A run and others that repeat it. Raises NoRepeatsError, and UsageError for a log that is given twice."""
     seen = {first.run.log.identity}
     for other in others:
         if other.run.log.identity in seen:
@@ -142,7 +142,7 @@ def with_repeats(first: Judged, others: Sequence[Judged]) -> Judged:
         for name in sorted(first.run.config.keys() & other.run.config.keys()):
             mine, theirs = first.run.config[name], other.run.config[name]
             if not same_value(mine, theirs):
-                raise UsageError(
+                raise NoRepeatsError(
                     f"The logs are no repeats of one configuration: {name} was {mine:g}, then {theirs:g}.",
                     hint="Triage them one by one.",
                     where=other.run.log.path,

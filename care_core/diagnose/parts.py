@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from care_core.ecosystems.findings import CAME_DOWN, UNCHARGED, Finding
 from care_core.ecosystems.ranking import LIKELY
+from care_core.text import log_time
 
 LATE_S = 5.0
 """Seconds after a sign of how the robot was set from which what fails may be of that."""
@@ -76,4 +77,4 @@ def unmended(part: Finding) -> str:
     """Why no parameter is changed while this part has failed."""
     if part.kind in ("battery", "prearm"):
         return f"{part.title}: charge or replace the battery; nothing is changed until it is full"
-    return f"{part.title} at {part.onset_s:.0f} s: nothing is changed until that is mended"
+    return f"{part.title} at {log_time(part.onset_s, 0)}: nothing is changed until that is mended"

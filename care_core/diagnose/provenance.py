@@ -8,7 +8,7 @@ from care_core.configs.driven import disagreements, readable
 from care_core.configs.loading import ConfigFile, guesses, resolve
 from care_core.profile.schema import Schema
 from care_core.run import Run, Setting, shown
-from care_core.text import clock
+from care_core.text import log_time
 
 _SHOWN = 5
 
@@ -34,7 +34,7 @@ def _changed_on_the_way(schema: Schema, run: Run) -> Iterator[str]:
         for parameter in readable(option):
             first, *later = run.changes.get(parameter, (None,))
             if first is not None:
-                steps = ", ".join(f"to {shown(one.value)} at {clock(one.changed_at_s)}" for one in later)
+                steps = ", ".join(f"to {shown(one.value)} at {log_time(one.changed_at_s)}" for one in later)
                 changes = f"from {shown(first.value)} {steps}"
                 judged = f"{shown(run.settings[parameter].value)}, as in most of the {option.phase or 'mission'}"
                 yield f"{option.name} was changed during the mission {changes}; judged is {judged}"

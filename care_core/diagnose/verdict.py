@@ -16,7 +16,7 @@ from care_core.ecosystems.ranking import LIKELY, SYMPTOMS
 from care_core.errors import ExitCode
 from care_core.records import Record
 from care_core.run import FIT_WORDS, Fit, FitVerdict
-from care_core.text import clean, seconds
+from care_core.text import clean, log_time
 
 RunStatus = Status | Literal["unreadable"]
 """What became of a log: the status of its run, or that it could not be read."""
@@ -328,7 +328,7 @@ def _worst(findings: Sequence[F]) -> list[F]:
 
 
 def _with_time(finding: SeenFinding) -> str:
-    return f"{finding.title} at {seconds(finding.onset_s)}"
+    return f"{finding.title} at {log_time(finding.onset_s)}"
 
 
 def _is_broken_part(finding: SeenFinding) -> bool:

@@ -18,7 +18,7 @@ from care_core.ecosystems.timeline import Span, is_telemetry_rate, within
 from care_core.ecosystems.vehicles import Motor, is_self_written, switched_off
 from care_core.ecosystems.vehicles.self_written import SIMULATOR_PREFIX
 from care_core.run import Setting, shown
-from care_core.text import listed
+from care_core.text import listed, log_time
 
 LIMITS = Limits()
 SOON_S = LIMITS.add(
@@ -118,8 +118,8 @@ def _finding(
         onset_s=since_s,
         end_s=max(upset.time_s, several[-1].time_s),
         severity="critical" if is_lost else "warning",
-        evidence=f"{'; '.join(map(str, several[:_NAMED]))}; {upset.what} {later_s:.1f} s later ({upset.time_s:.1f} s). "
-        f"To put it back: {back}",
+        evidence=f"{'; '.join(map(str, several[:_NAMED]))}; {upset.what} {later_s:.1f} s later "
+        f"({log_time(upset.time_s)}). To put it back: {back}",
         source=source,
         suspect="parameter",
         probability=_PROBABILITY,

@@ -14,6 +14,7 @@ import numpy as np
 from care_core.numbers import Floats, ascending, median, quantile
 from care_core.records import Record
 from care_core.run import Unavailable
+from care_core.text import log_time
 
 Span = tuple[float, float]
 """Start and end, in seconds from the start of the log."""
@@ -88,7 +89,7 @@ def _repeated(samples: Samples, t: Floats, usual_s: float, total_s: float) -> Un
     missed_s = unseen(live, samples.spans, usual_s)
     if missed_s <= samples.bears.of(total_s) and not any(_is_far(live, one, usual_s) for one in samples.moments):
         return None
-    said = " and ".join(f"from {start:.0f} to {end:.0f} s" for start, end in samples.dead[:2])
+    said = " and ".join(f"from {log_time(start, 0)} to {log_time(end, 0)}" for start, end in samples.dead[:2])
     return Unavailable(
         f"{samples.dead_name or samples.name} says the same {said}, so it measures nothing then", "check the sensor"
     )

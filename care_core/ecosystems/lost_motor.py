@@ -16,7 +16,7 @@ from care_core.ecosystems.base import Limits
 from care_core.ecosystems.vehicles import Motor
 from care_core.numbers import median
 from care_core.records import Record
-from care_core.text import listed
+from care_core.text import listed, log_time
 
 Floats = NDArray[np.float64]
 
@@ -72,8 +72,8 @@ class Hardest(Record):
         """What shows it, in a clause."""
         return (
             f"as the vehicle tipped it was driven hardest, at {self.share:.0%} where the others were at "
-            f"{self.others:.0%}, and was the first above {_NEAR_LIMIT:.0%} ({self.near_s:.1f} s), yet its side fell: "
-            "the motor, its controller or its propeller"
+            f"{self.others:.0%}, and was the first above {_NEAR_LIMIT:.0%} ({log_time(self.near_s)}), yet its side "
+            "fell: the motor, its controller or its propeller"
         )
 
     def title(self, motors: Iterable[Motor]) -> str:

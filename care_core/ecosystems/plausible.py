@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from care_core.ecosystems.dictionary import Dictionary, Message, find_message, instance_field
 from care_core.logs.base import Table
 from care_core.numbers import distinct, median
+from care_core.text import log_time
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -129,7 +130,7 @@ def _was_set(dictionary: Dictionary, tables: Mapping[str, Table], start_s: float
     if not steps or None in steps:
         return ""
     at_s, by_s = min(one for one in steps if one is not None)
-    return f"the log's clock was set forward by {by_s:.0f} s at {at_s:.1f} s, so no time across that is known"
+    return f"the log's clock was set forward by {by_s:.0f} s at {log_time(at_s)}, so no time across that is known"
 
 
 def set_forward(said: Floats, own: Floats) -> tuple[float, float] | None:

@@ -14,6 +14,7 @@ from care_core.ecosystems.vehicles import is_self_written
 from care_core.logs.base import Table
 from care_core.numbers import Floats, ascending, distinct, median, pauses
 from care_core.run import Damage, Setting, shown
+from care_core.text import log_time
 
 Span = tuple[float, float]
 
@@ -56,7 +57,7 @@ def repeats(events: Sequence[Event]) -> Iterator[Event]:
         groups.setdefault((event.kind, _NUMBERS.sub("#", event.text)), []).append(event)
     for several in groups.values():
         first = several[0]
-        again = f" ({len(several)} times until {several[-1].time_s:.0f} s)" if len(several) > 1 else ""
+        again = f" ({len(several)} times until {log_time(several[-1].time_s, 0)})" if len(several) > 1 else ""
         yield Event(first.time_s, first.kind, first.text + again, first.source)
 
 

@@ -57,7 +57,8 @@ def connected(scheduler: str | None = None, *, workers: int = 1, memory: str | N
         import_module("cryptography")  # for the certificate of a local cluster
     except ModuleNotFoundError as err:
         raise UsageError(
-            f"A fleet needs {err.name}, which is not installed.", hint=f"{install_hint('fleet')}."
+            f"A fleet needs {err.name}, which is not installed.",
+            hint=f"{install_hint('fleet')}; 'care triage LOG...' tells each in a line without it.",
         ) from err
     if scheduler is None:
         _check_memory(memory)

@@ -209,10 +209,15 @@ class History(Record):
     def triage_of(self, sha256: str, terms: str = "") -> Triaged | None:
         """The last triage of a log by what it holds, judged by these terms; None where there is none. Raises
         HistoryError."""
-        rows = self._read(
-            f"select at, log_path, mission, document, about from triages where {JUDGED_BY} order by id desc limit 1",
-            judged_by(sha256, terms),
-        )
+        return self._last(JUDGED_BY, judged_by(sha256, terms))
+
+    def last_of(self, log_path: str) -> Triaged | None:
+        """The last triage of the log at a path, None where there is none. Raises HistoryError."""
+        return self._last("log_path = ?", (log_path,))
+
+    def _last(self, which: str, values: tuple[str, ...]) -> Triaged | None:
+        columns = "at, log_path, mission, document, about"
+        rows = self._read(f"select {columns} from triages where {which} order by id desc limit 1", values)
         return next((self._triaged(at, path, mission, text, about) for at, path, mission, text, about in rows), None)
 
     def verifications(self, profile: str | None = None) -> tuple[Verified, ...]:

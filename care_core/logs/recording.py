@@ -12,6 +12,7 @@ from care_core.folders import files_in, may_list
 from care_core.logs.ros_log import Flaw
 from care_core.logs.ros_metadata import FILE_NAME, PARAMETERS_NAME, Metadata, parse_metadata
 from care_core.records import Record, field, replace
+from care_core.text import command
 
 ROS2_SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 ROS1_SUFFIXES = (".bag", ".bag.active")
@@ -20,6 +21,7 @@ RENAMED = "named in metadata.yaml but not there"
 """The fact about a recording whose files were renamed since."""
 
 _PART = re.compile(r"^(?P<series>.+)_(?P<number>0|[1-9]\d*)\.bag(\.active)?$")
+_ROS2_PART = re.compile(r"(_\d+)?\.(db3|mcap)$")
 _DATE = re.compile(r"\d{4}(-\d\d){5}")
 """What `rosbag record` puts into the name of each part: when that part was begun."""
 
@@ -72,16 +74,23 @@ def _in_folder(folder: Path) -> Recording:
     if bags and len({_series(name) for name in bags}) == 1:
         return Recording(tuple(folder / name for name in bags), missing=_gaps(bags))
     if bags:
-        raise LogError(
-            f"The folder holds {len(bags)} recordings, not one.", hint="Name one log file in it.", where=str(folder)
-        )
+        raise _several(folder, len(bags))
     if FILE_NAME in names:
         raise LogError(
             "A ROS 2 bag folder without .db3 or .mcap files.",
             hint="Copy them beside metadata.yaml.",
             where=str(folder),
         )
-    raise LogError("A folder, not a log.", hint="Name one log file in it.", where=str(folder))
+    hint = _one_or_all(folder) if names else "Name a log file."
+    raise LogError("A folder, not a log.", hint=hint, where=str(folder))
+
+
+def _several(folder: Path, count: int) -> LogError:
+    return LogError(f"The folder holds {count} recordings, not one.", hint=_one_or_all(folder), where=str(folder))
+
+
+def _one_or_all(folder: Path) -> str:
+    return f"Name one log file in it; '{command('care', 'triage', str(folder))}' has a line for each."
 
 
 def _ros2_bag(folder: Path, present: Sequence[str]) -> Recording:
@@ -96,6 +105,8 @@ def _ros2_bag(folder: Path, present: Sequence[str]) -> Recording:
         files, missing = sorted([*files, *others], key=_natural), missing[renamed:]
     elif not listed:
         files = list(present)
+        if len({_ros2_series(name) for name in files}) > 1:
+            raise _several(folder, len(files))
     if len({_bare_suffix(name) for name in files}) > 1:
         raise LogError("The folder holds both .db3 and .mcap files.", hint="Name the one to read.", where=str(folder))
     flaws = tuple(Flaw(f"{name} is missing from the folder") for name in missing)
@@ -141,6 +152,11 @@ def _series(name: str) -> str:
     """What the parts of one split bag share: the name without number and time; the name itself of any other file."""
     match = _PART.match(name)
     return name if match is None else _DATE.sub("", match["series"])
+
+
+def _ros2_series(name: str) -> str:
+    """What the parts of one split ROS 2 bag share: the name without its number; its format is told apart elsewhere."""
+    return _ROS2_PART.sub("", name.lower().removesuffix(".zstd"))
 
 
 def _gaps(names: Sequence[str]) -> tuple[Flaw, ...]:

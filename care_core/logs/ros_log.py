@@ -29,7 +29,7 @@ from care_core.logs.ros_settings import setting_fields, settings_in
 from care_core.logs.ros_types import cdr_types
 from care_core.records import Record, Struct, field, replace
 from care_core.run import Damage, Setting
-from care_core.text import clock
+from care_core.text import log_time
 
 _EPOCH_OF_ROS = datetime(2005, 1, 1, tzinfo=timezone.utc)
 """No recording is older: an earlier time comes from a simulated clock."""
@@ -377,8 +377,8 @@ class RosLog:
         own = [self._kept(times) for times in part.times_ns.values()]
         end_s = (max((int(times.max()) for times in own if len(times)), default=self._low_ns) - self._low_ns) / 1e9
         whole_s = self._metadata.duration_s
-        of = f" of about {clock(whole_s)}" if whole_s and whole_s > end_s else ""
-        what = f"{where}read 00:00 to {clock(end_s)}{of}, cut at byte {flaw.byte}: {flaw.what}"
+        of = f" of about {log_time(whole_s, 0)}" if whole_s and whole_s > end_s else ""
+        what = f"{where}read to {log_time(end_s)}{of}, cut at byte {flaw.byte}: {flaw.what}"
         return Damage(what, flaw.byte, end_s)
 
     @cached_property

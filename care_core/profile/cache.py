@@ -13,10 +13,13 @@ import os
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from care_core.files import read_small_text
-from care_core.profile.schema import Schema
 from care_core.records import UnfitError, plain, read_json
+
+if TYPE_CHECKING:
+    from care_core.profile.schema import Schema
 
 _MOST = 64
 """Entries that are kept; the ones that were written first go first."""
@@ -24,13 +27,22 @@ _MOST = 64
 
 def cached(text: str) -> Schema | None:
     """The schema of a `profile.yaml` with this text, None where it is not in the cache."""
+    from care_core.profile.schema import Schema  # numpy, which the names of variables do without
+
     try:
-        digest, _, stored = read_small_text(_entry(text)).partition("\n")
-        if hashlib.sha256(stored.encode()).hexdigest() != digest:
-            return None
-        return read_json(Schema, stored.encode())
-    except (OSError, ValueError, UnfitError):
+        kept = cached_json(text)
+        return None if kept is None else read_json(Schema, kept.encode())
+    except UnfitError:
         return None
+
+
+def cached_json(text: str) -> str | None:
+    """The same as it is stored, an object of JSON."""
+    try:
+        digest, _, kept = read_small_text(_entry(text)).partition("\n")
+    except (OSError, ValueError):
+        return None
+    return kept if hashlib.sha256(kept.encode()).hexdigest() == digest else None
 
 
 def store(text: str, schema: Schema) -> None:

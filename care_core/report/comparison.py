@@ -17,7 +17,7 @@ from care_core.report.markdown import escaped
 from care_core.report.published import Document, publish, publishable
 from care_core.report.wording import SEVERITY_WORDS
 from care_core.run import shown
-from care_core.text import clean, figures, seconds, wrapped
+from care_core.text import clean, figures, log_time, wrapped
 
 SCHEMA_ID: Final = "care.compare/1"
 PARAMETERS_SHOWN, MEASURES_SHOWN, EVENTS_SHOWN, FINDINGS_SHOWN = 20, 12, 24, 12
@@ -168,12 +168,12 @@ def _first(events: Sequence[EventPair], departures: Sequence[Departure]) -> str:
     signal = next(iter(departures), None)
     if signal is not None and (event is None or signal.time_s <= event.at_s):
         one, other = (f"{figures(value)} {signal.unit}".rstrip() for value in (signal.a, signal.b))
-        return clean(f"at {seconds(signal.time_s)} {signal.signal} goes apart: {one} in A, {other} in B")
+        return clean(f"at {log_time(signal.time_s)} {signal.signal} goes apart: {one} in A, {other} in B")
     if event is None:
         return ""
     if event.a_s is None or event.b_s is None:
-        return clean(f"at {seconds(event.at_s)} only {'B' if event.a_s is None else 'A'}: {event.what}")
-    return clean(f"{event.what}: at {seconds(event.a_s)} in A, at {seconds(event.b_s)} in B")
+        return clean(f"at {log_time(event.at_s)} only {'B' if event.a_s is None else 'A'}: {event.what}")
+    return clean(f"{event.what}: at {log_time(event.a_s)} in A, at {log_time(event.b_s)} in B")
 
 
 Row = tuple[str, ...]
@@ -227,7 +227,7 @@ def _judged(one: ObjectiveEntry | None) -> str:
 
 def _departures(document: CompareDocument) -> Iterator[Row]:
     for one in document.departures:
-        yield one.signal, seconds(one.time_s), figures(one.a), f"{figures(one.b)} {one.unit}".rstrip()
+        yield one.signal, log_time(one.time_s), figures(one.a), f"{figures(one.b)} {one.unit}".rstrip()
 
 
 def _events(document: CompareDocument) -> Iterator[Row]:
@@ -236,7 +236,7 @@ def _events(document: CompareDocument) -> Iterator[Row]:
 
 
 def _time(time_s: float | None) -> str:
-    return _NOTHING if time_s is None else seconds(time_s)
+    return _NOTHING if time_s is None else log_time(time_s)
 
 
 def _measures(document: CompareDocument) -> Iterator[Row]:
@@ -253,7 +253,7 @@ def _findings(document: CompareDocument) -> Iterator[Row]:
 def head_of(document: CompareDocument) -> Iterator[tuple[str, str]]:
     """Which runs, how they went, and what differs first: a word and a sentence each."""
     for name, side in (("A", document.a), ("B", document.b)):
-        yield name, f"{Path(side.log).name}, {seconds(side.duration_s)}: {side.headline}"
+        yield name, f"{Path(side.log).name}, {log_time(side.duration_s)}: {side.headline}"
     if document.first:
         yield "First", document.first
     for warning in document.warnings:

@@ -9,7 +9,7 @@ from care_core.diagnose.verdict import Reason
 from care_core.ecosystems.findings import Event, Finding
 from care_core.report.entries import EventEntry, FindingEntry
 from care_core.report.wording import SEVERITY_WORDS, noted
-from care_core.text import seconds, wrapped
+from care_core.text import log_time, log_times, wrapped
 
 EVENTS_SHOWN = 24
 """Lines of the account in text; the document holds all."""
@@ -23,7 +23,7 @@ def finding_sentence(finding: FindingEntry) -> str:
     """A finding of a document with its numbers and what is folded under it."""
     late = ", after it was down" if finding.after_impact else ""
     led = "".join(f" {words.capitalize()}: {'; '.join(one.title for one in below)}." for words, below in finding.links)
-    return f"{finding.title}, at {seconds(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
+    return f"{finding.title}, at {log_time(finding.onset_s)}{late}. {finding.evidence.rstrip('.')}.{led}"
 
 
 def account_lines(account: Sequence[Event | EventEntry], robot: str = "", most: int = EVENTS_SHOWN) -> Iterator[str]:
@@ -33,8 +33,8 @@ def account_lines(account: Sequence[Event | EventEntry], robot: str = "", most: 
     is_named = not robot or account[0].kind == "vehicle"
     yield from wrapped("What happened" if is_named else f"What happened ({robot})")
     told = telling(account, most)
-    for moment in told:
-        yield from wrapped(moment.text, f"  {seconds(moment.time_s):>9}  ")
+    for time, moment in zip(log_times([one.time_s for one in told]), told, strict=True):
+        yield from wrapped(moment.text, f"  {time:>9}  ")
     if len(told) < len(account):
         yield f"  and {len(account) - len(told)} more: 'care inspect' tells all"
 
@@ -63,7 +63,7 @@ def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
     for finding in shown:
         late = ", after it was down" if finding.after_impact else ""
         head = f"  {SEVERITY_WORDS[finding.severity]:<8}  "
-        yield from wrapped(f"{finding.title}, at {seconds(finding.onset_s)}{late}", head)
+        yield from wrapped(f"{finding.title}, at {log_time(finding.onset_s)}{late}", head)
         if finding.evidence:
             yield from wrapped(finding.evidence, " " * len(head))
         yield from _folded(finding, " " * len(head))
@@ -72,7 +72,7 @@ def finding_lines(findings: Sequence[Finding | FindingEntry]) -> Iterator[str]:
 def _folded(finding: Finding | FindingEntry, indent: str) -> Iterator[str]:
     for words, below in finding.links:
         gravest = sorted(below, key=lambda one: one.severity != "critical")[:LED_TO_SHOWN]
-        titles = dict.fromkeys(f"{one.title} ({seconds(one.onset_s)})" for one in below if one in gravest)
+        titles = dict.fromkeys(f"{one.title} ({log_time(one.onset_s)})" for one in below if one in gravest)
         more = f" and {len(below) - LED_TO_SHOWN} more" if len(below) > LED_TO_SHOWN else ""
         yield from wrapped(f"{words}: {'; '.join(titles)}{more}", indent)
 

@@ -20,6 +20,7 @@ from care_core.text import clean, wrapped
 SCHEMA_ID: Final = "care.history/1"
 _SPARKS = 24
 """Newest values that a trend shows."""
+_ALL = "--all shows them"
 _CHANGES = 4
 """Most parameters that are named of those that changed at a run."""
 
@@ -190,12 +191,16 @@ def history_json(document: HistoryDocument) -> str:
     return document.to_json()
 
 
-def history_text(document: HistoryDocument, *, ascii: bool = False) -> str:
-    """The history in lines: triages newest first, trends, and how promises held up."""
-    return "\n".join(_lines(document, ascii)) + "\n"
+def history_text(document: HistoryDocument, *, ascii: bool = False, everything: bool = False) -> str:
+    """The history in lines of 80 columns: triages newest first, trends, and how promises held up.
+
+    Args:
+        everything: robots and missions with too few runs to show a trend, too, which else are one line.
+    """
+    return "\n".join(_lines(document, ascii, everything)) + "\n"
 
 
-def _lines(document: HistoryDocument, ascii: bool) -> Iterator[str]:
+def _lines(document: HistoryDocument, ascii: bool, everything: bool) -> Iterator[str]:
     if not document.triages:
         yield "No triage is remembered yet."
     for past in document.triages:
@@ -203,10 +208,15 @@ def _lines(document: HistoryDocument, ascii: bool) -> Iterator[str]:
         odds = "odds not measured" if past.p_fixed is None else f"{past.p_fixed:.0%}{beside(past.odds_as_driven)}"
         fix = f"  change {', '.join(past.options)} ({odds})" if past.options else ""
         fit = fit_words(past.profile, past.fit).removeprefix("Profile ")
-        yield clean(f"{when}  {Path(past.log).name}  {fit}  {past.verdict}{fix}")
-    for robot in document.robots:
+        yield from wrapped(f"{when}  {Path(past.log).name}  {fit}  {past.verdict}{fix}", rest=" " * (len(when) + 2))
+    told = [robot for robot in document.robots if everything or not _is_thin(_all_trends(robot))]
+    for robot in told:
         yield ""
-        yield from _robot_lines(robot, ascii)
+        yield from _robot_lines(robot, ascii, everything)
+    thin = [f"{_name(robot)} ({_count(robot.runs, 'run')})" for robot in document.robots if robot not in told]
+    if thin:
+        yield ""
+        yield from wrapped(f"Fewer than the {LEAST_RUNS} runs of a trend ({_ALL}): {', '.join(thin)}", rest="  ")
     if any(trend.since for robot in document.robots for trend in _all_trends(robot)):
         yield ""
         yield from wrapped("What changed at the same run need not be the cause: 'care triage LOG' asks for that.")
@@ -218,19 +228,31 @@ def _all_trends(robot: RobotRunsEntry) -> list[TrendEntry]:
     return [robot.faults, *(trend for mission in robot.missions for trend in mission.trends)]
 
 
-def _robot_lines(robot: RobotRunsEntry, ascii: bool) -> Iterator[str]:
+def _is_thin(trends: Sequence[TrendEntry]) -> bool:
+    """Whether there are too few runs to say anything."""
+    return all(trend.direction == "too few" for trend in trends)
+
+
+def _name(robot: RobotRunsEntry) -> str:
+    return "robot not known" if robot.robot is None else robot.robot.name
+
+
+def _robot_lines(robot: RobotRunsEntry, ascii: bool, everything: bool) -> Iterator[str]:
     name = "Robot not known" if robot.robot is None else f"Robot {robot.robot.name}"
     source = "--robot NAME tells whose a log is" if robot.robot is None else robot.robot.source
     doubt = ", others may share it" if robot.robot is not None and not robot.robot.is_sure else ""
     faulty = "none" if not robot.faulty else f"{robot.faulty} of them"
     yield from wrapped(f"{name} ({source}{doubt}): {_count(robot.runs, 'run')}, {faulty} with a fault")
-    width = max(len(trend.objective) for trend in _all_trends(robot))
+    missions = [(n, one) for n, one in enumerate(robot.missions, 1) if everything or not _is_thin(one.trends)]
+    width = max(len(trend.objective) for trend in (robot.faults, *(t for _, one in missions for t in one.trends)))
     yield from _trend_lines(robot.faults, "  ", width + 2, ascii)
-    for number, mission in enumerate(robot.missions, start=1):
+    for number, mission in missions:
         judged = f"by {mission.profile}" if mission.profile else "without a profile"
         yield clean(f"  mission {number}: {_count(mission.runs, 'run')} judged {judged}")
         for trend in mission.trends:
             yield from _trend_lines(trend, "    ", width, ascii)
+    if thin := len(robot.missions) - len(missions):
+        yield f"  {_count(thin, 'mission')} with fewer than the {LEAST_RUNS} runs of a trend ({_ALL})"
 
 
 def _count(count: int, noun: str) -> str:

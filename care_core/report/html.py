@@ -21,7 +21,7 @@ from care_core.report.plots import NOTHING_DRAWN, Drawing, Plot, plot_figure
 from care_core.report.shared_causes import together
 from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.run import shown
-from care_core.text import clean, listed, seconds
+from care_core.text import clean, listed, log_time
 
 _SIGNS = {"ok": "✓", "fault": "✗", "not_evaluated": "?"}
 _CODE = Markup("<code>{}</code>")
@@ -41,6 +41,11 @@ def to_html(report: Report, drawing: Drawing = NOTHING_DRAWN) -> str:
     parts = [part for part in _parts(report, drawing) if part.content]
     name = Path(report.log.path).name
     return _pages().get_template("page.html").render(report=report, name=name, facts=_facts(report), parts=parts)
+
+
+def to_fragment(report: Report) -> str:
+    """The answer in short, to stand in a page of others."""
+    return _pages().get_template("fragment.html").render(report=report, name=Path(report.log.path).name)
 
 
 def comparison_html(document: CompareDocument, drawing: Drawing = NOTHING_DRAWN) -> str:
@@ -72,7 +77,7 @@ def _pages() -> Environment:
     pages.filters |= {
         "clean": clean,
         "figure": _figure,
-        "seconds": seconds,
+        "log_time": log_time,
         "share": "{:.0%}".format,
         "shown": shown,
     }
@@ -90,8 +95,7 @@ def _parts(report: Report, drawing: Drawing) -> Iterator[Part]:
         yield Part(f"causes{number}", Markup(f"Causes of {names}"), "causes", content)
     yield Part("fix", "Fix", "fix", report.fix and _fix(report, report.fix))
     yield Part("signals", "Signals", "signals", drawing if drawing.plots else None)
-    start_s = drawing.start_s if drawing.is_mission else 0.0
-    yield Part("account", "What happened", "account", report.account and {"events": report.account, "start_s": start_s})
+    yield Part("account", "What happened", "account", report.account)
     if report.since is not None:
         title = Markup("Changed since <code>{}</code>").format(Path(report.since.log).name)
         yield Part("since", title, "since", report.since)
@@ -111,7 +115,7 @@ def _facts(report: Report) -> list[tuple[str, str]]:
     return [
         ("Robot", robot),
         ("Recorded (UTC)", (log.start or "")[:19].replace("T", " ")),
-        ("Length of the log", seconds(log.duration_s)),
+        ("Length of the log", log_time(log.duration_s)),
         ("Mission", mission),
         ("Profile", f"{report.profile.title} {report.profile.version}" if report.profile else ""),
         ("Damage", f"{len(log.damage)} place{'s' if len(log.damage) > 1 else ''}" if log.damage else ""),

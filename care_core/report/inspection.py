@@ -26,7 +26,7 @@ from care_core.report.entries import (
 from care_core.report.health import account_lines, finding_lines
 from care_core.report.published import Document, publish
 from care_core.run import Damage, Fit, MissionInfo, ProfileChoice
-from care_core.text import WIDTH, clean, clock, wrapped
+from care_core.text import WIDTH, clean, log_time, wrapped
 
 INSPECT_ID: Final = "care.inspect/1"
 
@@ -287,9 +287,9 @@ def holdings_text(document: InspectDocument, width: int = WIDTH) -> str:
 
 def _span(log: LogEntry) -> str:
     if not log.damage:
-        return f"{clock(log.duration_s)} ({log.duration_s:.1f} s)"
-    about = "" if log.read.about_s is None else f" of about {clock(log.read.about_s)}"
-    return f"read 00:00 to {clock(log.read.to_s)}{about} ({log.duration_s:.1f} s), see Damage"
+        return log_time(log.duration_s)
+    about = "" if log.read.about_s is None else f" of about {log_time(log.read.about_s, 0)}"
+    return f"read to {log_time(log.read.to_s)}{about}, see Damage"
 
 
 def _damage_lines(damage: Sequence[DamageEntry]) -> Iterator[str]:
@@ -307,7 +307,7 @@ def _damage_lines(damage: Sequence[DamageEntry]) -> Iterator[str]:
 
 def _place(entry: DamageEntry) -> str:
     byte = "" if entry.byte is None else f" at byte {entry.byte}"
-    return byte + ("" if entry.time_s is None else f" (at {clock(entry.time_s)})")
+    return byte + ("" if entry.time_s is None else f", at {log_time(entry.time_s)}")
 
 
 def _parameter_lines(found: ParameterEntry) -> Iterator[str]:
@@ -315,7 +315,7 @@ def _parameter_lines(found: ParameterEntry) -> Iterator[str]:
     yield f"Parameters  {found.count}{f': {sources}' if sources else ''}"
     for change in found.changed[:MOST_CHANGED]:
         values = f"from {_value(change.before)} to {_value(change.after)}"
-        yield f"  changed   {change.name} {values} at {clock(change.time_s)}"
+        yield f"  changed   {change.name} {values} at {log_time(change.time_s)}"
     if len(found.changed) > MOST_CHANGED:
         yield f"  changed   and {len(found.changed) - MOST_CHANGED} more (see --json)"
 
@@ -342,7 +342,7 @@ def _profile_lines(profiles: Iterable[ProfileEntry], width: int) -> Iterator[str
 def _mission_text(mission: MissionEntry) -> str:
     end = "" if mission.ended else ", the log ends before it does"
     mismatch = f", {mission.mismatch}" if mission.mismatch else ""
-    return f"{clock(mission.start_s)} to {clock(mission.end_s)}{end}{mismatch}"
+    return f"{log_time(mission.start_s)} to {log_time(mission.end_s)}{end}{mismatch}"
 
 
 def _missed_lines(missed: Sequence[MissedEntry], width: int) -> Iterator[str]:

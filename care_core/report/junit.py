@@ -17,7 +17,7 @@ from care_core.records import Record
 from care_core.report.document import FaultEntry, ObjectiveEntry, Report
 from care_core.report.health import finding_sentence
 from care_core.report.wording import noted
-from care_core.text import clean, seconds
+from care_core.text import clean, log_times
 
 Outcome = Literal["passed", "failure", "error", "skipped"]
 
@@ -62,6 +62,7 @@ def suite_of(report: Report) -> Suite:
         cases.append(Case("run", "skipped", report.verdict.failed))
     robot = next((one.text for one in report.account if one.kind == "vehicle"), "")
     firmware = (("robot", robot),) if robot else ()
+    times = log_times([one.time_s for one in report.account])
     return Suite(
         name=Path(log.path).name,
         cases=tuple(cases),
@@ -74,7 +75,7 @@ def suite_of(report: Report) -> Suite:
         ),
         seconds=log.duration_s,
         timestamp=_timestamp(log.start),
-        out="\n".join(f"{seconds(one.time_s):>9}  {one.text}" for one in report.account),
+        out="\n".join(map("  ".join, zip(times, (one.text for one in report.account), strict=True))),
     )
 
 

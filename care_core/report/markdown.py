@@ -22,7 +22,7 @@ from care_core.report.health import finding_sentence
 from care_core.report.shared_causes import together
 from care_core.report.wording import SEVERITY_WORDS, noted
 from care_core.run import shown
-from care_core.text import listed, seconds
+from care_core.text import listed, log_time
 
 LONGEST = 30_000
 """Characters of a post."""
@@ -132,14 +132,14 @@ def _since(since: SinceEntry) -> Iterator[str]:
 def _account(report: Report) -> Iterator[str]:
     if report.account:
         yield from ("", "<details><summary>What happened</summary>", "")
-        yield from _at_most([f"- {seconds(one.time_s)}: {_clipped(one.text)}" for one in report.account])
+        yield from _at_most([f"- {log_time(one.time_s)}: {_clipped(one.text)}" for one in report.account])
         yield from ("", "</details>")
 
 
 def _origin(report: Report) -> Iterator[str]:
     log, profile = report.log, report.profile
     sha256 = f", SHA-256 `{log.sha256}`" if log.sha256 else ""
-    yield from ("", f"Log {code(Path(log.path).name)}, {log.format}, {log.duration_s:.0f} s{sha256}.")
+    yield from ("", f"Log {code(Path(log.path).name)}, {log.format}, {log_time(log.duration_s, 0)}{sha256}.")
     if profile is not None:
         yield escaped(f"Profile {profile.title} {profile.version} ({profile.platform}).")
     for damage in log.damage[:5]:

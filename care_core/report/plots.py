@@ -12,7 +12,7 @@ from html import escape
 from care_core.diagnose.records import Fault
 from care_core.records import Record
 from care_core.report.marks import Mark
-from care_core.text import clean, figures
+from care_core.text import clean, figures, log_time
 
 Point = tuple[float, float]
 """Seconds of the log, and a value."""
@@ -103,12 +103,8 @@ class Drawing(Record):
     """Limits of a time, in seconds of the log."""
     start_s: float = 0.0
     end_s: float = 1.0
-    is_mission: bool = False
-
-    @property
-    def since(self) -> str:
-        """What the seconds of the axis count from."""
-        return "the start of the mission" if self.is_mission else "the start of the log"
+    since: str = "the start of the log"
+    """What the seconds count from: that of the log, unless several runs are laid over each other."""
 
 
 NOTHING_DRAWN = Drawing()
@@ -141,7 +137,7 @@ def plot_figure(plot: Plot, drawn: Drawing, name: str) -> Iterator[str]:
     yield '</div><div class="x" aria-hidden="true">'
     for time_s in frame.times:
         unit = " s" if time_s == frame.times[-1] else ""
-        yield f'<span style="left:{frame.x_share(time_s + drawn.start_s):.2%}">{time_s:g}{unit}</span>'
+        yield f'<span style="left:{frame.x_share(time_s):.2%}">{time_s:g}{unit}</span>'
     yield "</div></div></figure>"
 
 
@@ -191,7 +187,7 @@ def _svg(plot: Plot, drawn: Drawing, frame: _Frame, name: str) -> Iterator[str]:
     for value in frame.values:
         yield f'<path class="grid" d="M0 {frame.y(value):.1f}H{_WIDE}"/>'
     for number, mark in enumerate(drawn.marks, start=1):
-        title = f"{number}: {clean(mark.words)}, {mark.time_s - drawn.start_s:.1f} s"
+        title = f"{number}: {clean(mark.words)}, {log_time(mark.time_s)}"
         yield f'<path class="mark {mark.severity}" d="M{frame.x(mark.time_s):.1f} 0V{_HIGH}"><title>'
         yield f"{escape(title)}</title></path>"
     for limit in drawn.deadlines:
@@ -221,8 +217,8 @@ def _told(plot: Plot, drawn: Drawing) -> str:
             span = f"{figures(min(values))} to {figures(max(values))} {plot.unit}".rstrip()
             parts.append(f"{clean(line.name)}{' (wanted)' if line.is_wanted else ''}: {span}")
     parts += [f"{clean(limit.words)}: {figures(limit.value)} {plot.unit}".rstrip() for limit in plot.limits]
-    parts += [f"{clean(b.words)} from {b.start_s - drawn.start_s:.1f} s" for b in plot.bands]
-    return f"{drawn.end_s - drawn.start_s:.0f} s from {drawn.since}. {'; '.join(parts)}."
+    parts += [f"{clean(b.words)} from {log_time(b.start_s)}" for b in plot.bands]
+    return f"{log_time(drawn.start_s)} to {log_time(drawn.end_s)} from {drawn.since}. {'; '.join(parts)}."
 
 
 class _Frame(Record):
@@ -233,7 +229,7 @@ class _Frame(Record):
     low: float
     high: float
     times: tuple[float, ...]
-    """Ticks in seconds from `start_s`."""
+    """Ticks, in seconds of the log."""
     values: tuple[float, ...]
 
     @classmethod
@@ -248,7 +244,8 @@ class _Frame(Record):
         low, high = low - pad, high + pad
         seconds = drawn.end_s - drawn.start_s
         step = next((step for step in _STEPS_OF_TIME if seconds / step <= _TICKS_X), _nice(seconds / _TICKS_X))
-        times = tuple(round(i * step, 6) for i in range(int(seconds / step) + 1))
+        ticks = range(math.ceil(drawn.start_s / step), math.floor(drawn.end_s / step) + 1)
+        times = tuple(round(i * step, 6) for i in ticks)
         return cls(drawn.start_s, drawn.end_s, low, high, times, _ticks(low, high))
 
     def x_share(self, time_s: float) -> float:

@@ -12,7 +12,7 @@ from care_core.diagnose.records import Cause, Diagnosis, Fault, PathNode, Predic
 from care_core.diagnose.verdict import STATUS_WORDS, Verdict, alone, chance, fit_text, promise, verdict_of
 from care_core.report.health import account_lines, finding_lines, reason_lines
 from care_core.report.shared_causes import together
-from care_core.text import listed, wrapped
+from care_core.text import listed, log_time, log_times, wrapped
 from care_core.variables import Variable
 
 EVIDENCE_SHOWN = 5
@@ -53,7 +53,7 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     told = ("vehicle", "frame") if diagnosis.health.timeline else ()  # the account begins with them
     facts = "".join(f", {name} {fact}" for name, fact in run.log.facts.items() if name not in told)
     mission = f"{run.noun} {run.mission.index} of {run.mission.count}"
-    duration = f"{run.mission.end_s - run.mission.start_s:.0f} s"
+    duration = log_time(run.mission.end_s - run.mission.start_s, 0)
     which = f", {mission}" if run.mission.count else ""
     yield from wrapped(f"{Path(run.log.path).name}{which}, {duration}{facts}", "Log      ")
     if profile.name:
@@ -63,7 +63,7 @@ def _origin(diagnosis: Diagnosis) -> Iterator[str]:
     elif diagnosis.profile.fit.verdict == "no":
         yield from wrapped("none fits", "Profile  ")
     for damage in run.log.damage[:DAMAGE_SHOWN]:
-        at = "" if damage.time_s is None else f" at {damage.time_s:.1f} s"
+        at = "" if damage.time_s is None else f" at {log_time(damage.time_s)}"
         yield from wrapped(f"{damage.what}{at}", "Damage   ")
     if len(run.log.damage) > DAMAGE_SHOWN:
         yield f"Damage   and {len(run.log.damage) - DAMAGE_SHOWN} more places, 'care inspect' lists them"
@@ -77,7 +77,7 @@ def _missions(diagnosis: Diagnosis) -> Iterator[str]:
     for verdict in diagnosis.missions:
         one = verdict.mission
         here = "  <- this report" if one.index == diagnosis.run.mission.index else ""
-        span = f"{one.start_s:.0f} to {one.end_s:.0f} s"
+        span = f"{log_time(one.start_s, 0)} to {log_time(one.end_s, 0)}"
         reason = f": {verdict.reason}" if verdict.reason else ""
         yield from wrapped(f"{STATUS_WORDS[verdict.status]}, {span}{reason}{here}", f"  {one.index:>2}  ")
 
@@ -190,10 +190,11 @@ def _evidence(diagnosis: Diagnosis) -> Iterator[str]:
     if not evidence or not diagnosis.faults:
         return
     yield "Messages of this run"
-    for item in evidence[-EVIDENCE_SHOWN:]:
+    shown = evidence[-EVIDENCE_SHOWN:]
+    for time, item in zip(log_times([item.time_s for item in shown]), shown, strict=True):
         says = f": {item.says}" if item.says else ""
         points = f" (points at {', '.join(item.options)})" if item.options else ""
-        yield from wrapped(f"{item.text}{says}{points}", f"  {item.time_s:8.1f} s  ")
+        yield from wrapped(f"{item.text}{says}{points}", f"  {time:>9}  ")
 
 
 def _rivals(diagnosis: Diagnosis) -> Iterator[str]:

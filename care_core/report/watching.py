@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Literal
 
@@ -14,7 +14,7 @@ from care_core.report.document import remembered_verdict
 from care_core.report.published import Document, publish
 from care_core.report.reading import remembered
 from care_core.run import FitVerdict, Robot
-from care_core.text import clean
+from care_core.text import WIDTH, clean
 
 SCHEMA_ID: Final = "care.watch/1"
 NO_ROBOT = "-"
@@ -109,6 +109,16 @@ def entry_line(entry: WatchEntry, clock: str, width: int | None, *, ascii: bool 
     start = f"{clock} {entry.number:>{_NUMBER}} {word:<{_VERDICT}} {_padded(_cut(robot, wide, dots), wide)} "
     room = width - _columns(start) - _columns(name) - 1
     return f"{start}{_padded(_cut(says, room, dots), room)} {name}".rstrip()
+
+
+def log_lines(logs: Sequence[tuple[Path, RunStatus, str]], width: int = WIDTH) -> list[str]:
+    """Several logs that were triaged, a line each: verdict, what explains it, log."""
+    names = [_cut(clean(path.name), width // 3, "...", keep_end=True) for path, *_ in logs]
+    room = width - _VERDICT - max(map(_columns, names), default=0) - 4
+    return [
+        f"{STATUS_WORDS[status]:<{_VERDICT}}  {_padded(_cut(clean(says) or '-', room, '...'), room)}  {name}"
+        for name, (_, status, says) in zip(names, logs, strict=True)
+    ]
 
 
 def _columns(text: str) -> int:

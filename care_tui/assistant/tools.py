@@ -194,7 +194,7 @@ class Tools:
         if path is None or not path.is_file():
             return f"No triage is remembered here{f': {SWITCH} is off' if path is None else ''}."
         own = [one for one in History(path).triages() if self.folders.holds(one.log_path)]
-        return history_text(history_document(own, (), limit), ascii=True)
+        return history_text(history_document(own, (), limit), ascii=True, everything=True)
 
     def _case(self, log: str, profile: str, mission: int, since: str, config: Sequence[str]) -> Case:
         """The open case of a log; kept, as long as its files are what they were."""

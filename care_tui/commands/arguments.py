@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from care_core.errors import UsageError
+from care_tui.completing import limits, missions, option_names, profile_names
 from care_tui.console import check_writable
 
 if TYPE_CHECKING:
@@ -18,17 +19,12 @@ if TYPE_CHECKING:
 LogPath = Annotated[Path, typer.Argument(metavar="LOG", help="The log to read.", show_default=False)]
 
 
-def profile_names(incomplete: str) -> list[str]:
-    """Installed profiles whose names begin so, for a shell's completion; where none does, the shell names folders."""
-    from care_core.files import profile_folders
-
-    return [name for name in profile_folders() if name.startswith(incomplete)]
+def profile_option(text: str) -> Any:
+    """`--profile` with its help; a shell completes it."""
+    return typer.Option("--profile", "-p", metavar="PROFILE", help=text, autocompletion=profile_names)
 
 
-ProfileName = Annotated[
-    str | None,
-    typer.Option("--profile", "-p", help="Name or folder; chosen by the log if absent.", autocompletion=profile_names),
-]
+ProfileName = Annotated[str | None, profile_option("Name or folder; chosen by the log if absent.")]
 ConfigPaths = Annotated[
     list[str] | None,
     typer.Option(
@@ -56,10 +52,19 @@ Out = Annotated[
 Force = Annotated[bool, typer.Option("--force", help="Replace a file of another kind with --out; never a log.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 Thresholds = Annotated[
-    list[str] | None, typer.Option("--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.")
+    list[str] | None,
+    typer.Option(
+        "--threshold", metavar="NAME=VALUE", help="Judge this objective by this bound.", autocompletion=limits
+    ),
 ]
 Keep = Annotated[
-    list[str] | None, typer.Option("--keep", metavar="OPTION", help="Never change this parameter; may be repeated.")
+    list[str] | None,
+    typer.Option(
+        "--keep",
+        metavar="OPTION",
+        help="Never change this parameter; may be repeated.",
+        autocompletion=option_names,
+    ),
 ]
 Since = Annotated[
     Path | None,
@@ -76,7 +81,16 @@ Site = Annotated[
 RobotName = Annotated[
     str | None, typer.Option("--robot", metavar="NAME", help="Whose log it is; by what the log says if absent.")
 ]
-Mission = Annotated[int | None, typer.Option("--mission", min=1, help="Which mission of the log; the last if absent.")]
+Mission = Annotated[
+    int | None,
+    typer.Option(
+        "--mission",
+        min=1,
+        metavar="NUMBER",
+        help="Which mission of the log; the last if absent.",
+        autocompletion=missions,
+    ),
+]
 
 
 Positions = Annotated[
@@ -99,6 +113,14 @@ def sharing_for(positions: bool | None, *, anonymous: bool) -> Sharing | None:
     from care_core.application.sharing import Sharing
 
     return Sharing(positions=bool(positions), anonymous=anonymous)
+
+
+def chosen(flags: Mapping[str, bool]) -> str | None:
+    """The one format that is asked for by its flag, None for none. Raises UsageError for more than one."""
+    names = [name for name, is_wanted in flags.items() if is_wanted]
+    if len(names) > 1:
+        raise UsageError(f"Only one of --{' and --'.join(names)} can be printed.", hint="Leave the others out.")
+    return names[0] if names else None
 
 
 def bounds(texts: Iterable[str]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-import care_core
+from care_core.application import api
 from care_core.application.case import Request, read_case
 from care_core.application.history_writing import remember
 from care_core.errors import UsageError
@@ -26,6 +26,7 @@ from care_tui.commands.arguments import (
     is_json,
 )
 from care_tui.commands.past import NoHistory, mention
+from care_tui.completing import changes
 from care_tui.console import Progress, emit
 
 app = typer.Typer()
@@ -35,7 +36,8 @@ app = typer.Typer()
 def whatif(
     log: LogPath,
     set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="OPTION=VALUE", help="Ask with this parameter changed.")
+        list[str] | None,
+        typer.Option("--set", metavar="OPTION=VALUE", help="Ask with this changed.", autocompletion=changes),
     ] = None,
     profile: ProfileName = None,
     config: ConfigPaths = None,
@@ -100,7 +102,7 @@ def verify(
     )
     with Progress() as progress:
         progress("reading the log", 0.0)
-        document = care_core.verify(report, request)
+        document = api.verify(report, request)
     if not no_history:
         verified = document.plain()
         mention(remember(lambda history: history.add_verification(verified)))

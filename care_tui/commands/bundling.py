@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-import care_core
+from care_core.application import api
 from care_core.application.case import Request
 from care_core.text import clean
 from care_tui import __version__
@@ -57,7 +57,7 @@ def bundle(
     request = Request(log, profile, tuple(config or ()), thresholds=bounds(threshold or ()), site=site, mission=mission)
     sharing = Sharing(positions=bool(positions), anonymous=anonymous)
     with Progress() as progress:
-        case = care_core.triage(request, progress)
+        case = api.triage(request, progress)
         progress("packing", 0.9)
         packed = bundle_of(case, sharing, __version__)
     write_binary(target, packed.content, "bundle", force=force)

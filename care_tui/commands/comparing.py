@@ -8,8 +8,6 @@ from typing import Annotated
 import typer
 
 from care_core.application.case import Request
-from care_core.diagnose.verdict import verdict_of
-from care_core.errors import UsageError
 from care_tui.commands.arguments import (
     Anonymous,
     AsJson,
@@ -21,6 +19,7 @@ from care_tui.commands.arguments import (
     Site,
     Thresholds,
     bounds,
+    chosen,
     sharing_for,
 )
 from care_tui.console import Progress, emit, painted
@@ -49,12 +48,11 @@ def compare(
     """Put two runs side by side. Parameters, what differs first, objectives, phases, findings. Ends as triage of B."""
     from care_core.application.comparing import FORMATS
     from care_core.application.comparing import compare as put_beside
+    from care_core.diagnose.verdict import verdict_of
 
-    flags = [name for name, wanted in (("json", json), ("markdown", markdown), ("html", html)) if wanted]
-    if len(flags) > 1:
-        raise UsageError(f"Only one of --{' and --'.join(flags)} can be printed.", hint="Leave the others out.")
+    asked = chosen({"json": json, "markdown": markdown, "html": html})
     suffix = "" if out is None else out.suffix.lower()
-    format = flags[0] if flags else next((name for name, ends in FORMATS.items() if suffix in ends), "text")
+    format = asked or next((name for name, ends in FORMATS.items() if suffix in ends), "text")
     one = Request(a, profile, tuple(config or ()), thresholds=bounds(threshold or ()), site=site, mission=mission_a)
     other = Request(b, profile, tuple(config or ()), thresholds=bounds(threshold or ()), site=site, mission=mission_b)
     with Progress() as progress:

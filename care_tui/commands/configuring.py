@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-import care_core
+from care_core.application import api
 from care_core.errors import ConfigError, ExitCode, UsageError
 from care_core.text import clean
 from care_tui import __version__
-from care_tui.commands.arguments import AsJson, Force, Out, is_json
+from care_tui.commands.arguments import AsJson, Force, Out, is_json, profile_option
 from care_tui.console import emit, say
 
 if TYPE_CHECKING:
@@ -55,9 +55,7 @@ def apply(
     in_place: Annotated[bool, typer.Option("--in-place", help="Change the files, each kept as FILE.bak.")] = False,
     force: Force = False,
     alternative: Annotated[int, typer.Option("--alternative", min=0, help="Another of the report's fixes.")] = 0,
-    profile: Annotated[
-        str | None, typer.Option("--profile", "-p", help="The report's profile, where it is not installed.")
-    ] = None,
+    profile: Annotated[str | None, profile_option("The report's profile, where it is not installed.")] = None,
 ) -> None:
     """Put a report's fix into configuration files. Comments and order stay. Without -o, print the patch."""
     from care_core.application.configuring import override_of, patch_of
@@ -69,7 +67,7 @@ def apply(
     if override:
         _write_or_print(override_of(report, config, alternative, profile), out, force=force)
         return
-    edited = care_core.apply(report, *config, alternative=alternative, profile=profile)
+    edited = api.apply(report, *config, alternative=alternative, profile=profile)
     for line in _told(edited):
         say(line)
     changed = [file for file in edited if file.edits]
@@ -90,9 +88,7 @@ def lint(
     target: Annotated[
         str, typer.Option("--target", "-t", help="What they are for: noetic, humble, copter-4.6; told by them else.")
     ] = "",
-    profile: Annotated[
-        str | None, typer.Option("--profile", "-p", help="Check against this profile's acceptable values as well.")
-    ] = None,
+    profile: Annotated[str | None, profile_option("Check against this profile's acceptable values as well.")] = None,
     as_json: AsJson = False,
     sarif: Annotated[bool, typer.Option("--sarif", help="Print SARIF 2.1.0, for code hosts and editors.")] = False,
     out: Out = None,

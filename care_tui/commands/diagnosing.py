@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-import care_core
+from care_core.application import api
 from care_core.application.case import Case, Request
 from care_core.application.history_writing import remember_triage
-from care_core.diagnose.verdict import exit_code, verdict_of
-from care_core.errors import ExitCode, LogError, UsageError
+from care_core.errors import ExitCode, LogError, NoRepeatsError, UsageError
 from care_core.records import replace
 from care_core.report.formats import format_of
+from care_core.text import command
 from care_tui.commands.arguments import (
     Anonymous,
     AsJson,
@@ -30,12 +30,16 @@ from care_tui.commands.arguments import (
     Site,
     Thresholds,
     bounds,
+    chosen,
     sharing_for,
 )
+from care_tui.commands.opening import newest_named
 from care_tui.commands.past import NoHistory, mention
 from care_tui.console import Progress, emit, painted, say
+from care_tui.start import called
 
 if TYPE_CHECKING:
+    from care_core.application.each import Answered
     from care_core.application.sharing import Sharing
 
 app = typer.Typer()
@@ -50,7 +54,7 @@ def triage(
         typer.Argument(
             metavar="[LOG...]",
             help="The log to read, the newest one of the usual places if absent; more of the same configuration: what"
-            " they share.",
+            " they share; of several, or a folder of them: a line each.",
             show_default=False,
         ),
     ] = None,
@@ -61,6 +65,10 @@ def triage(
     markdown: Annotated[bool, typer.Option("--markdown", help="Print Markdown for a ticket or a forum.")] = False,
     html: Annotated[bool, typer.Option("--html", help="Print a page with paths and signals drawn.")] = False,
     junit: Annotated[bool, typer.Option("--junit", help="Print JUnit XML for a CI, each log by itself.")] = False,
+    open_page: Annotated[
+        bool,
+        typer.Option("--open", help="Write the page to --out or a file of this user's, and open it in the browser."),
+    ] = False,
     positions: Positions = None,
     anonymous: Anonymous = False,
     out: Out = None,
@@ -76,16 +84,18 @@ def triage(
     no_history: NoHistory = False,
 ) -> None:
     """Find the fault of a run, its causes and a fix. Ends with 0 fine, 1 fault, 3 not all evaluated, 4 unreadable."""
+    from care_core.application.each import logs_of
+    from care_tui.browser import show_page
+
     flags = {"json": json, "yaml": yaml, "markdown": markdown, "html": html, "junit": junit}
-    formats = [name for name, wanted in flags.items() if wanted]
-    if len(formats) > 1:
-        raise UsageError(f"Only one of --{' and --'.join(formats)} can be printed.", hint="Leave the others out.")
-    format = formats[0] if formats else _format_of(out)
-    first, *others = logs or [_newest()]
+    format = chosen(flags) or ("html" if open_page else _format_of(out))
+    if open_page and format != "html":
+        raise UsageError(f"What a browser opens is a page, not {format}.", hint="Leave one of both out.")
+    found = logs_of(logs or [newest_named()])
     request = Request(
-        first,
+        found[0],
         profile,
-        repeats=tuple(others),
+        repeats=found[1:],
         configs=tuple(config or ()),
         keep=tuple(keep or ()),
         thresholds=bounds(threshold or ()),
@@ -99,30 +109,66 @@ def triage(
     sharing = sharing_for(positions, anonymous=anonymous)
     if format == "junit":
         raise typer.Exit(_write_junit(request, sharing, out, force=force, no_history=no_history))
-    with Progress() as progress:
-        case = care_core.triage(request, progress)
+    try:
+        if len(found) > len(logs or found):
+            raise NoRepeatsError("A folder of several logs is no one run.", hint="Name one of them.")
+        with Progress() as progress:
+            case = api.triage(request, progress)
+    except (LogError, NoRepeatsError) as err:
+        if format is not None or len(found) == 1:
+            raise
+        say(f"{err.where + ': ' if err.where else ''}{err.message} Each is triaged by itself.")
+        raise typer.Exit(_write_lines(request, out, force=force, no_history=no_history)) from None
     if not no_history:
         mention(remember_triage(case.diagnosis, request))
-    text = _written(case, format, sharing, to_file=out is not None)
-    emit(text, out, force=force, is_plain=format is None)
-    raise typer.Exit(verdict_of(case.diagnosis).exit_code)
+    if open_page:
+        show_page(case.report("html", sharing), case.diagnosis.run.log, out, force=force)
+    else:
+        emit(_written(case, format, sharing, to_file=out is not None), out, force=force, is_plain=format is None)
+    raise typer.Exit(_exit_code(case))
 
 
 def _write_junit(
     request: Request, sharing: Sharing | None, out: Path | None, *, force: bool, no_history: bool
 ) -> ExitCode:
     """Triage each log by itself and write a suite for each; the gravest of their exit codes."""
-    from care_core.application.suites import LogSuite, suite_of_log
+    from care_core.application.suites import suite_of_log
+    from care_core.diagnose.verdict import exit_code
     from care_core.report.junit import to_junit
 
-    found: list[LogSuite] = []
+    answers = _each(request, no_history=no_history)
+    emit(to_junit([suite_of_log(one, sharing) for one in answers]), out, force=force)
+    return exit_code(*(one.status for one in answers))
+
+
+def _write_lines(request: Request, out: Path | None, *, force: bool, no_history: bool) -> ExitCode:
+    """Triage each log by itself and write a line for each; the gravest of their exit codes."""
+    from care_core.diagnose.verdict import exit_code
+    from care_core.report.watching import log_lines
+
+    answers = _each(request, no_history=no_history)
+    text = "".join(f"{line}\n" for line in log_lines([(one.log, one.status, one.says) for one in answers]))
+    emit(text if out else painted(text), out, force=force, is_plain=True)
+    return exit_code(*(one.status for one in answers))
+
+
+def _each(request: Request, *, no_history: bool) -> list[Answered]:
+    """Every log of a request by itself."""
+    from care_core.application.each import answer_of
+
+    answers = []
     with Progress() as progress:
         for log in (request.log, *request.repeats):
-            found.append(suite_of_log(replace(request, log=log, repeats=()), sharing, progress))
-            if found[-1].case is not None and not no_history:
-                mention(remember_triage(found[-1].case.diagnosis, request))
-    emit(to_junit([one.suite for one in found]), out, force=force)
-    return exit_code(*(one.status for one in found))
+            answers.append(answer_of(replace(request, log=log, repeats=()), progress))
+            if (case := answers[-1].case) is not None and not no_history:
+                mention(remember_triage(case.diagnosis, request))
+    return answers
+
+
+def _exit_code(case: Case) -> ExitCode:
+    from care_core.diagnose.verdict import verdict_of  # not for '--help' nor a shell that completes
+
+    return verdict_of(case.diagnosis).exit_code
 
 
 @app.command()
@@ -134,21 +180,16 @@ def demo() -> None:
     if not path.is_file():
         raise LogError("The bundled sample is missing.", hint="Install the program again.", where=str(path))
     with Progress() as progress:
-        case = care_core.triage(path, progress)
+        case = api.triage(path, progress)
     emit(_written(case, None, None, to_file=False))
-    raise typer.Exit(verdict_of(case.diagnosis).exit_code)
+    say(f"Now open it: {command(*called(), _short(path))}")
+    raise typer.Exit(_exit_code(case))
 
 
-def _newest() -> Path:
-    """The newest log of the usual places, which is said. Raises UsageError where there is none."""
-    from care_tui.commands.opening import newest_log
-    from care_tui.settings import load_settings
-
-    found = newest_log(load_settings(None).places)
-    if found is None:
-        raise UsageError("There is no log in the usual places.", hint="Name one.")
-    say(f"the newest log is {found}")
-    return found
+def _short(path: Path) -> str:
+    """The sample as it is called in a checkout, else by its path."""
+    here = Path("samples", path.name)
+    return str(here if here.exists() and here.samefile(path) else path)
 
 
 def _format_of(out: Path | None) -> str | None:

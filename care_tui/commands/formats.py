@@ -41,6 +41,14 @@ def fleet() -> None:
     _print(fleet_schema())
 
 
+@app.command("graph")
+def graph() -> None:
+    """Print the JSON Schema of 'care graph --json'."""
+    from care_core.report.graph import graph_schema
+
+    _print(graph_schema())
+
+
 @app.command("compare")
 def compare() -> None:
     """Print the JSON Schema of 'care compare --json'."""

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from care_tui.commands.arguments import AsJson
+from care_tui.completing import profile_names
 from care_tui.console import Progress, emit, say
 
 app = typer.Typer()
@@ -33,7 +34,12 @@ def train(
 
 @app.command()
 def update(
-    profile: Annotated[str, typer.Argument(metavar="PROFILE", help="The profile to start from: name or folder.")],
+    profile: Annotated[
+        str,
+        typer.Argument(
+            metavar="PROFILE", help="The profile to start from: name or folder.", autocompletion=profile_names
+        ),
+    ],
     runs: Annotated[Path, typer.Argument(metavar="RUNS", help="Runs of the other robot: .csv or .parquet.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder of the new profile.")],
     seed: Annotated[int, typer.Option("--seed", help="Seed of every random choice.")] = 0,
@@ -50,7 +56,7 @@ def update(
 
 @app.command()
 def evaluate(
-    profile: Annotated[str, typer.Argument(metavar="PROFILE", help="Name or folder.")],
+    profile: Annotated[str, typer.Argument(metavar="PROFILE", help="Name or folder.", autocompletion=profile_names)],
     faults: Annotated[Path, typer.Option("--faults", help="The folder of the faults and their true causes.")],
     truth: Annotated[
         list[Path] | None, typer.Option("--truth", help="Table of true causes; found beside the faults if absent.")

@@ -24,12 +24,12 @@ MOST_FAILURES = 20
 @app.command()
 def inspect(log: LogPath, json: AsJson = False) -> None:
     """Show what a log holds. Span, channels, parameters, damage, missions, and what each profile would miss."""
-    import care_core
+    from care_core.application import api
     from care_core.report.inspection import inspection_json, inspection_text
 
     with Progress() as progress:
         progress("reading the log", 0.0)
-        document = care_core.inspect(log)
+        document = api.inspect(log)
     emit(inspection_json(document) if json else inspection_text(document))
 
 

@@ -104,6 +104,17 @@ def newest_log(places: Iterable[Path]) -> Path | None:
     return None
 
 
+def newest_named() -> Path:
+    """The newest log of the usual places, which is said. Raises UsageError where there is none."""
+    from care_tui.settings import load_settings
+
+    found = newest_log(load_settings(None).places)
+    if found is None:
+        raise UsageError("There is no log in the usual places.", hint="Name one.")
+    say(f"the newest log is {found}")
+    return found
+
+
 def _is_growing(path: Path) -> bool:
     """Whether a recorder says so by the name, or a file that was written to just now grows while we look."""
     if path.suffix == ".active":

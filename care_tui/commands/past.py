@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from care_core.errors import CareError, UsageError, nearest
-from care_tui.commands.arguments import AsJson, Force, Out, is_json
+from care_tui.commands.arguments import AsJson, Force, Out, is_json, profile_option
 from care_tui.console import emit, say
 
 if TYPE_CHECKING:
@@ -27,11 +27,14 @@ def mention(problem: CareError | None) -> None:
 
 @app.command()
 def history(
-    profile: Annotated[str | None, typer.Option("--profile", "-p", help="Only runs of this profile.")] = None,
+    profile: Annotated[str | None, profile_option("Only runs of this profile.")] = None,
     robot: Annotated[str | None, typer.Option("--robot", metavar="NAME", help="Only runs of this robot.")] = None,
     limit: Annotated[int, typer.Option("--limit", min=1, help="How many triages are listed.")] = 20,
     json: AsJson = False,
     ascii: Annotated[bool, typer.Option("--ascii", help="Draw trends without block characters.")] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Robots and missions with too few runs to show a trend, too.")
+    ] = False,
     card: Annotated[
         Path | None,
         typer.Option("--card", metavar="FOLDER", help="Write this profile's verified fixes beside its card."),
@@ -68,7 +71,7 @@ def history(
         return
     document = history_document(triages, store.verifications(profile), limit)
     as_json = json or is_json(out)
-    text = history_json(document) if as_json else history_text(document, ascii=ascii)
+    text = history_json(document) if as_json else history_text(document, ascii=ascii, everything=everything)
     emit(text, out, force=force, is_plain=not as_json)
 
 

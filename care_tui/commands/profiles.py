@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from care_core.errors import ExitCode, UsageError
+from care_tui.completing import profile_names
 from care_tui.console import Progress, emit, say
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ def listed_profiles() -> str:
 
 
 @app.command("show")
-def show(name: Annotated[str, typer.Argument(metavar="PROFILE")]) -> None:
+def show(name: Annotated[str, typer.Argument(metavar="PROFILE", autocompletion=profile_names)]) -> None:
     """Show what a profile knows. Its variables, ranges and thresholds, and which effects its runs cannot tell."""
     emit(shown_profile(name))
 
@@ -145,7 +146,7 @@ def new(
 
 @app.command("check")
 def check(
-    name: Annotated[str | None, typer.Argument(metavar="[PROFILE]")] = None,
+    name: Annotated[str | None, typer.Argument(metavar="[PROFILE]", autocompletion=profile_names)] = None,
     runs: Annotated[
         Path | None, typer.Option("--runs", metavar="TABLE", help="Say what these runs lack to train the profile.")
     ] = None,

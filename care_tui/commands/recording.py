@@ -9,7 +9,8 @@ from typing import Annotated
 import typer
 
 from care_core.errors import UsageError
-from care_tui.commands.arguments import Force, profile_names
+from care_tui.commands.arguments import Force
+from care_tui.completing import profile_names
 from care_tui.console import check_writable, emit, say
 
 app = typer.Typer()

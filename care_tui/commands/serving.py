@@ -10,6 +10,7 @@ import typer
 
 from care_core.errors import UsageError
 from care_core.extras import install_hint
+from care_core.text import clean
 from care_tui.commands.arguments import ConfigPaths, ProfileName
 from care_tui.console import emit, say
 from care_tui.settings import SERVER
@@ -39,8 +40,9 @@ def serve(
     words = [str(log.absolute())] if log else []
     words += ["--profile", profile] if profile else []
     words += [word for path in config or () for word in ("--config", path)]
+    title = f"{clean(log.name)} - care" if log else "care"
     replaced = "exec " if os.name == "posix" else ""  # the app is to be the server's own child, not a shell's
-    server = TokenServer(f"{replaced}{shlex.join(own_command(*words))}", port, secrets.token_urlsafe(24))
+    server = TokenServer(f"{replaced}{shlex.join(own_command(*words))}", port, secrets.token_urlsafe(24), title)
     emit(f"{server.address}\n")
     say("Open this address in a browser of this machine. Ctrl+C ends it.")
     server.serve()

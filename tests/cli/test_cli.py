@@ -23,7 +23,7 @@ from care_core.profile.store import load_profile
 from care_core.records import replace
 from care_core.tables.rows import ABOUT
 from care_tui import __version__, console
-from care_tui.cli import FAMILIES, command_line, route
+from care_tui.cli import FAMILIES, GROUPS, command_line, route
 from care_tui.commands.opening import newest_log
 from tests.conftest import Care
 from tests.made import HEALTH, made_diagnosis
@@ -65,6 +65,18 @@ def test_version_and_help(care: Care) -> None:
     assert listing.code == 0
     assert all(f"\n  {command}" in listing.stdout for command in COMMANDS)
     assert "\n  open" not in listing.stdout
+
+
+def test_the_help_groups_every_command_by_what_one_wants(care: Care) -> None:
+    listing = care("--help").stdout
+    grouped = [name for names in GROUPS.values() for name in names]
+    assert sorted(grouped) == sorted({name for names in FAMILIES.values() for name in names} - {"open"})
+    places = [listing.index(f"\n{title}:\n") for title in GROUPS]
+    assert places == sorted(places)
+    assert places[-1] < listing.index("\nOptions")
+    lines = listing.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert [line for line in lines[1:] if line.endswith("...")] == []
 
 
 @pytest.mark.parametrize(("family", "commands"), FAMILIES.items())

@@ -32,6 +32,8 @@ STRANGERS = {
     "Markdown": b"# Triage of the week\n\nBuy batteries.\n",
     "patch": b"--- a/nav2_params.yaml\n+++ b/nav2_params.yaml\n@@ -1 +1 @@\n-a: 1\n+a: 2\n",
     "JUnit": b'<?xml version="1.0"?>\n<testsuites>\n  <testsuite name="pytest" tests="4"/>\n</testsuites>\n',
+    "DOT": b"digraph robots {\n  a -> b;\n}\n",
+    "GraphML": b'<?xml version="1.0"?>\n<graphml xmlns="http://graphml.graphdrawing.org/xmlns"/>\n',
     "table": b"log,mission,pilot\na.BIN,1,Ann\n",
     "text": b"Profile of the rover: heavy.\n",
     "text that quotes us": b"Written by care.\nI do not believe it.\n",
@@ -60,6 +62,10 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "history.json": ("history", "--out"),
     "history.csv": ("history", "--export"),
     "history.parquet": ("history", "--export"),
+    "graph.txt": ("graph", "owlat", "--out"),
+    "graph.json": ("graph", "owlat", "--out"),
+    "graph.dot": ("graph", "owlat", "--out"),
+    "graph.graphml": ("graph", "owlat", "--out"),
     "a.care.zip": ("bundle", "LOG", "--out"),
 }
 
@@ -92,7 +98,19 @@ def test_no_strangers_file_is_of_a_kind_of_ours(tmp_path: Path, stranger: str) -
     path = tmp_path / "file"
     path.write_bytes(STRANGERS[stranger])
     assert kind_of(STRANGERS[stranger]) == ""
-    for kind in ("care.triage", "page", "Markdown", "JUnit", "patch", "parameters", "runs", "text", "bundle"):
+    for kind in (
+        "care.triage",
+        "page",
+        "Markdown",
+        "JUnit",
+        "patch",
+        "parameters",
+        "runs",
+        "text",
+        "bundle",
+        "DOT",
+        "GraphML",
+    ):
         with pytest.raises(UsageError, match=r"another kind|never overwritten"):
             check_replaceable(path, kind=kind)
     with pytest.raises(UsageError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import http.client
+import re
 import shutil
 import signal
 import socket
@@ -111,6 +112,33 @@ def test_the_cookie_holds_no_token_and_is_good_for_this_server_alone(address: st
             assert refused.value.code == 403
         finally:
             other.terminate()
+
+
+def test_the_page_fetches_nothing_from_elsewhere_and_takes_keys_at_once(address: str) -> None:
+    base = address.split("/?token=", maxsplit=1)[0]
+    browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
+    with browser.open(address) as page:
+        text, policy = page.read().decode(), page.headers["Content-Security-Policy"]
+    assert "<title>arducopter_failed.BIN - care</title>" in text
+    assert "takeKeys()" in text
+    for part in ("default-src 'none'", "font-src 'self'", f"connect-src ws://{base.removeprefix('http://')};"):
+        assert part in policy
+    assert "unsafe-inline" not in policy.partition("style-src")[0]
+    (nonce,) = re.findall(r"'nonce-([\w-]+)'", policy)
+    assert text.count(f'nonce="{nonce}"') == text.count("<script") + text.count("<style")
+    left, seen = ["/"], set[str]()
+    while left:
+        path = left.pop()
+        seen.add(path)
+        content = text if path == "/" else browser.open(base + path).read().decode("utf-8", "replace")
+        assert (
+            re.findall(r"https?://[\w.]+|[\"'(]//[\w.]+", re.sub(r"/\*.*?\*/", "", content, flags=re.DOTALL)) == []
+        ), path
+        if not path.endswith((".js", ".ttf")):
+            found = re.findall(r"""(?:src|href)="(/[^"]+)"|url\("?(/[^")]+)""", content)
+            left += [one for pair in found for one in pair if one and one not in seen]
+    assert {"/static/js/textual.js", "/static/css/xterm.css"} <= seen
+    assert any(path.endswith(".ttf") for path in seen)
 
 
 def test_no_page_reads_the_cookie_and_no_other_site_sends_it(address: str) -> None:

@@ -34,8 +34,8 @@ def test_a_crash_that_the_log_shows_counts_as_one_whatever_the_autopilot_reports
         "took_off": 1.0, "mission_success": 0.0, "no_crash": 0.0, "landed": Unavailable("it crashed"),
     }  # fmt: skip
     assert found.objectives == {"success": 0.0}
-    assert found.shortfall == ("it crashed at 100.0 s",)
-    assert [check.otherwise for check in found.checks if check.value == 0.0] == ["it crashed at 100.0 s"] * 2
+    assert found.shortfall == ("it crashed at 100.0 s (1:40)",)
+    assert [check.otherwise for check in found.checks if check.value == 0.0] == ["it crashed at 100.0 s (1:40)"] * 2
 
 
 def test_one_that_is_folded_under_its_cause_counts_too() -> None:
@@ -71,6 +71,6 @@ def test_a_crash_decides_a_mission_whose_end_the_log_does_not_hold() -> None:
 def test_how_it_failed_tells_the_crash_behind_what_was_not_reached_and_once() -> None:
     short = flown()
     found = as_found(replace(short, shortfall=("1 of 3 waypoints were reached", "disarmed by force")), [CRASH])
-    assert found.shortfall == ("1 of 3 waypoints were reached", "it crashed at 100.0 s", "disarmed by force")
+    assert found.shortfall == ("1 of 3 waypoints were reached", "it crashed at 100.0 s (1:40)", "disarmed by force")
     told = replace(short, shortfall=("crash detected at 99.0 s",))
     assert as_found(told, [CRASH]).shortfall == told.shortfall

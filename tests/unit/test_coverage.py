@@ -86,7 +86,7 @@ def test_a_sample_at_a_moment_must_be_near_it() -> None:
 
 def test_what_only_repeats_itself_is_as_good_as_not_recorded() -> None:
     said = reason(steady(10, 0, 201), dead=((60.0, 200.0),))
-    assert said == "the battery (BAT) says the same from 60 to 200 s, so it measures nothing then"
+    assert said == "the battery (BAT) says the same from 60 s to 200 s (3:20), so it measures nothing then"
     assert not reason(steady(10, 0, 201), dead=((60.0, 62.0),))
 
 

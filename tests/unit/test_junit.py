@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from care_core.application.case import Request
+from care_core.application.each import answer_of
 from care_core.application.suites import suite_of_log
 from care_core.diagnose.records import Diagnosis
 from care_core.ecosystems.findings import NOTHING_SEEN
@@ -93,11 +94,8 @@ def test_text_of_a_log_breaks_no_xml() -> None:
 def test_each_log_is_a_suite_and_one_that_cannot_be_read_an_error(tmp_path: Path) -> None:
     broken = tmp_path / "broken.BIN"
     broken.write_bytes(b"\xa3\x95")
-    found = [
-        suite_of_log(Request(path), None, lambda *_: None)
-        for path in (bundled("samples", "ardurover_failed.BIN"), broken)
-    ]
-    suites = checked(to_junit([one.suite for one in found]))
+    found = [answer_of(Request(path), lambda *_: None) for path in (bundled("samples", "ardurover_failed.BIN"), broken)]
+    suites = checked(to_junit([suite_of_log(one, None) for one in found]))
     assert [one.get("name") for one in suites] == ["ardurover_failed.BIN", "broken.BIN"]
     assert [one.get("errors") for one in suites] == ["0", "1"]
     assert suites[0].get("timestamp") != suites[1].get("timestamp") == "1970-01-01T00:00:00"

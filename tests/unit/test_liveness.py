@@ -172,7 +172,7 @@ def test_a_measure_by_a_frozen_source_is_none() -> None:
 
     value = find_extractor("energy_used").compute(flown(change), {})
     assert isinstance(value, Unavailable)
-    assert value.reason.startswith("the battery (BAT) says the same from 40 to ")
+    assert value.reason.startswith("the battery (BAT) says the same from 40 s to ")
 
 
 def test_a_path_by_a_frozen_receiver_is_none() -> None:
@@ -183,7 +183,7 @@ def test_a_path_by_a_frozen_receiver_is_none() -> None:
 
     value = find_extractor("path_error").compute(flown(change), {})
     assert isinstance(value, Unavailable)
-    assert value.reason.startswith("the receiver (GPS) says the same from 30 to ")
+    assert value.reason.startswith("the receiver (GPS) says the same from 30 s to ")
 
 
 # PX4

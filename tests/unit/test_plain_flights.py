@@ -191,8 +191,8 @@ def test_several_missions_are_listed_with_their_verdicts() -> None:
                       checks=(Check("no_crash", crashed, ""),), objectives={})  # fmt: skip
         missions.append(verdict(judge(one, schema, None)))
     shown = to_text(replace(made_diagnosis(), missions=tuple(missions)))
-    assert "   1  OK, 100 to 150 s: no mission was flown  <- this report" in shown
-    assert "   2  FAULT, 200 to 250 s: no_crash" in shown
+    assert "   1  OK, 100 s (1:40) to 150 s (2:30): no mission was flown  <- this report" in shown
+    assert "   2  FAULT, 200 s (3:20) to 250 s (4:10): no_crash" in shown
     assert "Missions of this log" not in to_text(made_diagnosis())
 
 

@@ -59,7 +59,9 @@ def test_a_plot_says_in_words_what_it_shows() -> None:
         [1.0, 9.0, 2.0], limits=(Limit(8.0, "ceiling"),), bands=(Band(1.0, 2.0, "critical", "motor 4 lost thrust"),)
     )
     marks = (Mark(0.0, "arming", "armed", 3), Mark(1.0, "critical", "motor 4 lost thrust", 0))
-    figure = ElementTree.fromstring("".join(plot_figure(plot, Drawing(marks=marks, end_s=2.0, is_mission=True), "p")))
+    figure = ElementTree.fromstring(
+        "".join(plot_figure(plot, Drawing(marks=marks, end_s=2.0, since="the start of the mission"), "p"))
+    )
     svg = next(figure.iter("svg"))
     assert svg.get("role") == "img"
     told = next(one.text or "" for one in figure.iter("desc"))

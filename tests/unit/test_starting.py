@@ -115,6 +115,7 @@ STARTERS = {
     "care_core/collect/guard.py": {"subprocess"},
     "care_core/application/notifying.py": {"subprocess"},
     "care_core/application/recorder.py": {"subprocess"},
+    "care_tui/browser.py": {"subprocess"},
     "care_tui/commands/watching.py": {"subprocess"},
     "care_tui/commands/doctor.py": {"subprocess"},
     "care_tui/web.py": {"textual_serve"},

@@ -1,10 +1,15 @@
-"""Text of others in a table: nothing in it is computed by who opens it."""
+"""Text of others in a table, which nobody computes by opening it, and the one clock of every report."""
 
 from __future__ import annotations
 
+import ast
+from pathlib import Path
+
 import pytest
 
-from care_core.text import cell
+from care_core.text import cell, log_time, log_times
+
+CORE = Path(__file__).parents[2] / "care_core"
 
 
 @pytest.mark.parametrize("text", ['=HYPERLINK("http://a","b")', "+1", "-1+1", "@SUM(A1)"])
@@ -15,3 +20,45 @@ def test_a_formula_is_text(text: str) -> None:
 @pytest.mark.parametrize(("text", "shown"), [("plain", "plain"), ("", ""), ("a=b", "a=b"), ("\x1b[0m", "\\x1b[0m")])
 def test_what_is_none_stays(text: str, shown: str) -> None:
     assert cell(text) == shown
+
+
+@pytest.mark.parametrize(
+    ("time_s", "shown"),
+    [
+        (0.0, "0.0 s"),
+        (61.34, "61.3 s"),
+        (99.94, "99.9 s"),
+        (99.96, "100.0 s (1:40)"),
+        (312.4, "312.4 s (5:12)"),
+        (3599.96, "3600.0 s (1:00:00)"),
+        (4000.0, "4000.0 s (1:06:40)"),
+        (-150.0, "-150.0 s (-2:30)"),
+        (None, "an unknown time"),
+        (float("nan"), "an unknown time"),
+    ],
+)
+def test_a_time_has_seconds_and_from_100_s_on_minutes(time_s: float | None, shown: str) -> None:
+    assert log_time(time_s) == shown
+
+
+def test_a_rounded_time_counts_its_minutes_from_what_is_shown() -> None:
+    assert log_time(317.7, 0) == "318 s (5:18)"
+    assert log_time(11.2, 0) == "11 s"
+
+
+def test_times_of_a_column_stand_below_each_other() -> None:
+    assert log_times([8.25, 317.7, None]) == ["  8.2 s       ", "317.7 s (5:17)", "      ?       "]
+    assert log_times([1.0, 12.0]) == [" 1.0 s", "12.0 s"]
+    assert log_times([]) == []
+
+
+def test_no_other_clock_is_used_where_the_core_writes_text() -> None:
+    """The narrow one is for columns of the app."""
+    users = [
+        path.name
+        for path in CORE.rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and node.module == "care_core.text"
+        if "seconds" in [name.name for name in node.names]
+    ]
+    assert users == []

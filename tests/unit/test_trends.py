@@ -142,7 +142,12 @@ def test_missions_are_told_apart_and_too_few_runs_are_said() -> None:
     (robot,) = told(runs)
     assert [len(mission.runs) for mission in robot.missions] == [5, 4]
     assert [mission.trends[1].direction for mission in robot.missions] == ["constant", "too few"]
-    assert "4 values" in history_text(history_document(list(reversed(runs)), ()))
+    document = history_document(list(reversed(runs)), ())
+    assert "4 values" in history_text(document, everything=True)
+    shown = history_text(document)
+    assert "4 values" not in shown
+    assert "with fewer than the 5 runs of a trend (--all shows them)" in shown or "Fewer than the 5 runs" in shown
+    assert all(len(line) <= 80 for line in shown.splitlines())
 
 
 def test_runs_are_ordered_by_their_logs_and_a_log_that_grew_counts_once() -> None:
@@ -205,7 +210,10 @@ def test_a_history_of_the_first_version_is_taken_over(tmp_path: Path) -> None:
     history = History(path)
     history.add_triage({**DOCUMENT, "log": {**DOCUMENT["log"], "sha256": "1" * 64}}, 1, About(A))
     assert [one.robot for one in history.triages()] == [A, None]
-    assert "Robot not known" in history_text(history_document(history.triages(), ()))
+    document = history_document(history.triages(), ())
+    assert "Robot not known" in history_text(document, everything=True)
+    folded = "Fewer than the 5 runs of a trend (--all shows them): robot not known (1 run)"
+    assert folded in " ".join(history_text(document).split())
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])

@@ -116,12 +116,16 @@ def test_a_fault_says_what_failed() -> None:
 def test_the_first_cause_is_told_before_what_followed_and_no_headline_is_longer_than_two_lines() -> None:
     failed = ObjectiveResult(SUCCESS, 0.0, SUCCESS.threshold, "fault", HOW)
     said = verdict_on([failed], [DRIFTS, replace(DRIFTS, title="a very long finding " * 4)]).headline
-    assert said.startswith("FAULT: 2 of 3 waypoints were reached; the barometer drifts at 166.1 s; battery failsafe")
+    assert said.startswith(
+        "FAULT: 2 of 3 waypoints were reached; the barometer drifts at 166.1 s (2:46); battery failsafe"
+    )
     assert len(wrapped(said)) <= 2
 
 
 def test_a_critical_finding_of_a_run_that_met_its_objectives_is_a_fault_that_says_both() -> None:
-    assert verdict_on([MET], [DRIFTS]).headline == ("FAULT: the barometer drifts at 166.1 s; every objective was met")
+    assert verdict_on([MET], [DRIFTS]).headline == (
+        "FAULT: the barometer drifts at 166.1 s (2:46); every objective was met"
+    )
 
 
 def test_an_ok_names_the_part_that_surely_failed() -> None:

@@ -45,7 +45,7 @@ from care_core.ecosystems.vehicles import (
     reason_words,
 )
 from care_core.logs.base import Table, Wanted
-from care_core.text import listed
+from care_core.text import listed, log_time
 
 READS: Wanted = {
     "MSG": ("Message",),
@@ -212,7 +212,7 @@ def _errors(flight: Flight, vehicle: Vehicle) -> Iterator[Event]:
     if lanes:
         t, code = lanes[0]
         told = error_words(_EKF_PRIMARY, code, vehicle.kind)
-        again = f", and {counted(len(lanes) - 1, 'more switch', 'es')} until {lanes[-1][0]:.0f} s"
+        again = f", and {counted(len(lanes) - 1, 'more switch', 'es')} until {log_time(lanes[-1][0], 0)}"
         yield Event(t, "error", told + (again if len(lanes) > 1 else ""), "ERR")
 
 
@@ -220,7 +220,7 @@ def _lasting(times: Sequence[tuple[float, float]]) -> str:
     """How often and until when something was so, of when it began and ended each time (infinity: it did not)."""
     start, end = times[0]
     if len(times) > 1:
-        return f" ({len(times)} times until {times[-1][0]:.0f} s)"
+        return f" ({len(times)} times until {log_time(times[-1][0], 0)})"
     return f", over after {end - start:.1f} s" if math.isfinite(end) else ""
 
 
@@ -308,7 +308,7 @@ def _mission(flight: Flight, items: Sequence[tuple[float, int, str]]) -> Iterato
         last = own[-1]
         text = f"mission: items {own[0][1]} to {max(number for _, number, _ in own)}"
         done = f", reached {_ranges(reached)}" if reached else ", none reached"
-        yield Event(own[0][0], "mission", f"{text} until {last[0]:.0f} s{done}", "MSG")
+        yield Event(own[0][0], "mission", f"{text} until {log_time(last[0], 0)}{done}", "MSG")
 
 
 def _replaced(flight: Flight) -> Iterator[Event]:

@@ -11,6 +11,7 @@ from care_core.ecosystems.findings import Finding, FindingKind, Severity, Suspec
 from care_core.ecosystems.px4.flight import Px4Flight, Span
 from care_core.logs.base import Table
 from care_core.records import Record
+from care_core.text import log_time
 
 
 class State(Record):
@@ -65,7 +66,9 @@ def episode(
     if not spans:
         return None
     start, end = spans[0]
-    lasting = f" ({len(spans)} times until {spans[-1][0]:.0f} s)" if len(spans) > 1 else f" for {end - start:.1f} s"
+    lasting = (
+        f" ({len(spans)} times until {log_time(spans[-1][0], 0)})" if len(spans) > 1 else f" for {end - start:.1f} s"
+    )
     return Episode(state, start, spans[-1][1], state.means + lasting, source)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from care_core.ecosystems.px4.flight import LANDED, RESULT, SAID_WITHIN_S, Px4Flight, Span, changes
 from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.run import Unavailable, Value
+from care_core.text import log_time
 
 _IDS = ("mission_id", "instance_count")
 """What changes with each upload: since 1.15, and before."""
@@ -27,7 +28,7 @@ def mission_outcome(flight: Px4Flight, span: Span) -> Value:
         return 0.0
     replaced_s = _replaced(flight, flown)
     if replaced_s is not None:
-        reason = f"the mission was replaced under way, at {replaced_s:.0f} s"
+        reason = f"the mission was replaced under way, at {log_time(replaced_s, 0)}"
         return Unavailable(reason, "judge a run whose mission stays as it was uploaded")
     if any(flight.ever(RESULT, "finished", 1, part) or _returned_from_last_item(flight, span, part) for part in flown):
         return 1.0

@@ -31,6 +31,7 @@ from care_core.ecosystems.vehicles import mode_name, way_of
 from care_core.logs.base import Table, Wanted
 from care_core.records import replace
 from care_core.run import Check, Evidence, Unavailable, Value
+from care_core.text import log_time
 
 _SOON_S = 1.0
 """What falls is disarmed as it hits the ground."""
@@ -123,7 +124,7 @@ def _no_crash(flight: Px4Flight, span: Span) -> Check:
         "the kill switch cut its motors in the air" if was_cut
         else f"it hit the ground at {hit.speed_ms:.1f} m/s" if hit is not None and _is_in(span, hit.time_s)
         else "control was lost in the air" if lost is not None and _is_in(span, lost.time_s)
-        else f"the failure detector acted at {gave_up_s:.1f} s" if gave_up_s is not None
+        else f"the failure detector acted at {log_time(gave_up_s)}" if gave_up_s is not None
         else ""
     )  # fmt: skip
     return Check("no_crash", float(not how), "the failure detector stayed silent", how)

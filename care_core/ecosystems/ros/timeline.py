@@ -35,6 +35,7 @@ from care_core.ecosystems.ros.other_robots import other_goals
 from care_core.ecosystems.ros.recoveries import announced, repairs
 from care_core.logs.ros_message import short_name
 from care_core.numbers import Floats, quantile
+from care_core.text import log_time
 
 _GOALS, _MESSAGES, _REPORTS, _CHANGES = 12, 14, 6, 5
 """Lines of each sort at most."""
@@ -95,7 +96,7 @@ def _goals(drive: Drive) -> Iterator[Event]:
         took = f"after {goal.time_s:.0f} s"
         why = f": {goal.text[:_TEXT]}" if goal.text and goal.failed else ""
         what = f"{goal.outcome} {took}{why}" if goal.outcome else f"still open {took}, when the recording ends"
-        yield Event(goal.end_s, "goal", f"goal {number}{place}, sent at {goal.sent_s:.1f} s, {what}", goal.action)
+        yield Event(goal.end_s, "goal", f"goal {number}{place}, sent at {log_time(goal.sent_s)}, {what}", goal.action)
     if len(shown) < len(goals):
         reached = sum(goal.outcome == "reached" for goal in goals)
         yield Event(goals[0].sent_s, "goal", f"{len(goals)} goals, {reached} reached", goals[0].action)
@@ -233,7 +234,7 @@ def _motion(drive: Drive) -> Iterator[Event]:
 
 
 def _times(count: int, last_s: float) -> str:
-    return f" ({count} times, until {last_s:.1f} s)" if count > 1 else ""
+    return f" ({count} times, until {log_time(last_s)})" if count > 1 else ""
 
 
 def _listed(names: Iterable[str], most: int = 6) -> str:

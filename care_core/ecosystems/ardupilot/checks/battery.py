@@ -20,6 +20,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import UNCHARGED, Finding, Severity
 from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median, median
+from care_core.text import log_time
 
 READS: Wanted = {"BAT": ("Volt", "Curr"), "POWR": ("Vcc",)}
 
@@ -131,7 +132,7 @@ def _failsafe(flight: Flight, failsafe: float, volts: float, cells: int, rest: f
 
 
 def _and_failsafe(failsafe: float | None) -> str:
-    return "" if failsafe is None else f"; battery failsafe at {failsafe:.1f} s"
+    return "" if failsafe is None else f"; battery failsafe at {log_time(failsafe)}"
 
 
 def _load(table: Table, start: float, end: float) -> str:

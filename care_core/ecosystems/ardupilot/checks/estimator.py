@@ -17,6 +17,7 @@ from care_core.ecosystems.ardupilot.statistics import lasting
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Wanted
+from care_core.text import log_time
 
 READS: Wanted = {"XKF4": ("SV", "SP", "SH", "SM", "FS")}
 
@@ -63,7 +64,7 @@ def find(flight: Flight) -> Iterator[Finding]:
     said = [f"{_WORDS[field]} {peak:.1f}" for field, (_, _, peak) in sorted(worst.items(), key=lambda one: one[1][0])]
     evidence = f"test ratios above {RATIO:g}: {', '.join(said)}" if said else "the firmware's EKF check failed"
     if failed:
-        evidence += f"; EKF check or failsafe at {min(failed):.1f} s"
+        evidence += f"; EKF check or failsafe at {log_time(min(failed))}"
     severity: Severity = "critical" if failed else "warning"
     yield Finding(
         kind="estimator",

@@ -8,6 +8,7 @@ from care_core.ecosystems.ardupilot.flight import Flight
 from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity
 from care_core.logs.base import Wanted
+from care_core.text import log_time
 
 READS: Wanted = {}
 
@@ -42,7 +43,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             onset_s=gone[0],
             end_s=end,
             severity=severity,
-            evidence=f"failsafe at {gone[0]:.1f} s, " + (f"back after {away:.1f} s" if back else "not back"),
+            evidence=f"failsafe at {log_time(gone[0])}, " + (f"back after {away:.1f} s" if back else "not back"),
             source=f"ERR {subsystem}",
             suspect="world",
             probability=_BRIEF if away < _BRIEF_S else _LOST,

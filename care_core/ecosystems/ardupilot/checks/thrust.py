@@ -18,6 +18,7 @@ from care_core.ecosystems.base import Check, Limits
 from care_core.ecosystems.findings import Finding, Severity, SuspectKind
 from care_core.logs.base import Wanted
 from care_core.numbers import median
+from care_core.text import log_time
 
 READS: Wanted = {"CTUN": ("ThO", "Alt", "DAlt", "CRt", "DCRt"), "MOTB": ("ThLimit", "LiftMax")}
 
@@ -71,7 +72,7 @@ def find(flight: Flight) -> Iterator[Finding]:
             end_s=end,
             severity=severity,
             evidence=(
-                f"throttle above {100 * FULL:.0f} % for {lasted:.0f} s from {start:.0f} s on"
+                f"throttle above {100 * FULL:.0f} % for {lasted:.0f} s from {log_time(start, 0)} on"
                 + (f", {below:.1f} m below the height wanted" if below else "")
                 + f"; {100 * before:.0f} % before that"
                 + why

@@ -37,6 +37,7 @@ from care_core.logs.base import Table, Wanted
 from care_core.numbers import median
 from care_core.records import Record
 from care_core.run import Unavailable, Value
+from care_core.text import log_time
 
 Floats = NDArray[np.float64]
 Ending = Literal["return", "land", "open"]
@@ -153,7 +154,7 @@ def mission_held(mission: Mission) -> HeldMission | Unavailable:
     held = known[-len(later) - 1]
     if not later or _is_done(flight, held, begun_s, mission.end_s, later[0].since_s):
         return held
-    return Unavailable(f"the mission was replaced under way, at {later[0].since_s:.0f} s", _ONE_MISSION)
+    return Unavailable(f"the mission was replaced under way, at {log_time(later[0].since_s, 0)}", _ONE_MISSION)
 
 
 def _begun_s(mission: Mission) -> float:

@@ -13,7 +13,7 @@ from care_core.ecosystems.measures import Mission
 from care_core.ecosystems.vehicles import error_kind as kind_of_error
 from care_core.ecosystems.vehicles import error_words
 from care_core.run import is_known
-from care_core.text import seconds
+from care_core.text import log_time
 
 WAYPOINT_TOLERANCE_M = 5.0
 _FAILSAFE_OF = re.compile(r"battery|radio|throttle|GCS|EKF|terrain|fence|leak|GPS|vibration", re.IGNORECASE)
@@ -43,7 +43,7 @@ def _clauses(mission: Mission) -> Iterator[str]:
     crash = event_clause(mission, "crash") or crash_of(mission)
     yield from filter(None, (crash, event_clause(mission, "failsafe")))
     if forced(mission):
-        yield f"disarmed by force at {seconds(mission.end_s)}"
+        yield f"disarmed by force at {log_time(mission.end_s)}"
 
 
 def tolerance_m(mission: Mission) -> float:
@@ -68,7 +68,7 @@ def event_clause(mission: Mission, kind: str) -> str:
     if not found:
         return ""
     time_s, words = min(found, key=lambda one: one[0])
-    return f"{words} at {seconds(time_s)}"
+    return f"{words} at {log_time(time_s)}"
 
 
 def _spoken(text: str, kind: str) -> str:

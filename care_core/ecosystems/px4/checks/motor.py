@@ -15,6 +15,7 @@ from care_core.ecosystems.px4 import motors, upset
 from care_core.ecosystems.px4.flight import LANDED, Px4Flight
 from care_core.ecosystems.vehicles import Motor
 from care_core.logs.base import Wanted, merge_needs
+from care_core.text import log_time
 
 READS: Wanted = merge_needs((motors.READS, upset.READS))
 LIMITS = Limits(lost_motor.LIMITS)
@@ -98,14 +99,14 @@ def _all_stopped(flight: Px4Flight, stopped_s: float, lost: upset.Lost) -> Findi
     height = flight.height_m(stopped_s)
     up = "" if height is None else f", {height:.0f} m above where it was armed"
     landed = [t for t, is_landed in flight.changes(LANDED, "landed") if is_landed and abs(t - stopped_s) < _NEAR_S]
-    said = f"; the land detector said that it had landed at {landed[0]:.1f} s" if landed else ""
+    said = f"; the land detector said that it had landed at {log_time(landed[0])}" if landed else ""
     return Finding(
         kind="motor",
         title="all motors were told to stop in the air",
         onset_s=stopped_s,
         end_s=lost.time_s,
         severity="critical",
-        evidence=f"every output is at idle from {stopped_s:.1f} s on{up}{said}",
+        evidence=f"every output is at idle from {log_time(stopped_s)} on{up}{said}",
         source="actuator_motors or actuator_outputs, vehicle_land_detected",
         suspect="operation",
         probability=_CUT,

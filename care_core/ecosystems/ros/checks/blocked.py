@@ -14,6 +14,7 @@ from care_core.ecosystems.ros.messages import GOALS, ODOMETRY, SCAN, reading
 from care_core.ecosystems.ros.motion import Odometry
 from care_core.ecosystems.ros.sensors import Scans
 from care_core.numbers import Floats, median
+from care_core.text import log_time
 
 LIMITS = Limits()
 _WAY = "what a robot's width and a few seconds of driving take up"
@@ -56,7 +57,7 @@ def find(drive: Drive) -> Iterator[Finding]:
                 end_s=float(odometry.t[-1]),
                 severity=drive.severity(at),
                 evidence=f"{wide:.1f} m wide, {far:.1f} m ahead, where the laser saw free space before; the robot gets"
-                f" no further from {stuck_s:.0f} s on",
+                f" no further from {log_time(stuck_s, 0)} on",
                 source=f"{scans.topic} against {odometry.topic}",
                 suspect="world",
                 probability=0.85,

@@ -12,6 +12,7 @@ from care_core.ecosystems.ros.drive import Drive
 from care_core.ecosystems.ros.messages import COMMANDS, GOALS, IMU, ODOMETRY, believable, holds, reading
 from care_core.logs.base import Table
 from care_core.numbers import Floats, median
+from care_core.text import log_time
 
 LIMITS = Limits()
 SHOCK_MPS2 = LIMITS.add(
@@ -49,7 +50,7 @@ def _felt(drive: Drive, topic: str, table: Table) -> Iterator[Finding]:
         return
     at = float(t[min(hits[:1].tolist() + tips[:1].tolist())])
     words = [f"{len(hits)} shocks up to {felt[hits].max():.0f} m/s^2"] if len(hits) else []
-    words += [f"tilted by up to {tilt[tips].max():.0f} deg from {t[tips[0]]:.1f} s on"] if len(tips) else []
+    words += [f"tilted by up to {tilt[tips].max():.0f} deg from {log_time(t[tips[0]])} on"] if len(tips) else []
     yield Finding(
         kind="crash",
         title="the robot tips over" if not len(hits) else "the robot hits something" + " and tips" * bool(len(tips)),

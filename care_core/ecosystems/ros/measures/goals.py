@@ -34,7 +34,7 @@ from care_core.ecosystems.ros.motion import STANDS_MPS
 from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS, Level, LogMessage, kept_its_rate
 from care_core.logs.base import Table, Wanted
 from care_core.run import Check, Evidence, Unavailable, Value
-from care_core.text import seconds
+from care_core.text import log_time
 
 _IDLE_S = 120.0
 """A pause this long between goals ends a mission."""
@@ -115,7 +115,7 @@ class GoalMissions(MissionKind):
         wanted = len(drive.listed) or len(drive.goals)
         if len(drive.goals) > wanted:
             return (f"{len(drive.goals)} goals were sent, the mission has {wanted}",)
-        failed = [f"{one.text.partition(':')[0]} at {seconds(one.time_s)}" for one in _failed_goals(mission)]
+        failed = [f"{one.text.partition(':')[0]} at {log_time(one.time_s)}" for one in _failed_goals(mission)]
         return (f"{len(drive.reached)} of {wanted} goals were reached", *failed)
 
     def outcome(self, mission: Mission) -> tuple[Check, ...]:

@@ -37,6 +37,7 @@ from care_core.ecosystems.ros.motion import STANDS_MPS, STANDS_RADPS
 from care_core.ecosystems.ros.node_messages import ROSOUT_TOPICS
 from care_core.numbers import Floats, quantile
 from care_core.run import Unavailable, Value
+from care_core.text import log_time
 
 _CRAWL_M = 0.3
 """How much nearer a goal must have come in the last fifth of its time to count as under way."""
@@ -199,7 +200,7 @@ def _untold(drive: DriveWindow) -> Unavailable | None:
     """Why it is not known whether the robot would have reached its goals, None where it is."""
     for number, goal in enumerate(drive.goals, start=1):
         if goal.is_replaced and goal.time_s <= drive.timeout_s:
-            replaced = f"goal {number} was replaced by another under way, at {goal.end_s:.0f} s"
+            replaced = f"goal {number} was replaced by another under way, at {log_time(goal.end_s, 0)}"
             return Unavailable(replaced, "judge a drive whose goals stay as they were sent")
     return drive.untold
 

@@ -30,6 +30,7 @@ from care_core.logs.base import Wanted
 from care_core.numbers import Bools, Floats
 from care_core.records import Record, replace
 from care_core.run import Unavailable
+from care_core.text import log_time
 
 GOAL_TIMEOUT_S = 60.0
 TOLERANCE_M = 0.3
@@ -234,7 +235,7 @@ def _untold(drive: Drive, goals: Sequence[Goal], odometry: Odometry | None) -> U
     last_s = drive.goals_untold_s(goals, odometry)
     if last_s is None:
         return _unheard(drive, [(goal.sent_s, goal.end_s) for goal in goals if goal.status is None])
-    reason = f"the recording tells of no goal after {last_s:.0f} s, though the robot drives on"
+    reason = f"the recording tells of no goal after {log_time(last_s, 0)}, though the robot drives on"
     return Unavailable(reason, "record the topics of the action to the end")
 
 

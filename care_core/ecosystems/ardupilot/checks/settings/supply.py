@@ -21,6 +21,7 @@ from care_core.logs.base import Table, Wanted
 from care_core.numbers import known_median
 from care_core.records import Record
 from care_core.run import shown
+from care_core.text import log_time
 
 READS: Wanted = {"BAT": ("Volt", "Curr")}
 
@@ -127,7 +128,7 @@ def _scale_finding(flight: Flight, parameter: str, wanted: float, rest: float, e
         onset_s=0.0,
         end_s=flight.end_s,
         severity="critical" if harmed else "warning",
-        evidence=evidence + (f"; battery failsafe at {failsafe:.1f} s" if failsafe is not None else ""),
+        evidence=evidence + (f"; battery failsafe at {log_time(failsafe)}" if failsafe is not None else ""),
         source="BAT.Volt before take-off; voltages of lithium polymer cells",
         suspect="parameter",
         probability=_SURE,
