@@ -119,6 +119,8 @@ def judge(folder: Path, most: int) -> Told:
 
 
 def _count_hypotheses(told: Told, one: Failure) -> None:
+    if not one.case.diagnosis.hypotheses:
+        return  # it was not flagged, which is counted apart
     true = frozenset().union(*one.fixing)
     hypotheses, failure = one.case.diagnosis.hypotheses, one.case.diagnosis.failure
     named = {h.name: h.acts for h in hypotheses if h.what == "parameter" and h.name}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from care_core.causal.model import EffectRecord, Model, SkillRecord
+from care_core.causal.model import UNKNOWN_CARRY_OVER, EffectRecord, Model, SkillRecord
 from care_core.files import read_small_text
 from care_core.learn.identification import identify
 from care_core.metadata.causal_map import meaning_of
@@ -27,6 +27,7 @@ def model_card(schema: Schema, model: Model) -> str:
         _graph(model),
         _paths(model),
         _skill(model),
+        _chance(model),
         _effects(model),
         _support(schema, model),
         _screened(schema),
@@ -116,6 +117,30 @@ def _skill(model: Model) -> str:
     header = ("probability of keeping the threshold of", "runs", "met", "log loss", "AUC", "calibration error")
     text = "## Skill on runs it has not seen (cross-validation)\n\n" + _table(header, rows)
     return text + (_curve(model.skill["all"]) if "all" in model.skill else "")
+
+
+def _chance(model: Model) -> str:
+    """What missions lose by chance, and how much of that the next one meets again."""
+    counted, carried = model.training.reference, model.training.carry_over
+    if counted.runs:
+        lost = (counted.failed + 0.5) / (counted.runs + 1.0)
+        lines = [
+            f"{counted.runs} training runs were made at the reference configuration and {counted.failed} of them "
+            f"missed an objective: such a mission is lost by chance in {lost:.1%} (Jeffreys)."
+        ]
+    else:
+        lines = ["No training run was made at the reference configuration: what it loses by chance is as learned."]
+    lines += [
+        f"Of the noise of {name} a run under the same conditions meets {one.same:.0%} again ({one.pairs[0]} pairs of "
+        f"runs), one on another day {one.another:.0%} ({one.pairs[1]} pairs)."
+        for name, one in carried.items()
+    ]
+    if not carried:
+        lines.append(
+            "No configuration was run twice: a run under the same conditions is taken to meet "
+            f"{UNKNOWN_CARRY_OVER.same:.0%} of the noise again, one on another day {UNKNOWN_CARRY_OVER.another:.0%}."
+        )
+    return "## Chance\n\n" + "\n".join(f"- {line}" for line in lines)
 
 
 def _curve(skill: SkillRecord) -> str:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from care_core.causal.graph import CausalGraph
-from care_core.causal.model import SkillRecord
+from care_core.causal.model import ReferenceRuns, SkillRecord
 from care_core.learn.card import model_card
 from care_core.profile.store import Profile
 from care_core.records import replace
@@ -12,7 +12,7 @@ def test_the_card_tells_what_the_model_is_made_of(planted: Profile) -> None:
     card = model_card(SCHEMA, planted.model)
     assert card == model_card(SCHEMA, planted.model)
     assert card.startswith("# Model card: planted\n")
-    for part in ("Data", "Graph", "Strongest paths", "Skill", "Total effects", "Support", "Limits"):
+    for part in ("Data", "Graph", "Strongest paths", "Skill", "Chance", "Total effects", "Support", "Limits"):
         assert f"\n## {part}" in card
     assert "250 runs" in card
     assert "simulated" in card
@@ -20,6 +20,14 @@ def test_the_card_tells_what_the_model_is_made_of(planted: Profile) -> None:
     assert "all objectives together" in card
     assert "set at random" in card
     assert "nan" not in card
+
+
+def test_the_card_tells_what_is_lost_by_chance(planted: Profile) -> None:
+    counted = replace(planted.model.training, reference=ReferenceRuns(runs=49, failed=2), carry_over={})
+    card = model_card(SCHEMA, replace(planted.model, training=counted))
+    assert "49 training runs were made at the reference configuration and 2 of them missed" in card
+    assert "lost by chance in 5.0%" in card
+    assert "No configuration was run twice" in card
 
 
 def test_tables_have_as_many_cells_as_heads(planted: Profile) -> None:

@@ -9,7 +9,7 @@ import pytest
 from care_core.causal.model import OutcomeRecord
 from care_core.learn.fitting import METRIC, fit_mechanism
 from care_core.learn.outcomes import inputs_of
-from care_core.learn.repeats import carry_over, repeated
+from care_core.learn.repeats import carry_over, reference_runs, repeated
 from care_core.learn.table import check_table
 from care_core.tables.rows import CONDITIONS
 from tests.planted import DEFAULTS, SCHEMA, fly_many
@@ -54,3 +54,13 @@ def test_runs_of_one_date_are_the_same_conditions_and_an_unknown_date_is_none() 
     same, another = repeated(check_table(frame, SCHEMA), SCHEMA)
     assert (0, 1) in same
     assert {(1, 2), (2, 3)} <= set(another)
+
+
+def test_runs_at_the_reference_are_counted_with_those_that_missed_an_objective() -> None:
+    frame = fly_many(60)
+    assert reference_runs(frame, SCHEMA).runs == 0
+    frame.loc[:9, list(DEFAULTS)] = list(DEFAULTS.values())
+    frame.loc[:9, "time"], frame.loc[:9, "success"] = 100.0, 1.0
+    frame.loc[[2, 5], "success"] = 0.0
+    counted = reference_runs(check_table(frame, SCHEMA), SCHEMA)
+    assert (counted.runs, counted.failed >= 2) == (10, True)
