@@ -149,7 +149,10 @@ def _count_promises(told: Told, one: Failure) -> None:
 
 
 def missions_until_repaired(one: Failure, proposals: Sequence[frozenset[str]]) -> int:
-    """How many missions are run until one meets everything, changes put on top of each other."""
+    """How many missions are run until one meets everything, changes put on top of each other; all of them where nobody
+    is told that it failed."""
+    if not proposals:
+        return MOST_MISSIONS
     done: frozenset[str] = frozenset()
     for count, changes in enumerate(proposals[:MOST_MISSIONS], start=1):
         done |= changes

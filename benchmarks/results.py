@@ -62,6 +62,12 @@ BENCHMARKS = (
     Benchmark("related", "benchmarks.related", "a related robot's profile helps below 100 runs", "from nothing"),
     Benchmark("discovery", "benchmarks.discovery --robots 16", "the default is not beaten", "other ways of the search"),
     Benchmark("observational", "benchmarks.observational", "fewer wrong field days than the peer", "plain classifier"),
+    Benchmark(
+        "odds",
+        "benchmarks.odds {shared}/data/varied/faults {shared}/data/rover/faults {shared}/data/move_base/faults",
+        "calibration error <= 0.05; fewest missions until repaired",
+        "largest deviation; everything at its reference",
+    ),
     Benchmark("fixes", "benchmarks.fixes", "suggested values do as well as resets", "reset to the reference"),
     Benchmark(
         "paper", "care_tui evaluate husky-care --faults {shared}/data/care", "F1 of the paper's rule 0.81", "CBI"

@@ -50,7 +50,7 @@ def _path_of_cause(case: Case) -> tuple[str, ...]:
     """The path from the parameter that explains a run best; none where something else explains it better."""
     diagnosis = case.diagnosis
     first = next(iter(diagnosis.hypotheses), None)
-    if first is None or first.what != "parameter":
+    if first is None or first.what != "parameter" or not first.name:
         return ()
     causes = (cause for fault in diagnosis.faults for cause in fault.causes if cause.option.name == first.name)
     cause = next(causes, None)

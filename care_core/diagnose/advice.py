@@ -55,7 +55,7 @@ def outweighed(hypotheses: Sequence[Hypothesis], findings: Sequence[Finding] = (
     motors at their limit for an oscillation have too little thrust. Then it is not what to look at first.
     """
     rival = next((one for one in hypotheses if one.what in ("hardware", "world") and one.name), None)
-    parameters = sum(one.probability for one in hypotheses if one.what == "parameter")
+    parameters = sum(one.probability for one in hypotheses if one.what == "parameter" and one.name)
     if rival is None or rival.probability <= parameters:
         return None
     doubtful = (one for one in findings if one.title == rival.name and one.probability < LIKELY)

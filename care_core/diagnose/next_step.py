@@ -85,10 +85,11 @@ def _undone(diagnosis: Diagnosis) -> str:
     refused = next((one for one in findings if one.kind == "prearm" and one.severity == "critical"), None)
     if refused is not None and not refused.parameters:
         return f"clear what refused arming: {refused.title.removeprefix(REFUSED)}"
-    if first is not None and first.what == "parameter" and any(one.title.startswith(first.name) for one in findings):
-        return f"put {first.name} back as the findings say"
-    if first is not None and first.what == "parameter" and first.name not in diagnosis.run.config:
-        return _looked_at(first.name, diagnosis)
+    named = first if first is not None and first.what == "parameter" and first.name else None
+    if named is not None and any(one.title.startswith(named.name) for one in findings):
+        return f"put {named.name} back as the findings say"
+    if named is not None and named.name not in diagnosis.run.config:
+        return _looked_at(named.name, diagnosis)
     return ""
 
 
