@@ -30,6 +30,7 @@ from care_core.diagnose.estimates import (
     MISSION_LOST_INFO,
     MISSION_LOST_WARNING,
     REFUSING,
+    SPOKEN_FOR,
     UNMODELLED,
     UNTOLD,
 )
@@ -93,6 +94,7 @@ def failure_of(
         unlearned = float(before.epistemic_ratio([before.config], names)[0])
         pointed = _pointed_at(found)
         options = {n: _either(q, MISSED.value, unlearned * pointed.get(n, 0.0)) for n, q in options.items()}
+        options = _set_wrong_by(findings, options)
     for finding in (one for one in findings if one.title in shown):
         for option, share in _named_by(finding, shown[finding.title].options, found).items():
             options[option] = _either(options.get(option, 0.0), share)
@@ -176,6 +178,16 @@ def _chance(learned: float, counted: ReferenceRuns) -> float:
     """The share of missions that the reference loses: as learned, and as counted where training flew it."""
     weight = LEARNED_WEIGHT.value
     return (weight * learned + counted.failed) / (weight + counted.runs)
+
+
+def _set_wrong_by(findings: Iterable[Finding], options: Mapping[str, float]) -> dict[str, float]:
+    """The options with what a finding says that speaks of how the robot was set and of no parameter: that one of them
+    loses the mission, each as likely as it is by itself; nothing where they hardly lose any."""
+    unnamed = (one for one in findings if set_wrong(one) and not one.parameters)
+    said, total = max((one.probability * mission_lost(one) for one in unnamed), default=0.0), sum(options.values())
+    if total < SPOKEN_FOR.value:
+        return dict(options)
+    return {name: _either(q, said * q / total) for name, q in options.items()}
 
 
 def _pointed_at(found: Mapping[str, Sequence[Suspect]]) -> dict[str, float]:

@@ -392,7 +392,8 @@ def alone(share: float, as_driven: float | None) -> str:
 
 def hypothesis_text(one: Hypothesis, findings: Sequence[SeenFinding] = (), outside: Sequence[SeenSuspect] = ()) -> str:
     """An explanation in a clause, with how likely it acted beside those above it where that is another matter."""
-    too = f"; {one.acts:.0%} that it acted as well" if one.acts - one.probability >= AS_WELL else ""
+    is_both = one.what != "chance" and one.acts - one.probability >= AS_WELL
+    too = f"; {one.acts:.0%} that it acted as well" if is_both else ""
     return f"{_explanation(one, findings, outside)}{too}"
 
 
