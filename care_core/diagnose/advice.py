@@ -116,7 +116,9 @@ def explained(fix: Fix, as_driven: float, hypotheses: Sequence[Hypothesis], faul
         does = "no acceptable value of it" if alone is None else f"changing only that has {alone:.0%}"
         return f"{leader} is the likelier cause ({weight:.0%}), but {does}"
     if leader and fix.p_fixed - as_driven < LITTLE * weight:
-        return f"{leader} explains {weight:.0%}, but a run as driven may go well by chance"
+        by_chance_alone = as_driven >= fix.p_fixed / 2
+        but = "a run as driven may go well by chance" if by_chance_alone else "its change may not be all that it takes"
+        return f"{leader} explains {weight:.0%}, but {but}"
     return ""
 
 

@@ -279,9 +279,9 @@ def _of_options(
     broken, as_driven = judged.broken, promise.as_driven()
     held = _failsafes_held(case, case.findings)
     held_too = held | _leads(faults)
-    found = _fixes(case, options, held_too)
+    found = _fixes(case, options, held_too, promise)
     if idle := _idle(judged, found[:1], promise):
-        found = _fixes(case, options, held_too | idle)
+        found = _fixes(case, options, held_too | idle, promise)
     fixes = promised(found, promise)
     if against is not None:
         return _Advised(fixes, against)
@@ -554,7 +554,7 @@ def _chosen_by_operators(effect: EffectRecord | None) -> str:
     )
 
 
-def _fixes(case: _Case, options: Collection[str], held: Collection[str]) -> list[Fix]:
+def _fixes(case: _Case, options: Collection[str], held: Collection[str], promise: Promise) -> list[Fix]:
     """The suggested fix first, then up to three that trade changes for probability or take another way.
 
     Args:
@@ -563,18 +563,26 @@ def _fixes(case: _Case, options: Collection[str], held: Collection[str]) -> list
     # Options off their reference that break another objective matter too once this fault is gone.
     off = deviating(case.query.config, case.query.reference)
     free = sorted({*options, *(name for name in off if _has_effect(case, name))} - {*held, *case.query.kept})
-    found = search(case.query, free)
+    found = _as_promised(search(case.query, free), promise)
     if not found:
         return []
     chosen = smallest_good(found)
     others = [found[i] for i in range(len(found)) if i != chosen and abs(i - chosen) == 1]
     without = [name for name in free if name not in found[chosen][0]]
-    detour = search(case.query, without)
+    detour = _as_promised(search(case.query, without), promise)
     others += [detour[smallest_good(detour)]] if detour else []
     useful = [pair for pair in sorted(others, key=lambda pair: -pair[1]) if _is_choice(pair, found[chosen])]
     ranked = [found[chosen], *useful[:MAX_ALTERNATIVES]]
     fixes = [to_fix(case.query, *settled(case.query, assignment)) for assignment, _probability in ranked]
     return [fix for i, fix in enumerate(fixes) if fix.changes not in [earlier.changes for earlier in fixes[:i]]]
+
+
+def _as_promised(found: Sequence[tuple[Assignment, float]], promise: Promise) -> list[tuple[Assignment, float]]:
+    """The sets that the search found with what they promise for the next run."""
+    if not found:
+        return []
+    odds = promise.odds([{**promise.query.config, **assignment} for assignment, _ in found])
+    return [(assignment, float(share)) for (assignment, _), share in zip(found, odds, strict=True)]
 
 
 def _is_choice(other: tuple[Assignment, float], chosen: tuple[Assignment, float]) -> bool:

@@ -200,6 +200,8 @@ def test_another_parameter_than_the_likeliest_cause_is_changed_only_where_it_was
 def test_a_likely_cause_whose_change_adds_little_is_explained() -> None:
     said = explained(fix_with(0.6), 0.3, ALONE, ())
     assert said == "land_speed explains 90%, but a run as driven may go well by chance"
+    said = explained(fix_with(0.4), 0.02, ALONE, ())
+    assert said == "land_speed explains 90%, but its change may not be all that it takes"
 
 
 @pytest.mark.parametrize(
