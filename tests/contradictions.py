@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 
+from care_core.diagnose.estimates import DOUBT
 from care_core.diagnose.verdict import exit_code, status_of
 from care_core.errors import ExitCode
 from care_core.report.document import Report
@@ -177,7 +178,7 @@ def _(report: Report) -> bool:
     acts = {one.name: one.acts for one in report.hypotheses if one.what == "parameter"}
     gained = 0.0 if driven is None else _odds(report) - driven
     # What has no line of its own acts in less than this share of such failures.
-    return gained > sum(acts.get(name, _UNTOLD) for name in _changed(report)) + _ROUNDED
+    return gained > sum(acts.get(name, _UNTOLD) for name in _changed(report)) + DOUBT.value + _ROUNDED
 
 
 @_named("a run that failed and is as likely as not to do well as driven, without chance")

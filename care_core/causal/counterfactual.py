@@ -120,6 +120,17 @@ class CounterfactualQuery(Record, eq=False, dict=True):
             total *= np.min([p_ok[name] for name in group], axis=0)
         return total
 
+    def before(self) -> CounterfactualQuery:
+        """The same before anything of this run is known but which stages of its mission it passed: what did not fail
+        there has lost it there in no way."""
+        passed = {
+            stage.variable: self.observed[stage.variable]
+            for outcome in self.model.outcomes.values()
+            for stage in outcome.stages
+            if stage.variable != outcome.objective and self._passed(outcome.objective, stage, self.observed)
+        }
+        return replace(self, observed=passed, repeats=())
+
     def base_rates(self) -> dict[str, float]:
         """Share of the training runs that kept the threshold, of the objectives that no mechanism predicts."""
         rates = {}

@@ -85,7 +85,7 @@ def failure_of(
         shown: by title, the findings that say which options they speak of (`speaking`).
         outside: how likely each parameter outside the profile is wrong and loses a mission in this way.
     """
-    before = replace(query, observed={}, repeats=())
+    before = query.before()
     names = [result.variable.name for result in broken]
     options, chance = _lost_by_options(before, names)
     if any(one.kind == "prearm" and one.severity == "critical" for one in findings):

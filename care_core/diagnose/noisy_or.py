@@ -27,7 +27,7 @@ MOST = 0.99
 """No cause is surer than this to lose a mission by itself."""
 
 
-class NoisyOr(Record, eq=False):
+class NoisyOr(Record):
     """The causes that may have lost a run, with what each loses by itself, 0 to 1."""
 
     loses: Mapping[Key, float]

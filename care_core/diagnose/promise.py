@@ -9,7 +9,7 @@ score on some robot.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -44,11 +44,12 @@ class Promise(Record, eq=False):
         """Probability that the next run meets every limit without a change."""
         return float(self.odds([self.query.config])[0])
 
-    def without(self, parameters: Collection[str]) -> float:
-        """Probability that the next run meets every limit once these parameters are right, whatever they are now: of
-        those that no mechanism knows the causes tell alone."""
-        gone: list[Key] = [("parameter", name) for name in parameters]
-        return float(self.failure.repaired(gone) * self._others_kept([self.query.config])[0])
+    def without(self, parameter: str, config: Config) -> float:
+        """Probability that the next run meets every limit under a configuration and with a parameter right that no
+        mechanism knows: of that the causes tell alone."""
+        gone: frozenset[Key] = self._changed(config) | {("parameter", parameter)}
+        odds = float(self.failure.repaired(gone) * self._others_kept([config])[0])
+        return min(odds, self.as_driven() + self.failure.acts_among(gone))
 
     def necessity(self, changed: Config, given: Config) -> float:
         """The largest share of the failures of a broken objective that changes take away (Pearl's probability of

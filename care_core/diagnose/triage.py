@@ -28,6 +28,7 @@ from care_core.diagnose.blame import blame
 from care_core.diagnose.circumstances import battery_is_low, circumstances, unusual
 from care_core.diagnose.estimates import NECESSARY, WORTH
 from care_core.diagnose.fixes import (
+    GAIN_FOR_ONE_MORE,
     MAX_ALTERNATIVES,
     Assignment,
     best_alone,
@@ -251,14 +252,30 @@ def _of_outside(lead: Advisable, case: _Case, hypotheses: Sequence[Hypothesis], 
     if not lead.is_advised:
         return _Advised((), check_first(lead))
     query = case.query
-    likely = {one.name: one.probability for one in hypotheses if one.probability >= BESIDE * lead.probability}
-    free = (_off(case) & likely.keys()) - query.kept - _failsafes_held(case, case.findings)
-    beside = {name: value for name in sorted(free) if query.variables[name].accepts(value := query.reference[name])}
-    odds = promise.without([lead.name, *beside])
+    beside = _beside(lead, case, hypotheses, promise)
+    odds = promise.without(lead.name, {**query.config, **beside})
     if was_refused(case.findings):
         odds *= float(replace(query, observed={}, repeats=()).probability([query.config])[0])
     changes = to_fix(query, beside, odds).changes if beside else ()
     return _Advised((outside_fix(lead, odds, case.run, changes),), None, lead.why)
+
+
+def _beside(lead: Advisable, case: _Case, hypotheses: Sequence[Hypothesis], promise: Promise) -> dict[str, float]:
+    """The options that go back to their reference with a parameter outside the profile: those that are about as likely,
+    and those without which its change promises much less."""
+    query = case.query
+    likely = {one.name for one in hypotheses if one.what == "parameter" and one.acts >= BESIDE * lead.probability}
+    off = _off(case) - query.kept - _failsafes_held(case, case.findings)
+    free = {name: value for name in sorted(off) if query.variables[name].accepts(value := query.reference[name])}
+    chosen = {name: value for name, value in free.items() if name in likely}
+    while rest := free.keys() - chosen:
+        now = promise.without(lead.name, {**query.config, **chosen})
+        odds = {name: promise.without(lead.name, {**query.config, **chosen, name: free[name]}) for name in sorted(rest)}
+        best = max(odds, key=lambda name: odds[name])
+        if odds[best] < now + GAIN_FOR_ONE_MORE:
+            break
+        chosen[best] = free[best]
+    return chosen
 
 
 def _of_options(
@@ -612,7 +629,8 @@ def _abstains(
         return None
     if any(cause.option.name in held for fault in faults for cause in fault.causes if not cause.is_lead):
         return f"charge or replace the battery first: {', '.join(sorted(held))} is not lowered while it is not full"
-    unsafe = needs_unsafe(case.query, max(MIN_PROBABILITY, as_driven + WORTH.value))
+    now = float(case.query.probability([case.query.config])[0])
+    unsafe = needs_unsafe(case.query, max(MIN_PROBABILITY, now + WORTH.value))
     if unsafe is not None:
         return f"only '{unsafe}' past its default is likely to help, and a safety parameter is never made looser"
     if not has_cause:

@@ -39,7 +39,7 @@ def test_logs_of_different_configurations_have_a_line_each(
         ("FAULT", "nav2_stall.mcap"),
     ]  # fmt: skip
     assert all(len(line) <= 80 for line in outcome.stdout.splitlines())
-    assert "86% LAND_SPEED" in outcome.stdout
+    assert "97% LAND_SPEED" in outcome.stdout
     assert "Each is triaged by itself" in outcome.stderr
     path = history_path()
     assert path is not None

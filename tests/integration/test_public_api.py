@@ -13,6 +13,7 @@ import pytest
 
 import care_core
 from care_core.application.speaking import in_python
+from care_core.diagnose.noisy_or import Key, NoisyOr
 from care_core.diagnose.records import Hypothesis
 from care_core.errors import UsageError
 from care_core.records import replace
@@ -166,6 +167,8 @@ def test_what_a_failed_part_explains_is_taken_off_every_prediction_as_off_the_su
     from care_core.application.case import predict
 
     plain = predict(case, {"LAND_SPEED": 40.0})
-    half = (Hypothesis("hardware", "motor 2 lost thrust", 0.5), Hypothesis("parameter", "LAND_SPEED", 0.5))
-    doubted = predict(replace(case, diagnosis=replace(case.diagnosis, hypotheses=half)), {"LAND_SPEED": 40.0})
-    assert doubted.p_fixed == pytest.approx(plain.p_fixed / 2)
+    motor: Key = ("hardware", "motor 2 lost thrust")
+    causes = NoisyOr({motor: 0.5, ("parameter", "LAND_SPEED"): 0.99})
+    doubted = predict(replace(case, diagnosis=replace(case.diagnosis, failure=causes)), {"LAND_SPEED": 40.0})
+    assert doubted.p_fixed < plain.p_fixed
+    assert doubted.p_fixed <= 1 - causes.acts(motor)
