@@ -72,6 +72,10 @@ def wrapped(text: str, first: str = "", rest: str | None = None, width: int = WI
     return [line.replace("\u00a0", " ") for line in lines]  # what must stand on one line was held together by them
 
 
+LONG_S = 600.0
+"""From here on a time of a log is said in minutes."""
+
+
 def clock(time_s: float | None) -> str:
     """A time of a log to the second, 02:13, from an hour on 1:02:13."""
     if time_s is None or not math.isfinite(time_s):
@@ -85,6 +89,6 @@ def seconds(time_s: float | None) -> str:
     """A time of a log as exact as an operator needs it: 61.3 s, from ten minutes on 12:05, from an hour on 1:02:05."""
     if time_s is None or not math.isfinite(time_s):
         return "?"
-    if abs(time_s) < 600:
+    if abs(time_s) < LONG_S:
         return f"{time_s:.1f} s"
     return clock(math.floor(time_s))

@@ -7,6 +7,15 @@ from textual.theme import Theme
 DEFAULT = "ansi-dark"
 """The terminal's own colours: right on any background, with 16 colours, and half the bytes on a slow link."""
 
+OWN_COLOURS = {
+    "accent": "ansi_cyan",
+    "text-accent": "ansi_cyan",
+    "border": "ansi_cyan",
+    "border-blurred": "ansi_bright_black",
+    "footer-key-foreground": "ansi_cyan",
+}
+"""One accent in them, which is no colour of a verdict; a frame that is not looked at is grey."""
+
 HIGH_CONTRAST = Theme(
     name="high-contrast",
     primary="#ffff00",

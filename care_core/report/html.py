@@ -90,8 +90,7 @@ def _parts(report: Report, drawing: Drawing) -> Iterator[Part]:
         yield Part(f"causes{number}", Markup(f"Causes of {names}"), "causes", content)
     yield Part("fix", "Fix", "fix", report.fix and _fix(report, report.fix))
     yield Part("signals", "Signals", "signals", drawing if drawing.plots else None)
-    start_s = drawing.start_s if drawing.is_mission else 0.0
-    yield Part("account", "What happened", "account", report.account and {"events": report.account, "start_s": start_s})
+    yield Part("account", "What happened", "account", report.account)
     if report.since is not None:
         title = Markup("Changed since <code>{}</code>").format(Path(report.since.log).name)
         yield Part("since", title, "since", report.since)

@@ -6,43 +6,44 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
+from textual.binding import Binding, BindingType
 from textual.content import Content
 
 from care_core.application.viewing import Past, past_runs
 from care_core.diagnose.verdict import fit_words
 from care_core.text import clean
-from care_tui.pages.page import Fetch, Page, View, sentence
+from care_tui.messages import OpenLog
+from care_tui.pages.page import Page, View, enter_to, sentence, view_of
 from care_tui.render.rows import ASCII, Row, Rows, labelled, padded, text
-from care_tui.screens.panes import PanesScreen
 from care_tui.widgets.choices import Listing
 
 NAME_WIDTH, VALUE_WIDTH = 18, 16
+RUNS = "runs"
 TREND = 24
 """Newest runs that a trend shows."""
 
 
 class HistoryPage(Page):
-    name = "History"
     HELP = (
         "Runs that were triaged before, the newest first, with the trend of every objective up to the one under the "
         "cursor. Enter opens its log. x marks a run; then every other is compared with it. / filters, Esc leaves."
     )
-    ENTER = "Its log"
-    ACTIONS: ClassVar[frozenset[str]] = frozenset({"mark"})
-
-    def __init__(self, screen: PanesScreen) -> None:
-        super().__init__(screen)
-        self._found: Fetch[list[Past]] = Fetch(self, "history")
-        self._marked: Past | None = None
+    BINDINGS: ClassVar[list[BindingType]] = [
+        enter_to("Open its log"),
+        Binding("x", "mark", "Compare", id="history.mark"),
+    ]
+    _marked: Past | None = None
 
     def enter(self) -> None:
-        self._found.start(past_runs)
+        self.forget(RUNS)
 
     def view(self) -> View:
-        return self._found.view("History", self._show)
+        return view_of("History", self.fetched(RUNS, past_runs), self._show)
 
-    def works(self, action: str) -> bool:
-        return super().works(action) and bool(self._found.answer)
+    @property
+    def _runs(self) -> list[Past]:
+        found = self._answers.get(RUNS)
+        return found if isinstance(found, list) else []
 
     def _show(self, runs: list[Past]) -> View:
         if not runs:
@@ -54,9 +55,9 @@ class HistoryPage(Page):
             lambda i: f"{runs[i].log} {runs[i].profile} {runs[i].verdict} {runs[i].cause}",
         )
         count = f"{len(runs)} run{'' if len(runs) == 1 else 's'}"
-        title = Content.assemble(f"History  {count}", ("  x marks one to compare with", "dim"))
+        title = Content(f"{count}; x marks one to compare with")
         if self._marked is not None:
-            title = Content.assemble("History  against ", (_named(self._marked), "bold"), ("  x again unmarks", "dim"))
+            title = Content(f"Compared with {_named(self._marked)}; x again unmarks")
         return View(title, lambda i: Rows([]) if i is None else Rows(self._detail(i, runs)), listing)
 
     def _item(self, past: Past) -> Content:
@@ -90,19 +91,19 @@ class HistoryPage(Page):
             return ""
         return f"{sparkline(known, ascii=self.glyphs is ASCII)}  {min(known):.4g} to {max(known):.4g}"
 
-    def open(self, index: int | None) -> None:
-        runs = self._found.answer
-        if isinstance(runs, list) and index is not None:
-            self.walk.open_log(Path(runs[index].log))
+    def action_open(self) -> None:
+        """Open the log of the run under the cursor."""
+        if self._runs and self.index is not None:
+            self.post_message(OpenLog(Path(self._runs[self.index].log)))
 
-    def mark(self) -> None:
+    def action_mark(self) -> None:
         """Mark the run under the cursor to compare others with, or take the mark away."""
-        runs, index = self._found.answer, self.screen.choices.highlighted
-        if isinstance(runs, list) and index is not None:
+        runs, index = self._runs, self.index
+        if runs and index is not None:
             self._marked = None if runs[index] == self._marked else runs[index]
-            self.screen.draw()
+            self.show()
             if self._marked is not None and len(runs) > 1:
-                self.screen.say("Marked: go to another run to compare it with this one.")
+                self.say("Marked: go to another run to compare it with this one.")
 
 
 def comparison(past: Past, other: Past) -> list[Row]:

@@ -49,6 +49,7 @@ class Glyphs(Record):
     ahead: str
     more: str
     rule: str
+    open: str
 
 
 UNICODE = Glyphs(
@@ -64,6 +65,7 @@ UNICODE = Glyphs(
     ahead="░",
     more="…",
     rule="─",
+    open="▾",
 )
 ASCII = Glyphs(
     ok="+",
@@ -78,6 +80,7 @@ ASCII = Glyphs(
     ahead=".",
     more="~",
     rule="-",
+    open="v",
 )
 
 _COLOURS: dict[Status, str] = {"ok": "$text-success", "fault": "bold $text-error", "not_evaluated": "$text-warning"}
@@ -167,6 +170,14 @@ def labelled(label: str, value: Content | str, style: str = "") -> Row:
 
 def heading(value: str) -> Row:
     return Row(text(value, "bold"))
+
+
+def folded(title: str, rows: Sequence[Row], glyphs: Glyphs, *, is_open: bool) -> list[Row]:
+    """A part of a text that can be put away: `z` opens and closes those of a page."""
+    if not rows:
+        return []
+    head = Content.assemble((f"{glyphs.open if is_open else glyphs.here} {title}", "bold"), ("  z", "dim"))
+    return [Row(Content()), Row(head), *(rows if is_open else ())]
 
 
 def warning(label: str, value: str) -> Row:
