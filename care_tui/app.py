@@ -101,7 +101,8 @@ class CareApp(App[int], inherit_bindings=False):
         return linked(super().get_driver_class(), self.link)
 
     def get_css_variables(self) -> dict[str, str]:
-        return {**super().get_css_variables(), **(OWN_COLOURS if self.theme == DEFAULT else {})}
+        own = OWN_COLOURS if self.theme == DEFAULT else {}
+        return {**super().get_css_variables(), "frame": "ansi_bright_black", **own}
 
     def on_mount(self) -> None:
         asyncio.get_running_loop().set_default_executor(DaemonThreads())

@@ -11,10 +11,10 @@ OWN_COLOURS = {
     "accent": "ansi_cyan",
     "text-accent": "ansi_cyan",
     "border": "ansi_cyan",
-    "border-blurred": "ansi_bright_black",
     "footer-key-foreground": "ansi_cyan",
+    "text-primary": "ansi_magenta",
 }
-"""One accent in them, which is no colour of a verdict; a frame that is not looked at is grey."""
+"""One accent, which is no colour of a verdict."""
 
 HIGH_CONTRAST = Theme(
     name="high-contrast",

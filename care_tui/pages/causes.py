@@ -7,6 +7,7 @@ from typing import ClassVar, NamedTuple
 from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
+from textual.containers import Container
 from textual.content import Content
 
 from care_core.application.proof import Subject
@@ -29,9 +30,9 @@ from care_tui.render.causes import (
     worth_rows,
 )
 from care_tui.render.health import hypothesis_rows
-from care_tui.render.rows import Row, Rows, folded, heading
+from care_tui.render.rows import Row, Rows, folded, heading, labelled
 from care_tui.screens.prompt import Prompt
-from care_tui.widgets.choices import Listing
+from care_tui.widgets.choices import Choices, Listing
 from care_tui.widgets.reader import Reader
 
 FIGURE, LEAST_FIGURE = 14, 6
@@ -69,10 +70,12 @@ class CausesPage(DiagnosisPage):
     _is_open = False
 
     def compose(self) -> ComposeResult:
-        yield from super().compose()
-        side = Reader(id="side")
-        side.border_title = "Path and fix"
-        yield side
+        with Container(id="left"):
+            yield Choices(self.glyphs.more, id="list")
+            side = Reader(id="side")
+            side.border_title = "Path and fix"
+            yield side
+        yield Reader(id="text")
 
     def view_of_diagnosis(self) -> View:
         ranked = self.ranked()
@@ -190,7 +193,7 @@ class CausesPage(DiagnosisPage):
         rows = [*(doubt if cause.is_lead else ()), *shown]
         rows += self._figure(cause.option.name, cause, len(Rows(rows).wrap(self.reader.room.width)))
         side = self._of_cause(cause)
-        return Rows(rows if self._is_widest else [*rows, *side])
+        return Rows(rows if self._is_wide else [*rows, *side])
 
     def _of_cause(self, cause: Cause) -> list[Row]:
         """The path of a cause, what its change brings, and the statistics, folded."""
@@ -210,20 +213,20 @@ class CausesPage(DiagnosisPage):
         rows = hypothesis_rows(hypothesis, finding, told)
         if finding is None:
             return Rows(rows)
-        room = self.reader.room
-        first = rows[:3]
-        return Rows([*first, *self._figure(finding.title, finding, len(Rows(first).wrap(room.width))), *rows[3:]])
+        first = [labelled("Seen by", finding.evidence)] if finding.evidence else []
+        figure = self._figure(finding.title, finding, len(Rows(first).wrap(self.reader.room.width)))
+        return Rows([*first, *figure, *(() if self._is_wide else rows)])
 
     def _figure(self, name: str, subject: Subject, above: int) -> list[Row]:
         """The proof as a plot in what room is left."""
         room = self.reader.room
-        height = min(max(room.height - above, LEAST_FIGURE), FIGURE if not self._is_widest else 2 * FIGURE)
+        height = min(max(room.height - above, LEAST_FIGURE), FIGURE if not self._is_wide else 2 * FIGURE)
         return proof_rows(self, name, subject, room.width, height)
 
     @property
-    def _is_widest(self) -> bool:
-        """Whether cause, proof and fix stand side by side."""
-        return self.screen.has_class("-widest")
+    def _is_wide(self) -> bool:
+        """Whether cause, proof and fix stand together."""
+        return self.screen.has_class("-wide") or self.screen.has_class("-widest")
 
     def show_text(self, *, from_top: bool = True) -> None:
         super().show_text(from_top=from_top)
@@ -235,10 +238,17 @@ class CausesPage(DiagnosisPage):
 
     def _show_side(self) -> None:
         side, here = self.query_one("#side", Reader), self._here
-        cause = None if here is None else here.cause
-        side.display = self._is_widest and cause is not None and self.session.result is not None
-        if side.display and cause is not None:
-            side.show(Rows(self._of_cause(cause)))
+        rows = self._beside(here) if here is not None and self._is_wide else []
+        side.display = bool(rows)
+        if rows:
+            side.show(Rows(rows))
+
+    def _beside(self, here: Explanation) -> list[Row]:
+        """What stands beside the proof: the path of a cause and what its change brings, or all about a finding."""
+        if here.cause is not None and self.session.result is not None:
+            return self._of_cause(here.cause)
+        finding = here.hypothesis and self._finding(here.hypothesis)
+        return hypothesis_rows(here.hypothesis, finding) if here.hypothesis and finding else []
 
     @on(Reader.Fitted, "#side")
     def _side_fits(self, event: Reader.Fitted) -> None:

@@ -35,8 +35,8 @@ class ObjectivesPage(DiagnosisPage):
     NOTHING = "nothing is judged"
     HELP = (
         "What the mission is judged by. Enter shows what caused the fault under the cursor, else the first fault that "
-        "has causes. = judges by a limit of your own, marked as mine: the log is judged again, nothing is written to the "
-        "profile. p shows the signals that an objective is measured on."
+        "has causes. = judges by a limit of your own, marked as mine: the log is judged again, nothing is written to "
+        "the profile. p shows the signals that an objective is measured on."
     )
     BINDINGS: ClassVar[list[BindingType]] = [
         enter_to("Causes"),

@@ -21,6 +21,7 @@ from care_tui.render.rows import ASCII, Row, Rows, error_rows, padded, text
 from care_tui.widgets.choices import Listing
 from care_tui.workspace import Workspace
 
+NAME_WIDTH = 14
 MOST_TOLD = 6
 """Marks that are told below a plot."""
 SHORTEST_S = 0.5
@@ -96,7 +97,7 @@ class PlotsPage(Page):
 
     def _item(self, signal: Signal) -> Content:
         mark = self.glyphs.root if signal == self._beside else " "
-        line = Content(f"{mark} ") + padded(signal.name, 26, "bold")
+        line = Content(f"{mark} ") + padded(signal.name, NAME_WIDTH, "bold")
         if signal.wanted_name:
             line += text(f"  to follow {signal.wanted_name}")
         return line + text("  for " + ", ".join(signal.used_by), "dim") if signal.used_by else line

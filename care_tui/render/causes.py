@@ -145,7 +145,7 @@ def worth_rows(cause: Cause, result: ObjectiveResult, without: float | None, gly
         rows.append(labelled("Change", Content.assemble(text(option.name, "bold"), " ", change)))
     if cause.p_fixed is not None:
         beside = "" if without is None else f"  without {percent(without)}"
-        rows.append(labelled("Alone", promise(cause.p_fixed, glyphs) + Content.styled(beside, "dim")))
+        rows.append(labelled("Odds of it", promise(cause.p_fixed, glyphs) + Content.styled(beside, "dim")))
     if cause.predicted is not None and cause.suggested is not None:
         rows.append(
             labelled(

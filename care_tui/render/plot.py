@@ -20,9 +20,7 @@ _BITS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 
 EMPTY = 0x2800
 """The braille cell without a dot."""
-ACTUAL, WANTED = "$text-accent", "$text-warning"
-SHADE = "on ansi_bright_black"
-"""The time of a finding; the line below the axis says the same without colours."""
+ACTUAL, WANTED = "$text-accent", "$text-primary"
 AXIS = 9
 """Cells for the numbers left of a plot, with a gap."""
 LOWEST = 4
@@ -48,6 +46,7 @@ def plot(  # noqa: PLR0913 (a plot has all of these)
     rule: str = "|",
     span: Cells | None = None,
     zero: str = "",
+    shaded: str = " ",
 ) -> list[Content]:
     """Lines of cells, from the top down. A column is drawn from its least to its greatest value.
 
@@ -58,7 +57,7 @@ def plot(  # noqa: PLR0913 (a plot has all of these)
         height: lines of cells.
         wanted: what the line was to follow, drawn dotted behind it, and in a colour where there are colours.
         cursor: column of cells to mark by a line of `rule` where nothing else is drawn.
-        span: the first and the last column of cells that are shaded.
+        span: the first and the last column of cells that are shaded, with the sign `shaded`.
         zero: what the line of zero is drawn with, where it lies between both ends.
     """
     tall = height if ascii else 4 * height
@@ -77,11 +76,11 @@ def plot(  # noqa: PLR0913 (a plot has all of these)
                 for parts, sign in ((actual, "*"), (behind, "."))
             )
             place = x // across
-            empty = rule if place == cursor else zero if y == at_zero else " "
+            shade = span is not None and span[0] <= place <= span[1]
+            empty = rule if place == cursor else zero if y == at_zero else shaded if shade else " "
             both = here if ascii and here != " " else there if here == " " else _together(here, there)
-            shade = f" {SHADE}" if span is not None and span[0] <= place <= span[1] else ""
             style = "dim" if both == " " else WANTED if here == " " else ACTUAL
-            cells.append((empty if both == " " else both, f"{style}{shade}" if both + empty != "  " else shade.strip()))
+            cells.append((empty if both == " " else both, style))
         lines.append(assembled(cells))
     return lines
 
@@ -124,7 +123,7 @@ def assembled(cells: Sequence[tuple[str, str]]) -> Content:
     """Cells with their styles, neighbours of one style as one piece: each piece costs bytes."""
     pieces: list[tuple[str, str]] = []
     for sign, style in cells:
-        if pieces and (pieces[-1][1] == style or (sign == " " and SHADE not in style + pieces[-1][1])):
+        if pieces and (pieces[-1][1] == style or sign == " "):
             pieces[-1] = pieces[-1][0] + sign, pieces[-1][1]
         else:
             pieces.append((sign, style))
@@ -152,6 +151,7 @@ class Figure(Record):
         lines = plot(
             trace.columns, trace.low, trace.high, high, ascii=glyphs is ASCII, wanted=trace.wanted, cursor=cursor,
             rule=glyphs.line, span=span, zero=glyphs.rule,
+            shaded=glyphs.shade,
         )  # fmt: skip
         labels = self._labels(high)
         rows = [Row(self._head(glyphs).truncate(width))]

@@ -50,6 +50,7 @@ class Glyphs(Record):
     more: str
     rule: str
     open: str
+    shade: str
 
 
 UNICODE = Glyphs(
@@ -66,6 +67,7 @@ UNICODE = Glyphs(
     more="…",
     rule="─",
     open="▾",
+    shade="·",
 )
 ASCII = Glyphs(
     ok="+",
@@ -81,6 +83,7 @@ ASCII = Glyphs(
     more="~",
     rule="-",
     open="v",
+    shade=":",
 )
 
 _COLOURS: dict[Status, str] = {"ok": "$text-success", "fault": "bold $text-error", "not_evaluated": "$text-warning"}

@@ -45,8 +45,13 @@ class _Item(Visual):
         self._choices, self._index = choices, index
 
     def render_strips(self, width: int, height: int | None, style: Style, options: RenderOptions) -> list[Strip]:
-        lines = self._choices.lines(self._index, width)
-        if style.reverse:  # grey on the bar of the cursor is a patch
+        lines = [
+            line.pad(1, 1).pad_right(width - 2 - line.cell_length)
+            for line in self._choices.lines(self._index, width - 2)
+        ]
+        if style.underline:  # stands for reverse in the style sheet: `get_visual_style` leaves reverse out
+            style += Style(underline=False, reverse=True)
+            # Grey on the bar of the cursor is a patch.
             lines = [Content(line.plain, [span for span in line.spans if span.style != "dim"]) for line in lines]
         return [strip for line in lines for strip in line.render_strips(width, 1, style, options)]
 

@@ -77,8 +77,8 @@ class Reader(ScrollView, can_focus=True, inherit_bindings=False):
     def _lay_out(self) -> None:
         width, height = self.room
         before, self._lines = self._lines, self._kept().wrap(width)
-        size = Size(width, max(len(self._lines), height))
-        if size != self.virtual_size:
+        size = Size(width, len(self._lines) if len(self._lines) > height else 1)
+        if size != self.virtual_size:  # a new size has the pane painted, so texts that fit have the same
             self.virtual_size = size
         top = self.scroll_offset.y
         for row in range(self.size.height):
